@@ -1,0 +1,216 @@
+"""What a person can decide about a calibration campaign, and what a campaign needs to know of a study.
+
+Every number that a stage decides with is a field here, so that the study file can fix it. Factor values
+(``start``, ``step``, ``center``, ``half_range``, ``point``, ``truth``) are in each factor's natural unit;
+angles and margins are in degrees. "Coded" is the screening design's coding: -1 at a factor's low level, +1
+at its high level.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Literal, Protocol
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+if TYPE_CHECKING:
+    from doe import Factor
+
+FactorValues = dict[str, float]
+
+
+class _Settings(BaseModel):
+    """Frozen settings: an unknown key is an error, so that a misspelt decision is never ignored."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class SeedSettings(_Settings):
+    """Where the seeds of all cases come from; each case has its own."""
+
+    campaign: int = Field(default=1, ge=0)
+    """Root of the seeds of every stage's cases."""
+    target: int = Field(default=2, ge=0)
+    """Root of the seeds of a twin study's target heaps."""
+
+    @model_validator(mode="after")
+    def _roots_differ(self) -> SeedSettings:
+        if self.campaign == self.target:
+            raise ValueError(f"seeds.campaign and seeds.target must differ, both are {self.campaign}")
+        return self
+
+
+class NoiseFloorSettings(_Settings):
+    """Stage (a): replicates with every factor at its middle."""
+
+    replicates: int = Field(default=5, ge=2)
+    """Cases at the centre."""
+    confidence: float = Field(default=0.95, gt=0.0, lt=1.0)
+    """Level of the interval of the standard deviation."""
+
+
+class ScreeningSettings(_Settings):
+    """Stage (b): the Plackett-Burman design."""
+
+    runs: int | None = Field(default=None, ge=4, multiple_of=4)
+    """Runs of the design; None: the fewest that leave ``dummies`` columns free."""
+    dummies: int = Field(default=3, ge=0)
+    """Dummy columns wanted when ``runs`` is None: each is one degree of freedom of the error."""
+    replicates: int = Field(default=1, ge=1)
+    """Cases of each run."""
+
+
+class SelectionSettings(_Settings):
+    """Stage (c): which factors are kept."""
+
+    keep: tuple[str, ...] | None = Field(default=None, min_length=1)
+    """Names of the factors to keep; None: by the rule below."""
+    alpha: float = Field(default=0.10, gt=0.0, lt=1.0)
+    """A factor is kept when its p value is below this."""
+    at_least: int = Field(default=0, ge=0)
+    """Keep this many even when fewer are significant, strongest first."""
+    at_most: int = Field(default=3, ge=1)
+    """Keep no more than this many, strongest first."""
+    power: float = Field(default=0.80, gt=0.0, lt=1.0)
+    """Power at which the smallest visible effect is stated."""
+
+    @model_validator(mode="after")
+    def _limits_in_order(self) -> SelectionSettings:
+        if self.at_least > self.at_most:
+            raise ValueError(f"selection.at_least ({self.at_least}) must not exceed at_most ({self.at_most})")
+        return self
+
+
+class ClimbSettings(_Settings):
+    """Stage (d): the path of steepest ascent in the kept factors."""
+
+    replicates: int = Field(default=2, ge=1)
+    """Cases of each step."""
+    steps: int = Field(default=6, ge=2)
+    """Points of the first batch."""
+    start: FactorValues | None = None
+    """First point; None: the low end of the line through the centre along the effects."""
+    step: FactorValues | None = None
+    """Move per step; None: along the effects, so that ``steps`` points span the stated range."""
+    extensions: int = Field(default=1, ge=0)
+    """Further batches of up to ``steps`` points when the target was not crossed."""
+    reach: float = Field(default=2.0, ge=1.0)
+    """How far from the middle the climb may go, in half-ranges (hard limits hold in any case)."""
+    alpha: float = Field(default=0.05, gt=0.0, lt=1.0)
+    """A fall from the best step, or a slope, counts when it is significant at this level."""
+
+    @model_validator(mode="after")
+    def _start_with_step(self) -> ClimbSettings:
+        if (self.start is None) != (self.step is None):
+            raise ValueError("climb.start and climb.step must be given together")
+        if self.start is not None and self.step is not None and set(self.start) != set(self.step):
+            raise ValueError(
+                f"climb.start and climb.step must name the same factors, got {sorted(self.start)} "
+                f"and {sorted(self.step)}"
+            )
+        return self
+
+
+class SurfaceSettings(_Settings):
+    """Stages (e) and (f): the composite design and the fitted surface."""
+
+    center_rule: Literal["crossing", "smallest-error"] = "crossing"
+    """Centre where the climb crosses the target (interpolated), or at its step nearest to the target."""
+    center: FactorValues | None = None
+    """Centre of the design; None: by ``center_rule``."""
+    half_range: FactorValues | None = None
+    """Coded unit of each factor; None: one climb step, at least ``half_range_least``."""
+    half_range_least: float = Field(default=0.4, gt=0.0)
+    """Least half-range as a fraction of the factor's screening half-range (a step along a weak factor is
+    too short to fit a slope)."""
+    alpha: Literal["rotatable", "spherical", "face"] | float = "rotatable"
+    """Distance of the axial points in half-ranges."""
+    center_points: int = Field(default=5, ge=2)
+    """Replicates at the centre: the pure error."""
+    replicates: int = Field(default=1, ge=1)
+    """Cases of each factorial and axial run."""
+    drop: tuple[str, ...] | None = None
+    """Terms to leave out of the reduced surface ("F^2", "E:F"); None: backward elimination."""
+    reduce_alpha: float = Field(default=0.05, gt=0.0, lt=1.0)
+    """Backward elimination drops a term whose p value is above this."""
+    lack_of_fit_alpha: float = Field(default=0.05, gt=0.0, lt=1.0)
+    """Lack of fit is called significant below this."""
+
+
+class OptimumSettings(_Settings):
+    """Stage (g): the chosen point and the compatible region."""
+
+    point: FactorValues | None = None
+    """The chosen point; None: the point of the target contour nearest to the design centre (coded units)."""
+    confidence: float = Field(default=0.95, gt=0.0, lt=1.0)
+    """Level of the compatible region."""
+    unidentified_span: float = Field(default=0.5, gt=0.0, le=1.0)
+    """A factor whose compatible values span more than this share of the design's range is unidentified."""
+
+
+class VerificationSettings(_Settings):
+    """Stage (h): fresh cases at the optimum against the target."""
+
+    replicates: int = Field(default=5, ge=2)
+    """Fresh cases at the chosen point."""
+    margin: float | None = Field(default=None, gt=0.0)
+    """Equivalence margin [deg]; None: ``margin_sds`` standard deviations of the target."""
+    margin_sds: float = Field(default=2.0, gt=0.0)
+    """Margin in standard deviations of the target when ``margin`` is None."""
+    alpha: float = Field(default=0.05, gt=0.0, lt=1.0)
+    """Level of the t-test and of each one-sided test."""
+    require_equivalence: bool = False
+    """Call the campaign calibrated only when equivalence is shown, not merely no difference found."""
+
+
+class CampaignSettings(_Settings):
+    """The ``[campaign]`` section of a study."""
+
+    seeds: SeedSettings = SeedSettings()
+    noise_floor: NoiseFloorSettings = NoiseFloorSettings()
+    screening: ScreeningSettings = ScreeningSettings()
+    selection: SelectionSettings = SelectionSettings()
+    climb: ClimbSettings = ClimbSettings()
+    surface: SurfaceSettings = SurfaceSettings()
+    optimum: OptimumSettings = OptimumSettings()
+    verification: VerificationSettings = VerificationSettings()
+
+
+class MeasuredTarget(_Settings):
+    """The ``[target]`` section: what the physical test gave."""
+
+    mean: float = Field(gt=0.0, lt=90.0)
+    """Mean repose angle [deg]."""
+    sd: float = Field(gt=0.0)
+    """Standard deviation of one measurement [deg]."""
+    n: int = Field(ge=2)
+    """Measurements."""
+
+
+class TwinTarget(_Settings):
+    """The ``[target.twin]`` section: the target is simulated with settings that the campaign does not see."""
+
+    truth: FactorValues = Field(min_length=1)
+    """Hidden factor values; the factors not named are at their middle."""
+    replicates: int = Field(default=5, ge=2)
+    """Heaps of the target."""
+
+
+class CampaignStudy(Protocol):
+    """What ``calibrate`` reads of a study."""
+
+    @property
+    def factors(self) -> Sequence[Factor]:
+        """Factors of the screening, in order."""
+
+    @property
+    def campaign(self) -> CampaignSettings:
+        """The decisions."""
+
+    @property
+    def target(self) -> MeasuredTarget | TwinTarget:
+        """What the heaps must match."""
+
+    @property
+    def limits(self) -> Mapping[str, tuple[float, float]]:
+        """Hard physical limits of every factor in its natural unit (friction >= 0, ...); may be infinite."""
