@@ -1,0 +1,23 @@
+"""The one error of this package: a picture that cannot be measured, or a setting that makes no sense."""
+
+from __future__ import annotations
+
+
+class PictureError(ValueError):
+    """A picture without a measurable heap, or a wrong measurement setting.
+
+    Parameters
+    ----------
+    rule : str
+        What must hold.
+    value : object
+        What was received instead.
+    place : str
+        Where: a file, a view of a heap, the name of an argument.
+    """
+
+    def __init__(self, rule: str, value: object, place: str) -> None:
+        super().__init__(f"{place}: {rule}; received {value}")
+        self.rule = rule
+        self.value = value
+        self.place = place

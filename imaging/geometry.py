@@ -1,0 +1,127 @@
+"""What heaps as arrays and pictures of them share: checked spheres, the camera's directions, the picture's frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from imaging.errors import PictureError
+
+FloatArray = NDArray[np.float64]
+Picture = NDArray[np.uint8]
+"""A picture as OpenCV holds it: (rows, columns) grey or (rows, columns, 3) blue-green-red, row 0 at the top."""
+
+CORE_FRACTION = 0.98
+"""Share of the spheres whose distance from the axis sets the scale of a picture; the rest may be strays."""
+CORE_MARGIN = 1.1
+"""The heap is taken to end at this multiple of the core's radius (a cone's 98 % lie within 0.92 of its base)."""
+FIELD_OF_VIEW = 2.0
+"""A picture reaches at most this multiple of the heap's radius; spheres that flew further are not drawn."""
+
+
+@dataclass(frozen=True)
+class Spheres:
+    """Spheres of one heap, checked.
+
+    Attributes
+    ----------
+    centers : (n, 3) array
+        Centres [m]; z is up and the plate is z = 0.
+    radii : (n,) array
+        Radii [m].
+    """
+
+    centers: FloatArray
+    radii: FloatArray
+
+    def __post_init__(self) -> None:
+        if self.centers.ndim != 2 or self.centers.shape[1] != 3 or len(self.centers) == 0:
+            raise PictureError("centres are an (n, 3) array with n > 0", self.centers.shape, "centers")
+        if self.radii.shape != (len(self.centers),):
+            raise PictureError("there is one radius for each centre", self.radii.shape, "radii")
+        bad = ~(np.isfinite(self.centers).all(axis=1) & np.isfinite(self.radii) & (self.radii > 0))
+        if bad.any():
+            row = int(np.argmax(bad))
+            received = (*self.centers[row].tolist(), float(self.radii[row]))
+            raise PictureError("centres are finite and radii finite and positive", received, f"sphere {row}")
+
+    @classmethod
+    def of(cls, centers: ArrayLike, radii: ArrayLike) -> Spheres:
+        """Check `centers` (n, 3) and `radii` (n,) or a scalar [m]; raise `PictureError` on a bad one."""
+        points = np.asarray(centers, dtype=np.float64)
+        sizes = np.asarray(radii, dtype=np.float64)
+        return cls(points, np.full(len(points), float(sizes)) if sizes.ndim == 0 and points.ndim else sizes)
+
+    def seen_from(self, azimuth: float) -> FloatArray:
+        """Centres in the camera's frame (n, 3): right, away from the camera, up [m].
+
+        At azimuth 0 the picture's right is +x and the camera looks along +y; azimuth + pi gives the mirror image.
+        """
+        cosine, sine = np.cos(azimuth), np.sin(azimuth)
+        x, y, z = self.centers.T
+        return np.column_stack([x * cosine + y * sine, y * cosine - x * sine, z])
+
+
+@dataclass(frozen=True)
+class Frame:
+    """The part of space that pictures of one heap show: the same for every azimuth.
+
+    Attributes
+    ----------
+    axis : (float, float)
+        x and y of the heap's middle [m].
+    half_width, height : float
+        What the picture shows to either side of the axis and above the plate [m].
+    below : float
+        What it shows below the plate [m].
+    meters_per_pixel : float
+        Scale.
+    """
+
+    axis: tuple[float, float]
+    half_width: float
+    height: float
+    below: float
+    meters_per_pixel: float
+
+    @classmethod
+    def around(cls, spheres: Spheres, pixels: int, margin: float = 0.08) -> Frame:
+        """Frame a heap so that the heap itself, strays aside, is about `pixels` wide."""
+        if pixels < 16:
+            raise PictureError("a heap is drawn at least 16 pixels wide", pixels, "pixels")
+        middle = np.median(spheres.centers[:, :2], axis=0)
+        reach = np.hypot(*(spheres.centers[:, :2] - middle).T) + spheres.radii
+        heap_radius = CORE_MARGIN * float(np.quantile(reach, CORE_FRACTION))
+        half_width = min(float(reach.max()), FIELD_OF_VIEW * heap_radius) * (1.0 + margin)
+        kept = reach <= half_width
+        top = float((spheres.centers[:, 2] + spheres.radii)[kept].max())
+        if top <= 0:
+            raise PictureError(
+                "the heap stands above the plate z = 0", f"highest point {top:.4g} m", "centers"
+            )
+        return cls(
+            axis=(float(middle[0]), float(middle[1])),
+            half_width=half_width,
+            height=top + margin * heap_radius,
+            below=margin * heap_radius,
+            meters_per_pixel=2.0 * heap_radius / pixels,
+        )
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns of the picture."""
+        rows = self.ground_rows + int(np.ceil(self.below / self.meters_per_pixel))
+        return rows, 2 * int(np.ceil(self.half_width / self.meters_per_pixel))
+
+    @property
+    def ground_rows(self) -> int:
+        """Rows above the plate."""
+        return int(np.ceil(self.height / self.meters_per_pixel))
+
+    def select(self, spheres: Spheres) -> tuple[Spheres, NDArray[np.intp]]:
+        """Spheres within the frame, moved so that the axis is at x = y = 0, and their indices."""
+        shifted = spheres.centers - np.array([*self.axis, 0.0])
+        inside = np.flatnonzero(np.hypot(shifted[:, 0], shifted[:, 1]) + spheres.radii <= self.half_width)
+        return Spheres(shifted[inside], spheres.radii[inside]), inside

@@ -1,0 +1,89 @@
+"""The line on which a heap stands: seen as the edge of a plate, or else as the underside of the heap."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imaging.errors import PictureError
+from imaging.geometry import FloatArray
+
+END_SHARE = 0.05
+"""Share of the width, at either end, that shows whether a plate reaches beyond the heap."""
+END_TOLERANCE = 1.0
+"""A plate's edge is straight within this many pixels."""
+MAXIMUM_TILT = 20.0
+"""A camera that is tilted by more [degrees] has not seen a plate."""
+
+
+@dataclass(frozen=True)
+class PlateLine:
+    """Surface of the plate in a picture: row = `row` + `slope` * column, in pixels."""
+
+    row: float
+    slope: float
+
+    @property
+    def tilt(self) -> float:
+        """Angle between the plate and the picture's rows [degrees], positive where it falls to the right."""
+        return float(np.degrees(np.arctan(self.slope)))
+
+    def level(self, column: FloatArray, row: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Distance along the plate and height over it [pixels] of points in the picture."""
+        cosine, sine = np.cos(np.arctan(self.slope)), np.sin(np.arctan(self.slope))
+        below = row - self.row
+        return column * cosine + below * sine, column * sine - below * cosine
+
+    def picture_point(self, position: FloatArray, height: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Column and row of points given by distance along the plate and height over it: undoes `level`."""
+        cosine, sine = np.cos(np.arctan(self.slope)), np.sin(np.arctan(self.slope))
+        return position * cosine + height * sine, self.row + position * sine - height * cosine
+
+
+def find_plate(top: FloatArray, bottom: FloatArray, place: str) -> PlateLine:
+    """Find the plate from the upper and lower edge of what stands out of the background.
+
+    Where a plate stands out together with the heap, the outermost parts of the upper edge lie on one line, the plate.
+    Otherwise the lower edge of the heap is taken: the line through its columns, without those that end above it
+    (round undersides of the outermost grains).
+
+    Parameters
+    ----------
+    top, bottom : (n,) arrays
+        Rows of the two edges in consecutive columns; NaN outside the body.
+    place : str
+        Names the picture in errors.
+    """
+    columns = np.flatnonzero(np.isfinite(top)).astype(np.float64)
+    upper, lower = top[np.isfinite(top)], bottom[np.isfinite(top)]
+    line = _shelf(columns, upper) or _underside(columns, lower)
+    if abs(line.tilt) > MAXIMUM_TILT:
+        raise PictureError(
+            f"the plate is level within {MAXIMUM_TILT:g} degrees", f"{line.tilt:.1f} degrees", place
+        )
+    return line
+
+
+def _shelf(columns: FloatArray, upper: FloatArray) -> PlateLine | None:
+    """The line through both ends of the upper edge, where they lie on one."""
+    size = max(2, round(END_SHARE * len(columns)))
+    ends = np.r_[0:size, len(columns) - size : len(columns)]
+    slope, row = np.polyfit(columns[ends], upper[ends], 1)
+    residual = np.abs(upper[ends] - row - slope * columns[ends])
+    return PlateLine(float(row), float(slope)) if residual.max() <= END_TOLERANCE else None
+
+
+def _underside(columns: FloatArray, lower: FloatArray) -> PlateLine:
+    """The line along the lower edge, from the columns that are not above it."""
+    kept = np.ones(len(columns), dtype=np.bool_)
+    slope, row = 0.0, 0.0
+    for _ in range(20):
+        slope, row = np.polyfit(columns[kept], lower[kept], 1)
+        height = row + slope * columns - lower
+        limit = max(1.0, 2.0 * float(np.median(np.abs(height[kept]))))
+        before, kept = kept, height <= limit
+        if np.array_equal(before, kept):
+            break
+    return PlateLine(float(row), float(slope))

@@ -1,0 +1,123 @@
+"""Spheres to pixels with numpy alone: exact silhouettes and a depth buffer, for machines without OpenGL."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from imaging.geometry import FloatArray, Frame, Picture, Spheres
+
+SUPERSAMPLING = 4
+"""Silhouettes are drawn this many times finer than the picture, then averaged: 17 grey levels at an edge."""
+SHADING_SUPERSAMPLING = 2
+"""The same for shaded pictures, whose edges need only look smooth."""
+FRAGMENT_LIMIT = 4_000_000
+"""Pixels of spheres held in memory at a time while a depth buffer is filled."""
+
+
+def coverage(spheres: Spheres, frame: Frame, azimuth: float) -> Picture:
+    """Share of each pixel that the spheres cover, 0 to 255, seen along a horizontal orthographic camera.
+
+    Every sphere covers, in each fine column, one run of fine rows; the runs are opened and closed in a
+    difference image whose running sum along the columns is the number of spheres over a pixel.
+
+    Parameters
+    ----------
+    spheres : Spheres
+        Within the frame, centred on its axis (`Frame.select`).
+    frame : Frame
+    azimuth : float
+        Direction of the camera [rad].
+    """
+    right, up, radii = _pixel_positions(spheres, frame, azimuth, SUPERSAMPLING)
+    rows, columns = (SUPERSAMPLING * size for size in frame.shape)
+    sphere, column = _spans(right, radii, columns)
+    half_chord = np.sqrt(np.maximum(radii[sphere] ** 2 - (column + 0.5 - right[sphere]) ** 2, 0.0))
+    first = np.clip(np.ceil(up[sphere] - half_chord - 0.5), 0, rows).astype(np.int64)
+    last = np.clip(np.floor(up[sphere] + half_chord + 0.5), 0, rows).astype(np.int64)
+    size = (rows + 1) * columns
+    opened = np.bincount(first * columns + column, minlength=size)
+    closed = np.bincount(np.maximum(first, last) * columns + column, minlength=size)
+    depth_count = np.cumsum((opened - closed).reshape(rows + 1, columns)[:rows], axis=0)
+    mask = np.where(depth_count > 0, np.uint8(255), np.uint8(0))
+    return cv2.resize(mask, frame.shape[::-1], interpolation=cv2.INTER_AREA).astype(np.uint8)
+
+
+def depth_buffer(
+    spheres: Spheres, frame: Frame, azimuth: float
+) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
+    """Nearest sphere of every fine pixel (-1: none), its surface normal (rows, columns, 3) and distance [m].
+
+    The normal is in the camera's frame (right, away, up). The image is `SHADING_SUPERSAMPLING` times finer than the frame.
+    """
+    right, up, radii = _pixel_positions(spheres, frame, azimuth, SHADING_SUPERSAMPLING)
+    away = spheres.seen_from(azimuth)[:, 1] * SHADING_SUPERSAMPLING / frame.meters_per_pixel
+    rows, columns = (SHADING_SUPERSAMPLING * size for size in frame.shape)
+    nearest = np.full(rows * columns, np.inf)
+    owner = np.full(rows * columns, -1, dtype=np.int64)
+    for chunk in _chunks(radii):
+        pixel, sphere, distance = _fragments(chunk, right, up, away, radii, (rows, columns))
+        before = nearest.copy()
+        np.minimum.at(nearest, pixel, distance)
+        wins = (distance == nearest[pixel]) & (distance < before[pixel])
+        owner[pixel[wins]] = sphere[wins]
+    normal = _normals(owner.reshape(rows, columns), right, up, radii)
+    scale = frame.meters_per_pixel / SHADING_SUPERSAMPLING
+    return owner.reshape(rows, columns), normal, (nearest * scale).reshape(rows, columns)
+
+
+def _pixel_positions(
+    spheres: Spheres, frame: Frame, azimuth: float, supersampling: int
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Column, row and radius of every sphere in fine pixels; a pixel's middle is at its index + 0.5."""
+    scale = supersampling / frame.meters_per_pixel
+    right, _, up = spheres.seen_from(azimuth).T
+    middle = 0.5 * supersampling * frame.shape[1]
+    return middle + right * scale, supersampling * frame.ground_rows - up * scale, spheres.radii * scale
+
+
+def _spans(position: FloatArray, radii: FloatArray, size: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """All (sphere, column) pairs in which a column's middle lies within the sphere's width."""
+    first = np.clip(np.ceil(position - radii - 0.5), 0, size).astype(np.int64)
+    last = np.clip(np.floor(position + radii + 0.5), 0, size).astype(np.int64)
+    counts = np.maximum(last - first, 0)
+    sphere = np.repeat(np.arange(len(position)), counts)
+    return sphere, np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts - first, counts)
+
+
+def _chunks(radii: FloatArray) -> list[NDArray[np.intp]]:
+    """Sphere indices in groups of about `FRAGMENT_LIMIT` pixels."""
+    group = np.cumsum((2.0 * radii + 1.0) ** 2) // FRAGMENT_LIMIT
+    return np.split(np.arange(len(radii)), np.flatnonzero(np.diff(group)) + 1)
+
+
+def _fragments(
+    chunk: NDArray[np.intp],
+    right: FloatArray,
+    up: FloatArray,
+    away: FloatArray,
+    radii: FloatArray,
+    shape: tuple[int, int],
+) -> tuple[NDArray[np.int64], NDArray[np.int64], FloatArray]:
+    """Pixel, sphere and distance of every pixel that each sphere of a chunk covers."""
+    rows, columns = shape
+    span, column = _spans(right[chunk], radii[chunk], columns)
+    sphere = chunk[span]
+    half_chord = np.sqrt(np.maximum(radii[sphere] ** 2 - (column + 0.5 - right[sphere]) ** 2, 0.0))
+    run, row = _spans(up[sphere], half_chord, rows)
+    sphere, column = sphere[run], column[run]
+    across = (column + 0.5 - right[sphere]) ** 2 + (row + 0.5 - up[sphere]) ** 2
+    distance = away[sphere] - np.sqrt(np.maximum(radii[sphere] ** 2 - across, 0.0))
+    return row * columns + column, sphere, distance
+
+
+def _normals(owner: NDArray[np.int64], right: FloatArray, up: FloatArray, radii: FloatArray) -> FloatArray:
+    row, column = np.nonzero(owner >= 0)
+    sphere = owner[row, column]
+    x = (column + 0.5 - right[sphere]) / radii[sphere]
+    z = (up[sphere] - row - 0.5) / radii[sphere]
+    y = -np.sqrt(np.maximum(1.0 - x**2 - z**2, 0.0))
+    normal = np.zeros((*owner.shape, 3))
+    normal[row, column] = np.column_stack([x, y, z])
+    return normal
