@@ -1,0 +1,208 @@
+"""Grain shapes: rigid sets of spheres with the mass properties of their union."""
+
+from dataclasses import dataclass
+from itertools import permutations
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dem_warp.sphere_union import DEFAULT_RESOLUTION, Array, union_moments
+
+_MILLIMETER = 1e-3
+_MOMENT_TOLERANCE = 1e-4  # of the largest moment: less apart are equal, smaller products of inertia are none
+
+
+@dataclass(frozen=True, eq=False)
+class ClumpShape:
+    """A rigid set of spheres in its principal frame, the centre of mass of their union at the origin.
+
+    Build it with `from_spheres`, `read` or `sphere`, which compute the mass properties and the frame. Two
+    shapes are equal when their spheres are.
+
+    Raises
+    ------
+    ValueError
+        If an array has the wrong shape or a value is not finite, or a radius, volume or moment not positive.
+    """
+
+    centers: Array
+    """Sphere centres [m], shape (S, 3), read-only."""
+    radii: Array
+    """Sphere radii [m], shape (S,), read-only."""
+    volume: float
+    """Volume of the union [m3]."""
+    inertia_over_mass: Array
+    """Principal moments of inertia over the mass [m2], shape (3,), read-only."""
+
+    def __post_init__(self) -> None:
+        centers, radii = _checked_spheres(self.centers, self.radii)
+        moments = np.array(self.inertia_over_mass, dtype=np.float64)
+        if moments.shape != (3,) or not (np.isfinite(moments) & (moments > 0.0)).all():
+            raise ValueError(f"inertia_over_mass must be three positive moments [m2], got {moments.tolist()}")
+        if not (np.isfinite(self.volume) and self.volume > 0.0):
+            raise ValueError(f"volume must be finite and positive [m3], got {self.volume!r}")
+        for name, array in (("centers", centers), ("radii", radii), ("inertia_over_mass", moments)):
+            array.flags.writeable = False
+            object.__setattr__(self, name, array)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, ClumpShape):
+            return NotImplemented
+        return np.array_equal(self.centers, other.centers) and np.array_equal(self.radii, other.radii)
+
+    def __hash__(self) -> int:
+        return hash((self.centers.tobytes(), self.radii.tobytes()))
+
+    @property
+    def sphere_count(self) -> int:
+        """Number of spheres."""
+        return len(self.radii)
+
+    @property
+    def bounding_radius(self) -> float:
+        """Radius of the smallest sphere about the centre of mass that holds the clump [m]."""
+        return float((np.linalg.norm(self.centers, axis=1) + self.radii).max())
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the spheres, which determine the shape, as plain lists [m]."""
+        return {"centers": self.centers.tolist(), "radii": self.radii.tolist()}
+
+    @classmethod
+    def sphere(cls, radius: float) -> "ClumpShape":
+        """Return the shape of one sphere of a radius [m]."""
+        return cls.from_spheres(np.zeros((1, 3)), [radius])
+
+    @classmethod
+    def from_spheres(
+        cls, centers: ArrayLike, radii: ArrayLike, resolution: int = DEFAULT_RESOLUTION
+    ) -> "ClumpShape":
+        """Build a shape from spheres in any frame.
+
+        Parameters
+        ----------
+        centers, radii
+            Spheres [m], shapes (S, 3) and (S,). Their order is kept.
+        resolution
+            Gauss nodes a panel of the surface quadrature, see `sphere_union.union_moments`; by default 64,
+            for a relative error below 1e-4.
+
+        Returns
+        -------
+        ClumpShape
+            The spheres, moved and turned into the principal frame of their union. Of all principal frames
+            it is the nearest to the frame given: axes are not sorted, axes of equal moments do not spin, and
+            axes that are principal stay. Equal and principal are meant within 1e-4 of the largest moment.
+
+        Raises
+        ------
+        ValueError
+            If the arrays do not fit, or a value is not finite, or a radius not positive.
+        """
+        centers, radii = _checked_spheres(centers, radii)
+        moments = union_moments(centers, radii, resolution)
+        axes = _principal_axes(moments.inertia_over_mass)
+        principal = np.einsum("ia,ij,ja->a", axes, moments.inertia_over_mass, axes)
+        return cls((centers - moments.center) @ axes, radii, moments.volume, principal)
+
+    @classmethod
+    def read(cls, path: str | Path) -> "ClumpShape":
+        """Read spheres, one a line: ``x y z r`` in mm; ``#`` starts a comment.
+
+        Parameters
+        ----------
+        path
+            Text file, its spheres in any frame.
+
+        Returns
+        -------
+        ClumpShape
+            The spheres in the principal frame of their union, as by `from_spheres`.
+
+        Raises
+        ------
+        ValueError
+            If a line is not four finite numbers with a positive radius, or the file has no sphere; the
+            message names the file and the line.
+        FileNotFoundError
+            If there is no such file.
+        """
+        rows = []
+        for number, line in enumerate(Path(path).read_text(encoding="utf-8").splitlines(), start=1):
+            words = line.partition("#")[0].split()
+            if words:
+                rows.append(_parse_sphere(words, f"{path}, line {number}"))
+        if not rows:
+            raise ValueError(f"{path}: a clump needs at least one line 'x y z r' [mm], got none")
+        spheres = np.array(rows) * _MILLIMETER
+        return cls.from_spheres(spheres[:, :3], spheres[:, 3])
+
+    def write(self, path: str | Path) -> None:
+        """Write the spheres as `read` takes them, with the mass properties in comments.
+
+        Parameters
+        ----------
+        path
+            Text file; an existing one is replaced.
+        """
+        moments = " ".join(f"{moment / _MILLIMETER**2:.6g}" for moment in self.inertia_over_mass)
+        lines = [
+            "# Clump: x y z r of each sphere in mm, origin at the centre of mass, principal axes.",
+            f"# Union: volume {self.volume / _MILLIMETER**3:.6g} mm3, inertia over mass {moments} mm2.",
+        ]
+        for (x, y, z), r in zip(self.centers / _MILLIMETER, self.radii / _MILLIMETER, strict=True):
+            lines.append(f"{x:.9f} {y:.9f} {z:.9f} {r:.9f}")
+        Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _checked_spheres(centers: ArrayLike, radii: ArrayLike) -> tuple[Array, Array]:
+    """Copy spheres into float64 arrays (S, 3) and (S,) or say which one breaks which rule."""
+    centers, radii = np.array(centers, dtype=np.float64), np.array(radii, dtype=np.float64)
+    if radii.ndim != 1 or radii.size == 0 or centers.shape != (radii.size, 3):
+        raise ValueError(
+            "spheres must be centers (S, 3) and radii (S,) with S >= 1, "
+            f"got shapes {centers.shape} and {radii.shape}"
+        )
+    for index, (center, radius) in enumerate(zip(centers, radii, strict=True)):
+        if not np.isfinite(center).all():
+            raise ValueError(f"sphere {index}: its center must be finite [m], got {center.tolist()}")
+        if not (np.isfinite(radius) and radius > 0.0):
+            raise ValueError(f"sphere {index}: its radius must be finite and positive [m], got {radius}")
+    return centers, radii
+
+
+def _parse_sphere(words: list[str], place: str) -> list[float]:
+    try:
+        row = [float(word) for word in words]
+    except ValueError:
+        row = []
+    if len(row) != 4 or not np.isfinite(row).all() or row[3] <= 0.0:
+        rule = "a sphere is four finite numbers 'x y z r' [mm] with r > 0"
+        raise ValueError(f"{place}: {rule}, got {' '.join(words)!r}")
+    return row
+
+
+def _principal_axes(inertia: Array) -> Array:
+    """Return the principal axes nearest to the present ones: a rotation matrix, an axis a column."""
+    moments, vectors = np.linalg.eigh(inertia)
+    products = inertia - np.diag(np.diag(inertia))
+    if np.abs(products).max() <= _MOMENT_TOLERANCE * moments[-1]:
+        return np.eye(3)
+    apart = np.diff(moments) > _MOMENT_TOLERANCE * moments[-1]
+    groups = np.concatenate([[0], np.cumsum(apart)])  # one number for each set of equal moments
+    projectors = [vectors[:, groups == g] @ vectors[:, groups == g].T for g in range(groups[-1] + 1)]
+    # slots[a] is the moment that axis a takes: the assignment that turns the axes least. Rounding lets a tie
+    # fall to the first one, whatever the last bits.
+    slots = max(
+        permutations(range(3)),
+        key=lambda slots: round(float(sum(projectors[groups[s]][a, a] for a, s in enumerate(slots))), 9),
+    )
+    axes = np.empty((3, 3))
+    for group, projector in enumerate(projectors):
+        taken = [a for a, s in enumerate(slots) if groups[s] == group]
+        left, _, right = np.linalg.svd(projector[:, taken], full_matrices=False)
+        axes[:, taken] = left @ right  # the orthonormal basis of the eigenspace nearest to the axes taken
+    if np.linalg.det(axes) < 0.0:
+        axes[:, np.argmin(np.diag(axes))] *= -1.0
+    return axes
