@@ -1,0 +1,195 @@
+"""``[[factor]]`` sections: the parameters of a study that its designs vary."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from pydantic import Field, ValidationInfo, field_validator, model_validator
+
+from doe.factors import Factor
+from experiments.errors import StudyError
+from experiments.places import KeyPath, Places, value_at
+from experiments.schema import Dimension, RawQuantity, Section, bounds, field_at, nearest_name
+from experiments.sections import Physics
+from experiments.units import Quantity, unit_size
+
+
+class FactorSection(Section):
+    """One factor. Its natural unit is the unit of ``low``."""
+
+    name: str = Field(pattern=r"^[A-Za-z_]\w*$")
+    """Short name: a column of every table, and what ``--set`` takes."""
+    label: str
+    """What it is, in words."""
+    parameter: str
+    """The parameter's place in the study, as ``contact.grain-grain.static_friction``."""
+    low: RawQuantity
+    """Lower end of the range."""
+    high: RawQuantity
+    """Upper end of the range."""
+
+    @field_validator("parameter")
+    @classmethod
+    def _is_a_quantity(cls, parameter: str) -> str:
+        if _dimension_of(parameter) is None:
+            raise ValueError('must lead to a quantity of the study, as "contact.grain-grain.static_friction"')
+        return parameter
+
+    @field_validator("low", "high")
+    @classmethod
+    def _has_the_dimension(cls, level: Quantity, info: ValidationInfo) -> Quantity:
+        if dimension := _dimension_of(info.data.get("parameter", "")):
+            level.to_base(dimension.name)
+        return level
+
+    @model_validator(mode="after")
+    def _range_is_physical(self) -> FactorSection:
+        low, high = self.low.number, self.natural(self.high)
+        least, most = self.limits
+        if not low < high:
+            raise ValueError(f"low must be below high, not {self.low} above {self.high}")
+        if low < least or high > most:
+            raise ValueError(f"low and high must stay within {least:g} and {most:g} {self.unit}".rstrip())
+        return self
+
+    @property
+    def path(self) -> tuple[str, ...]:
+        """Key path of the parameter."""
+        return tuple(self.parameter.split("."))
+
+    @property
+    def unit(self) -> str:
+        """Natural unit."""
+        return self.low.unit
+
+    @property
+    def dimension(self) -> str:
+        """Dimension of the parameter, a key of ``units.UNITS`` or ``""``."""
+        dimension = _dimension_of(self.parameter)
+        return dimension.name if dimension else ""
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """Hard physical limits in the natural unit, infinite where there is none."""
+        field = field_at(Physics, self.path)
+        least, most = bounds(field) if field else (float("-inf"), float("inf"))
+        size = unit_size(self.unit, self.dimension)
+        return least / size, most / size
+
+    def natural(self, value: object) -> float:
+        """Read a quantity (``"34 MPa"``, 0.46) as a number in the natural unit.
+
+        Raises
+        ------
+        ValueError
+            When it is no quantity of the factor's dimension.
+        """
+        quantity = value if isinstance(value, Quantity) else Quantity.parse(value)
+        return quantity.to_unit(self.unit, self.dimension)
+
+    def factor(self) -> Factor:
+        """Build the factor of the designs."""
+        return Factor(self.name, self.low.number, self.natural(self.high), self.unit)
+
+
+class FactorTable(Section):
+    """All factors of a study."""
+
+    factor: tuple[FactorSection, ...] = ()
+    """The factors as written, in order."""
+
+    @model_validator(mode="after")
+    def _each_once(self) -> FactorTable:
+        for key in ("name", "parameter"):
+            values = [getattr(section, key) for section in self.factor]
+            if twice := sorted({value for value in values if values.count(value) > 1}):
+                raise ValueError(f"each factor has a {key} of its own; given twice: {', '.join(twice)}")
+        return self
+
+
+def natural_settings(
+    sections: Iterable[FactorSection], settings: Mapping[str, object], places: Places, path: KeyPath = ()
+) -> dict[str, float]:
+    """Read factor values with their units as numbers in natural units.
+
+    Parameters
+    ----------
+    sections
+        Factors of the study.
+    settings
+        Quantities by factor name, as ``{"B": "34 MPa", "E": 0.46}``.
+    places, path
+        Where they stand.
+
+    Raises
+    ------
+    StudyError
+        When there is no such factor, or a value is no quantity of its dimension.
+    """
+    by_name = {section.name: section for section in sections}
+    natural = {}
+    for name, value in settings.items():
+        if name not in by_name:
+            rule = f"must name a factor, {nearest_name(name, list(by_name))}"
+            raise StudyError(rule, name, places.of((*path, name)))
+        try:
+            natural[name] = by_name[name].natural(value)
+        except ValueError as error:
+            raise StudyError(str(error), value, places.of((*path, name))) from None
+    return natural
+
+
+def merge(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
+    """Merge one document over another, table by table; any other value replaces the one below it."""
+    merged = dict(base)
+    for key, value in over.items():
+        below = merged.get(key)
+        if isinstance(value, Mapping) and isinstance(below, Mapping):
+            value = merge(below, value)
+        merged[key] = value
+    return copy.deepcopy(merged)
+
+
+def with_factor_values(
+    document: Mapping[str, Any], sections: Iterable[FactorSection], settings: Mapping[str, float]
+) -> dict[str, Any]:
+    """Copy a document and write a value into every factor's parameter: the setting, or the factor's middle.
+
+    Parameters
+    ----------
+    document
+        A study document, or its physical sections.
+    sections
+        Factors of the study.
+    settings
+        Values by factor name, natural units.
+    """
+    values: dict[str, Any] = {}
+    for section in sections:
+        table = values
+        for key in section.path[:-1]:
+            table = table.setdefault(key, {})
+        value = settings.get(section.name, section.factor().center)
+        table[section.path[-1]] = str(Quantity(value, section.unit)) if section.unit else value
+    return merge(document, values)
+
+
+def check_one_home(document: Mapping[str, Any], sections: Iterable[FactorSection], places: Places) -> None:
+    """Refuse a factor whose parameter has a fixed value beside it: nobody could say which one holds.
+
+    Raises
+    ------
+    StudyError
+        At the fixed value.
+    """
+    for section in sections:
+        if (value := value_at(document, section.path)) is not None:
+            rule = f"is varied by the factor {section.name!r} and takes no fixed value: remove one of them"
+            raise StudyError(rule, value, places.of(section.path))
+
+
+def _dimension_of(parameter: str) -> Dimension | None:
+    field = field_at(Physics, tuple(parameter.split(".")))
+    return next((mark for mark in field.metadata if isinstance(mark, Dimension)), None) if field else None

@@ -1,0 +1,92 @@
+"""Where in a TOML file a value stands: file, line and key, for error messages."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+KeyPath = tuple[str | int, ...]
+
+_HEADER = re.compile(r"\s*(\[\[?)([^\]]+)\]\]?")
+_ASSIGNMENT = re.compile(r"""\s*((?:"[^"]*"|'[^']*'|[\w-]+)(?:\s*\.\s*(?:"[^"]*"|'[^']*'|[\w-]+))*)\s*=""")
+_KEY_PART = re.compile(r""""([^"]*)"|'([^']*)'|([\w-]+)""")
+
+
+@dataclass(frozen=True)
+class Places:
+    """Finds the line of a key of a study, also of one that the chosen scale overrides."""
+
+    file: Path
+    """The study file."""
+    lines: Mapping[KeyPath, int]
+    """Line of each table and key, counted from 1."""
+    scale: str | None = None
+    """Scale whose table overrides the rest."""
+
+    @classmethod
+    def read(cls, path: Path, text: str, scale: str | None = None) -> Places:
+        """Index the keys of a TOML text."""
+        return cls(path, _index_lines(text), scale)
+
+    @property
+    def folder(self) -> Path:
+        """Folder that file names in the study are relative to."""
+        return self.file.parent
+
+    def of(self, path: KeyPath) -> str:
+        """Name the place of a key: its own line, or that of the nearest table around it."""
+        overridden: KeyPath = ("scale", self.scale or "", *path)
+        if overridden in self.lines:
+            return self._name(self.lines[overridden], overridden)
+        for length in range(len(path), 0, -1):
+            if path[:length] in self.lines:
+                return self._name(self.lines[path[:length]], path)
+        return self._name(None, path)
+
+    def _name(self, line: int | None, path: KeyPath) -> str:
+        where = str(self.file) if line is None else f"{self.file}:{line}"
+        return f"{where}: {dotted(path)}" if path else where
+
+
+def dotted(path: Sequence[str | int]) -> str:
+    """Write a key path as a person would: ``factor[2].low`` for the second table of an array.
+
+    Examples
+    --------
+    >>> dotted(("factor", 1, "low"))
+    'factor[2].low'
+    """
+    parts = [f"[{part + 1}]" if isinstance(part, int) else f".{part}" for part in path]
+    return "".join(parts).removeprefix(".")
+
+
+def value_at(document: object, path: Sequence[str | int]) -> object:
+    """Look up the value at a key path; None when there is none."""
+    for part in path:
+        try:
+            document = document[part]  # type: ignore[index]
+        except (KeyError, IndexError, TypeError):
+            return None
+    return document
+
+
+def _index_lines(text: str) -> dict[KeyPath, int]:
+    lines: dict[KeyPath, int] = {}
+    table: KeyPath = ()
+    array_sizes: dict[KeyPath, int] = {}
+    for number, line in enumerate(text.splitlines(), start=1):
+        if header := _HEADER.match(line):
+            table = _split_key(header[2])
+            if header[1] == "[[":
+                array_sizes[table] = array_sizes.get(table, 0) + 1
+                table = (*table, array_sizes[table] - 1)
+            lines.setdefault(table, number)
+        elif assignment := _ASSIGNMENT.match(line):
+            lines.setdefault((*table, *_split_key(assignment[1])), number)
+    return lines
+
+
+def _split_key(text: str) -> KeyPath:
+    return tuple(double or single or bare for double, single, bare in _KEY_PART.findall(text))

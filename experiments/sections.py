@@ -1,0 +1,188 @@
+"""The sections of a study file that describe the grains, the walls, the contacts, the test and the numerics.
+
+A field's type names its dimension; its bounds are the hard physical limits, for a campaign too.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from pydantic import Field, ValidationInfo, field_validator, model_validator
+
+from dem_warp.clumps import ClumpShape
+from dem_warp.materials import Interaction, Material
+from experiments.schema import Density, Length, Number, Pressure, Rate, Section, Speed
+
+if TYPE_CHECKING:
+    from dem_warp import Case, GrainPopulation, Numerics
+
+
+class MaterialSection(Section):
+    """What a grain or a wall is made of."""
+
+    density: Density = Field(gt=0.0)
+    """Mass of the solid per volume."""
+    shear_modulus: Pressure = Field(ge=1e3)
+    """Shear modulus."""
+    poisson_ratio: Number = Field(ge=0.0, le=0.5)
+    """Poisson's ratio."""
+
+    def material(self) -> Material:
+        """Build the engine's material."""
+        return Material(
+            density=self.density, shear_modulus=self.shear_modulus, poisson_ratio=self.poisson_ratio
+        )
+
+
+class GrainSection(MaterialSection):
+    """``[grain]``: shape, size and material of the grains."""
+
+    clump: Path | None = None
+    """File with the clump's spheres (x y z r in mm), relative to the study file."""
+    sphere: Length | None = Field(default=None, gt=0.0)
+    """Radius of spherical grains, instead of a clump."""
+    size_mean: Number = Field(default=1.0, gt=0.0)
+    """Mean size, as a multiple of the shape."""
+    size_sd: Number = Field(default=0.05, ge=0.0)
+    """Standard deviation of the size."""
+
+    @field_validator("clump")
+    @classmethod
+    def _clump_exists(cls, clump: Path | None, info: ValidationInfo) -> Path | None:
+        if clump is None:
+            return None
+        path = Path((info.context or {}).get("folder", ".")) / clump
+        if not path.is_file():
+            raise ValueError(f"must name an existing clump file (looked for {path})")
+        return path
+
+    @model_validator(mode="after")
+    def _one_shape(self) -> GrainSection:
+        if self.clump is not None and self.sphere is not None:
+            raise ValueError("takes a clump (a file) or a sphere (a radius), not both")
+        self.shape()
+        return self
+
+    def shape(self) -> ClumpShape:
+        """Build the grain's shape."""
+        if self.sphere is not None:
+            return ClumpShape.sphere(self.sphere)
+        if self.clump is not None:
+            return _read_clump(self.clump, self.clump.stat().st_mtime_ns)
+        raise ValueError("needs a clump (a file) or a sphere (a radius)")
+
+    def population(self) -> GrainPopulation:
+        """Build the engine's population."""
+        from dem_warp import GrainPopulation
+
+        return GrainPopulation(
+            shape=self.shape(), material=self.material(), size_mean=self.size_mean, size_sd=self.size_sd
+        )
+
+
+@lru_cache(maxsize=8)
+def _read_clump(path: Path, modified: int) -> ClumpShape:
+    """Read a clump once: its volume integral is slow, and every case of a campaign needs it."""
+    return ClumpShape.read(path)
+
+
+class InteractionSection(Section):
+    """One pair of surfaces."""
+
+    restitution: Number = Field(ge=0.01, le=1.0)
+    """Coefficient of restitution."""
+    static_friction: Number = Field(ge=0.0)
+    """Coefficient of static friction."""
+    rolling_friction: Number = Field(ge=0.0)
+    """Coefficient of rolling friction."""
+
+    def interaction(self) -> Interaction:
+        """Build the engine's interaction."""
+        return Interaction(
+            restitution=self.restitution,
+            static_friction=self.static_friction,
+            rolling_friction=self.rolling_friction,
+        )
+
+
+class ContactSection(Section):
+    """``[contact]``: the two pairs of surfaces."""
+
+    grain_grain: InteractionSection = Field(alias="grain-grain")
+    """Grain on grain."""
+    grain_wall: InteractionSection = Field(alias="grain-wall")
+    """Grain on tube and plate."""
+
+
+class LiftedCylinderSection(Section):
+    """``[scene.lifted-cylinder]``: a tube full of grains is lifted off a plate."""
+
+    diameter: Length = Field(gt=0.0)
+    """Inner diameter of the tube."""
+    height: Length = Field(gt=0.0)
+    """Height of the tube."""
+    lift_speed: Speed = Field(default=0.05, gt=0.0)
+    """Speed of the tube."""
+    rain_rate: Rate = Field(default=3000.0, gt=0.0)
+    """Grains per second while filling."""
+    rain_speed: Speed = Field(default=0.5, ge=0.0)
+    """Speed of the raining grains."""
+    grain_count: int | None = Field(default=None, ge=1)
+    """Grains; left out: until the tube is full."""
+
+
+class SceneSection(Section):
+    """``[scene]``: the physical test."""
+
+    lifted_cylinder: LiftedCylinderSection = Field(alias="lifted-cylinder")
+    """The lifted cylinder."""
+
+
+class NumericsSection(Section):
+    """``[numerics]``: how the equations are integrated."""
+
+    time_step_fraction: Number = Field(default=0.25, gt=0.0, le=1.0)
+    """Time step, as a fraction of the Rayleigh time of the smallest sphere."""
+    modulus_scale: Number = Field(default=1.0, ge=1.0)
+    """The grains' shear modulus is divided by this (softer grains take larger steps)."""
+    skin: Length | None = Field(default=None, gt=0.0)
+    """Reach of the neighbour search beyond contact; left out: chosen by the engine."""
+    precision: Literal["mixed", "double"] = "mixed"
+    """Floating point precision of the forces."""
+
+    def numerics(self) -> Numerics:
+        """Build the engine's numerics."""
+        from dem_warp import Numerics
+
+        return Numerics(**dict(self))
+
+
+class Physics(Section):
+    """Everything of a study that decides how a heap turns out."""
+
+    grain: GrainSection
+    """The grains."""
+    wall: MaterialSection
+    """The tube and the plate."""
+    contact: ContactSection
+    """Contact properties of each pair of surfaces."""
+    scene: SceneSection
+    """The physical test."""
+    numerics: NumericsSection = NumericsSection()
+    """Time step, softening, precision."""
+
+    def build_case(self, seed: int) -> Case:
+        """Build one case of the engine."""
+        from dem_warp import Case, LiftedCylinder
+
+        tube = self.scene.lifted_cylinder
+        return Case(
+            scene=LiftedCylinder(wall_material=self.wall.material(), **dict(tube)),
+            grains=self.grain.population(),
+            grain_grain=self.contact.grain_grain.interaction(),
+            grain_wall=self.contact.grain_wall.interaction(),
+            seed=seed,
+            numerics=self.numerics.numerics(),
+        )

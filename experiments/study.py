@@ -1,0 +1,264 @@
+"""Studies: everything that a person configures, one TOML file.
+
+A study file is read once: its scale is merged over it, units are converted, every rule is checked. A breach is a
+`StudyError` with the rule, the value received and the file, line and key. What comes out is frozen.
+"""
+
+from __future__ import annotations
+
+import copy
+import re
+import tomllib
+from collections.abc import Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from pydantic import Field, PrivateAttr, model_validator
+
+from doe.factors import Factor
+from experiments.calibrate.settings import CampaignSettings, MeasuredTarget, TwinTarget
+from experiments.errors import StudyError
+from experiments.factor_section import (
+    FactorSection,
+    FactorTable,
+    check_one_home,
+    merge,
+    natural_settings,
+    with_factor_values,
+)
+from experiments.places import Places, value_at
+from experiments.schema import Angle, Dimension, Section, nearest_name, validated
+from experiments.sections import Physics
+
+if TYPE_CHECKING:
+    from dem_warp import Case
+
+BUCKWHEAT = Path(__file__).parent / "studies" / "buckwheat" / "study.toml"
+"""The study that is meant when none is named: the paper's buckwheat."""
+
+_FACTOR_VALUE_TABLES = (
+    ("campaign", "climb", "start"),
+    ("campaign", "climb", "step"),
+    ("campaign", "surface", "center"),
+    ("campaign", "surface", "half_range"),
+    ("campaign", "optimum", "point"),
+    ("target", "twin", "truth"),
+)
+"""Tables of a study that hold quantities by factor name."""
+
+
+class TargetSection(Section):
+    """``[target]``: the repose angle to be matched; with a twin, the measured values are for reading only."""
+
+    mean: Angle | None = Field(default=None, gt=0.0, lt=90.0)
+    """Mean of the measurements."""
+    sd: Angle | None = Field(default=None, gt=0.0)
+    """Standard deviation of one measurement."""
+    n: int | None = Field(default=None, ge=2)
+    """Number of measurements."""
+    twin: TwinTarget | None = None
+    """The target comes from heaps simulated with settings that the campaign does not see."""
+
+    @model_validator(mode="after")
+    def _complete(self) -> TargetSection:
+        missing = [name for name in ("mean", "sd", "n") if getattr(self, name) is None]
+        if self.twin is None and missing:
+            raise ValueError(f"needs mean, sd and n of the measured angle; missing: {', '.join(missing)}")
+        return self
+
+    def target(self) -> MeasuredTarget | TwinTarget:
+        """Build the target of the campaign."""
+        if self.twin is not None:
+            return self.twin
+        return MeasuredTarget.model_validate({"mean": self.mean, "sd": self.sd, "n": self.n})
+
+
+class MeasurementSection(Section):
+    """``[measurement]``: how an angle is read from a heap; only angles read the same way compare."""
+
+    fit: Literal["flank", "middle"] = "flank"
+    """Part of the flank that the line is fitted to."""
+    azimuths: int = Field(default=8, ge=1)
+    """Views of one heap, over half a turn."""
+
+
+class Study(Physics):
+    """Everything that a person configures; built by `load_study`."""
+
+    name: str
+    """What is calibrated, in words."""
+    note: str = ""
+    """What a reader must know about the study at this scale."""
+    paper: bool = False
+    """The study is the paper's buckwheat: the report shows the published numbers beside."""
+    measurement: MeasurementSection = MeasurementSection()
+    """How the angle is read."""
+    target_section: TargetSection | None = Field(default=None, alias="target")
+    """The angle to be matched."""
+    factor_sections: tuple[FactorSection, ...] = Field(default=(), alias="factor")
+    """The factors as written, in order."""
+    campaign: CampaignSettings = CampaignSettings()
+    """Every decision of the campaign."""
+
+    _document: dict[str, Any] = PrivateAttr(default_factory=dict)
+    _places: Places = PrivateAttr(default_factory=lambda: Places(BUCKWHEAT, {}))
+
+    @property
+    def file(self) -> Path:
+        """The study file."""
+        return self._places.file
+
+    @property
+    def scale(self) -> str | None:
+        """The chosen scale; None: the study as written."""
+        return self._places.scale
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """The study as written, the scale merged over it: plain JSON-able data."""
+        return copy.deepcopy(self._document)
+
+    @property
+    def target(self) -> MeasuredTarget | TwinTarget:
+        """What the heaps must match.
+
+        Raises
+        ------
+        StudyError
+            When the study has no ``[target]``.
+        """
+        if self.target_section is None:
+            raise StudyError("a calibration needs a [target] section", "none", str(self.file))
+        return self.target_section.target()
+
+    @cached_property
+    def factors(self) -> tuple[Factor, ...]:
+        """Factors of the designs in natural units, in the order of the file."""
+        return tuple(section.factor() for section in self.factor_sections)
+
+    @cached_property
+    def limits(self) -> dict[str, tuple[float, float]]:
+        """Hard physical limits of every factor in its natural unit, infinite where there is none."""
+        return {section.name: section.limits for section in self.factor_sections}
+
+    def natural_settings(self, settings: Mapping[str, object]) -> dict[str, float]:
+        """Read factor values with their units (``{"B": "34 MPa", "E": 0.46}``) as numbers in natural units.
+
+        Raises
+        ------
+        StudyError
+            When there is no such factor, or a value is no quantity of its dimension.
+        """
+        return natural_settings(self.factor_sections, settings, Places(self.file, {}))
+
+    def case(self, settings: Mapping[str, float], seed: int) -> Case:
+        """Build one case.
+
+        Parameters
+        ----------
+        settings
+            Values by factor name in natural units; a factor that is not named is at its middle.
+        seed
+            Seed of everything random in the case.
+
+        Raises
+        ------
+        StudyError
+            When there is no such factor, or a value leaves what is physical.
+        """
+        names = [section.name for section in self.factor_sections]
+        for name in settings:
+            if name not in names:
+                raise StudyError(f"must name a factor, {nearest_name(name, names)}", name, str(self.file))
+        document = with_factor_values(self._document, self.factor_sections, settings)
+        sections = {key: document[key] for key in Physics.model_fields if key in document}
+        physics = validated(Physics, sections, self._places)
+        try:
+            return physics.build_case(seed)
+        except ValueError as error:
+            raise StudyError(str(error), dict(settings), str(self.file)) from error
+
+
+def load_study(path: str | Path | None = None, scale: str | None = None) -> Study:
+    """Read and check a study file.
+
+    Parameters
+    ----------
+    path
+        The TOML file; None: the paper's buckwheat.
+    scale
+        Name of a ``[scale.NAME]`` table to merge over the rest; None: the study as written.
+
+    Raises
+    ------
+    StudyError
+        When the file cannot be read or breaks a rule: the rules, the values received, and their places.
+    """
+    path = BUCKWHEAT if path is None else Path(path)
+    text, document = _read(path)
+    places = Places.read(path, text, scale)
+    scales = _scales(path, document)
+    document.pop("scale", None)
+    if scale is not None:
+        if scale not in scales:
+            rule = f"the scale must be one that the study has, {nearest_name(scale, list(scales))}"
+            raise StudyError(rule, scale, str(path))
+        document = merge(document, scales[scale])
+    sections = validated(FactorTable, {"factor": document.get("factor", [])}, places).factor
+    check_one_home(document, sections, places)
+    plain = with_factor_values(_without_units(document, sections, places), sections, {})
+    study = validated(Study, plain, places)
+    study._document, study._places = document, places
+    return study
+
+
+def study_scales(path: str | Path | None = None) -> tuple[str, ...]:
+    """Names of the scales that a study file has.
+
+    Raises
+    ------
+    StudyError
+        When the file cannot be read.
+    """
+    path = BUCKWHEAT if path is None else Path(path)
+    return tuple(_scales(path, _read(path)[1]))
+
+
+def _scales(path: Path, document: Mapping[str, Any]) -> Mapping[str, Mapping[str, Any]]:
+    scales = document.get("scale", {})
+    if not isinstance(scales, Mapping) or not all(isinstance(table, Mapping) for table in scales.values()):
+        raise StudyError("scales are tables, [scale.NAME]", scales, str(path))
+    return scales
+
+
+def _read(path: Path) -> tuple[str, dict[str, Any]]:
+    try:
+        text = path.read_text(encoding="utf-8")
+        return text, tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        found = re.search(r"at line (\d+)", str(error))
+        number = int(found[1]) if found else len(text.splitlines())
+        shown = text.splitlines()[number - 1].strip()
+        raise StudyError(f"must be valid TOML: {error}", shown, f"{path}:{number}") from None
+    except UnicodeDecodeError:
+        raise StudyError("must be a text file in UTF-8", "other bytes", str(path)) from None
+    except OSError as error:
+        raise StudyError("the study must be a readable file", error.strerror or "none", str(path)) from None
+
+
+def _without_units(
+    document: dict[str, Any], sections: tuple[FactorSection, ...], places: Places
+) -> dict[str, Any]:
+    """Copy a document with factor values and margin as plain numbers, as the campaign takes them."""
+    plain = copy.deepcopy(document)
+    for path in _FACTOR_VALUE_TABLES:
+        if isinstance(table := value_at(plain, path), dict):
+            value_at(plain, path[:-1])[path[-1]] = natural_settings(sections, table, places, path)  # type: ignore[index]
+    path = ("campaign", "verification", "margin")
+    if (margin := value_at(plain, path)) is not None:
+        try:
+            plain["campaign"]["verification"]["margin"] = Dimension("angle").to_base(margin)
+        except ValueError as error:
+            raise StudyError(str(error), margin, places.of(path)) from None
+    return plain

@@ -1,0 +1,94 @@
+"""Quantities with units, as study files write them ("110 mm"), turned into SI once, at the edge.
+
+Angles are the one exception to SI: they are in degrees everywhere in ``experiments``.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+
+UNITS: dict[str, dict[str, float]] = {
+    "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6},
+    "pressure": {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9},
+    "density": {"kg/m^3": 1.0, "g/cm^3": 1e3},
+    "speed": {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3},
+    "rate": {"1/s": 1.0, "1/min": 1.0 / 60.0},
+    "time": {"s": 1.0, "ms": 1e-3, "min": 60.0},
+    "angle": {"deg": 1.0, "rad": math.degrees(1.0)},
+}
+"""Size of each unit in the base unit of its dimension (SI; degrees for angles)."""
+
+_TEXT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\S.*?)?\s*")
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A number and the name of its unit (``""``: a plain number)."""
+
+    number: float
+    unit: str = ""
+
+    @classmethod
+    def parse(cls, value: object) -> Quantity:
+        """Read a number, or text such as ``"110 mm"``.
+
+        Raises
+        ------
+        ValueError
+            When the value is neither, or the number is not finite.
+        """
+        if isinstance(value, (int, float)) and not isinstance(value, bool):
+            quantity = cls(float(value))
+        elif isinstance(value, str) and (match := _TEXT.fullmatch(value)):
+            quantity = cls(float(match[1]), match[2] or "")
+        else:
+            raise ValueError('must be a number, or text with a number and its unit such as "110 mm"')
+        if not math.isfinite(quantity.number):
+            raise ValueError("must be finite")
+        return quantity
+
+    def __str__(self) -> str:
+        return f"{self.number!r} {self.unit}".rstrip()
+
+    def to_base(self, dimension: str) -> float:
+        """Convert to SI (degrees for angles); ``dimension`` ``""`` takes plain numbers only.
+
+        Raises
+        ------
+        ValueError
+            When the unit is not one of the dimension's; the message names those.
+
+        Examples
+        --------
+        >>> Quantity(34.325, "MPa").to_base("pressure")
+        34325000.0
+        """
+        size = unit_size(self.unit, dimension)
+        # Dividing by a whole number gives the float nearest to 28 mm in metres; multiplying by 1e-3 may not.
+        inverse = round(1.0 / size) if size < 1.0 else 1
+        return self.number / inverse if math.isclose(inverse * size, 1.0) else self.number * size
+
+    def to_unit(self, unit: str, dimension: str) -> float:
+        """Express in another unit of the same dimension."""
+        return self.number if unit == self.unit else self.to_base(dimension) / unit_size(unit, dimension)
+
+
+def unit_size(unit: str, dimension: str) -> float:
+    """Size of a unit in the base unit of its dimension.
+
+    Raises
+    ------
+    ValueError
+        When the unit is not one of the dimension's; the message names those.
+    """
+    if not dimension:
+        if unit:
+            raise ValueError(f"must be a plain number without the unit {unit!r}")
+        return 1.0
+    known = UNITS[dimension]
+    if unit not in known:
+        example = f'"1.5 {next(iter(known))}"'
+        raise ValueError(f"needs a unit of {dimension} ({', '.join(known)}), for example {example}")
+    return known[unit]
