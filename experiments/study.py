@@ -1,7 +1,7 @@
 """Studies: everything that a person configures, one TOML file.
 
-A study file is read once: its scale is merged over it, units are converted, every rule is checked. A breach is a
-`StudyError` with the rule, the value received and the file, line and key. What comes out is frozen.
+A study file is read once: its scale is merged over it, units are converted, every rule is checked. Any breach
+is a `StudyError` with the rule, the value received and the file, line and key. What comes out is frozen.
 """
 
 from __future__ import annotations

@@ -1,0 +1,90 @@
+"""The folder of a campaign: which study made it, and whether a run may go on in it."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from experiments.errors import StoreError
+from experiments.files import write_whole
+from experiments.places import KeyPath, dotted
+from experiments.store import Store
+from experiments.study import Study
+
+MANIFEST = "study.json"
+"""File that says which study the folder belongs to."""
+
+CASES = "cases"
+"""Folder of the stored cases."""
+
+
+def open_folder(folder: Path, study: Study, resume: bool = False) -> tuple[Store, list[str]]:
+    """Make a campaign's folder, or go on in an existing one.
+
+    Parameters
+    ----------
+    folder
+        The output folder.
+    study
+        The study that will run.
+    resume
+        Go on in a folder that an earlier run left.
+
+    Returns
+    -------
+    store
+        Where the cases are kept.
+    changes
+        What differs from the study that the folder was made with, one line a key. Cases that a change does
+        not touch are used again: each is stored under all that determines it.
+
+    Raises
+    ------
+    StoreError
+        When the folder is in use and not to be resumed, or is no campaign's. Nothing is written then.
+    """
+    manifest = folder / MANIFEST
+    described = describe(study)
+    changes: list[str] = []
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        if not resume:
+            raise StoreError(
+                "the output folder must be new or empty; --resume goes on in it", "a used one", str(folder)
+            )
+        changes = list(differences(_read_manifest(manifest), described))
+    write_whole(manifest, json.dumps(described, indent=1, allow_nan=False).encode())
+    return Store(folder / CASES), changes
+
+
+def describe(study: Study) -> dict[str, Any]:
+    """Everything that a study says, its clump included, as JSON-able data."""
+    clump = study.grain.clump
+    digest = hashlib.sha256(clump.read_bytes()).hexdigest() if clump else None
+    return {"study": study.document, "scale": study.scale, "clump_sha256": digest}
+
+
+def differences(old: object, new: object, path: KeyPath = ()) -> Iterator[str]:
+    """Name every key whose value differs, as ``key: old -> new``."""
+    if isinstance(old, Mapping) and isinstance(new, Mapping):
+        for key in [*old, *(key for key in new if key not in old)]:
+            yield from differences(old.get(key), new.get(key), (*path, key))
+    elif isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
+        for index, (before, after) in enumerate(zip(old, new, strict=True)):
+            yield from differences(before, after, (*path, index))
+    elif old != new:
+        yield f"{dotted(path)}: {_shown(old)} -> {_shown(new)}"
+
+
+def _shown(value: object) -> str:
+    return "not given" if value is None else json.dumps(value)
+
+
+def _read_manifest(path: Path) -> dict[str, Any]:
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        rule = f"a folder to resume must hold the {MANIFEST} of the run that made it"
+        raise StoreError(rule, "none that can be read", str(path)) from None

@@ -1,0 +1,124 @@
+"""Results of cases: one folder, one file a case, keyed by everything that determines it."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.metadata
+import importlib.util
+import io
+import json
+import zipfile
+from dataclasses import fields
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from experiments.errors import StoreError
+from experiments.files import write_whole
+
+if TYPE_CHECKING:
+    from dem_warp import Case, CaseResult
+
+FORMAT = 1
+"""Version of the case files; an older one is not read."""
+
+_RECORD = "record"
+
+
+class Store:
+    """Results of cases in a folder.
+
+    A case's file is written whole or not at all, and its checksums are verified when it is read.
+
+    Parameters
+    ----------
+    folder
+        The folder; it is made when the first case is saved.
+    """
+
+    def __init__(self, folder: str | Path) -> None:
+        self.folder = Path(folder)
+
+    def key(self, case: Case) -> str:
+        """Key of a case: a hash of all that determines its result, the engine's own code included."""
+        determined_by = {"case": case.to_dict(), "engine": engine_fingerprint(), "format": FORMAT}
+        text = json.dumps(determined_by, sort_keys=True, separators=(",", ":"), allow_nan=False)
+        return hashlib.sha256(text.encode()).hexdigest()
+
+    def path(self, key: str) -> Path:
+        """File of a case."""
+        return self.folder / f"{key}.npz"
+
+    def has(self, key: str) -> bool:
+        """Whether the case is stored and whole."""
+        return self.path(key).is_file() and self.damage(key) is None
+
+    def damage(self, key: str) -> str | None:
+        """What is wrong with a stored case; None when it is whole or absent."""
+        if not self.path(key).exists():
+            return None
+        try:
+            self.load(key)
+        except StoreError as error:
+            return str(error)
+        return None
+
+    def save(self, key: str, result: CaseResult) -> None:
+        """Save the result of a case, replacing an earlier one."""
+        arrays: dict[str, Any] = {}
+        record: dict[str, Any] = {"key": key, "format": FORMAT}
+        for field in fields(result):
+            value = getattr(result, field.name)
+            if isinstance(value, np.ndarray):
+                arrays[field.name] = value
+            else:
+                record[field.name] = value
+        text = json.dumps(record, allow_nan=False).encode()
+        buffer = io.BytesIO()
+        arrays[_RECORD] = np.frombuffer(text, dtype=np.uint8)
+        np.savez(buffer, **arrays)
+        write_whole(self.path(key), buffer.getvalue())
+
+    def load(self, key: str) -> CaseResult:
+        """Load the result of a case.
+
+        Raises
+        ------
+        KeyError
+            When the case is not stored.
+        StoreError
+            When its file is damaged.
+        """
+        from dem_warp import CaseResult
+
+        path = self.path(key)
+        if not path.is_file():
+            raise KeyError(key)
+        try:
+            values = _read_values(path)
+            found = (values.pop("key"), values.pop("format"))
+            if found != (key, FORMAT):
+                raise ValueError(f"it holds the case {found[0]} in format {found[1]}")
+            return CaseResult(**values)
+        except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
+            raise StoreError("a stored case must be whole", f"a damaged file: {error}", str(path)) from error
+
+
+@lru_cache(maxsize=1)
+def engine_fingerprint() -> str:
+    """Hash of the engine's sources and of the version of Warp that compiles them."""
+    spec = importlib.util.find_spec("dem_warp")
+    digest = hashlib.sha256(importlib.metadata.version("warp-lang").encode())
+    for root in map(Path, (spec and spec.submodule_search_locations) or ()):
+        for path in sorted(root.rglob("*.py")):
+            digest.update(f"\n{path.relative_to(root).as_posix()}\n".encode())
+            digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+def _read_values(path: Path) -> dict[str, Any]:
+    with np.load(path, allow_pickle=False) as archive:
+        values: dict[str, Any] = {name: archive[name] for name in archive.files if name != _RECORD}
+        return values | json.loads(archive[_RECORD].tobytes())
