@@ -1,28 +1,38 @@
 """Pictures and repose angles: heaps and photographs in, angles with their uncertainty out.
 
-Pictures are OpenCV's: uint8, row 0 at the top, grey or blue-green-red. Lengths are metres, angles of heaps degrees.
+Pictures are OpenCV's: uint8, row 0 at the top, grey or blue-green-red. Angles of heaps are in degrees, directions
+of cameras in radians, lengths in metres or, where said so, in pixels.
 """
 
 from imaging.errors import PictureError
-from imaging.repose import (
-    FITS,
-    FitSettings,
-    HeapAngle,
-    ReposeAngle,
-    compare,
-    heap_angle,
-    measure,
-    measure_photograph,
-)
+from imaging.flanks import FITS, FitSettings
+from imaging.heap import HeapAngle, heap_angle
+from imaging.overlay import overlay
+from imaging.pictures import read_picture, save_picture
+from imaging.render import Snapshot, silhouette, snapshot
+from imaging.repose import AngleDifference, ReposeAngle, compare, measure, measure_photograph
+from imaging.shape import HeapShape, heap_shape
+from imaging.silhouette import Outline, find_outline
 
 __all__ = [
     "FITS",
+    "AngleDifference",
     "FitSettings",
     "HeapAngle",
+    "HeapShape",
+    "Outline",
     "PictureError",
     "ReposeAngle",
+    "Snapshot",
     "compare",
+    "find_outline",
     "heap_angle",
+    "heap_shape",
     "measure",
     "measure_photograph",
+    "overlay",
+    "read_picture",
+    "save_picture",
+    "silhouette",
+    "snapshot",
 ]

@@ -120,6 +120,11 @@ class Frame:
         """Rows above the plate."""
         return int(np.ceil(self.height / self.meters_per_pixel))
 
+    @property
+    def ground_row(self) -> float:
+        """Row of the plate's surface; whole numbers are the middles of pixels."""
+        return self.ground_rows - 0.5
+
     def select(self, spheres: Spheres) -> tuple[Spheres, NDArray[np.intp]]:
         """Spheres within the frame, moved so that the axis is at x = y = 0, and their indices."""
         shifted = spheres.centers - np.array([*self.axis, 0.0])

@@ -12,6 +12,14 @@ SUPERSAMPLING = 4
 """Silhouettes are drawn this many times finer than the picture, then averaged: 17 grey levels at an edge."""
 SHADING_SUPERSAMPLING = 2
 """The same for shaded pictures, whose edges need only look smooth."""
+LIGHT = np.array([-0.45, -0.65, 0.61])
+"""Where the light comes from, in the camera's frame (right, away, up)."""
+AMBIENT = 0.45
+"""Light on a surface that is turned away from the lamp."""
+BRIGHTNESS = 1.25
+"""Overall exposure."""
+CAVITY_SHADING = 0.6
+"""How much what lies behind its neighbours is darkened, at the most."""
 FRAGMENT_LIMIT = 4_000_000
 """Pixels of spheres held in memory at a time while a depth buffer is filled."""
 
@@ -44,27 +52,58 @@ def coverage(spheres: Spheres, frame: Frame, azimuth: float) -> Picture:
     return cv2.resize(mask, frame.shape[::-1], interpolation=cv2.INTER_AREA).astype(np.uint8)
 
 
-def depth_buffer(
+def shaded(spheres: Spheres, colors: FloatArray, frame: Frame, azimuth: float) -> Picture:
+    """Lit spheres, seen as in `coverage`: (rows, columns, 4) blue-green-red and opacity.
+
+    Lambert's cosine law, and the depth buffer's unsharp mask (Luft et al., ACM Trans. Graphics 25, 2006) to darken
+    what lies behind its neighbours.
+
+    Parameters
+    ----------
+    spheres, frame, azimuth
+        As in `coverage`.
+    colors : (n, 3) array
+        Blue-green-red of every sphere, 0 to 255.
+    """
+    owner, normal, distance = _depth_buffer(spheres, frame, azimuth)
+    visible = owner >= 0
+    diffuse = np.clip(normal @ (LIGHT / np.linalg.norm(LIGHT)), 0.0, None)
+    light = AMBIENT + (1.0 - AMBIENT) * diffuse
+    behind = np.where(visible, distance, distance[visible].max() if visible.any() else 0.0)
+    reach = 3.0 * float(np.median(spheres.radii)) * SHADING_SUPERSAMPLING / frame.meters_per_pixel
+    recess = (behind - cv2.GaussianBlur(behind, (0, 0), reach)) / reach
+    light *= 1.0 - CAVITY_SHADING * np.clip(recess, 0.0, 1.0)
+    layer = np.zeros((*owner.shape, 4))
+    layer[visible, :3] = colors[owner[visible]] * light[visible, None] * BRIGHTNESS
+    layer[visible, 3] = 255.0
+    small = cv2.resize(layer, frame.shape[::-1], interpolation=cv2.INTER_AREA)
+    opacity = small[:, :, 3:] / 255.0
+    small[:, :, :3] = np.divide(
+        small[:, :, :3], opacity, out=np.zeros_like(small[:, :, :3]), where=opacity > 0
+    )
+    return np.rint(np.clip(small, 0.0, 255.0)).astype(np.uint8)
+
+
+def _depth_buffer(
     spheres: Spheres, frame: Frame, azimuth: float
 ) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
-    """Nearest sphere of every fine pixel (-1: none), its surface normal (rows, columns, 3) and distance [m].
+    """Nearest sphere of every fine pixel (-1: none), its normal (rows, columns, 3) and distance [fine pixels].
 
-    The normal is in the camera's frame (right, away, up). The image is `SHADING_SUPERSAMPLING` times finer than the frame.
+    The normal is in the camera's frame: right, away, up.
     """
     right, up, radii = _pixel_positions(spheres, frame, azimuth, SHADING_SUPERSAMPLING)
     away = spheres.seen_from(azimuth)[:, 1] * SHADING_SUPERSAMPLING / frame.meters_per_pixel
-    rows, columns = (SHADING_SUPERSAMPLING * size for size in frame.shape)
-    nearest = np.full(rows * columns, np.inf)
-    owner = np.full(rows * columns, -1, dtype=np.int64)
+    shape = (SHADING_SUPERSAMPLING * frame.shape[0], SHADING_SUPERSAMPLING * frame.shape[1])
+    nearest = np.full(shape[0] * shape[1], np.inf)
+    owner = np.full(shape[0] * shape[1], -1, dtype=np.int64)
     for chunk in _chunks(radii):
-        pixel, sphere, distance = _fragments(chunk, right, up, away, radii, (rows, columns))
-        before = nearest.copy()
+        pixel, sphere, distance = _fragments(chunk, right, up, away, radii, shape)
+        before = nearest[pixel]
         np.minimum.at(nearest, pixel, distance)
-        wins = (distance == nearest[pixel]) & (distance < before[pixel])
+        wins = (distance == nearest[pixel]) & (distance < before)
         owner[pixel[wins]] = sphere[wins]
-    normal = _normals(owner.reshape(rows, columns), right, up, radii)
-    scale = frame.meters_per_pixel / SHADING_SUPERSAMPLING
-    return owner.reshape(rows, columns), normal, (nearest * scale).reshape(rows, columns)
+    owner = owner.reshape(shape)
+    return owner, _normals(owner, right, up, radii), nearest.reshape(shape)
 
 
 def _pixel_positions(

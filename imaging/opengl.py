@@ -1,0 +1,149 @@
+"""Spheres to pixels with pyvista (VTK), off screen: without a display, and without a word on stderr."""
+
+from __future__ import annotations
+
+import functools
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+import cv2
+import numpy as np
+
+from imaging.errors import PictureError
+from imaging.geometry import FloatArray, Frame, Picture, Spheres
+
+if TYPE_CHECKING:
+    import pyvista
+
+SUPERSAMPLING = 3
+"""Drawn this many times finer than the picture, then averaged."""
+SECTORS, RINGS = 24, 5
+"""Facets of a sphere: round the line of sight, and from its rim to its middle."""
+LIGHT_POSITION = (-0.45, 0.61, 0.65)
+"""Where the light comes from, as VTK counts for a headlight: right, up, towards the camera."""
+QUIET_ENVIRONMENT = {"VTK_DEFAULT_OPENGL_WINDOW": "vtkEGLRenderWindow", "EGL_LOG_LEVEL": "fatal"}
+"""On Linux VTK otherwise asks an X server first, and complains on stderr where there is none."""
+PROBE = """
+import vtkmodules.vtkRenderingOpenGL2
+from vtkmodules.vtkRenderingCore import vtkRenderer, vtkRenderWindow
+window = vtkRenderWindow()
+window.OffScreenRenderingOn()
+window.AddRenderer(vtkRenderer())
+window.Render()
+raise SystemExit(0 if window.SupportsOpenGL() else 1)
+"""
+
+
+@functools.cache
+def opengl_works() -> bool:
+    """Whether VTK can draw on this machine.
+
+    Tried once, in a child process: without a driver VTK does not raise an error, it ends the process.
+    """
+    environment = os.environ | QUIET_ENVIRONMENT
+    probe = subprocess.run([sys.executable, "-c", PROBE], capture_output=True, check=False, env=environment)
+    return probe.returncode == 0
+
+
+def coverage(spheres: Spheres, frame: Frame, azimuth: float) -> Picture:
+    """Share of each pixel that the spheres cover, 0 to 255: as `raster.coverage`, with pyvista."""
+    return shaded(spheres, np.zeros((len(spheres.radii), 3)), frame, azimuth)[:, :, 3]
+
+
+def shaded(spheres: Spheres, colors: FloatArray, frame: Frame, azimuth: float) -> Picture:
+    """Lit spheres, (rows, columns, 4) blue-green-red and opacity: as `raster.shaded`, with pyvista."""
+    if not opengl_works():
+        raise PictureError("VTK can draw off screen (EGL or OSMesa)", "no OpenGL driver", "backend 'pyvista'")
+    import pyvista
+
+    rows, columns = frame.shape
+    with _quiet_environment():
+        plotter = pyvista.Plotter(
+            off_screen=True, window_size=[SUPERSAMPLING * columns, SUPERSAMPLING * rows], lighting="none"
+        )
+        plotter.add_mesh(
+            _sphere_mesh(spheres, colors, azimuth),
+            scalars="color",
+            rgb=True,
+            smooth_shading=False,
+            ambient=0.35,
+        )
+        plotter.add_light(pyvista.Light(position=LIGHT_POSITION, light_type="camera light", intensity=1.1))
+        _aim(plotter, frame)
+        picture = plotter.screenshot(return_img=True, transparent_background=True)
+        plotter.close()
+    return _reduced(np.asarray(picture), frame.shape)
+
+
+@contextmanager
+def _quiet_environment() -> Iterator[None]:
+    before = {name: os.environ.get(name) for name in QUIET_ENVIRONMENT}
+    os.environ.update(QUIET_ENVIRONMENT)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+
+
+def _aim(plotter: pyvista.Plotter, frame: Frame) -> None:
+    """Look along +y at the frame's middle, without perspective."""
+    rows = frame.shape[0]
+    middle = (frame.ground_rows - 0.5 * rows) * frame.meters_per_pixel
+    distance = 4.0 * frame.half_width
+    plotter.camera.focal_point = (0.0, 0.0, middle)
+    plotter.camera.position = (0.0, -distance, middle)
+    plotter.camera.up = (0.0, 0.0, 1.0)
+    plotter.enable_parallel_projection()
+    plotter.camera.parallel_scale = 0.5 * rows * frame.meters_per_pixel
+    plotter.camera.clipping_range = (0.5 * distance, 1.5 * distance)
+
+
+def _sphere_mesh(spheres: Spheres, colors: FloatArray, azimuth: float) -> pyvista.PolyData:
+    """The near half of every sphere, in the camera's frame, with smooth normals."""
+    import pyvista
+
+    unit, triangles = _hemisphere()
+    count = len(spheres.radii)
+    points = spheres.seen_from(azimuth)[:, None] + spheres.radii[:, None, None] * unit
+    corners = triangles + len(unit) * np.arange(count)[:, None, None]
+    mesh = pyvista.PolyData.from_regular_faces(points.reshape(-1, 3), corners.reshape(-1, 3))
+    mesh.point_data.active_normals = np.tile(unit / np.linalg.norm(unit, axis=1, keepdims=True), (count, 1))
+    mesh["color"] = np.repeat(np.rint(colors[:, ::-1]).astype(np.uint8), len(unit), axis=0)
+    return mesh
+
+
+def _hemisphere() -> tuple[FloatArray, np.ndarray]:
+    """Points and triangles of the half sphere towards -y; its rim is a polygon with the area of the circle."""
+    step = 2.0 * np.pi / SECTORS
+    rim = np.sqrt(step / np.sin(step))
+    tilt, turn = np.meshgrid(
+        np.linspace(0.5 * np.pi, 0.0, RINGS + 1), step * np.arange(SECTORS), indexing="ij"
+    )
+    unit = np.stack(
+        [rim * np.sin(tilt) * np.cos(turn), -np.cos(tilt), rim * np.sin(tilt) * np.sin(turn)], axis=-1
+    )
+    ring, sector = np.mgrid[0:RINGS, 0:SECTORS]
+    here, beside = ring * SECTORS + sector, ring * SECTORS + (sector + 1) % SECTORS
+    lower = np.stack([here, beside, beside + SECTORS], axis=-1)
+    upper = np.stack([here, beside + SECTORS, here + SECTORS], axis=-1)
+    return unit.reshape(-1, 3), np.concatenate([lower.reshape(-1, 3), upper.reshape(-1, 3)])
+
+
+def _reduced(picture: np.ndarray, shape: tuple[int, int]) -> Picture:
+    """Average of the fine pixels: red-green-blue-opacity in, blue-green-red and opacity out."""
+    layer = picture[:, :, [2, 1, 0, 3]].astype(np.float32)
+    layer[:, :, :3] *= layer[:, :, 3:] / 255.0
+    small = cv2.resize(layer, shape[::-1], interpolation=cv2.INTER_AREA)
+    opacity = small[:, :, 3:] / 255.0
+    small[:, :, :3] = np.divide(
+        small[:, :, :3], opacity, out=np.zeros_like(small[:, :, :3]), where=opacity > 0
+    )
+    return np.rint(small).astype(np.uint8)
