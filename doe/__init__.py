@@ -1,0 +1,53 @@
+"""Designs of experiments and their analysis: screening, climbing, response surfaces, comparison of means."""
+
+from doe.anova import ErrorTerm, pure_error
+from doe.central_composite import central_composite
+from doe.compare import Comparison, Sample, compare_means
+from doe.design import Design
+from doe.errors import DesignError, TargetError
+from doe.factors import Factor
+from doe.noise import (
+    NoiseFloor,
+    VarianceRatio,
+    curvature_test,
+    detectable_effect,
+    effect_power,
+    noise_floor,
+    variance_ratio,
+)
+from doe.optimum import Region, StationaryPoint
+from doe.plackett_burman import plackett_burman
+from doe.screening import ScreenResult, aliases, screen
+from doe.steepest import ClimbPath, climb_table, steepest_path
+from doe.surface import Surface, fit_surface
+
+__all__ = [
+    "ClimbPath",
+    "Comparison",
+    "Design",
+    "DesignError",
+    "ErrorTerm",
+    "Factor",
+    "NoiseFloor",
+    "Region",
+    "Sample",
+    "ScreenResult",
+    "StationaryPoint",
+    "Surface",
+    "TargetError",
+    "VarianceRatio",
+    "aliases",
+    "central_composite",
+    "climb_table",
+    "compare_means",
+    "curvature_test",
+    "detectable_effect",
+    "effect_power",
+    "fit_surface",
+    "noise_floor",
+    "plackett_burman",
+    "pure_error",
+    "screen",
+    "steepest_path",
+    "variance_ratio",
+]

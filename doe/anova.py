@@ -1,0 +1,144 @@
+"""Least squares of a design's terms and the analysis of variance made from it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+import statsmodels.api as sm
+from scipy import stats
+from statsmodels.regression.linear_model import RegressionResults
+
+from doe.errors import DesignError
+
+ALIAS_TOLERANCE = 1e-8
+"""Length of what a column adds to those before it, relative to its own, below which it adds nothing."""
+
+SAME_SETTING_DECIMALS = 9
+"""Runs whose coded settings agree to so many decimals are replicates of one setting."""
+
+COLUMNS = ("df", "sum_sq", "mean_sq", "F", "p")
+
+
+@dataclass(frozen=True)
+class ErrorTerm:
+    """A sum of squares that estimates an error, with its degrees of freedom."""
+
+    df: float
+    sum_sq: float
+
+    @property
+    def mean_sq(self) -> float:
+        """Mean square; NaN without degrees of freedom."""
+        return self.sum_sq / self.df if self.df > 0 else np.nan
+
+
+def least_squares(matrix: pd.DataFrame, response: pd.Series) -> RegressionResults:
+    """Return the statsmodels fit of the response on the columns of a model matrix.
+
+    Raises
+    ------
+    DesignError
+        Fewer observations than columns, or columns that are combinations of others (all are named).
+    """
+    if len(matrix) < matrix.shape[1]:
+        raise DesignError(
+            f"too few runs for the terms: {matrix.shape[1]} coefficients ({', '.join(matrix.columns)}) "
+            f"from {len(matrix)} observations"
+        )
+    aliased = _aliased_columns(matrix)
+    if aliased:
+        raise DesignError(f"the design cannot tell these terms apart: {'; '.join(aliased)}")
+    with np.errstate(divide="ignore", invalid="ignore"):  # a saturated fit has no residual variance
+        return sm.OLS(response.to_numpy(), matrix).fit()
+
+
+def pure_error(coded: pd.DataFrame, response: pd.Series) -> ErrorTerm:
+    """Return the spread of replicates about the mean of their setting.
+
+    Rows of ``coded`` that agree are replicates of one setting; the degrees of freedom are the observations less
+    the distinct settings.
+    """
+    setting = settings_of(coded)
+    within = response.to_numpy() - response.groupby(setting).transform("mean").to_numpy()
+    return ErrorTerm(float(len(response) - len(np.unique(setting))), float(within @ within))
+
+
+def settings_of(coded: pd.DataFrame) -> np.ndarray:
+    """Return for every row the number of its setting: rows that agree share it."""
+    # Adding zero makes -0.0 (from rounding) the same setting as 0.0.
+    return (
+        coded.round(SAME_SETTING_DECIMALS)
+        .add(0.0)
+        .groupby(list(coded.columns), sort=False)
+        .ngroup()
+        .to_numpy()
+    )
+
+
+def partial_sums(fit: RegressionResults) -> pd.Series:
+    """Return what each column explains beyond all others: b^2 over its diagonal element of (X'X)^-1."""
+    return fit.params**2 / np.diag(fit.normalized_cov_params)
+
+
+def f_ratio(effect: ErrorTerm, error: ErrorTerm) -> tuple[float, float]:
+    """Return F and its p value; NaN where a mean square is missing or both are zero."""
+    if not effect.df > 0 or not error.df > 0 or (effect.mean_sq == 0.0 and error.mean_sq == 0.0):
+        return np.nan, np.nan
+    ratio = effect.mean_sq / error.mean_sq if error.mean_sq > 0.0 else np.inf
+    return ratio, float(stats.f.sf(ratio, effect.df, error.df))
+
+
+def anova_table(
+    fit: RegressionResults, replicates: ErrorTerm, error: ErrorTerm | None = None
+) -> pd.DataFrame:
+    """Return the analysis of variance of a fit whose first column is the intercept.
+
+    Rows: model, every term (partial sum of squares: types II and III of a hierarchical model in coded units),
+    residual, lack of fit (residual less pure error, tested against pure error), pure error, total (about the
+    mean). Columns: df, sum_sq, mean_sq, F, p; NaN where a row has none.
+
+    Parameters
+    ----------
+    fit : statsmodels results
+    replicates : ErrorTerm
+        Pure error, from ``pure_error``.
+    error : ErrorTerm, optional
+        What model and terms are tested against; default the residual.
+    """
+    residual = ErrorTerm(float(fit.df_resid), float(fit.ssr))
+    error = residual if error is None else error
+    lack_df = residual.df - replicates.df
+    lack = ErrorTerm(lack_df, max(residual.sum_sq - replicates.sum_sq, 0.0) if lack_df > 0 else 0.0)
+    rows = {"model": (ErrorTerm(float(fit.df_model), float(fit.ess)), error)}
+    for name, sum_sq in partial_sums(fit).iloc[1:].items():
+        rows[str(name)] = (ErrorTerm(1.0, sum_sq), error)
+    none = ErrorTerm(0.0, 0.0)
+    rows |= {
+        "residual": (residual, none),
+        "lack of fit": (lack, replicates),
+        "pure error": (replicates, none),
+    }
+    rows["total"] = (ErrorTerm(float(fit.nobs - 1), float(fit.centered_tss)), none)
+    table = {
+        name: (row.df, row.sum_sq, row.mean_sq, *f_ratio(row, against))
+        for name, (row, against) in rows.items()
+    }
+    table["total"] = (*table["total"][:2], np.nan, np.nan, np.nan)
+    return pd.DataFrame.from_dict(table, orient="index", columns=list(COLUMNS)).rename_axis("source")
+
+
+def _aliased_columns(matrix: pd.DataFrame) -> Sequence[str]:
+    """Return a description of each column that is a combination of those before it."""
+    values, names = matrix.to_numpy(), list(matrix.columns)
+    described = []
+    for position in range(1, len(names)):
+        before, column = values[:, :position], values[:, position]
+        weights = np.linalg.lstsq(before, column, rcond=None)[0]
+        if np.linalg.norm(column - before @ weights) > ALIAS_TOLERANCE * np.sqrt(len(column)):
+            continue
+        partners = [name for name, w in zip(names, weights, strict=False) if abs(w) > ALIAS_TOLERANCE]
+        described.append(
+            f"{names[position]} with {' + '.join(partners) or 'nothing: it is zero in every run'}"
+        )
+    return described

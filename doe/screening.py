@@ -1,0 +1,192 @@
+"""Screening: effects of two-level factors, tested against dummies, replicates or Lenth's pseudo error."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
+from scipy import stats
+from statsmodels.regression.linear_model import RegressionResults
+
+from doe.anova import ErrorTerm, anova_table, least_squares, partial_sums, pure_error
+from doe.design import Design, observations
+from doe.errors import DesignError
+from doe.terms import Term, find_term, model_matrix, model_terms, natural_coefficients, term_name
+
+ERRORS = ("pooled", "dummies", "pure", "lenth")
+
+
+@dataclass(frozen=True, eq=False)
+class ScreenResult:
+    """Effects of a screening design and their tests; made by ``screen``."""
+
+    design: Design
+    response: pd.Series
+    """One row an observation, labelled by its run."""
+    fit: RegressionResults
+    """Least squares of the response on the intercept and every factor (dummies are left to the error)."""
+    pure_error: ErrorTerm
+    error: ErrorTerm
+    """What the effects are tested against, by the rule ``error_rule``."""
+    error_rule: str
+
+    @property
+    def error_df(self) -> float:
+        """Degrees of freedom of the error."""
+        return self.error.df
+
+    @property
+    def error_ms(self) -> float:
+        """Mean square of the error."""
+        return self.error.mean_sq
+
+    @property
+    def standard_error(self) -> pd.Series:
+        """Standard error of each factor's effect."""
+        variances = np.diag(self.fit.normalized_cov_params)[1:]
+        return pd.Series(2.0 * np.sqrt(self.error_ms * variances), index=self.design.names)
+
+    @property
+    def coded_coefficients(self) -> pd.Series:
+        """Intercept and half effects: the first-order model in coded units."""
+        return self.fit.params.copy()
+
+    @property
+    def coefficients(self) -> pd.Series:
+        """The first-order model in natural units."""
+        terms: list[Term] = [(), *model_terms(self.design.names, "first-order")]
+        coded = dict(zip(terms, self.fit.params, strict=True))
+        natural = natural_coefficients(coded, self.design.factors)
+        return pd.Series({term_name(term): value for term, value in natural.items()})
+
+    @cached_property
+    def effects(self) -> pd.Series:
+        """Effects of every column, dummies included where the runs allow (all of them in a complete design)."""
+        return _all_effects(self.design, self.response)
+
+    @cached_property
+    def table(self) -> pd.DataFrame:
+        """Tests by factor: effect, sum_sq, F, t, p, percent (of the total sum of squares), rank (1 is largest)."""
+        sums = partial_sums(self.fit).iloc[1:]
+        effect = 2.0 * self.fit.params.iloc[1:]
+        t = effect / self.standard_error
+        table = pd.DataFrame(
+            {
+                "effect": effect,
+                "sum_sq": sums,
+                "F": t**2,
+                "t": t,
+                "p": 2.0 * stats.t.sf(t.abs(), self.error_df),
+                "percent": 100.0 * sums / self.fit.centered_tss,
+                "rank": sums.rank(ascending=False, method="first").astype(int),
+            }
+        )
+        return table.rename_axis("factor")
+
+    @cached_property
+    def anova(self) -> pd.DataFrame:
+        """Analysis of variance by source; model and factors are tested against the chosen error."""
+        return anova_table(self.fit, self.pure_error, self.error)
+
+    def critical_t(self, alpha: float = 0.05, bonferroni: bool = False) -> float:
+        """Return the absolute t above which an effect is significant at a two-sided level.
+
+        With ``bonferroni`` the level is shared among all columns of the design, dummies included.
+        """
+        shared = alpha / self.design.coded.shape[1] if bonferroni else alpha
+        return float(stats.t.isf(0.5 * shared, self.error_df))
+
+    def significant(self, alpha: float = 0.05) -> list[str]:
+        """Return the factors with p below alpha, largest effect first."""
+        return list(self.table[self.table["p"] < alpha].sort_values("rank").index)
+
+
+def screen(design: Design, response: ArrayLike, error: str = "pooled") -> ScreenResult:
+    """Estimate every factor's effect (mean at +1 less mean at -1) and test it.
+
+    Parameters
+    ----------
+    design : Design
+        Two-level; runs may be missing (``Design.select``): least squares then replaces the plain contrasts.
+    response : array-like, shape (runs,) or (runs, replicates)
+    error : {"pooled", "dummies", "pure", "lenth"}
+        What the effects are tested against. ``"pooled"``: all that the factors leave unexplained, dummy columns
+        and replicates together; ``"dummies"``: the columns without factor alone, which hold interactions too (the
+        careful choice with replicates); ``"pure"``: the replicates alone; ``"lenth"``: Lenth's pseudo standard
+        error (Technometrics 31, 1989, p. 469), for a design without dummies and replicates in which few effects
+        are active.
+
+    Raises
+    ------
+    DesignError
+        A response that is not finite, terms that the runs cannot tell apart, or no degrees of freedom for the
+        error that was asked for.
+    """
+    if error not in ERRORS:
+        raise DesignError(f"error is one of {', '.join(ERRORS)}, received {error!r}")
+    coded, values = observations(design, response)
+    fit = least_squares(model_matrix(coded, model_terms(design.names, "first-order")), values)
+    replicates = pure_error(coded, values)
+    chosen = _error_term(design, values, fit, replicates, error)
+    return ScreenResult(design, values, fit, replicates, chosen, error)
+
+
+def aliases(design: Design, interaction: str) -> pd.Series:
+    """Return how an interaction that is not fitted biases each column's coefficient.
+
+    The alias matrix (X'X)^-1 X'z of the product column z, for the intercept, every factor and every dummy:
+    +1/3 means that a third of the interaction is added to that coefficient.
+    """
+    product_of = find_term(interaction, _interactions(design))
+    columns = model_matrix(design.coded, [(name,) for name in design.coded.columns])
+    product = design.coded[list(product_of)].prod(axis=1)
+    weights = np.linalg.lstsq(columns.to_numpy(), product.to_numpy(), rcond=None)[0]
+    return pd.Series(weights, index=columns.columns, name=term_name(product_of))
+
+
+def _interactions(design: Design) -> list[Term]:
+    return [term for term in model_terms(design.names, "interaction") if len(term) == 2]
+
+
+def _error_term(
+    design: Design, response: pd.Series, fit: RegressionResults, replicates: ErrorTerm, rule: str
+) -> ErrorTerm:
+    """Return the error that a rule chooses; raise DesignError when it has no degrees of freedom."""
+    residual = ErrorTerm(float(fit.df_resid), float(fit.ssr))
+    if rule == "lenth":
+        return _lenth_error(_all_effects(design, response), len(response))
+    chosen = {
+        "pooled": residual,
+        "dummies": ErrorTerm(residual.df - replicates.df, residual.sum_sq - replicates.sum_sq),
+        "pure": replicates,
+    }[rule]
+    if chosen.df <= 0:
+        raise DesignError(
+            f"no degrees of freedom for the error {rule!r}: {len(response)} observations of {len(design.names)} "
+            f"factors, {len(design.dummies)} dummies, {replicates.df:.0f} degrees of freedom from replicates; "
+            "use a larger design (its spare columns are dummies), replicate the runs, or choose error='lenth'"
+        )
+    return chosen
+
+
+def _all_effects(design: Design, response: pd.Series) -> pd.Series:
+    """Return effects of factors and dummies; of the factors alone when too few runs are left for all columns."""
+    coded = design.coded.loc[response.index]
+    columns = list(coded.columns)
+    matrix = np.column_stack([np.ones(len(coded)), coded.to_numpy()])
+    if np.linalg.matrix_rank(matrix) < matrix.shape[1]:
+        columns = design.names
+        matrix = matrix[:, : len(columns) + 1]
+    return pd.Series(2.0 * np.linalg.lstsq(matrix, response.to_numpy(), rcond=None)[0][1:], index=columns)
+
+
+def _lenth_error(effects: pd.Series, observation_count: int) -> ErrorTerm:
+    """Return Lenth's error: degrees of freedom m / 3; a mean square that gives effects their pseudo error."""
+    size = effects.abs()
+    first_guess = 1.5 * size.median()
+    pseudo_error = 1.5 * size[size < 2.5 * first_guess].median()
+    if not pseudo_error > 0.0:
+        raise DesignError("Lenth's error needs effects that are not zero: more than half of them are")
+    df = len(effects) / 3.0
+    return ErrorTerm(df, df * pseudo_error**2 * observation_count / 4.0)

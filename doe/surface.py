@@ -1,0 +1,268 @@
+"""Response surfaces: polynomial fits of a designed experiment, their quality and their predictions."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+from scipy import stats
+from statsmodels.regression.linear_model import RegressionResults
+
+from doe import optimum
+from doe.anova import ErrorTerm, anova_table, least_squares, partial_sums, pure_error
+from doe.compare import Sample
+from doe.design import Design, observations
+from doe.errors import DesignError
+from doe.factors import coded_points
+from doe.terms import (
+    INTERCEPT,
+    Term,
+    contains,
+    equation_text,
+    find_term,
+    model_matrix,
+    model_terms,
+    natural_coefficients,
+    term_name,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """A polynomial fitted to a design's response; made by ``fit_surface``.
+
+    Terms are written "E", "E:F" and "E^2". The model is hierarchical: a term stays while a multiple of it is in.
+    """
+
+    design: Design
+    points: pd.DataFrame
+    """Coded settings, one row an observation."""
+    response: pd.Series
+    """One row an observation, labelled by its run."""
+    terms: tuple[Term, ...]
+    dropped: tuple[str, ...] = ()
+    """Terms that were taken out, in that order."""
+
+    def __post_init__(self) -> None:
+        if len(self.points) <= len(self.terms) + 1:
+            raise DesignError(
+                f"too few runs for the terms: {len(self.points)} observations leave no residual for "
+                f"intercept, {', '.join(map(term_name, self.terms))}"
+            )
+        self.fit  # noqa: B018  (columns that cannot be told apart are an error now, not at the first use)
+
+    @cached_property
+    def fit(self) -> RegressionResults:
+        """The statsmodels least squares fit in coded units."""
+        return least_squares(model_matrix(self.points, self.terms), self.response)
+
+    @cached_property
+    def pure_error(self) -> ErrorTerm:
+        """Spread of the replicated settings."""
+        return pure_error(self.points, self.response)
+
+    @cached_property
+    def anova(self) -> pd.DataFrame:
+        """Analysis of variance by source (see ``doe.anova.anova_table``)."""
+        return anova_table(self.fit, self.pure_error)
+
+    @property
+    def coded_coefficients(self) -> pd.Series:
+        """Coefficients by term, in coded units."""
+        return self.fit.params.copy()
+
+    @cached_property
+    def coefficients(self) -> pd.Series:
+        """Coefficients by term, in natural units."""
+        coded = dict(zip((INTERCEPT, *self.terms), self.fit.params, strict=True))
+        natural = natural_coefficients(coded, self.design.factors)
+        return pd.Series({term_name(term): value for term, value in natural.items()})
+
+    def equation(self, units: str = "natural", digits: int = 6) -> str:
+        """Return the fitted polynomial as text, in natural or coded units."""
+        if units not in ("natural", "coded"):
+            raise DesignError(f"units is natural or coded, received {units!r}")
+        coefficients = self.coefficients if units == "natural" else self.coded_coefficients
+        return equation_text(coefficients.to_dict(), digits)
+
+    @property
+    def residual_df(self) -> float:
+        """Degrees of freedom of the residual."""
+        return float(self.fit.df_resid)
+
+    @property
+    def residual_ms(self) -> float:
+        """Mean square of the residual."""
+        return float(self.fit.mse_resid)
+
+    @property
+    def fitted(self) -> pd.Series:
+        """Fitted response of every observation."""
+        return pd.Series(self.fit.fittedvalues.to_numpy(), index=self.response.index, name="fitted")
+
+    @property
+    def residuals(self) -> pd.Series:
+        """Response less fitted response."""
+        return (self.response - self.fitted).rename("residual")
+
+    @cached_property
+    def leverage(self) -> pd.Series:
+        """Diagonal of the hat matrix: how far each observation draws its own fit."""
+        matrix = self.fit.model.exog
+        hat = np.einsum("ij,jk,ik->i", matrix, self.fit.normalized_cov_params, matrix)
+        return pd.Series(hat, index=self.response.index, name="leverage")
+
+    @property
+    def studentized_residuals(self) -> pd.Series:
+        """Residuals over their standard errors (internally studentized); NaN where the leverage is 1."""
+        spread = np.sqrt(self.residual_ms * (1.0 - self.leverage).clip(lower=0.0))
+        return (self.residuals / spread.where(spread > 0.0)).rename("studentized residual")
+
+    @property
+    def r2(self) -> float:
+        """Share of the sum of squares about the mean that the model explains."""
+        return float(self.fit.rsquared)
+
+    @property
+    def r2_adjusted(self) -> float:
+        """R2 with both variances by their degrees of freedom."""
+        return float(self.fit.rsquared_adj)
+
+    @property
+    def press(self) -> float:
+        """Sum of squared errors when each observation is predicted from all others; infinite at leverage 1."""
+        left = (1.0 - self.leverage).to_numpy()
+        if np.any(left < 1e-12):
+            return np.inf
+        return float(np.sum((self.residuals.to_numpy() / left) ** 2))
+
+    @property
+    def r2_predicted(self) -> float:
+        """R2 of predictions that leave the predicted observation out (from ``press``)."""
+        return float(1.0 - self.press / self.fit.centered_tss)
+
+    @property
+    def cv_percent(self) -> float:
+        """Coefficient of variation: residual standard deviation in percent of the mean response."""
+        return float(100.0 * np.sqrt(self.residual_ms) / self.response.mean())
+
+    @property
+    def adequate_precision(self) -> float:
+        """Range of the fitted responses over their mean standard error (Box and Draper); above 4 is wanted."""
+        mean_variance = len(self.fit.params) * self.residual_ms / len(self.response)
+        return float((self.fitted.max() - self.fitted.min()) / np.sqrt(mean_variance))
+
+    def drop(self, *names: str) -> "Surface":
+        """Return the refit without these terms; raise DesignError when one is part of a term that stays."""
+        out = [find_term(name, self.terms) for name in names]
+        kept = tuple(term for term in self.terms if term not in out)
+        for term in out:
+            multiples = [term_name(other) for other in kept if contains(other, term)]
+            if multiples:
+                raise DesignError(
+                    f"the model stays hierarchical: {term_name(term)} cannot go while {', '.join(multiples)} stays"
+                )
+        return replace(self, terms=kept, dropped=(*self.dropped, *map(term_name, out)))
+
+    def reduce(self, alpha: float = 0.05) -> "Surface":
+        """Return the model after hierarchical backward elimination.
+
+        Again and again the least significant term goes, among those with p above alpha that are part of no other.
+        """
+        surface = self
+        while True:
+            p = surface.anova["p"]
+            free = [t for t in surface.terms if not any(contains(other, t) for other in surface.terms)]
+            weakest = max(free, key=lambda term: p[term_name(term)], default=None)
+            if weakest is None or not p[term_name(weakest)] > alpha:
+                return surface
+            surface = surface.drop(term_name(weakest))
+
+    def evaluate(self, coded: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return fitted mean and its standard error at coded points, shape (points, factors)."""
+        table = pd.DataFrame(np.atleast_2d(np.asarray(coded, dtype=np.float64)), columns=self.design.names)
+        matrix = model_matrix(table, self.terms).to_numpy()
+        variance = np.einsum("ij,jk,ik->i", matrix, self.fit.cov_params().to_numpy(), matrix)
+        return matrix @ self.fit.params.to_numpy(), np.sqrt(variance)
+
+    def predict(
+        self, points: pd.DataFrame | Mapping[str, float], alpha: float = 0.05, coded: bool = False
+    ) -> pd.DataFrame:
+        """Predict the response.
+
+        Parameters
+        ----------
+        points : DataFrame with a column for each factor, or one point as a mapping
+            In natural units (``coded``: in coded ones).
+        alpha : float
+            The intervals hold with probability 1 - alpha.
+
+        Returns
+        -------
+        DataFrame, index of ``points``
+            mean, se (of the mean), confidence_low, confidence_high (of the mean), prediction_low, prediction_high
+            (of one further observation).
+        """
+        table = points if isinstance(points, pd.DataFrame) else pd.DataFrame([dict(points)])
+        missing = [name for name in self.design.names if name not in table.columns]
+        if missing:
+            raise DesignError(f"no value for factor {missing[0]!r}; the points have {list(table.columns)}")
+        inside = table[self.design.names] if coded else coded_points(self.design.factors, table)
+        mean, se = self.evaluate(inside)
+        t = stats.t.isf(0.5 * alpha, self.residual_df)
+        single = np.sqrt(se**2 + self.residual_ms)
+        columns = {"mean": mean, "se": se, "confidence_low": mean - t * se, "confidence_high": mean + t * se}
+        columns |= {"prediction_low": mean - t * single, "prediction_high": mean + t * single}
+        return pd.DataFrame(columns, index=table.index)
+
+    def contour(self, target: float, extent: float = 1.0, resolution: int | None = None) -> pd.DataFrame:
+        """Return points of the target contour, natural units (see ``doe.optimum.contour``)."""
+        return optimum.contour(self, target, extent, resolution)
+
+    def nearest(self, target: float, to: Mapping[str, float] | None = None, extent: float = 1.0) -> pd.Series:
+        """Return the contour's point nearest to the design center, natural units (see ``doe.optimum.nearest``)."""
+        return optimum.nearest(self, target, to, extent)
+
+    def stationary_point(self) -> optimum.StationaryPoint:
+        """Return where the gradient vanishes, and its kind (see ``doe.optimum.stationary_point``)."""
+        return optimum.stationary_point(self)
+
+    def compatible_region(
+        self,
+        target: float | Sample,
+        target_se: float = 0.0,
+        target_df: float = np.inf,
+        alpha: float = 0.05,
+        extent: float = 1.0,
+        resolution: int | None = None,
+    ) -> optimum.Region:
+        """Return the settings that the target does not contradict (see ``doe.optimum.compatible_region``)."""
+        return optimum.compatible_region(self, target, target_se, target_df, alpha, extent, resolution)
+
+    def band(
+        self, target: float, half_width: float, extent: float = 1.0, resolution: int | None = None
+    ) -> optimum.Region:
+        """Return where the fitted mean lies within target +- half_width (the fit taken as exact)."""
+        return optimum.band(self, target, half_width, extent, resolution)
+
+
+def fit_surface(design: Design, response: ArrayLike, model: str = "quadratic") -> Surface:
+    """Fit a polynomial to a design's response by least squares in coded units.
+
+    Parameters
+    ----------
+    design : Design
+        Dummy columns are not used.
+    response : array-like, shape (runs,) or (runs, replicates)
+    model : {"first-order", "interaction", "quadratic"}
+        Linear terms; with the products of two factors; with the squares too.
+
+    Raises
+    ------
+    DesignError
+        A response that is not finite, too few runs for the terms, or terms that the runs cannot tell apart.
+    """
+    coded, values = observations(design, response)
+    return Surface(design, coded[design.names], values, model_terms(design.names, model))
