@@ -1,0 +1,22 @@
+"""Discrete element simulation of clumped grains on NVIDIA Warp: many worlds in one batch, on a GPU or a CPU."""
+
+from dem_warp.batch import CaseResult, Progress, simulate
+from dem_warp.case import Case, GrainPopulation, Numerics
+from dem_warp.clumps import ClumpShape
+from dem_warp.materials import Interaction, Material, effective_moduli, rayleigh_time
+from dem_warp.scenes.lifted_cylinder import LiftedCylinder
+
+__all__ = [
+    "Case",
+    "CaseResult",
+    "ClumpShape",
+    "GrainPopulation",
+    "Interaction",
+    "LiftedCylinder",
+    "Material",
+    "Numerics",
+    "Progress",
+    "effective_moduli",
+    "rayleigh_time",
+    "simulate",
+]

@@ -1,0 +1,1 @@
+"""Launchable device code, built for one precision and cached."""

@@ -1,0 +1,1 @@
+"""Contact mechanics, one file a mechanism: formula, units and source in each docstring."""

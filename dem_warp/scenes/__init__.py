@@ -1,0 +1,1 @@
+"""Physical tests, one file each."""

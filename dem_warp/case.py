@@ -1,0 +1,149 @@
+"""One simulation: what is simulated (scene, grains, contacts, seed) and how (numerics)."""
+
+from dataclasses import dataclass, field, fields, is_dataclass
+from typing import Any
+
+import numpy as np
+
+from dem_warp.clumps import ClumpShape
+from dem_warp.materials import Interaction, Material, rayleigh_time
+from dem_warp.scenes.lifted_cylinder import LiftedCylinder
+from dem_warp.types import PRECISIONS
+
+SIZE_LIMIT = 3.0
+"""Sizes are drawn within this many standard deviations of their mean."""
+
+
+@dataclass(frozen=True)
+class GrainPopulation:
+    """Grains of one shape and material whose sizes vary.
+
+    Attributes
+    ----------
+    shape : ClumpShape
+    material : Material
+    size_mean, size_sd : float
+        Of the normal distribution of the factor that scales the shape, truncated at +-3 standard deviations.
+    """
+
+    shape: ClumpShape
+    material: Material
+    size_mean: float = 1.0
+    size_sd: float = 0.05
+
+    def __post_init__(self) -> None:
+        _require(self.size_mean > 0, "GrainPopulation.size_mean", "must be positive", self.size_mean)
+        _require(
+            0 <= SIZE_LIMIT * self.size_sd < self.size_mean,
+            "GrainPopulation.size_sd",
+            f"must be at least 0 and below size_mean / {SIZE_LIMIT:g}",
+            self.size_sd,
+        )
+
+    @property
+    def smallest_sphere(self) -> float:
+        """Smallest sphere radius that the population may hold [m]."""
+        return float(self.shape.radii.min()) * (self.size_mean - SIZE_LIMIT * self.size_sd)
+
+    def draw_sizes(self, count: int, rng: np.random.Generator) -> np.ndarray:
+        """Sizes of `count` grains, (count,)."""
+        sizes = rng.normal(size=count)
+        while (wide := np.abs(sizes) > SIZE_LIMIT).any():
+            sizes[wide] = rng.normal(size=int(wide.sum()))
+        return self.size_mean + self.size_sd * sizes
+
+
+@dataclass(frozen=True)
+class Numerics:
+    """How a case is computed.
+
+    Attributes
+    ----------
+    time_step_fraction : float
+        Time step over the Rayleigh time of the smallest sphere; the paper uses 0.25.
+    skin : float, optional
+        Reach of the neighbour lists beyond contact [m]; affects the speed only. By default from the time step.
+    precision : "mixed" or "double"
+    modulus_scale : float
+        The grains' shear modulus is divided by it, for larger time steps; 1 leaves it.
+    clamp_attraction : bool
+        Keep the damping from attracting at the end of an impact.
+    """
+
+    time_step_fraction: float = 0.25
+    skin: float | None = None
+    precision: str = "mixed"
+    modulus_scale: float = 1.0
+    clamp_attraction: bool = False
+
+    def __post_init__(self) -> None:
+        _require(
+            0 < self.time_step_fraction <= 1,
+            "Numerics.time_step_fraction",
+            "must be above 0 and at most 1",
+            self.time_step_fraction,
+        )
+        _require(self.skin is None or self.skin > 0, "Numerics.skin", "must be positive [m]", self.skin)
+        _require(self.modulus_scale >= 1, "Numerics.modulus_scale", "must be at least 1", self.modulus_scale)
+        _require(
+            self.precision in PRECISIONS, "Numerics.precision", f"must be one of {sorted(PRECISIONS)}", self.precision
+        )
+
+
+@dataclass(frozen=True)
+class Case:
+    """One scene with one set of parameters and one seed.
+
+    Attributes
+    ----------
+    scene : LiftedCylinder
+    grains : GrainPopulation
+    grain_grain, grain_wall : Interaction
+    seed : int
+        Of sizes, orientations and places of the grains.
+    numerics : Numerics
+    """
+
+    scene: LiftedCylinder
+    grains: GrainPopulation
+    grain_grain: Interaction
+    grain_wall: Interaction
+    seed: int = 0
+    numerics: Numerics = field(default_factory=Numerics)
+
+    def __post_init__(self) -> None:
+        _require(0 <= self.seed < 2**63, "Case.seed", "must be an integer from 0 to 2^63 - 1", self.seed)
+
+    @property
+    def grain_material(self) -> Material:
+        """The grains' material with the shear modulus that is simulated."""
+        material = self.grains.material
+        return Material(
+            material.density, material.shear_modulus / self.numerics.modulus_scale, material.poisson_ratio
+        )
+
+    @property
+    def time_step(self) -> float:
+        """[s]"""
+        return self.numerics.time_step_fraction * rayleigh_time(self.grains.smallest_sphere, self.grain_material)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything that determines the result, as plain JSON values; the device and the skin do not."""
+        content = _plain(self)
+        del content["numerics"]["skin"]
+        return content
+
+
+def _plain(value: Any) -> Any:
+    if hasattr(value, "to_dict") and not isinstance(value, Case):
+        return value.to_dict()
+    if is_dataclass(value) and not isinstance(value, type):
+        return {f.name: _plain(getattr(value, f.name)) for f in fields(value)}
+    return value
+
+
+def _require(holds: bool, place: str, rule: str, value: Any) -> None:
+    if not holds:
+        raise ValueError(f"{place}: {rule}, got {value!r}")
+
+

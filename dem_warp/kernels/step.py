@@ -1,0 +1,171 @@
+"""The step: contact forces, motion and new sphere positions of every grain of every running world, in one launch."""
+
+import functools
+from types import SimpleNamespace
+
+import warp as wp
+
+from dem_warp.kernels.contacts import contact_functions
+from dem_warp.kernels.integration import integration_functions
+from dem_warp.kernels.packing import packing
+from dem_warp.kernels.summation import WARP, cooperative_sum, serial_sum
+from dem_warp.types import Precision, WorldFlag, device_structs
+
+DIVERGED = wp.constant(int(WorldFlag.DIVERGED))
+LEAVING = -2  # a grain whose spheres have yet to be taken out of both copies of the state
+LATE_REBUILD = wp.constant(int(WorldFlag.LATE_REBUILD))
+
+
+@functools.cache
+def step_kernels(precision: Precision, cooperative: bool) -> SimpleNamespace:
+    """`step`, `remove` and `place_spheres` in one precision, for a GPU warp (`cooperative`) or a single thread."""
+    real, vec3, vec4, quat, sphere = (
+        precision.real, precision.vec3, precision.vec4, precision.quat, precision.sphere,
+    )  # fmt: skip
+    types = device_structs(precision)
+    Model, World, Grains, Neighbours = types.Model, types.World, types.Grains, types.Neighbours  # noqa: N806
+    pack = packing(precision)
+    contacts = contact_functions(precision)
+    motion = integration_functions(precision)
+    sum_contacts = (cooperative_sum if cooperative else serial_sum)(precision)
+    module = wp.get_module(f"dem_warp_step_{precision.name}_{'warp' if cooperative else 'serial'}")
+    wp.set_module_options({"fast_math": cooperative and precision.is_fixed_point, "enable_backward": False}, module)
+
+    @wp.func
+    def spread_spheres(
+        model: Model, world: World, out: Grains, g: int, center: sphere, q: quat, lane: int, lanes: int
+    ):
+        """Sphere positions of a grain from its centre and orientation, a sphere a lane."""
+        size = pack.last(center)
+        shape = model.shape[g]
+        for i in range(lane, model.shape_sphere_count[shape], lanes):
+            local = model.shape_spheres[shape * model.sphere_count + i] * size
+            offset = wp.quat_rotate(q, vec3(local[0], local[1], local[2]))
+            pack.store_sphere(
+                out.spheres, g * model.sphere_count + i, pack.pack_offset(center, offset, local[3], world)
+            )
+
+    @wp.func
+    def clear_spheres(model: Model, out: Grains, g: int):
+        """Takes a grain's spheres out: compared with a radius that is not a number, nothing touches."""
+        for i in range(model.sphere_count):
+            none = pack.load_sphere(out.spheres, g * model.sphere_count + i)
+            none[3] = pack.no_radius()
+            pack.store_sphere(out.spheres, g * model.sphere_count + i, none)
+
+    @wp.func
+    def left_domain(world: World, position: wp.vec3d) -> bool:
+        d = position - world.origin
+        h = world.half_extent
+        return not (wp.abs(d[0]) < h[0] and wp.abs(d[1]) < h[1] and wp.abs(d[2]) < h[2])
+
+    @wp.func
+    def move(
+        model: Model, world: World, grains: Grains, out: Grains, hood: Neighbours, alive: wp.array(dtype=int),
+        flags: wp.array(dtype=int), w: int, g: int, step: int, force: vec3, torque: vec3, rolling: real,
+        lane: int, lanes: int,
+    ):  # fmt: skip
+        """New pose, velocity, spin and spheres of a grain; every lane works it out, the first one stores it."""
+        dt = world.time_step
+        v4 = pack.load_vec4(grains.velocity, g)
+        w4 = pack.load_vec4(grains.spin, g)
+        velocity = vec3(v4[0], v4[1], v4[2])
+        spin = vec3(w4[0], w4[1], w4[2])
+        turned = grains.orientation[g]
+        inertia = model.inertia[g]
+        if step >= model.release_step[g]:
+            velocity += (force / v4[3] + world.gravity) * dt
+            turned, spin = motion.turn(
+                turned, spin, torque, vec3(inertia[0], inertia[1], inertia[2]), rolling, dt
+            )
+        position = grains.position[g] + wp.vec3d(
+            wp.float64(velocity[0] * dt), wp.float64(velocity[1] * dt), wp.float64(velocity[2] * dt)
+        )
+        center = pack.pack(position, pack.last(pack.load_sphere(grains.center, g)), world)
+        speed = wp.length(velocity) + wp.length(spin) * inertia[3]
+        if lane == 0:
+            out.position[g] = position
+            out.orientation[g] = turned
+            pack.store_vec4(out.velocity, g, vec4(velocity[0], velocity[1], velocity[2], v4[3]))
+            pack.store_vec4(out.spin, g, vec4(spin[0], spin[1], spin[2], real(0.0)))
+            pack.store_sphere(out.center, g, center)
+            travel = hood.travel[g] + speed * dt
+            hood.travel[g] = travel
+            if not (speed < world.speed_limit):
+                wp.atomic_or(flags, w, DIVERGED)
+            elif real(2.0) * travel > world.skin:
+                wp.atomic_or(flags, w, LATE_REBUILD)
+            if left_domain(world, position):
+                alive[g] = LEAVING
+        spread_spheres(model, world, out, g, center, motion.rounded(turned), lane, lanes)
+
+    @wp.kernel(module=module, grid_stride=False)
+    def step(
+        lanes: int,
+        slot_count: int,
+        # model
+        model: Model,
+        # state in
+        running: wp.array(dtype=int),
+        grains_in: Grains,
+        # state in and out
+        hood: Neighbours,
+        alive: wp.array(dtype=int),
+        flags: wp.array(dtype=int),
+        # state out
+        grains_out: Grains,
+    ):
+        """Moves `slot_count` grain slots, those of the `running` worlds, on by a step; `lanes` threads a grain."""
+        thread = wp.tid()
+        slot = thread // lanes
+        lane = thread - slot * lanes
+        w = int(0)
+        g = int(0)
+        count = int(0)
+        first = int(0)
+        near = int(0)
+        step = int(0)
+        moving = bool(False)
+        if slot < slot_count:
+            w = running[slot // model.grain_count]
+            g = w * model.grain_count + slot % model.grain_count
+            moving = alive[g] > 0
+            step = grains_in.step[w]
+            if lane == 0 and slot % model.grain_count == 0:
+                grains_out.step[w] = step + 1
+        world = model.world[w]
+        if moving and step >= model.release_step[g]:
+            row = hood.list[w] * model.shape.shape[0] + g
+            count = hood.count[row]
+            first = row * hood.capacity
+            near = contacts.near_walls(model, w, grains_in.position[g], model.inertia[g][3], step, world.time_step)
+        force, torque, rolling = sum_contacts(
+            model, world, grains_in, hood, w, g, count, first, near, step, thread & (WARP - 1), lane, lanes
+        )
+        if moving:
+            move(
+                model, world, grains_in, grains_out, hood, alive, flags, w, g, step, force, torque, rolling, lane, lanes
+            )
+
+        elif slot < slot_count and alive[g] < 0 and lane == 0:
+            clear_spheres(model, grains_out, g)
+            alive[g] = alive[g] + 1
+
+    @wp.kernel(module=module)
+    def remove(model: Model, removed: wp.array(dtype=int), alive: wp.array(dtype=int), a: Grains, b: Grains):
+        """Takes the grains listed in `removed` out of both copies of the state."""
+        g = removed[wp.tid()]
+        alive[g] = 0
+        clear_spheres(model, a, g)
+        clear_spheres(model, b, g)
+
+    @wp.kernel(module=module)
+    def place_spheres(model: Model, grains: Grains):
+        """Centres and spheres from the poses; the size factor is in the last component of the centre."""
+        g = wp.tid()
+        world = model.world[g // model.grain_count]
+        center = pack.pack(grains.position[g], pack.last(grains.center[g]), world)
+        grains.center[g] = center
+        spread_spheres(model, world, grains, g, center, motion.rounded(grains.orientation[g]), 0, 1)
+
+    return SimpleNamespace(step=step, place_spheres=place_spheres, remove=remove, module=module)

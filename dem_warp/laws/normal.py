@@ -1,0 +1,30 @@
+"""Normal force: Hertz with EDEM's viscous damping."""
+
+from typing import Any
+
+import warp as wp
+
+
+@wp.func
+def hertz_stiffness(modulus: Any, radius: Any, overlap: Any):
+    """Tangent stiffness S_n = 2 E* sqrt(R* d) [N/m] of a Hertz contact.
+
+    Source: K. L. Johnson, Contact Mechanics (1985), section 4.2.
+    """
+    return type(overlap)(2.0) * modulus * wp.sqrt(radius * overlap)
+
+
+@wp.func
+def damped_hertz(stiffness: Any, overlap: Any, damping_rate: Any, normal_velocity: Any, clamp_attraction: Any):
+    """Normal force (4/3) E* sqrt(R*) d^(3/2) - c v_n [N], with c = 2 sqrt(5/6) |beta| sqrt(S_n m*).
+
+    `normal_velocity` is the separation speed. Near the end of an impact the damping exceeds the spring and attracts;
+    left alone, the chosen restitution comes back. With `clamp_attraction` the force never attracts, which raises the
+    effective restitution (0.18 becomes about 0.31).
+
+    Source: Tsuji, Tanaka and Ishida, Powder Technology 71 (1992) 239-250; EDEM 2.7 Theory Reference Guide.
+    """
+    force = type(overlap)(2.0) / type(overlap)(3.0) * stiffness * overlap - damping_rate * normal_velocity
+    if clamp_attraction > type(overlap)(0.0):
+        force = wp.max(force, type(overlap)(0.0))
+    return force

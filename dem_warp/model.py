@@ -1,0 +1,199 @@
+"""What one world is made of, described on the host, and the stacking of many worlds into arrays."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from dem_warp.clumps import ClumpShape
+from dem_warp.materials import Interaction, Material, damping_coefficient, effective_moduli
+from dem_warp.types import MAX_SPHERES_PER_GRAIN, MAX_SPHERES_PER_WORLD
+from dem_warp.walls import Wall
+
+AT_ONCE = 0
+"""Release step of a grain that is free from the start."""
+
+
+@dataclass(frozen=True)
+class ContactCoefficients:
+    """Coefficients of the contact law for one pair of surfaces.
+
+    Attributes
+    ----------
+    modulus, shear_modulus : float
+        Effective E* and G* [Pa].
+    damping : float
+        2 sqrt(5/6) |beta|, with beta = ln e / sqrt(ln^2 e + pi^2).
+    static_friction, rolling_friction : float
+    clamp_attraction : bool
+        Whether the damping is kept from attracting at the end of an impact.
+    """
+
+    modulus: float
+    shear_modulus: float
+    damping: float
+    static_friction: float
+    rolling_friction: float
+    clamp_attraction: bool = False
+
+    @classmethod
+    def of_pair(
+        cls, a: Material, b: Material, interaction: Interaction, clamp_attraction: bool = False
+    ) -> "ContactCoefficients":
+        """Coefficients of two materials in contact."""
+        modulus, shear_modulus = effective_moduli(a, b)
+        return cls(
+            modulus,
+            shear_modulus,
+            damping_coefficient(interaction.restitution),
+            interaction.static_friction,
+            interaction.rolling_friction,
+            clamp_attraction,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Grains:
+    """Grains of one world at the start.
+
+    Attributes
+    ----------
+    positions, orientations : (n, 3) and (n, 4) arrays
+        Poses [m], quaternions x y z w.
+    velocities, spins : (n, 3) arrays
+        [m/s] and [rad/s], both in the world's frame.
+    sizes, densities : (n,) arrays
+        Scale of the shape [1] and density [kg/m3].
+    shapes : (n,) int array
+        Index into the world's shapes.
+    release_steps : (n,) int array
+        A grain keeps its velocity, and feels nothing, before this step.
+    """
+
+    positions: np.ndarray
+    orientations: np.ndarray
+    velocities: np.ndarray
+    spins: np.ndarray
+    sizes: np.ndarray
+    densities: np.ndarray
+    shapes: np.ndarray
+    release_steps: np.ndarray
+
+    def __post_init__(self) -> None:
+        n = len(self.positions)
+        widths = {"positions": 3, "orientations": 4, "velocities": 3, "spins": 3}
+        for name in self.__dataclass_fields__:
+            array = getattr(self, name)
+            expected = (n, widths[name]) if name in widths else (n,)
+            if np.shape(array) != expected:
+                raise ValueError(f"Grains.{name}: must have shape {expected}, got {np.shape(array)}")
+            bad = np.flatnonzero(~np.isfinite(array).reshape(n, -1).all(axis=1))
+            if bad.size:
+                raise ValueError(f"Grains.{name}: must be finite, grains {bad[:5].tolist()} are not")
+        for name in ("sizes", "densities"):
+            bad = np.flatnonzero(np.asarray(getattr(self, name)) <= 0)
+            if bad.size:
+                raise ValueError(f"Grains.{name}: must be positive, grains {bad[:5].tolist()} are not")
+
+    @property
+    def count(self) -> int:
+        """Number of grains."""
+        return len(self.positions)
+
+
+@dataclass(frozen=True, eq=False)
+class WorldSetup:
+    """One world before its first step.
+
+    Attributes
+    ----------
+    grains : Grains
+    shapes : tuple of ClumpShape
+        The shapes that the grains' `shapes` index.
+    contacts : tuple of ContactCoefficients
+        Grain against grain first, then one for each kind of wall surface.
+    walls : tuple of (Wall, int)
+        Each wall with the index into `contacts` that holds for it.
+    time_step : float
+        [s]
+    skin : float
+        Pairs of spheres nearer than this are listed as neighbours [m].
+    speed_limit : float
+        A world with a faster grain has diverged [m/s].
+    domain : (lower, upper)
+        Corners of the box that grains may be in [m].
+    gravity : 3 floats
+        [m/s2]
+    """
+
+    grains: Grains
+    shapes: tuple[ClumpShape, ...]
+    contacts: tuple[ContactCoefficients, ...]
+    walls: tuple[tuple[Wall, int], ...]
+    time_step: float
+    skin: float
+    speed_limit: float
+    domain: tuple[tuple[float, float, float], tuple[float, float, float]]
+    gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
+
+    def __post_init__(self) -> None:
+        for name in ("time_step", "skin", "speed_limit"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value > 0):
+                raise ValueError(f"WorldSetup.{name}: must be positive and finite, got {value!r}")
+        if not np.all(np.subtract(self.domain[1], self.domain[0]) > 0):
+            raise ValueError(f"WorldSetup.domain: lower corner must lie below the upper, got {self.domain!r}")
+        for wall, pair in self.walls:
+            if not 1 <= pair < len(self.contacts):
+                raise ValueError(f"WorldSetup.walls: {wall!r} names contact {pair}; there are 1 to {len(self.contacts) - 1}")
+        spheres = max(shape.sphere_count for shape in self.shapes)
+        if spheres > MAX_SPHERES_PER_GRAIN:
+            raise ValueError(f"ClumpShape: at most {MAX_SPHERES_PER_GRAIN} spheres a grain, got {spheres}")
+        if spheres * self.grains.count > MAX_SPHERES_PER_WORLD:
+            raise ValueError(
+                f"WorldSetup.grains: at most {MAX_SPHERES_PER_WORLD} spheres a world, got {spheres * self.grains.count}"
+            )
+
+    @property
+    def largest_sphere(self) -> float:
+        """Largest sphere radius of the world [m]."""
+        largest = np.array([shape.radii.max() for shape in self.shapes])
+        return float((largest[self.grains.shapes] * self.grains.sizes).max())
+
+    @property
+    def masses(self) -> np.ndarray:
+        """Mass of each grain [kg], (n,)."""
+        volume = np.array([shape.volume for shape in self.shapes])
+        return self.grains.densities * volume[self.grains.shapes] * self.grains.sizes**3
+
+    @property
+    def inertias(self) -> np.ndarray:
+        """Principal moments of each grain [kg m2], (n, 3)."""
+        specific = np.array([shape.inertia_over_mass for shape in self.shapes])
+        return (self.masses * self.grains.sizes**2)[:, None] * specific[self.grains.shapes]
+
+    @property
+    def bounding_radii(self) -> np.ndarray:
+        """Distance of the farthest point of each grain from its centre [m], (n,)."""
+        reach = np.array([shape.bounding_radius for shape in self.shapes])
+        return reach[self.grains.shapes] * self.grains.sizes
+
+    @property
+    def origin(self) -> np.ndarray:
+        """Centre of the domain, where fixed-point positions count from [m]."""
+        return np.mean(self.domain, axis=0)
+
+    @property
+    def half_extent(self) -> np.ndarray:
+        """Half the sides of the domain [m]."""
+        return np.subtract(self.domain[1], self.domain[0]) / 2
+
+    @property
+    def length_unit(self) -> float:
+        """Count of a fixed-point position [m]: the power of two that lets 31 bits span the domain and a margin."""
+        return float(2.0 ** np.ceil(np.log2(1.05 * self.half_extent.max() / 2**31)))
+
+
+def shape_table(worlds: Sequence[WorldSetup]) -> list[ClumpShape]:
+    """Every different shape of the worlds, in order of first appearance."""
+    return list(dict.fromkeys(shape for world in worlds for shape in world.shapes))

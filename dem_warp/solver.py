@@ -1,0 +1,292 @@
+"""The sequence of launches that moves a batch on, captured once as a graph and replayed."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from dem_warp.kernels.neighbours import neighbour_kernels
+from dem_warp.kernels.step import step_kernels
+from dem_warp.kernels.summation import BLOCK, MIN_LANES, WARP
+from dem_warp.model import WorldSetup
+from dem_warp.state import (
+    Layout,
+    build_grains,
+    build_model,
+    build_neighbours,
+    copy_grains,
+    struct_array,
+    wall_rows,
+)
+from dem_warp.types import PRECISIONS, device_structs
+
+CHUNK = 256
+"""Steps that `advance` takes at the least; a multiple of every length of a cycle."""
+
+LONGEST_CYCLE = 32
+SKIN_PER_CYCLE = 0.15
+"""Part of the skin that the fastest expected grain may use up between two checks of the neighbour list."""
+
+FULL_DEVICE_THREADS = 200_000
+"""Threads that fill a large GPU; below it, more lanes a grain shorten a step."""
+
+
+@dataclass(frozen=True)
+class WorldView:
+    """What a scene sees of one world between two chunks; arrays are by grain slot.
+
+    Attributes
+    ----------
+    step : int
+        Steps done.
+    time : float
+        [s]
+    alive : (n,) bool array
+    released : (n,) bool array
+        Grains that move freely.
+    positions, velocities : (n, 3) arrays
+        [m], [m/s]
+    masses : (n,) array
+        [kg]
+    """
+
+    step: int
+    time: float
+    alive: np.ndarray
+    released: np.ndarray
+    positions: np.ndarray
+    velocities: np.ndarray
+    masses: np.ndarray
+
+
+class Solver:
+    """A batch of worlds on one device.
+
+    Every world steps with its own time step and parameters; worlds share nothing but the launches. The state of a world
+    after a number of steps depends on its setup alone, not on the other worlds, its place, the lanes or the skin.
+
+    Parameters
+    ----------
+    worlds : sequence of WorldSetup
+        With the same number of walls and contacts.
+    device : str or warp Device
+    precision : "mixed" or "double"
+    capacity : int, optional
+        Neighbours a grain; by default from the densest packing of the spheres.
+    """
+
+    def __init__(
+        self, worlds: Sequence[WorldSetup], device: Any = "cpu", precision: str = "mixed", capacity: int | None = None
+    ) -> None:
+        self.worlds = list(worlds)
+        self.device = wp.get_device(device)
+        self.precision = PRECISIONS[precision]
+        self.layout = Layout.of(worlds)
+        self._step_kernels = step_kernels(self.precision, self.device.is_cuda)
+        self._list_kernels = neighbour_kernels(self.precision)
+        found, row = _neighbour_capacities(worlds)
+        with wp.ScopedDevice(self.device):
+            self._build_state(capacity or row, found)
+        self._running = list(range(len(worlds)))
+        self._graphs: dict[tuple[int, int], Any] = {}
+        self._walls = wall_rows(worlds)
+        self.cycle = _cycle_length(worlds)
+        self._place()
+
+    def _build_state(self, capacity: int, found_capacity: int) -> None:
+        layout, device = self.layout, self.device
+        self.model = build_model(self.worlds, layout, self.precision, device)
+        first = build_grains(self.worlds, layout, self.precision, device)
+        self.grains = (first, copy_grains(first, self.precision))
+        self.hood = build_neighbours(layout, capacity, self.precision, device)
+        self.alive = _padded_ones(self.worlds, layout, device)
+        self.flags, self.stale, self.idle, self.rebuilds, self.running = (
+            wp.zeros(layout.world_count, dtype=int) for _ in range(5)
+        )
+        self.any_stale = wp.zeros(1, dtype=int)
+        self.cells = self._build_cells(found_capacity)
+
+    def _build_cells(self, found_capacity: int) -> Any:
+        layout = self.layout
+        cells = self._list_kernels.Cells()
+        spheres = layout.grain_count * layout.sphere_count
+        bits = max(int(np.ceil(np.log2(2 * spheres))), 6)
+        across = bits // 3
+        cells.bits = wp.vec3i(across, across, bits - 2 * across)
+        cells.bucket_size = wp.zeros(layout.world_count << bits, dtype=int)
+        cells.bucket_start = wp.zeros(layout.world_count << bits, dtype=int)
+        cells.cursor = wp.zeros(layout.world_count, dtype=int)
+        for name in ("bucket", "rank", "order", "found_count"):
+            setattr(cells, name, wp.zeros(layout.sphere_total, dtype=int))
+        cells.found = wp.zeros(layout.sphere_total * found_capacity, dtype=int)
+        cells.found_capacity = found_capacity
+        return cells
+
+    def _place(self) -> None:
+        for grains in self.grains:
+            self._launch(self._step_kernels.place_spheres, self.layout.grain_total, [self.model, grains])
+        self._set_running(self._running)
+        self.stale.fill_(1)
+        self._rebuild()
+
+    def _launch(self, kernel: Any, dim: int, inputs: list[Any]) -> None:
+        wp.launch(kernel, dim, inputs=inputs, device=self.device, block_dim=BLOCK)
+
+    # ---- the sequence of a step -------------------------------------------------------------------------------------
+
+    @property
+    def lanes(self) -> int:
+        """Threads a grain: few when many grains fill the device, more when there is room."""
+        if not self.device.is_cuda:
+            return 1
+        grains = max(len(self._running) * self.layout.grain_count, 1)
+        lanes = MIN_LANES
+        while lanes < WARP // 2 and lanes * grains < FULL_DEVICE_THREADS:
+            lanes *= 2
+        return lanes
+
+    def _step(self, read: int) -> None:
+        slots = len(self._running) * self.layout.grain_count
+        threads = -(-slots * self.lanes // WARP) * WARP if self.device.is_cuda else slots
+        inputs = [
+            self.lanes, slots, self.model, self.running, self.grains[read], self.hood, self.alive, self.flags,
+            self.grains[1 - read],
+        ]  # fmt: skip
+        self._launch(self._step_kernels.step, threads, inputs)
+
+    def _rebuild(self) -> None:
+        k, spheres = self._list_kernels, self.layout.sphere_total
+        grains = self.grains[0]
+        self._launch(k.bin_spheres, spheres, [self.model, grains, self.alive, self.stale, self.cells])
+        self._launch(k.open_buckets, spheres, [self.model, self.stale, self.cells])
+        self._launch(k.fill_buckets, spheres, [self.model, self.stale, self.cells])
+        self._launch(k.search, spheres, [self.model, grains, self.stale, self.cells, self.flags])
+        self._launch(k.write_lists, spheres, [self.model, self.stale, self.cells, self.hood, self.flags])
+        finish = [self.cells, self.hood, self.stale, self.any_stale, self.rebuilds]
+        self._launch(k.finish, self.layout.world_count, finish)
+
+    def _cycle(self) -> None:
+        for step in range(self.cycle):
+            self._step(step % 2)
+        inputs = [
+            self.cycle, self.model, self.grains[0], self.alive, self.idle, self.hood, self.stale, self.any_stale,
+        ]  # fmt: skip
+        self._launch(self._list_kernels.mark_stale, self.layout.grain_total, inputs)
+        wp.capture_if(self.any_stale, self._rebuild)
+
+    def _graph(self) -> Any:
+        key = (self.lanes, len(self._running))
+        if key not in self._graphs:
+            with wp.ScopedCapture(self.device) as capture:
+                for _ in range(CHUNK // self.cycle):
+                    self._cycle()
+            self._graphs[key] = capture.graph
+        return self._graphs[key]
+
+    def advance(self, chunks: int = 1) -> None:
+        """Take `chunks` times CHUNK steps in every running world."""
+        if self._running:
+            graph = self._graph()
+            for _ in range(chunks):
+                wp.capture_launch(graph)
+
+    # ---- what a scene does between chunks ---------------------------------------------------------------------------
+
+    def _set_running(self, running: Sequence[int]) -> None:
+        self._running = list(running)
+        slots = np.zeros(self.layout.world_count, dtype=np.int32)
+        slots[: len(running)] = running
+        idle = np.ones(self.layout.world_count, dtype=np.int32)
+        idle[list(running)] = 0
+        self.running.assign(slots)
+        self.idle.assign(idle)
+
+    def stop(self, world: int) -> None:
+        """Freeze a world in its present state."""
+        self._set_running([w for w in self._running if w != world])
+
+    def remove(self, world: int, grains: np.ndarray) -> None:
+        """Take grains (slots of the world) out of it."""
+        rows = np.asarray(grains, dtype=np.int32) + world * self.layout.grain_count
+        if rows.size:
+            removed = wp.array(rows.astype(np.int32), dtype=int, device=self.device)
+            self._launch(self._step_kernels.remove, rows.size, [self.model, removed, self.alive, *self.grains])
+
+    def move_wall(self, world: int, wall: int, velocity: Sequence[float]) -> None:
+        """Let a wall move with a constant velocity [m/s] from the present step on."""
+        row = self._walls[world * self.layout.wall_count + wall]
+        step = int(self.grains[0].step.numpy()[world])
+        moved = max(step - row["start_step"], 0) * self.worlds[world].time_step
+        row["point"] = tuple(np.add(row["point"], np.multiply(row["velocity"], moved)))
+        row["velocity"], row["start_step"] = tuple(velocity), step
+        self.model.wall.assign(struct_array(device_structs(self.precision).Wall, self._walls, self.device))
+
+    def view(self, worlds: Sequence[int]) -> list[WorldView]:
+        """What scenes need of some worlds, copied from the device."""
+        n = self.layout.grain_count
+        grains = self.grains[0]
+        steps, alive = grains.step.numpy(), self.alive.numpy().reshape(-1, n) > 0
+        release = self.model.release_step.numpy().reshape(-1, n)
+        positions = grains.position.numpy().reshape(-1, n, 3)
+        velocities = grains.velocity.numpy().reshape(-1, n, 4)
+        return [
+            WorldView(
+                int(steps[w]),
+                float(steps[w] * self.worlds[w].time_step),
+                alive[w],
+                release[w] <= steps[w],
+                positions[w],
+                velocities[w, :, :3],
+                velocities[w, :, 3],
+            )
+            for w in worlds
+        ]
+
+    def poses(self, world: int) -> dict[str, np.ndarray]:
+        """Positions [m], orientations, velocities [m/s], spins [rad/s] of the living grains, and their slots."""
+        n = self.layout.grain_count
+        rows = slice(world * n, (world + 1) * n)
+        slots = np.flatnonzero(self.alive.numpy()[rows] > 0)
+        grains = self.grains[0]
+        return {
+            "slots": slots,
+            "positions": grains.position.numpy()[rows][slots],
+            "orientations": grains.orientation.numpy()[rows][slots],
+            "velocities": grains.velocity.numpy()[rows][slots, :3],
+            "spins": grains.spin.numpy()[rows][slots, :3],
+        }
+
+
+def _padded_ones(worlds: Sequence[WorldSetup], layout: Layout, device: Any) -> wp.array:
+    alive = np.zeros((layout.world_count, layout.grain_count), dtype=np.int32)
+    for w, world in enumerate(worlds):
+        alive[w, : world.grains.count] = 1
+    return wp.array(alive.ravel(), dtype=int, device=device)
+
+
+def _cycle_length(worlds: Sequence[WorldSetup]) -> int:
+    """Steps between two checks of the neighbour lists: a power of two, short enough for every world."""
+    free = min(
+        SKIN_PER_CYCLE * world.skin / (world.time_step * expected_speed(world)) for world in worlds
+    )
+    return int(2 ** np.clip(np.floor(np.log2(max(free, 1.0))), 1, np.log2(LONGEST_CYCLE)))
+
+
+def expected_speed(world: WorldSetup) -> float:
+    """Speed of the fastest grain that an ordinary course of events brings [m/s]."""
+    return world.speed_limit / 20
+
+
+def _neighbour_capacities(worlds: Sequence[WorldSetup]) -> tuple[int, int]:
+    """Partners of one sphere, and entries of one grain, that no packing of the worlds' grains is expected to pass."""
+    found, row = 16, 32
+    for world in worlds:
+        for shape in world.shapes:
+            reach = 2 * shape.radii.mean() + world.skin
+            per_volume = 0.7 * shape.sphere_count / shape.volume
+            around = per_volume * (4 / 3 * np.pi * reach**3)
+            found = max(found, int(1.5 * around) + 16)
+            row = max(row, int(shape.sphere_count * around * 0.7) + 32)
+    return found, -(-row // 8) * 8

@@ -1,0 +1,187 @@
+"""The device arrays of a batch: what stays (`Model`), what moves (`Grains`, in two copies), and the neighbour lists."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from dem_warp.model import WorldSetup, shape_table
+from dem_warp.types import Precision, device_structs
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Sizes of a batch, the same for each of its worlds."""
+
+    world_count: int
+    grain_count: int
+    sphere_count: int
+    wall_count: int
+    pair_count: int
+
+    @classmethod
+    def of(cls, worlds: Sequence[WorldSetup]) -> "Layout":
+        """Layout that holds all worlds; worlds with fewer grains are padded."""
+        walls = {len(world.walls) for world in worlds}
+        pairs = {len(world.contacts) for world in worlds}
+        if len(walls) > 1 or len(pairs) > 1:
+            raise ValueError(f"worlds of one batch must have the same number of walls and contacts, got {walls} and {pairs}")
+        return cls(
+            len(worlds),
+            max(world.grains.count for world in worlds),
+            max(shape.sphere_count for world in worlds for shape in world.shapes),
+            walls.pop(),
+            pairs.pop(),
+        )
+
+    @property
+    def grain_total(self) -> int:
+        """Grain slots of the batch."""
+        return self.world_count * self.grain_count
+
+    @property
+    def sphere_total(self) -> int:
+        """Sphere slots of the batch."""
+        return self.grain_total * self.sphere_count
+
+
+def _padded(worlds: Sequence[WorldSetup], layout: Layout, rows: Sequence[np.ndarray], fill: Any, width: int) -> np.ndarray:
+    """Stack one array a world into (grain slots, width), the free slots filled."""
+    out = np.empty((layout.world_count, layout.grain_count, width))
+    out[:] = fill
+    for w, row in enumerate(rows):
+        out[w, : len(row)] = np.reshape(row, (len(row), width))
+    return out.reshape(layout.grain_total, width)
+
+
+def struct_array(struct: Any, rows: Sequence[dict[str, Any]], device: Any) -> wp.array:
+    """Device array of `struct` from one dictionary of fields a row."""
+    host = np.zeros(len(rows), dtype=struct.numpy_dtype())
+    for i, row in enumerate(rows):
+        for name, value in row.items():
+            host[name][i] = value
+    return wp.array(host, dtype=struct, device=device)
+
+
+def wall_rows(worlds: Sequence[WorldSetup]) -> list[dict[str, Any]]:
+    """Fields of every wall at rest, world by world."""
+    return [
+        {
+            "kind": wall.kind,
+            "pair": pair,
+            "start_step": np.iinfo(np.int32).max,
+            "point": wall.point,
+            "axis": wall.axis,
+            "velocity": (0.0, 0.0, 0.0),
+            "radius": wall.radius,
+            "length": wall.length,
+        }
+        for world in worlds
+        for wall, pair in world.walls
+    ]
+
+
+def build_model(worlds: Sequence[WorldSetup], layout: Layout, precision: Precision, device: Any) -> Any:
+    """`Model` of a batch on a device."""
+    types = device_structs(precision)
+    shapes = shape_table(worlds)
+    real = np.float32 if precision.real is wp.float32 else np.float64
+    spheres = np.zeros((len(shapes), layout.sphere_count, 4))
+    for i, shape in enumerate(shapes):
+        spheres[i, : shape.sphere_count] = np.column_stack([shape.centers, shape.radii])
+    shape_index = [np.array([shapes.index(s) for s in world.shapes])[world.grains.shapes] for world in worlds]
+    inertia = [np.column_stack([world.inertias, world.bounding_radii]) for world in worlds]
+    world_rows = [
+        {
+            "time_step": world.time_step,
+            "gravity": world.gravity,
+            "unit": world.length_unit if precision.is_fixed_point else 1.0,
+            "skin": world.skin,
+            "cell_rate": _cell_rate(world, precision),
+            "speed_limit": world.speed_limit,
+            "origin": world.origin,
+            "half_extent": world.half_extent,
+        }
+        for world in worlds
+    ]
+    contact_rows = [
+        {name: float(getattr(contact, name)) for name in contact.__dataclass_fields__}
+        for world in worlds
+        for contact in world.contacts
+    ]
+    model = types.Model()
+    model.world = struct_array(types.World, world_rows, device)
+    model.contact = struct_array(types.ContactParams, contact_rows, device)
+    model.wall = struct_array(types.Wall, wall_rows(worlds), device)
+    model.shape_spheres = wp.array(spheres.reshape(-1, 4).astype(real), dtype=precision.vec4, device=device)
+    model.shape_sphere_count = wp.array([s.sphere_count for s in shapes], dtype=int, device=device)
+    model.shape = _ints(worlds, layout, shape_index, 0, device)
+    model.inertia = wp.array(
+        _padded(worlds, layout, inertia, 1.0, 4).astype(real), dtype=precision.vec4, device=device
+    )
+    model.release_step = _ints(worlds, layout, [world.grains.release_steps for world in worlds], 0, device)
+    model.grain_count, model.sphere_count = layout.grain_count, layout.sphere_count
+    model.wall_count, model.pair_count = layout.wall_count, layout.pair_count
+    return model
+
+
+def _cell_rate(world: WorldSetup, precision: Precision) -> float:
+    """Cells per count of a sphere position; a cell holds the reach of a contact, and a little for rounding."""
+    unit = world.length_unit if precision.is_fixed_point else 1.0
+    return unit / (1.01 * (2 * world.largest_sphere + world.skin))
+
+
+def _ints(worlds: Sequence[WorldSetup], layout: Layout, rows: Sequence[np.ndarray], fill: int, device: Any) -> wp.array:
+    return wp.array(_padded(worlds, layout, rows, fill, 1)[:, 0].astype(np.int32), dtype=int, device=device)
+
+
+def build_grains(worlds: Sequence[WorldSetup], layout: Layout, precision: Precision, device: Any) -> Any:
+    """`Grains` of a batch at the start on a device; spheres are still to be placed."""
+    types = device_structs(precision)
+    real = np.float32 if precision.real is wp.float32 else np.float64
+    positions = _padded(worlds, layout, [world.grains.positions for world in worlds], 0.0, 3)
+    orientations = _padded(worlds, layout, [_unit(world.grains.orientations) for world in worlds], [0, 0, 0, 1], 4)
+    velocity = [np.column_stack([world.grains.velocities, world.masses]) for world in worlds]
+    spin = [np.column_stack([world.grains.spins, np.zeros(world.grains.count)]) for world in worlds]
+    sizes = _padded(worlds, layout, [world.grains.sizes for world in worlds], 1.0, 1)[:, 0].astype(real)
+    center = np.zeros((layout.grain_total, 4), dtype=np.int32 if precision.is_fixed_point else real)
+    center[:, 3] = sizes.view(np.int32) if precision.is_fixed_point else sizes
+
+    grains = types.Grains()
+    grains.step = wp.zeros(layout.world_count, dtype=int, device=device)
+    grains.position = wp.array(positions, dtype=wp.vec3d, device=device)
+    grains.orientation = wp.array(orientations, dtype=wp.quatd, device=device)
+    grains.velocity = wp.array(_padded(worlds, layout, velocity, 1.0, 4).astype(real), dtype=precision.vec4, device=device)
+    grains.spin = wp.array(_padded(worlds, layout, spin, 0.0, 4).astype(real), dtype=precision.vec4, device=device)
+    grains.center = wp.array(center, dtype=precision.sphere, device=device)
+    grains.spheres = wp.zeros(layout.sphere_total, dtype=precision.sphere, device=device)
+    return grains
+
+
+def copy_grains(grains: Any, precision: Precision) -> Any:
+    """A second copy of `Grains`, for steps that read one and write the other."""
+    other = device_structs(precision).Grains()
+    for name in ("step", "position", "orientation", "velocity", "spin", "center", "spheres"):
+        setattr(other, name, wp.clone(getattr(grains, name)))
+    return other
+
+
+def build_neighbours(layout: Layout, capacity: int, precision: Precision, device: Any) -> Any:
+    """Empty `Neighbours` of a batch."""
+    hood = device_structs(precision).Neighbours()
+    slots = 2 * layout.grain_total * capacity
+    hood.capacity = capacity
+    hood.list = wp.zeros(layout.world_count, dtype=int, device=device)
+    hood.count = wp.zeros(2 * layout.grain_total, dtype=int, device=device)
+    hood.entry = wp.zeros(slots, dtype=int, device=device)
+    # all zero is a displacement of zero, remembered at step 0: no history
+    hood.history = wp.zeros(slots + layout.sphere_total * layout.wall_count, dtype=precision.vec4, device=device)
+    hood.first_wall = slots
+    hood.travel = wp.zeros(layout.grain_total, dtype=precision.real, device=device)
+    return hood
+
+
+def _unit(quaternions: np.ndarray) -> np.ndarray:
+    return quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)

@@ -1,0 +1,138 @@
+"""Device types: the precision of a build, the parameters of a contact, a wall and a world, the flags of a world.
+
+Every struct is made for one floating type, so that the same kernel source serves the production precision and the
+float64 build used for verification.
+"""
+
+import functools
+from dataclasses import dataclass
+from enum import IntFlag
+from types import SimpleNamespace
+from typing import Any
+
+import warp as wp
+
+SPHERE_BITS = 23
+"""Bits of a neighbour entry that hold the partner's sphere index; the bits above hold the own sphere's number."""
+
+SPHERE_MASK = (1 << SPHERE_BITS) - 1
+MAX_SPHERES_PER_WORLD = 1 << SPHERE_BITS
+MAX_SPHERES_PER_GRAIN = 1 << (31 - SPHERE_BITS)
+
+
+class WorldFlag(IntFlag):
+    """What happened to a world while it ran; 0 is a healthy one."""
+
+    DIVERGED = 1
+    """A grain passed the speed limit of the scene (or is not finite)."""
+    NEIGHBOUR_OVERFLOW = 2
+    """A grain has more neighbours than the list holds."""
+    LATE_REBUILD = 4
+    """A grain left its skin before the list was rebuilt, so a contact may have been seen late."""
+
+
+@dataclass(frozen=True)
+class Precision:
+    """Floating types of a build.
+
+    `mixed` is the production build: poses in float64, sphere positions as 32-bit integers of a power-of-two length unit,
+    forces in float32. `double` is float64 throughout.
+    """
+
+    name: str
+    real: Any
+    vec3: Any
+    vec4: Any
+    quat: Any
+    sphere: Any
+
+    @property
+    def is_fixed_point(self) -> bool:
+        """Whether sphere positions are integers of the length unit."""
+        return self.sphere is wp.vec4i
+
+
+MIXED = Precision("mixed", wp.float32, wp.vec3f, wp.vec4f, wp.quatf, wp.vec4i)
+DOUBLE = Precision("double", wp.float64, wp.vec3d, wp.vec4d, wp.quatd, wp.vec4d)
+PRECISIONS = {precision.name: precision for precision in (MIXED, DOUBLE)}
+
+
+@functools.cache
+def device_structs(precision: Precision) -> SimpleNamespace:
+    """Structs of the kernels in one precision: `ContactParams`, `World`, `Wall`, `Grains`, `Neighbours`, `Model`."""
+    real, vec3, vec4, sphere = precision.real, precision.vec3, precision.vec4, precision.sphere
+
+    @wp.struct
+    class ContactParams:
+        modulus: real  # effective Young's modulus E* [Pa]
+        shear_modulus: real  # effective shear modulus G* [Pa]
+        damping: real  # 2 sqrt(5/6) |beta| [1]
+        static_friction: real  # [1]
+        rolling_friction: real  # [1]
+        clamp_attraction: real  # 1: the damping force may not attract; 0: it may
+
+    @wp.struct
+    class World:
+        time_step: real  # [s]
+        gravity: vec3  # [m/s2]
+        unit: real  # length of one count of a sphere position [m]
+        skin: real  # [m]
+        cell_rate: real  # cells per count of a sphere position
+        speed_limit: real  # above it the world has diverged [m/s]
+        origin: wp.vec3d  # where sphere positions count from [m]
+        half_extent: wp.vec3d  # a grain further from the origin has left the domain [m]
+
+    @wp.struct
+    class Wall:
+        kind: int  # walls.PLANE or walls.CYLINDER
+        pair: int  # which contact parameters hold
+        start_step: int  # the motion starts with this step
+        point: wp.vec3d  # a point of the plane; the centre of the cylinder's lower rim [m]
+        axis: wp.vec3d  # unit normal of the plane; unit axis of the cylinder
+        velocity: wp.vec3d  # [m/s]
+        radius: wp.float64  # [m]
+        length: wp.float64  # [m]
+
+    @wp.struct
+    class Model:
+        world: wp.array(dtype=World)  # (worlds,)
+        contact: wp.array(dtype=ContactParams)  # (worlds * pairs,)
+        wall: wp.array(dtype=Wall)  # (worlds * walls,)
+        shape_spheres: wp.array(dtype=vec4)  # local centre and radius, (shapes * spheres,) [m]
+        shape_sphere_count: wp.array(dtype=int)  # (shapes,)
+        shape: wp.array(dtype=int)  # (grains,)
+        inertia: wp.array(dtype=vec4)  # principal moments [kg m2] and bounding radius [m], (grains,)
+        release_step: wp.array(dtype=int)  # a grain moves at constant velocity before it, (grains,)
+        grain_count: int  # slots of a world
+        sphere_count: int  # slots of a grain
+        wall_count: int
+        pair_count: int
+
+    @wp.struct
+    class Grains:
+        step: wp.array(dtype=int)  # steps done, (worlds,)
+        position: wp.array(dtype=wp.vec3d)  # [m], (grains,)
+        orientation: wp.array(dtype=wp.quatd)  # body to world, (grains,)
+        velocity: wp.array(dtype=vec4)  # [m/s] and mass [kg], (grains,)
+        spin: wp.array(dtype=vec4)  # [rad/s], world frame, (grains,)
+        center: wp.array(dtype=sphere)  # position in counts and size factor, (grains,)
+        spheres: wp.array(dtype=sphere)  # position in counts and radius [m], (grains * spheres,)
+
+    @wp.struct
+    class Neighbours:
+        capacity: int  # entries a grain
+        list: wp.array(dtype=int)  # which of the two lists holds, (worlds,)
+        count: wp.array(dtype=int)  # (2 * grains,)
+        entry: wp.array(dtype=int)  # own sphere's number and partner's sphere, (2 * grains * capacity,)
+        history: wp.array(dtype=vec4)  # tangential displacement [m] and its step: one an entry, then one a wall and sphere
+        first_wall: int  # where the histories of the walls begin, (grains * walls * spheres,)
+        travel: wp.array(dtype=real)  # path of a grain's farthest point since the rebuild [m], (grains,)
+
+    return SimpleNamespace(
+        ContactParams=ContactParams,
+        World=World,
+        Wall=Wall,
+        Model=Model,
+        Grains=Grains,
+        Neighbours=Neighbours,
+    )
