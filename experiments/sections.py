@@ -7,16 +7,15 @@ from __future__ import annotations
 
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
+from dem_warp.case import Case, GrainPopulation, Numerics
 from dem_warp.clumps import ClumpShape
 from dem_warp.materials import Interaction, Material
-from experiments.schema import Density, Length, Number, Pressure, Rate, Section, Speed
-
-if TYPE_CHECKING:
-    from dem_warp import Case, GrainPopulation, Numerics
+from dem_warp.scenes.lifted_cylinder import LiftedCylinder
+from experiments.schema import Density, Length, Number, Pressure, Rate, Section, Speed, Time
 
 
 class MaterialSection(Section):
@@ -75,8 +74,6 @@ class GrainSection(MaterialSection):
 
     def population(self) -> GrainPopulation:
         """Build the engine's population."""
-        from dem_warp import GrainPopulation
-
         return GrainPopulation(
             shape=self.shape(), material=self.material(), size_mean=self.size_mean, size_sd=self.size_sd
         )
@@ -131,6 +128,12 @@ class LiftedCylinderSection(Section):
     """Speed of the raining grains."""
     grain_count: int | None = Field(default=None, ge=1)
     """Grains; left out: until the tube is full."""
+    rest_speed: Speed = Field(default=1.0e-3, gt=0.0)
+    """The heap rests when its grains have been slower than this ..."""
+    rest_time: Time = Field(default=0.05, gt=0.0)
+    """... for this long."""
+    duration: Time | None = Field(default=None, gt=0.0)
+    """Ends the test after this simulated time, instead of at rest."""
 
 
 class SceneSection(Section):
@@ -151,11 +154,11 @@ class NumericsSection(Section):
     """Reach of the neighbour search beyond contact; left out: chosen by the engine."""
     precision: Literal["mixed", "double"] = "mixed"
     """Floating point precision of the forces."""
+    clamp_attraction: bool = False
+    """Keep the damping from attracting at the end of an impact."""
 
     def numerics(self) -> Numerics:
         """Build the engine's numerics."""
-        from dem_warp import Numerics
-
         return Numerics(**dict(self))
 
 
@@ -175,8 +178,6 @@ class Physics(Section):
 
     def build_case(self, seed: int) -> Case:
         """Build one case of the engine."""
-        from dem_warp import Case, LiftedCylinder
-
         tube = self.scene.lifted_cylinder
         return Case(
             scene=LiftedCylinder(wall_material=self.wall.material(), **dict(tube)),

@@ -12,10 +12,11 @@ import tomllib
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any
 
-from pydantic import Field, PrivateAttr, model_validator
+from pydantic import Field, PrivateAttr, field_validator, model_validator
 
+from dem_warp.case import Case
 from doe.factors import Factor
 from experiments.calibrate.settings import CampaignSettings, MeasuredTarget, TwinTarget
 from experiments.errors import StudyError
@@ -30,9 +31,7 @@ from experiments.factor_section import (
 from experiments.places import Places, value_at
 from experiments.schema import Angle, Dimension, Section, nearest_name, validated
 from experiments.sections import Physics
-
-if TYPE_CHECKING:
-    from dem_warp import Case
+from imaging import FITS
 
 BUCKWHEAT = Path(__file__).parent / "studies" / "buckwheat" / "study.toml"
 """The study that is meant when none is named: the paper's buckwheat."""
@@ -77,10 +76,19 @@ class TargetSection(Section):
 class MeasurementSection(Section):
     """``[measurement]``: how an angle is read from a heap; only angles read the same way compare."""
 
-    fit: Literal["flank", "middle"] = "flank"
-    """Part of the flank that the line is fitted to."""
-    azimuths: int = Field(default=8, ge=1)
+    fit: str = "flank"
+    """Part of the flank that the line is fitted to, one of ``imaging.FITS``."""
+    azimuths: int = Field(default=8, ge=2)
     """Views of one heap, over half a turn."""
+    pixels: int = Field(default=800, ge=50, le=4000)
+    """Width of the heap in a view."""
+
+    @field_validator("fit")
+    @classmethod
+    def _is_known(cls, fit: str) -> str:
+        if fit not in FITS:
+            raise ValueError(f"must be one of {', '.join(FITS)}")
+        return fit
 
 
 class Study(Physics):

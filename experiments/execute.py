@@ -1,0 +1,180 @@
+"""Running cases: a table of settings in, the same table with repose angles out."""
+
+from __future__ import annotations
+
+import logging
+import math
+import os
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import TYPE_CHECKING, Any
+
+import pandas as pd
+
+from experiments.errors import StudyError
+from imaging import HeapAngle, PictureError, heap_angle
+
+if TYPE_CHECKING:
+    from dem_warp import Case, CaseResult, Progress
+    from experiments.store import Store
+    from experiments.study import Study
+
+RESULT_COLUMNS = ("status", "reason", "angle", "angle_se", "case_key")
+"""Columns that `run_cases` adds, beside one for every observable of the scene."""
+
+REPEATABLE_STATUSES = frozenset({"finished", "diverged", "overflow"})
+"""Ends that the same case reaches every time: only these are stored, any other is tried again."""
+
+_log = logging.getLogger(__name__)
+
+
+def run_cases(
+    study: Study,
+    table: pd.DataFrame,
+    store: Store,
+    device: str | None = None,
+    workers: int | None = None,
+    progress: Callable[[Progress], None] | None = None,
+) -> pd.DataFrame:
+    """Simulate every case of a table that is not stored yet, all at once, and measure every heap.
+
+    Parameters
+    ----------
+    study
+        What the cases are made from, and how their angle is read.
+    table
+        One row a case: factors by name in natural units (one that is missing is at its middle), ``seed``, and
+        any further columns, which are carried over.
+    store
+        Where results are kept; each is saved as it finishes.
+    device
+        ``"cpu"``, ``"cuda"``, ``"cuda:1"``; None: the engine's choice.
+    workers
+        Processes on the CPU; None: the engine's choice.
+    progress
+        Called with the engine's progress.
+
+    Returns
+    -------
+    pandas.DataFrame
+        The same rows and index with ``status``, ``reason``, ``angle`` and ``angle_se`` [deg], ``case_key`` and
+        one column an observable. A case that fails is a row with its status and reason, and without an angle;
+        so is a heap that cannot be measured.
+
+    Raises
+    ------
+    ValueError
+        When the table has no seeds, or a column that this function adds.
+    """
+    _check_columns(table)
+    cases, refused = _build_cases(study, table)
+    keys = [store.key(case) if case else "" for case in cases]
+    by_key = {key: case for key, case in zip(keys, cases, strict=True) if case}
+    with ThreadPoolExecutor(max_workers=workers or os.cpu_count()) as pool:
+        outcomes = _simulate_missing(study, by_key, store, pool, device, workers, progress)
+        for key in by_key.keys() - outcomes.keys():
+            outcomes[key] = pool.submit(_stored_outcome, study, store, key)
+        rows = [
+            outcomes[key].result() if key else _outcome("refused", reason)
+            for key, reason in zip(keys, refused, strict=True)
+        ]
+    results = pd.DataFrame(rows, index=table.index)
+    results["case_key"] = keys
+    return pd.concat([table, results], axis=1)
+
+
+def measure_heap(study: Study, result: CaseResult) -> HeapAngle:
+    """Measure the repose angle of a finished case as the study says.
+
+    Raises
+    ------
+    imaging.PictureError
+        When there is no measurable heap.
+    """
+    settings = study.measurement
+    return heap_angle(
+        result.sphere_centers,
+        result.sphere_radii,
+        azimuths=settings.azimuths,
+        fit=settings.fit,
+        pixels=settings.pixels,
+    )
+
+
+def _check_columns(table: pd.DataFrame) -> None:
+    if "seed" not in table.columns:
+        raise ValueError(
+            f"a table of cases needs the column 'seed', has {', '.join(map(str, table.columns))}"
+        )
+    if taken := [name for name in RESULT_COLUMNS if name in table.columns]:
+        raise ValueError(f"a table of cases must not have the columns of its results: {', '.join(taken)}")
+
+
+def _build_cases(study: Study, table: pd.DataFrame) -> tuple[list[Case | None], list[str]]:
+    """Build every row's case; a row that breaks a physical rule has none, and the reason instead."""
+    names = [factor.name for factor in study.factors if factor.name in table.columns]
+    cases: list[Case | None] = []
+    refused = []
+    for settings, seed in zip(table[names].to_dict("records"), table["seed"], strict=True):
+        try:
+            cases.append(study.case({str(name): float(value) for name, value in settings.items()}, int(seed)))
+            refused.append("")
+        except StudyError as error:
+            cases.append(None)
+            refused.append(str(error))
+    return cases, refused
+
+
+def _simulate_missing(
+    study: Study,
+    cases: dict[str, Case],
+    store: Store,
+    pool: ThreadPoolExecutor,
+    device: str | None,
+    workers: int | None,
+    progress: Callable[[Progress], None] | None,
+) -> dict[str, Future[dict[str, Any]]]:
+    """Simulate what the store lacks, in one call; save each result as it finishes and measure it meanwhile."""
+    from dem_warp import simulate
+
+    for key in cases:
+        if damage := store.damage(key):
+            _log.warning("%s; it is simulated again", damage)
+    missing = [key for key in cases if not store.has(key)]
+    outcomes: dict[str, Future[dict[str, Any]]] = {}
+
+    def keep(index: int, result: CaseResult) -> None:
+        key = missing[index]
+        if result.status in REPEATABLE_STATUSES:
+            store.save(key, result)
+        outcomes[key] = pool.submit(_outcome_of, study, result)
+
+    if missing:
+        simulate(
+            [cases[key] for key in missing],
+            device=device,
+            workers=workers,
+            on_result=keep,
+            on_progress=progress,
+        )
+    return outcomes
+
+
+def _stored_outcome(study: Study, store: Store, key: str) -> dict[str, Any]:
+    return _outcome_of(study, store.load(key))
+
+
+def _outcome_of(study: Study, result: CaseResult) -> dict[str, Any]:
+    if result.status != "finished":
+        return _outcome(result.status, result.reason, **result.observables)
+    try:
+        angle = measure_heap(study, result)
+    except PictureError as error:
+        return _outcome(result.status, f"no angle: {error}", **result.observables)
+    return _outcome(result.status, "", angle.mean, angle.se, **result.observables)
+
+
+def _outcome(
+    status: str, reason: str, angle: float = math.nan, angle_se: float = math.nan, **observables: float
+) -> dict[str, Any]:
+    return {"status": status, "reason": reason, "angle": angle, "angle_se": angle_se, **observables}
