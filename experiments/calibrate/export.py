@@ -1,0 +1,205 @@
+"""Results as plain data: JSON-able values for results.json and tables for CSV files."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from enum import Enum
+from functools import singledispatch
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+from pydantic import BaseModel
+
+from doe import Comparison, Design, NoiseFloor, Region, Sample, ScreenResult, Surface
+
+if TYPE_CHECKING:
+    from experiments.calibrate.results import Campaign
+
+_COMPARISON = (
+    "difference",
+    "se",
+    "df",
+    "t",
+    "p",
+    "interval",
+    "alpha",
+    "margin",
+    "equivalence_p",
+    "equivalent",
+)
+_QUALITY = ("r2", "r2_adjusted", "r2_predicted", "cv_percent", "adequate_precision")
+
+
+@singledispatch
+def jsonable(value: Any) -> Any:
+    """Turn a result into plain JSON data: text, finite numbers, lists, dicts; a number that is not finite is None.
+
+    Raises
+    ------
+    TypeError
+        For a kind of value that has no plain form.
+    """
+    if is_dataclass(value) and not isinstance(value, type):
+        return {field.name: jsonable(getattr(value, field.name)) for field in fields(value)}
+    raise TypeError(f"a {type(value).__name__} has no plain form for results.json")
+
+
+@jsonable.register(type(None))
+@jsonable.register(bool)
+@jsonable.register(int)
+@jsonable.register(str)
+def _plain(value: Any) -> Any:
+    return value
+
+
+@jsonable.register
+def _number(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+@jsonable.register
+def _scalar(value: np.generic) -> Any:
+    return jsonable(value.item())
+
+
+@jsonable.register
+def _enum(value: Enum) -> Any:
+    return value.value
+
+
+@jsonable.register
+def _array(value: np.ndarray) -> Any:
+    return jsonable(value.tolist())
+
+
+@jsonable.register(list)
+@jsonable.register(tuple)
+def _sequence(value: Any) -> list[Any]:
+    return [jsonable(item) for item in value]
+
+
+@jsonable.register
+def _mapping(value: Mapping) -> dict[str, Any]:
+    return {str(key): jsonable(item) for key, item in value.items()}
+
+
+@jsonable.register
+def _model(value: BaseModel) -> Any:
+    return value.model_dump(mode="json")
+
+
+@jsonable.register
+def _series(value: pd.Series) -> dict[str, Any]:
+    return _mapping(value.to_dict())
+
+
+@jsonable.register
+def _frame(value: pd.DataFrame) -> list[dict[str, Any]]:
+    return [_mapping(row) for row in indexed(value).to_dict("records")]
+
+
+@jsonable.register
+def _sample(value: Sample) -> dict[str, Any]:
+    return _properties(value, "mean", "sd", "n", "se")
+
+
+@jsonable.register
+def _noise_floor(value: NoiseFloor) -> dict[str, Any]:
+    return _properties(value.sample, "mean", "sd", "n", "se") | _properties(
+        value, "confidence", "mean_interval", "sd_interval"
+    )
+
+
+@jsonable.register
+def _comparison(value: Comparison) -> dict[str, Any]:
+    return _properties(value, "a", "b", "method", *_COMPARISON, "smallest_margin")
+
+
+@jsonable.register
+def _design(value: Design) -> dict[str, Any]:
+    return _properties(value, "factors", "dummies", "coded", "natural")
+
+
+@jsonable.register
+def _screen(value: ScreenResult) -> dict[str, Any]:
+    return _properties(value, "table", "anova", "error_rule", "error_df", "error_ms", "effects")
+
+
+@jsonable.register
+def _surface(value: Surface) -> dict[str, Any]:
+    return _properties(value, "anova", "coefficients", "coded_coefficients", "dropped", *_QUALITY) | {
+        "equation": value.equation("natural"),
+        "equation_coded": value.equation("coded"),
+    }
+
+
+@jsonable.register
+def _region(value: Region) -> dict[str, Any]:
+    return _properties(value, "fraction", "ranges", "extent", "resolution")
+
+
+def _properties(value: Any, *names: str) -> dict[str, Any]:
+    return {name: jsonable(getattr(value, name)) for name in names}
+
+
+def indexed(table: pd.DataFrame) -> pd.DataFrame:
+    """Copy a table with its index as the first column where the index has a name."""
+    return table.reset_index() if table.index.name is not None else table
+
+
+def campaign_tables(campaign: Campaign) -> dict[str, pd.DataFrame]:
+    """Collect the tables of every stage that was reached, by file name (without ending)."""
+    tables = {"cases": campaign.cases, "factors": pd.DataFrame([jsonable(f) for f in campaign.factors])}
+    if campaign.screening is not None:
+        tables |= _screening_tables(campaign.screening)
+    if campaign.selection is not None:
+        tables["selection"] = campaign.selection.table
+    if campaign.climb is not None:
+        tables["climb"] = campaign.climb.path
+    if campaign.surface is not None:
+        tables |= _surface_tables(campaign.surface)
+    if campaign.optimum is not None:
+        tables["contour"] = campaign.optimum.contour
+        tables["compatible_ranges"] = campaign.optimum.region.ranges
+    if campaign.verification is not None:
+        tables["verification"] = campaign.verification.cases
+    tables["decisions"] = _decision_table(campaign)
+    return {name: indexed(table) for name, table in tables.items()}
+
+
+def _screening_tables(screening: Any) -> dict[str, pd.DataFrame]:
+    design = screening.design.coded.copy()
+    for replicate in range(screening.response.shape[1]):
+        design[f"angle_{replicate + 1}"] = screening.response[:, replicate]
+    return {
+        "screening_design": design,
+        "screening_effects": screening.screen.table,
+        "screening_anova": screening.screen.anova,
+    }
+
+
+def _surface_tables(surface: Any) -> dict[str, pd.DataFrame]:
+    coded = surface.design.coded.add_suffix("_coded")
+    design = pd.concat([surface.design.natural, coded], axis=1).assign(angle=surface.response)
+    return {
+        "surface_design": design,
+        "surface_anova_full": surface.full.anova,
+        "surface_anova_reduced": surface.reduced.anova,
+        "surface_outside_ranges": surface.outside,
+    }
+
+
+def _decision_table(campaign: Campaign) -> pd.DataFrame:
+    rows = [
+        {
+            "stage": decision.stage,
+            "rule": decision.rule,
+            "numbers": "; ".join(f"{name} = {value}" for name, value in jsonable(decision.numbers).items()),
+            "outcome": decision.outcome,
+        }
+        for decision in campaign.decisions
+    ]
+    return pd.DataFrame(rows, columns=["stage", "rule", "numbers", "outcome"])

@@ -1,0 +1,277 @@
+"""What each stage of a campaign found, and the decisions that it took.
+
+A stage that simulates keeps its cases as ``cases``: one row a case as the runner returned it (every factor in
+its natural unit, ``seed``, ``stage``, ``run``, ``replicate``, ``status``, ``reason``, ``angle``, ``angle_se`` [deg],
+observables, ``case_key``). Failed cases stay in it. Runs and replicates count from 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
+from enum import StrEnum
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from experiments.calibrate.export import campaign_tables, jsonable
+
+if TYPE_CHECKING:
+    from doe import Comparison, Design, Factor, NoiseFloor, Region, Sample, ScreenResult, Surface
+    from experiments.calibrate.settings import CampaignSettings
+
+
+class Outcome(StrEnum):
+    """How a campaign ended."""
+
+    CALIBRATED = "calibrated"
+    NOT_VERIFIED = "not-verified"
+    NO_SIGNIFICANT_FACTOR = "no-significant-factor"
+    TARGET_NOT_REACHED = "target-not-reached"
+    PLATEAU = "plateau"
+    NO_CONTOUR = "no-contour"
+    TOO_MANY_FAILED_RUNS = "too-many-failed-runs"
+
+
+class ClimbEnd(StrEnum):
+    """How a climb ended."""
+
+    CROSSED = "crossed"
+    TURNED = "turned"
+    FLAT = "flat"
+    BOUNDED = "bounded"
+
+
+@dataclass(frozen=True)
+class Decision:
+    """One decision, in words and with the numbers that made it."""
+
+    stage: str
+    """Stage that decided: "noise_floor", "screening", "selection", ..."""
+    rule: str
+    """The rule, as a sentence."""
+    numbers: dict[str, Any]
+    """The numbers that the rule looked at (unit in the key)."""
+    outcome: str
+    """What was decided, as a sentence."""
+
+
+@dataclass(frozen=True)
+class TargetResult:
+    """The repose angle to be matched."""
+
+    sample: Sample
+    """Mean, standard deviation and count of the target's measurements [deg]."""
+    truth: dict[str, float] | None
+    """Twin study: hidden value of every factor; None for a physical target."""
+    cases: pd.DataFrame | None
+    """Twin study: the heaps of the target; None for a physical target."""
+    decisions: tuple[Decision, ...]
+
+
+@dataclass(frozen=True)
+class NoiseFloorResult:
+    """Replicates with every factor at its middle."""
+
+    cases: pd.DataFrame
+    floor: NoiseFloor
+    """Mean, standard deviation and its interval [deg]."""
+    decisions: tuple[Decision, ...]
+
+
+@dataclass(frozen=True)
+class ScreeningResult:
+    """The Plackett-Burman design, its response and analysis."""
+
+    cases: pd.DataFrame
+    design: Design
+    """As planned; ``screen.design`` holds the cases that gave an angle, a row each."""
+    response: np.ndarray
+    """Repose angles [deg] of the plan, shape (runs, replicates); a failed case is NaN."""
+    screen: ScreenResult
+    decisions: tuple[Decision, ...]
+
+
+@dataclass(frozen=True)
+class SelectionResult:
+    """The factors that the later stages vary."""
+
+    kept: tuple[str, ...]
+    """Names, strongest first."""
+    table: pd.DataFrame
+    """By factor: effect [deg], p, percent, rank, visible (larger than the noise can explain), kept, reason."""
+    visible_effect: float
+    """Smallest effect [deg] that the noise floor lets this design see (at the power of the settings)."""
+    decisions: tuple[Decision, ...]
+
+
+@dataclass(frozen=True)
+class ClimbResult:
+    """The path of steepest ascent and where it meets the target."""
+
+    cases: pd.DataFrame
+    kept: tuple[str, ...]
+    path: pd.DataFrame
+    """By step (index ``step``; 1 is the start, an extension below it counts 0, -1, ...): value of every kept
+    factor, predicted (by the screening) and measured angle, sd [deg], n (cases measured), error (angle - target)
+    [deg], error_percent; NaN where all cases of a step failed."""
+    step: dict[str, float]
+    """Move of every kept factor per step, natural unit."""
+    end: ClimbEnd
+    crossing: dict[str, float] | None
+    """Kept factors where the path crosses the target (interpolated), natural unit; None when it does not."""
+    crossing_step: float | None
+    """The same place as a fractional step."""
+    best_step: int
+    """Step with the smallest error."""
+    decisions: tuple[Decision, ...]
+
+    @property
+    def best(self) -> dict[str, float]:
+        """Kept factors at the step with the smallest error, natural unit."""
+        return {name: float(self.path.at[self.best_step, name]) for name in self.kept}
+
+
+@dataclass(frozen=True)
+class SurfaceResult:
+    """The composite design and the fitted surfaces (coded in the design's own half-ranges)."""
+
+    cases: pd.DataFrame
+    design: Design
+    """As planned; ``full.design`` holds the cases that gave an angle, a row each."""
+    response: np.ndarray
+    """Repose angle [deg] of every planned run, mean over its replicates; NaN where all of them failed."""
+    center: dict[str, float]
+    half_range: dict[str, float]
+    full: Surface
+    reduced: Surface
+    """The surface that the optimum is taken from."""
+    outside: pd.DataFrame
+    """Runs outside the stated factor ranges: run, factor, value, low, high."""
+    decisions: tuple[Decision, ...]
+
+
+@dataclass(frozen=True)
+class TruthCheck:
+    """A twin study's hidden settings against the fitted surface."""
+
+    values: dict[str, float]
+    """Hidden value of every kept factor, natural unit."""
+    inside_design: bool
+    """Whether the composite design reaches so far."""
+    compatible: bool | None
+    """Whether the truth lies in the compatible region; None outside the design, where nothing can be said."""
+    distance: float
+    """Coded distance from the truth to the nearest point of the target contour."""
+    predicted: float
+    """The surface's angle at the truth [deg]."""
+
+
+@dataclass(frozen=True)
+class OptimumResult:
+    """The chosen point of the target contour and everything that is as good."""
+
+    point: dict[str, float]
+    """Chosen value of every kept factor, natural unit."""
+    settings: dict[str, float]
+    """The same with every other factor at its middle: what a case needs."""
+    prediction: pd.Series
+    """The fit there [deg]: mean, se, confidence and prediction interval, as ``Surface.predict`` names them."""
+    extent: float
+    """Coded half width of the box that contour and region are drawn in: the reach of the axial points."""
+    contour: pd.DataFrame
+    """Points of the target contour in that box, one column a kept factor, natural unit (index: piece)."""
+    region: Region
+    """Where the fit and the target agree within their uncertainties."""
+    unidentified: tuple[str, ...]
+    """Kept factors that the target does not pin down."""
+    truth: TruthCheck | None
+    """Twin study: where the hidden truth lies; None for a physical target."""
+    decisions: tuple[Decision, ...]
+
+
+@dataclass(frozen=True)
+class VerificationResult:
+    """Fresh cases at the chosen point against the target."""
+
+    cases: pd.DataFrame
+    angles: np.ndarray
+    """Repose angles [deg] of the cases that gave one."""
+    comparison: Comparison
+    margin: float
+    """Equivalence margin [deg]."""
+    verified: bool
+    decisions: tuple[Decision, ...]
+
+
+StageResult = (
+    TargetResult
+    | NoiseFloorResult
+    | ScreeningResult
+    | SelectionResult
+    | ClimbResult
+    | SurfaceResult
+    | OptimumResult
+    | VerificationResult
+)
+
+STAGES = ("target", "noise_floor", "screening", "selection", "climb", "surface", "optimum", "verification")
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """A calibration campaign; the stages after the one where it ended are None."""
+
+    factors: tuple[Factor, ...]
+    settings: CampaignSettings
+    outcome: Outcome
+    reason: str
+    """The outcome as a sentence: what happened and, where it failed, what to change."""
+    unanalysed_cases: pd.DataFrame
+    """Cases of the stage that could not be analysed; empty in a campaign that was not cut short by failures."""
+    target: TargetResult | None = None
+    noise_floor: NoiseFloorResult | None = None
+    screening: ScreeningResult | None = None
+    selection: SelectionResult | None = None
+    climb: ClimbResult | None = None
+    surface: SurfaceResult | None = None
+    optimum: OptimumResult | None = None
+    verification: VerificationResult | None = None
+
+    @property
+    def stages(self) -> dict[str, StageResult]:
+        """The stages that were reached, by name, in order."""
+        return {name: result for name in STAGES if (result := getattr(self, name)) is not None}
+
+    @property
+    def decisions(self) -> tuple[Decision, ...]:
+        """Every decision, in the order in which they were taken."""
+        return tuple(decision for result in self.stages.values() for decision in result.decisions)
+
+    @property
+    def cases(self) -> pd.DataFrame:
+        """Every case of the campaign, one row each."""
+        tables = [*self._case_tables(), self.unanalysed_cases]
+        filled = [table for table in tables if len(table)]
+        return pd.concat(filled, ignore_index=True) if filled else self.unanalysed_cases
+
+    @property
+    def failed_cases(self) -> pd.DataFrame:
+        """Cases that gave no angle."""
+        cases = self.cases
+        return cases[cases["angle"].isna()] if len(cases) else cases
+
+    def _case_tables(self) -> Iterator[pd.DataFrame]:
+        for result in self.stages.values():
+            table = getattr(result, "cases", None)
+            if table is not None:
+                yield table
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything as plain JSON data: finite numbers, text, lists and dicts; what is not finite is null."""
+        return {field.name: jsonable(getattr(self, field.name)) for field in fields(self)}
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """Named tables for CSV files; an index that means something is a column."""
+        return campaign_tables(self)
