@@ -1,0 +1,93 @@
+"""Materials: published constants of the buckwheat study, limits, and refused values."""
+
+import math
+
+import pytest
+
+from dem_warp.materials import Interaction, Material, damping_coefficient, effective_moduli, rayleigh_time
+
+GRAIN = Material(density=698.0, shear_modulus=34.325e6, poisson_ratio=0.29)
+STEEL = Material(density=7800.0, shear_modulus=70e9, poisson_ratio=0.30)
+
+
+def test_rayleigh_time_of_a_buckwheat_sphere_of_one_millimetre():
+    # The reference is given to seven digits.
+    assert rayleigh_time(1e-3, GRAIN) == pytest.approx(1.533373e-5, rel=5e-7)
+
+
+def test_effective_moduli_of_the_study_at_mid_levels():
+    # The references are given to seven digits.
+    assert effective_moduli(GRAIN, GRAIN) == pytest.approx((48.34507e6, 10.03655e6), rel=5e-7)
+    assert effective_moduli(GRAIN, STEEL) == pytest.approx((96.64342e6, 20.06332e6), rel=5e-7)
+
+
+def test_effective_moduli_do_not_depend_on_the_order_of_the_bodies():
+    assert effective_moduli(GRAIN, STEEL) == effective_moduli(STEEL, GRAIN)
+
+
+def test_effective_moduli_against_a_rigid_body_are_those_of_the_soft_one():
+    rigid = Material(density=1.0, shear_modulus=1e30, poisson_ratio=0.3)
+    youngs, shear = effective_moduli(GRAIN, rigid)
+    # The rigid body's compliance is 1e-22 of the grain's: rounding is all that is left.
+    assert youngs == pytest.approx(GRAIN.youngs_modulus / (1.0 - 0.29**2), rel=1e-14)
+    assert shear == pytest.approx(GRAIN.shear_modulus / (2.0 - 0.29), rel=1e-14)
+
+
+def test_youngs_modulus_of_an_isotropic_solid():
+    assert GRAIN.youngs_modulus == pytest.approx(88.5585e6, rel=1e-14)
+
+
+def test_an_elastic_contact_has_no_damping():
+    assert damping_coefficient(1.0) == 0.0
+
+
+def test_damping_at_the_restitution_of_a_half():
+    # |beta| = ln 2 / sqrt(ln^2 2 + pi^2), divided through by ln 2.
+    expected = 2.0 * math.sqrt(5.0 / 6.0) / math.hypot(1.0, math.pi / math.log(2.0))
+    assert damping_coefficient(0.5) == pytest.approx(expected, rel=1e-14)
+
+
+def test_damping_grows_as_restitution_falls_and_stays_below_its_limit():
+    values = [damping_coefficient(e) for e in (0.9, 0.5, 0.18, 1e-3, 1e-300)]
+    assert values == sorted(values)
+    assert values[-1] < 2.0 * math.sqrt(5.0 / 6.0)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ((0.0, 1e6, 0.3), "density must be finite and positive"),
+        ((698.0, -1.0, 0.3), "shear_modulus must be finite and positive"),
+        ((698.0, math.nan, 0.3), "shear_modulus must be finite and positive"),
+        ((698.0, 1e6, 0.51), "poisson_ratio must be above -1 and at most 0.5, got 0.51"),
+        ((698.0, 1e6, math.nan), "poisson_ratio must be above -1"),
+    ],
+)
+def test_a_material_refuses_values_out_of_range(values, message):
+    with pytest.raises(ValueError, match=message):
+        Material(*values)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ((0.0, 0.5, 0.05), "restitution must be above 0 and at most 1, got 0.0"),
+        ((1.01, 0.5, 0.05), "restitution must be above 0 and at most 1, got 1.01"),
+        ((0.5, -0.1, 0.05), "static_friction must be finite and 0 or more, got -0.1"),
+        ((0.5, 0.5, math.inf), "rolling_friction must be finite and 0 or more, got inf"),
+    ],
+)
+def test_an_interaction_refuses_values_out_of_range(values, message):
+    with pytest.raises(ValueError, match=message):
+        Interaction(*values)
+
+
+@pytest.mark.parametrize("restitution", [0.0, -0.5, 1.5, math.nan])
+def test_damping_refuses_a_restitution_out_of_range(restitution):
+    with pytest.raises(ValueError, match="restitution must be above 0 and at most 1"):
+        damping_coefficient(restitution)
+
+
+def test_rayleigh_time_refuses_a_radius_that_is_not_positive():
+    with pytest.raises(ValueError, match="radius must be finite and positive"):
+        rayleigh_time(0.0, GRAIN)
