@@ -15,8 +15,9 @@ from doe.noise import (
     noise_floor,
     variance_ratio,
 )
-from doe.optimum import Region, StationaryPoint
+from doe.optimum import StationaryPoint
 from doe.plackett_burman import plackett_burman
+from doe.region import Region
 from doe.screening import ScreenResult, aliases, screen
 from doe.steepest import ClimbPath, climb_table, steepest_path
 from doe.surface import Surface, fit_surface

@@ -56,8 +56,8 @@ def least_squares(matrix: pd.DataFrame, response: pd.Series) -> RegressionResult
 def pure_error(coded: pd.DataFrame, response: pd.Series) -> ErrorTerm:
     """Return the spread of replicates about the mean of their setting.
 
-    Rows of ``coded`` that agree are replicates of one setting; the degrees of freedom are the observations less
-    the distinct settings.
+    Rows of ``coded`` that agree are replicates of one setting; the degrees of freedom are the observations
+    less the distinct settings.
     """
     setting = settings_of(coded)
     within = response.to_numpy() - response.groupby(setting).transform("mean").to_numpy()

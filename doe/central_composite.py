@@ -31,15 +31,15 @@ def central_composite(
 ) -> Design:
     """Return the central composite design (Box and Wilson 1951) of 1 to 10 factors.
 
-    Standard order: the two-level part (first factor fastest; full up to 5 factors, else a fraction of resolution
-    V), the axial points -alpha and +alpha of each factor, the center runs.
+    Standard order: the two-level part (first factor fastest; full up to 5 factors, else a fraction of
+    resolution V), the axial points -alpha and +alpha of each factor, the center runs.
 
     Parameters
     ----------
     factors : iterable of Factor
     alpha : {"rotatable", "face", "spherical"} or float
-        Coded distance of the axial points. ``"rotatable"``: fourth root of the number of two-level runs, so that
-        the variance of a prediction depends on the distance from the center alone; ``"face"``: 1;
+        Coded distance of the axial points. ``"rotatable"``: fourth root of the number of two-level runs, so
+        that the variance of a prediction depends on the distance from the center alone; ``"face"``: 1;
         ``"spherical"``: square root of the number of factors.
     center : int
         Number of center runs.

@@ -58,7 +58,7 @@ class Comparison:
     """Difference of two means and what can be said of it; made by ``compare_means``."""
 
     a: Sample
-    b: Sample
+    b: Sample | float
     method: str
     difference: float
     """Mean of a less mean of b."""
@@ -138,19 +138,20 @@ def compare_means(
     if not 0.0 < alpha < 1.0:
         raise DesignError(f"alpha lies between 0 and 1, received {alpha}")
     first = Sample.of(a)
-    if method == "one-sample" and isinstance(b, float | int):
-        second = Sample(float(b), 0.0, 2)
-    else:
-        second = Sample.of(b)
-    se, df = _difference_error(first, second, method)
+    if not isinstance(b, float | int):
+        b = Sample.of(b)
+    elif method != "one-sample":
+        raise DesignError(f"a plain number has no spread: give a sample or method='one-sample', received {b}")
+    se, df = _difference_error(first, b, method)
     if not se > 0.0:
         raise DesignError("no test without spread: every value of the samples is the same")
-    return Comparison(first, second, method, first.mean - second.mean, se, df, alpha, margin)
+    known = b.mean if isinstance(b, Sample) else float(b)
+    return Comparison(first, b, method, first.mean - known, se, df, alpha, margin)
 
 
-def _difference_error(a: Sample, b: Sample, method: str) -> tuple[float, float]:
+def _difference_error(a: Sample, b: Sample | float, method: str) -> tuple[float, float]:
     """Return the standard error of the difference and its degrees of freedom."""
-    if method == "one-sample":
+    if method == "one-sample" or not isinstance(b, Sample):
         return a.se, float(a.df)
     if method == "pooled":
         df = a.df + b.df

@@ -151,7 +151,7 @@ def observations(design: Design, response: ArrayLike) -> tuple[pd.DataFrame, pd.
 
 
 def _checked_table(table: pd.DataFrame, names: list[str]) -> pd.DataFrame:
-    """Return a float copy whose first columns are the factors'; raise DesignError when it is no table of runs."""
+    """Return a float copy with the factors' columns first; raise DesignError when it is no table of runs."""
     missing = [name for name in names if name not in table.columns]
     if missing:
         raise DesignError(f"no column for factor {missing[0]!r}; the table has {list(table.columns)}")
@@ -169,7 +169,7 @@ def _checked_table(table: pd.DataFrame, names: list[str]) -> pd.DataFrame:
     if len(bad):
         row, column = bad[0]
         raise DesignError(
-            f"settings must be finite: {table.iat[row, column]} in run {table.index[row]}, "
+            f"settings must be finite: {table.iloc[row, column]!r} in run {table.index[row]}, "
             f"column {table.columns[column]!r}"
         )
     return table

@@ -47,7 +47,7 @@ class NoiseFloor:
 class VarianceRatio:
     """F test of one mean square against another, one-sided: is the first one larger."""
 
-    F: float  # noqa: N815  (the statistic's name)
+    F: float
     df: tuple[float, float]
 
     @property
@@ -76,8 +76,8 @@ def curvature_test(
 ) -> VarianceRatio:
     """Test whether the center lies off the plane through a two-level design's runs.
 
-    Single-degree-of-freedom curvature nF nC (mean F - mean C)^2 / (nF + nC) against the spread of the replicated
-    centers (Montgomery, Design and Analysis of Experiments, section 6.8).
+    Single-degree-of-freedom curvature nF nC (mean F - mean C)^2 / (nF + nC) against the spread of the
+    replicated centers (Montgomery, Design and Analysis of Experiments, section 6.8).
     """
     corner, center = Sample.of(corners), Sample.of(centers)
     gap = corner.mean - center.mean

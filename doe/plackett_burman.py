@@ -80,8 +80,8 @@ def screening_matrix(runs: int) -> NDArray[np.float64]:
 def hadamard(order: int) -> NDArray[np.float64]:
     """Return a Hadamard matrix: entries -1 and +1, H'H = order * I.
 
-    Doubling (Sylvester 1867) and the two constructions from the squares of a finite field of q elements, with q
-    a prime or the square of a prime (Paley, J. Math. Phys. 12, 1933): order q + 1 and 2 (q + 1).
+    Doubling (Sylvester 1867) and the two constructions from the squares of a finite field of q elements, with
+    q a prime or the square of a prime (Paley, J. Math. Phys. 12, 1933): order q + 1 and 2 (q + 1).
     """
     if order == 1:
         return np.ones((1, 1))
@@ -97,7 +97,8 @@ def hadamard(order: int) -> NDArray[np.float64]:
         conference = np.ones((half, half))
         conference[0, 0] = 0.0
         conference[1:, 1:] = _residue_matrix(half - 1)
-        return np.kron(conference, hadamard(2)) + np.kron(np.eye(half), [[1.0, -1.0], [-1.0, -1.0]])
+        signs = np.array([[1.0, -1.0], [-1.0, -1.0]])
+        return np.kron(conference, hadamard(2)) + np.kron(np.eye(half), signs)
     return np.kron(hadamard(half), hadamard(2))
 
 
@@ -117,7 +118,7 @@ def _is_conference(order: int) -> bool:
 def _is_field(size: int) -> bool:
     """Whether the size is an odd prime or the square of one."""
     return size % 2 == 1 and (
-        _is_prime(size) or _is_prime(math.isqrt(size)) and math.isqrt(size) ** 2 == size
+        _is_prime(size) or (_is_prime(math.isqrt(size)) and math.isqrt(size) ** 2 == size)
     )
 
 

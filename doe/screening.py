@@ -62,12 +62,12 @@ class ScreenResult:
 
     @cached_property
     def effects(self) -> pd.Series:
-        """Effects of every column, dummies included where the runs allow (all of them in a complete design)."""
+        """Effects of every column, dummies too unless missing runs leave too few for them."""
         return _all_effects(self.design, self.response)
 
     @cached_property
     def table(self) -> pd.DataFrame:
-        """Tests by factor: effect, sum_sq, F, t, p, percent (of the total sum of squares), rank (1 is largest)."""
+        """Tests by factor: effect, sum_sq, F, t, p, percent (of the total sum of squares), rank (1: largest)."""
         sums = partial_sums(self.fit).iloc[1:]
         effect = 2.0 * self.fit.params.iloc[1:]
         t = effect / self.standard_error
@@ -111,11 +111,11 @@ def screen(design: Design, response: ArrayLike, error: str = "pooled") -> Screen
         Two-level; runs may be missing (``Design.select``): least squares then replaces the plain contrasts.
     response : array-like, shape (runs,) or (runs, replicates)
     error : {"pooled", "dummies", "pure", "lenth"}
-        What the effects are tested against. ``"pooled"``: all that the factors leave unexplained, dummy columns
-        and replicates together; ``"dummies"``: the columns without factor alone, which hold interactions too (the
-        careful choice with replicates); ``"pure"``: the replicates alone; ``"lenth"``: Lenth's pseudo standard
-        error (Technometrics 31, 1989, p. 469), for a design without dummies and replicates in which few effects
-        are active.
+        What the effects are tested against. ``"pooled"``: all that the factors leave unexplained, dummy
+        columns and replicates together; ``"dummies"``: the columns without factor alone, which hold
+        interactions too (the careful choice with replicates); ``"pure"``: the replicates alone; ``"lenth"``:
+        Lenth's pseudo standard error (Technometrics 31, 1989, p. 469), for a design without dummies and
+        replicates in which few effects are active.
 
     Raises
     ------
@@ -163,15 +163,16 @@ def _error_term(
     }[rule]
     if chosen.df <= 0:
         raise DesignError(
-            f"no degrees of freedom for the error {rule!r}: {len(response)} observations of {len(design.names)} "
-            f"factors, {len(design.dummies)} dummies, {replicates.df:.0f} degrees of freedom from replicates; "
-            "use a larger design (its spare columns are dummies), replicate the runs, or choose error='lenth'"
+            f"no degrees of freedom for the error {rule!r}: {len(response)} observations of "
+            f"{len(design.names)} factors, {len(design.dummies)} dummies, {replicates.df:.0f} degrees of freedom "
+            "from replicates; use a larger design (its spare columns are dummies), replicate the runs, or "
+            "choose error='lenth'"
         )
     return chosen
 
 
 def _all_effects(design: Design, response: pd.Series) -> pd.Series:
-    """Return effects of factors and dummies; of the factors alone when too few runs are left for all columns."""
+    """Return effects of factors and dummies; of the factors alone when too few runs are left for more."""
     coded = design.coded.loc[response.index]
     columns = list(coded.columns)
     matrix = np.column_stack([np.ones(len(coded)), coded.to_numpy()])

@@ -43,8 +43,9 @@ def steepest_path(
     factors : names, optional
         Factors that move; default all.
     step : float or mapping of positive natural steps by factor
-        A number: the textbook path, every factor moves in proportion to its coded coefficient, and the strongest
-        one by ``step`` coded units. A mapping: fixed natural steps; the model gives their signs alone.
+        A number: the textbook path, every factor moves in proportion to its coded coefficient, and the
+        strongest one by ``step`` coded units. A mapping: fixed natural steps; the model gives their signs
+        alone.
     start : mapping of natural values by factor, optional
         Default: the factors' centers.
     limits : mapping of (low, high) natural values by factor, optional

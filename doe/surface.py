@@ -10,12 +10,13 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 from statsmodels.regression.linear_model import RegressionResults
 
-from doe import optimum
-from doe.anova import ErrorTerm, anova_table, least_squares, partial_sums, pure_error
+from doe import contour, optimum, region
+from doe.anova import ErrorTerm, anova_table, least_squares, pure_error
 from doe.compare import Sample
 from doe.design import Design, observations
 from doe.errors import DesignError
 from doe.factors import coded_points
+from doe.quadratic import QuadraticForm
 from doe.terms import (
     INTERCEPT,
     Term,
@@ -33,7 +34,8 @@ from doe.terms import (
 class Surface:
     """A polynomial fitted to a design's response; made by ``fit_surface``.
 
-    Terms are written "E", "E:F" and "E^2". The model is hierarchical: a term stays while a multiple of it is in.
+    Terms are written "E", "E:F" and "E^2". The model is hierarchical: a term stays while a multiple of it is
+    in.
     """
 
     design: Design
@@ -85,7 +87,12 @@ class Surface:
         if units not in ("natural", "coded"):
             raise DesignError(f"units is natural or coded, received {units!r}")
         coefficients = self.coefficients if units == "natural" else self.coded_coefficients
-        return equation_text(coefficients.to_dict(), digits)
+        return equation_text({str(name): value for name, value in coefficients.items()}, digits)
+
+    @cached_property
+    def quadratic_form(self) -> QuadraticForm:
+        """The fitted polynomial as c + b'x + x'Bx in coded units."""
+        return QuadraticForm.of(self.design.names, self.terms, self.fit.params)
 
     @property
     def residual_df(self) -> float:
@@ -132,7 +139,7 @@ class Surface:
 
     @property
     def press(self) -> float:
-        """Sum of squared errors when each observation is predicted from all others; infinite at leverage 1."""
+        """Sum of squared errors when each observation is predicted from the others; infinite at leverage 1."""
         left = (1.0 - self.leverage).to_numpy()
         if np.any(left < 1e-12):
             return np.inf
@@ -150,7 +157,7 @@ class Surface:
 
     @property
     def adequate_precision(self) -> float:
-        """Range of the fitted responses over their mean standard error (Box and Draper); above 4 is wanted."""
+        """Range of the fitted responses over their mean standard error (Box and Draper); wanted above 4."""
         mean_variance = len(self.fit.params) * self.residual_ms / len(self.response)
         return float((self.fitted.max() - self.fitted.min()) / np.sqrt(mean_variance))
 
@@ -162,14 +169,16 @@ class Surface:
             multiples = [term_name(other) for other in kept if contains(other, term)]
             if multiples:
                 raise DesignError(
-                    f"the model stays hierarchical: {term_name(term)} cannot go while {', '.join(multiples)} stays"
+                    f"the model stays hierarchical: {term_name(term)} cannot go "
+                    f"while {', '.join(multiples)} stays"
                 )
         return replace(self, terms=kept, dropped=(*self.dropped, *map(term_name, out)))
 
     def reduce(self, alpha: float = 0.05) -> "Surface":
         """Return the model after hierarchical backward elimination.
 
-        Again and again the least significant term goes, among those with p above alpha that are part of no other.
+        Again and again the least significant term goes, among those with p above alpha that are part of no
+        other.
         """
         surface = self
         while True:
@@ -202,8 +211,8 @@ class Surface:
         Returns
         -------
         DataFrame, index of ``points``
-            mean, se (of the mean), confidence_low, confidence_high (of the mean), prediction_low, prediction_high
-            (of one further observation).
+            mean, se (of the mean), confidence_low, confidence_high (of the mean), prediction_low,
+            prediction_high (of one further observation).
         """
         table = points if isinstance(points, pd.DataFrame) else pd.DataFrame([dict(points)])
         missing = [name for name in self.design.names if name not in table.columns]
@@ -218,11 +227,11 @@ class Surface:
         return pd.DataFrame(columns, index=table.index)
 
     def contour(self, target: float, extent: float = 1.0, resolution: int | None = None) -> pd.DataFrame:
-        """Return points of the target contour, natural units (see ``doe.optimum.contour``)."""
-        return optimum.contour(self, target, extent, resolution)
+        """Return points of the target contour, natural units (see ``doe.contour.contour``)."""
+        return contour.contour(self, target, extent, resolution)
 
     def nearest(self, target: float, to: Mapping[str, float] | None = None, extent: float = 1.0) -> pd.Series:
-        """Return the contour's point nearest to the design center, natural units (see ``doe.optimum.nearest``)."""
+        """Return the contour's point nearest to the design center, natural (see ``doe.optimum.nearest``)."""
         return optimum.nearest(self, target, to, extent)
 
     def stationary_point(self) -> optimum.StationaryPoint:
@@ -237,15 +246,15 @@ class Surface:
         alpha: float = 0.05,
         extent: float = 1.0,
         resolution: int | None = None,
-    ) -> optimum.Region:
-        """Return the settings that the target does not contradict (see ``doe.optimum.compatible_region``)."""
-        return optimum.compatible_region(self, target, target_se, target_df, alpha, extent, resolution)
+    ) -> region.Region:
+        """Return the settings that the target does not contradict (see ``doe.region.compatible_region``)."""
+        return region.compatible_region(self, target, target_se, target_df, alpha, extent, resolution)
 
     def band(
         self, target: float, half_width: float, extent: float = 1.0, resolution: int | None = None
-    ) -> optimum.Region:
+    ) -> region.Region:
         """Return where the fitted mean lies within target +- half_width (the fit taken as exact)."""
-        return optimum.band(self, target, half_width, extent, resolution)
+        return region.band(self, target, half_width, extent, resolution)
 
 
 def fit_surface(design: Design, response: ArrayLike, model: str = "quadratic") -> Surface:

@@ -60,8 +60,8 @@ def model_matrix(coded: pd.DataFrame, terms: Iterable[Term]) -> pd.DataFrame:
 def natural_coefficients(coded: Mapping[Term, float], factors: Iterable[Factor]) -> dict[Term, float]:
     """Return a coded polynomial's coefficients in natural units.
 
-    Each coded variable is (natural - center) / half range; every product is multiplied out. The terms come in the
-    order of the coded ones; a linear term that the coded model lacks may come in behind them.
+    Each coded variable is (natural - center) / half range; every product is multiplied out. The terms come in
+    the order of the coded ones; a linear term that the coded model lacks may come in behind them.
     """
     by_name = {factor.name: factor for factor in factors}
     natural: dict[Term, float] = defaultdict(float, dict.fromkeys(coded, 0.0))

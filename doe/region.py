@@ -1,0 +1,130 @@
+"""Regions of a surface: the settings that a measured target does not contradict."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy import stats
+
+from doe.compare import Sample
+from doe.errors import DesignError
+from doe.factors import Factor, natural_points
+
+if TYPE_CHECKING:
+    from doe.surface import Surface
+
+CELL_BUDGET = 160_000
+"""Cells that a region is sampled on, over all factors."""
+
+CELLS_PER_FACTOR = 2_000
+"""Most cells along one factor."""
+
+
+@dataclass(frozen=True, eq=False)
+class Region:
+    """Cells of a regular grid over the coded box -extent..+extent and which of them belong."""
+
+    factors: tuple[Factor, ...]
+    coded: pd.DataFrame
+    """Centers of all cells; the last factor varies fastest."""
+    mask: NDArray[np.bool_]
+    """Which cells belong, shape (cells,)."""
+    resolution: int
+    """Cells along each factor."""
+    extent: float
+
+    @cached_property
+    def natural(self) -> pd.DataFrame:
+        """Centers of all cells in natural units."""
+        return natural_points(self.factors, self.coded)
+
+    @property
+    def fraction(self) -> float:
+        """Share of the box that belongs."""
+        return float(self.mask.mean())
+
+    @property
+    def ranges(self) -> pd.DataFrame:
+        """Natural low and high of each factor over the cells that belong, to their edges; NaN when none does.
+
+        A range alone does not make a setting compatible: the factors trade off against one another.
+        """
+        half_cell = self.extent / self.resolution
+        belonging = self.coded[self.mask]
+        edges = pd.DataFrame({"low": belonging.min() - half_cell, "high": belonging.max() + half_cell}).T
+        return natural_points(self.factors, edges).T.rename_axis("factor")
+
+
+def compatible_region(
+    surface: Surface,
+    target: float | Sample,
+    target_se: float = 0.0,
+    target_df: float = np.inf,
+    alpha: float = 0.05,
+    extent: float = 1.0,
+    resolution: int | None = None,
+) -> Region:
+    """Return the settings whose fitted mean and the measured target do not differ significantly.
+
+    A setting belongs when |mean - target| <= t sqrt(se_fit^2 + se_target^2), with t on the Welch-Satterthwaite
+    degrees of freedom of the two errors. So the true setting belongs with probability 1 - alpha, where the
+    model holds.
+
+    Parameters
+    ----------
+    surface : Surface
+    target : float or Sample
+        A Sample brings its standard error and degrees of freedom.
+    target_se, target_df : float
+        Standard error of the target's mean and its degrees of freedom, when the target is a number.
+    alpha : float
+    extent : float
+        Coded half width of the box.
+    resolution : int, optional
+        Cells along each factor.
+    """
+    if isinstance(target, Sample):
+        goal, goal_se, goal_df = target.mean, target.se, float(target.df)
+    else:
+        goal, goal_se, goal_df = target, target_se, target_df
+    if not (np.isfinite(goal_se) and goal_se >= 0.0):
+        raise DesignError(f"target_se must be finite and not negative, received {goal_se}")
+    points, count = box_cells(len(surface.design.factors), extent, resolution)
+    mean, se = surface.evaluate(points)
+    total = se**2 + goal_se**2
+    df = total**2 / (se**4 / surface.residual_df + goal_se**4 / goal_df)
+    mask = np.abs(mean - goal) <= stats.t.isf(0.5 * alpha, df) * np.sqrt(total)
+    return _region(surface, points, mask, count, extent)
+
+
+def band(
+    surface: Surface, target: float, half_width: float, extent: float = 1.0, resolution: int | None = None
+) -> Region:
+    """Return the settings whose fitted mean lies within target +- half_width, the fit taken as exact."""
+    points, count = box_cells(len(surface.design.factors), extent, resolution)
+    mean, _ = surface.evaluate(points)
+    return _region(surface, points, np.abs(mean - target) <= half_width, count, extent)
+
+
+def box_cells(
+    factor_count: int, extent: float, resolution: int | None = None
+) -> tuple[NDArray[np.float64], int]:
+    """Return the centers of a coded box's cells, shape (cells, factors), and the cells along each factor."""
+    if not (np.isfinite(extent) and extent > 0.0):
+        raise DesignError(f"extent, the coded half width of the box, must be positive, received {extent}")
+    count = resolution or min(CELLS_PER_FACTOR, max(3, int(CELL_BUDGET ** (1.0 / factor_count))))
+    centers = extent * ((2.0 * np.arange(count) + 1.0) / count - 1.0)
+    cells = np.stack(np.meshgrid(*[centers] * factor_count, indexing="ij"), axis=-1)
+    return cells.reshape(-1, factor_count), count
+
+
+def _region(
+    surface: Surface, points: NDArray[np.float64], mask: NDArray[np.bool_], count: int, extent: float
+) -> Region:
+    table = pd.DataFrame(points, columns=surface.design.names)
+    return Region(surface.design.factors, table, mask, count, extent)
