@@ -27,8 +27,9 @@ def contour(
 ) -> pd.DataFrame:
     """Return points where the fitted mean is the target, inside the coded box -extent..+extent.
 
-    One factor: the roots. Two: ordered points along the curve, the index numbering its separate pieces. More:
-    a cloud of the contour's crossings with lines parallel to the axes. Every point solves the fitted equation.
+    One factor: the roots. Two: ordered points along the curve, the index numbering its separate pieces.
+    More: a cloud of the contour's crossings with lines parallel to the axes. Every point solves the fitted
+    equation.
 
     Parameters
     ----------
@@ -63,7 +64,7 @@ def contour_points(surface: Surface, target: float, extent: float, resolution: i
 def _traced_curves(
     form: QuadraticForm, target: float, extent: float, resolution: int
 ) -> list[NDArray[np.float64]]:
-    """Return the curves in the square: marching squares, each vertex moved onto the exact root of its edge."""
+    """Return the curves in the square: marching squares, each vertex moved to its edge's exact root."""
     grid = np.linspace(-extent, extent, resolution)
     values = form.value(np.stack(np.meshgrid(grid, grid), axis=-1))
     lines = contourpy.contour_generator(grid, grid, values).lines(target)

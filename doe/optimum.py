@@ -122,15 +122,13 @@ def _refined(
     extent: float,
 ) -> NDArray[np.float64]:
     """Return the contour's point nearest to the origin, searched from a point of the contour."""
-    on_contour: Any = {"type": "eq", "fun": lambda x: form.value(x) - target, "jac": form.gradient}
-    result = optimize.minimize(
-        lambda x: float((x - origin) @ (x - origin)),
-        start,
-        jac=lambda x: 2.0 * (x - origin),
-        bounds=[(-extent, extent)] * len(start),
-        constraints=on_contour,
-        method="SLSQP",
-        options={"ftol": 1e-15, "maxiter": 200},
-    )
+    settings: dict[str, Any] = {
+        "jac": lambda x: 2.0 * (x - origin),
+        "bounds": [(-extent, extent)] * len(start),
+        "constraints": {"type": "eq", "fun": lambda x: form.value(x) - target, "jac": form.gradient},
+        "method": "SLSQP",
+        "options": {"ftol": 1e-15, "maxiter": 200},
+    }
+    result = optimize.minimize(lambda x: float((x - origin) @ (x - origin)), start, **settings)
     solved = result.success and abs(form.value(result.x) - target) <= 1e-9 * max(1.0, abs(target))
     return result.x if solved else start

@@ -57,7 +57,7 @@ def plackett_burman(factors: Iterable[Factor], runs: int | None = None, seed: in
     return Design(factors, numbered(pd.DataFrame(matrix, columns=names + dummies)), seed)
 
 
-def screening_matrix(runs: int) -> NDArray[np.float64]:
+def screening_matrix(runs: int) -> NDArray[np.floating]:
     """Return the N x (N - 1) matrix of -1 and +1 with orthogonal, balanced columns and a last row of -1.
 
     Cyclic shifts of the published generators where there is one, else a Hadamard matrix.
@@ -77,7 +77,7 @@ def screening_matrix(runs: int) -> NDArray[np.float64]:
     return matrix[:, 1:]
 
 
-def hadamard(order: int) -> NDArray[np.float64]:
+def hadamard(order: int) -> NDArray[np.floating]:
     """Return a Hadamard matrix: entries -1 and +1, H'H = order * I.
 
     Doubling (Sylvester 1867) and the two constructions from the squares of a finite field of q elements, with

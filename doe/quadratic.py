@@ -35,11 +35,11 @@ class QuadraticForm:
                 matrix[index[1], index[0]] += 0.5 * value
         return cls(float(constant), slopes, matrix)
 
-    def value(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def value(self, points: NDArray[np.floating]) -> NDArray[np.floating]:
         """Return the value at points, shape (..., factors)."""
         return self.constant + points @ self.slopes + np.einsum("...j,jk,...k", points, self.matrix, points)
 
-    def gradient(self, point: NDArray[np.float64]) -> NDArray[np.float64]:
+    def gradient(self, point: NDArray[np.floating]) -> NDArray[np.float64]:
         """Return the gradient at one point, shape (factors,)."""
         return self.slopes + 2.0 * self.matrix @ point
 

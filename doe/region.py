@@ -71,9 +71,9 @@ def compatible_region(
 ) -> Region:
     """Return the settings whose fitted mean and the measured target do not differ significantly.
 
-    A setting belongs when |mean - target| <= t sqrt(se_fit^2 + se_target^2), with t on the Welch-Satterthwaite
-    degrees of freedom of the two errors. So the true setting belongs with probability 1 - alpha, where the
-    model holds.
+    A setting belongs when |mean - target| <= t sqrt(se_fit^2 + se_target^2), with t on the degrees of freedom
+    of the two errors together (Welch and Satterthwaite). So the true setting belongs with probability
+    1 - alpha, where the model holds.
 
     Parameters
     ----------

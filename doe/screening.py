@@ -67,7 +67,7 @@ class ScreenResult:
 
     @cached_property
     def table(self) -> pd.DataFrame:
-        """Tests by factor: effect, sum_sq, F, t, p, percent (of the total sum of squares), rank (1: largest)."""
+        """Tests by factor: effect, sum_sq, F, t, p, percent (of the total sum of squares), rank."""
         sums = partial_sums(self.fit).iloc[1:]
         effect = 2.0 * self.fit.params.iloc[1:]
         t = effect / self.standard_error
@@ -164,8 +164,8 @@ def _error_term(
     if chosen.df <= 0:
         raise DesignError(
             f"no degrees of freedom for the error {rule!r}: {len(response)} observations of "
-            f"{len(design.names)} factors, {len(design.dummies)} dummies, {replicates.df:.0f} degrees of freedom "
-            "from replicates; use a larger design (its spare columns are dummies), replicate the runs, or "
+            f"{len(design.names)} factors, {len(design.dummies)} dummies, {replicates.df:.0f} from replicates; "
+            "use a larger design (its spare columns are dummies), replicate the runs, or "
             "choose error='lenth'"
         )
     return chosen

@@ -139,7 +139,7 @@ class Surface:
 
     @property
     def press(self) -> float:
-        """Sum of squared errors when each observation is predicted from the others; infinite at leverage 1."""
+        """Sum of squares of each observation less its prediction from the others; infinite at leverage 1."""
         left = (1.0 - self.leverage).to_numpy()
         if np.any(left < 1e-12):
             return np.inf
