@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imaging.errors import PictureError
-from imaging.geometry import FloatArray
+from imaging.geometry import FloatArray, Picture
 
 BLUR = 1.0
 """Standard deviation [pixels] of the horizontal smoothing: along a flat outline, so that it does not lower it."""
@@ -15,18 +15,21 @@ BORDER_SHARE = 0.08
 """Part of the width and height, at the top and the upper sides, that starts the background fit."""
 FIT_SAMPLES = 20_000
 """Pixels that the background surface is fitted to."""
-FIT_ROUNDS = 6
-"""Rounds of the fit; each takes the pixels that the last one explained within 4 standard deviations."""
-SEPARATION = 6.0
-"""Foreground and background differ by this many standard deviations of the background, at the least."""
+FIT_ROUNDS = 4
+"""Rounds of the fit, first of a plane, then of the quadratic; each takes the pixels that the last one explained."""
+SEPARATION = 5.0
+"""A heap differs from the background by this many times the background's noise, on average, at the least."""
+LEAST_NOISE = 1.0
+"""Noise [of 255] below which a background counts as even: that of rounding and compression."""
 
 
-def contrast_with_background(picture: NDArray[np.uint8], place: str) -> tuple[FloatArray, float]:
-    """Distance of each pixel's colour from the background's, and the threshold between the two.
+def contrast_with_background(picture: Picture, place: str) -> tuple[FloatArray, list[float]]:
+    """Distance of each pixel's colour from the background's, and where to cut it, most likely first.
 
     The background is a quadratic surface in each colour channel, fitted from the border inwards to whatever looks
     like it, so that uneven light and a coloured cloth drop out, and a heap may be darker or lighter than what is
-    behind it. The threshold is Otsu's (IEEE Trans. SMC 9, 1979), on the distance.
+    behind it. The first threshold is Otsu's (IEEE Trans. SMC 9, 1979); where a plate stands out far more than the
+    heap it may cut between those two, so the second splits what is below the first once more.
 
     Parameters
     ----------
@@ -37,7 +40,8 @@ def contrast_with_background(picture: NDArray[np.uint8], place: str) -> tuple[Fl
     Returns
     -------
     contrast : (rows, columns) array
-    threshold : float
+    thresholds : list of float
+        One or two; what is above each differs clearly from the background's noise.
 
     Raises
     ------
@@ -46,13 +50,21 @@ def contrast_with_background(picture: NDArray[np.uint8], place: str) -> tuple[Fl
     """
     channels = _channels(picture, place)
     smooth = cv2.GaussianBlur(channels, (0, 0), sigmaX=BLUR, sigmaY=1e-6).reshape(channels.shape)
-    difference = smooth - _background(smooth)
+    background, noise = _background(np.asarray(smooth, dtype=np.float64))
+    difference = smooth - background
     contrast = np.sqrt(np.einsum("ijk,ijk->ij", difference, difference))
-    threshold = otsu_threshold(contrast)
-    back, front = contrast[contrast <= threshold], contrast[contrast > threshold]
-    if front.size == 0 or front.mean() - back.mean() < max(SEPARATION * float(back.std()), 4.0):
+    thresholds = []
+    values = contrast.ravel()
+    for _ in range(2):
+        threshold = otsu_threshold(values)
+        front = values[values > threshold]
+        if front.size == 0 or front.mean() < SEPARATION * max(noise, LEAST_NOISE):
+            break
+        thresholds.append(threshold)
+        values = values[values <= threshold]
+    if not thresholds:
         raise PictureError("a heap stands out of the background", "a picture without contrast", place)
-    return contrast, threshold
+    return contrast, thresholds
 
 
 def otsu_threshold(values: FloatArray) -> float:
@@ -69,7 +81,7 @@ def otsu_threshold(values: FloatArray) -> float:
     return float(0.5 * (edges[best[0] + 1] + edges[best[-1] + 1]))
 
 
-def _channels(picture: NDArray[np.uint8], place: str) -> NDArray[np.float32]:
+def _channels(picture: Picture, place: str) -> NDArray[np.float32]:
     layered = picture[:, :, None] if picture.ndim == 2 else picture
     if layered.ndim != 3 or layered.shape[2] not in (1, 3) or picture.dtype != np.uint8:
         rule = "a picture is a (rows, columns) or (rows, columns, 3) array of uint8"
@@ -79,25 +91,23 @@ def _channels(picture: NDArray[np.uint8], place: str) -> NDArray[np.float32]:
     return layered.astype(np.float32)
 
 
-def _background(channels: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Quadratic surface (rows, columns, channels) through the pixels that belong to the background."""
+def _background(channels: FloatArray) -> tuple[FloatArray, float]:
+    """Quadratic surface (rows, columns, channels) through the background's pixels, and their median distance to it."""
     rows, columns, _ = channels.shape
     stride = max(1, int(np.sqrt(rows * columns / FIT_SAMPLES)))
     row, column = (axis.ravel() for axis in np.mgrid[0:rows:stride, 0:columns:stride])
-    sample = channels[row, column].astype(np.float64)
+    sample = channels[row, column]
     terms = _surface_terms(row, column, (rows, columns))
-    upper = row < 0.5 * rows
     side = (column < BORDER_SHARE * columns) | (column >= (1.0 - BORDER_SHARE) * columns)
-    chosen = (row < BORDER_SHARE * rows) | (upper & side)
-    size = 3
-    for _ in range(FIT_ROUNDS):
+    chosen = (row < BORDER_SHARE * rows) | ((row < 0.5 * rows) & side)
+    for size in (1, *[3] * FIT_ROUNDS, *[6] * FIT_ROUNDS):
         surface = np.linalg.lstsq(terms[chosen, :size], sample[chosen], rcond=None)[0]
         residual = np.linalg.norm(sample - terms[:, :size] @ surface, axis=1)
-        chosen = residual <= max(4.0 * float(np.median(residual[chosen])), 1.0)
-        size = terms.shape[1]
+        noise = float(np.median(residual[chosen]))
+        chosen = residual <= max(4.0 * noise, 2.0 * LEAST_NOISE)
     grid = np.mgrid[0:rows, 0:columns]
     fitted = _surface_terms(grid[0].ravel(), grid[1].ravel(), (rows, columns)) @ surface
-    return fitted.reshape(channels.shape).astype(np.float32)
+    return fitted.reshape(channels.shape), noise
 
 
 def _surface_terms(row: NDArray[np.intp], column: NDArray[np.intp], shape: tuple[int, int]) -> FloatArray:

@@ -12,7 +12,7 @@ from imaging.errors import PictureError
 from imaging.geometry import FloatArray
 from imaging.silhouette import Outline
 
-MINIMUM_FLANK_COLUMNS = 5
+MINIMUM_FLANK_COLUMNS = 3
 """A line is not fitted to fewer columns."""
 
 

@@ -14,16 +14,26 @@ END_SHARE = 0.05
 """Share of the width, at either end, that shows whether a plate reaches beyond the heap."""
 END_TOLERANCE = 1.0
 """A plate's edge is straight within this many pixels."""
+MINIMUM_PLATE_THICKNESS = 3.0
+"""A plate beside the heap is seen at least this thick [pixels]; a thinner end is a toe of the heap, or a thin line."""
+THICK_SHARE = 0.4
+"""The underside is taken from columns at least this thick, as a share of the thickest."""
+UNDERSIDE_ROUNDS = 5
+"""Rounds of leaving out columns that end above the line."""
 MAXIMUM_TILT = 20.0
 """A camera that is tilted by more [degrees] has not seen a plate."""
 
 
 @dataclass(frozen=True)
 class PlateLine:
-    """Surface of the plate in a picture: row = `row` + `slope` * column, in pixels."""
+    """Surface of the plate in a picture: row = `row` + `slope` * column, in pixels.
+
+    `visible` says whether the plate itself stands out of the background, together with the heap.
+    """
 
     row: float
     slope: float
+    visible: bool
 
     @property
     def tilt(self) -> float:
@@ -45,9 +55,9 @@ class PlateLine:
 def find_plate(top: FloatArray, bottom: FloatArray, place: str) -> PlateLine:
     """Find the plate from the upper and lower edge of what stands out of the background.
 
-    Where a plate stands out together with the heap, the outermost parts of the upper edge lie on one line, the plate.
-    Otherwise the lower edge of the heap is taken: the line through its columns, without those that end above it
-    (round undersides of the outermost grains).
+    Where a plate stands out together with the heap, the outermost parts of the upper edge lie on one line, the
+    plate. Otherwise the lower edge of the heap is taken, under its thicker columns: those of its toes are faint,
+    or end on the round undersides of single grains.
 
     Parameters
     ----------
@@ -55,35 +65,40 @@ def find_plate(top: FloatArray, bottom: FloatArray, place: str) -> PlateLine:
         Rows of the two edges in consecutive columns; NaN outside the body.
     place : str
         Names the picture in errors.
+
+    Raises
+    ------
+    PictureError
+        When the line is so steep that it is no plate.
     """
-    columns = np.flatnonzero(np.isfinite(top)).astype(np.float64)
-    upper, lower = top[np.isfinite(top)], bottom[np.isfinite(top)]
-    line = _shelf(columns, upper) or _underside(columns, lower)
+    columns = np.flatnonzero(np.isfinite(top))
+    upper, lower = top[columns], bottom[columns]
+    line = _shelf(columns, upper, lower) or _underside(columns, upper, lower)
     if abs(line.tilt) > MAXIMUM_TILT:
-        raise PictureError(
-            f"the plate is level within {MAXIMUM_TILT:g} degrees", f"{line.tilt:.1f} degrees", place
-        )
+        rule = f"the plate is level within {MAXIMUM_TILT:g} degrees"
+        raise PictureError(rule, f"{line.tilt:.1f} degrees", place)
     return line
 
 
-def _shelf(columns: FloatArray, upper: FloatArray) -> PlateLine | None:
-    """The line through both ends of the upper edge, where they lie on one."""
+def _shelf(columns: NDArray[np.intp], upper: FloatArray, lower: FloatArray) -> PlateLine | None:
+    """The line through both ends of the upper edge, where they lie on one and are no thin toes."""
     size = max(2, round(END_SHARE * len(columns)))
     ends = np.r_[0:size, len(columns) - size : len(columns)]
     slope, row = np.polyfit(columns[ends], upper[ends], 1)
     residual = np.abs(upper[ends] - row - slope * columns[ends])
-    return PlateLine(float(row), float(slope)) if residual.max() <= END_TOLERANCE else None
+    if residual.max() > END_TOLERANCE or (lower - upper)[ends].min() < MINIMUM_PLATE_THICKNESS:
+        return None
+    return PlateLine(float(row), float(slope), visible=True)
 
 
-def _underside(columns: FloatArray, lower: FloatArray) -> PlateLine:
-    """The line along the lower edge, from the columns that are not above it."""
-    kept = np.ones(len(columns), dtype=np.bool_)
-    slope, row = 0.0, 0.0
-    for _ in range(20):
+def _underside(columns: NDArray[np.intp], upper: FloatArray, lower: FloatArray) -> PlateLine:
+    """The line along the lower edge of the thicker columns, without those that end well above it."""
+    thickness = lower - upper
+    candidate = thickness >= THICK_SHARE * thickness.max()
+    kept = candidate
+    for _ in range(UNDERSIDE_ROUNDS):
         slope, row = np.polyfit(columns[kept], lower[kept], 1)
         height = row + slope * columns - lower
         limit = max(1.0, 2.0 * float(np.median(np.abs(height[kept]))))
-        before, kept = kept, height <= limit
-        if np.array_equal(before, kept):
-            break
-    return PlateLine(float(row), float(slope))
+        kept = candidate & (height <= limit)
+    return PlateLine(float(row), float(slope), visible=False)

@@ -21,6 +21,8 @@ MINIMUM_HEAP_WIDTH = 16
 """A narrower heap [pixels] is not measured."""
 MINIMUM_HEAP_SHARE = 0.25
 """The heap holds at least this share of everything that stands on the plate: else the picture shows no *single* heap."""
+THIN = 4.0
+"""Columns up to this high [pixels] are measured by their area."""
 PLATE_CLEARANCE = 0.25
 """What rises less than this over the plate line [pixels] belongs to the plate."""
 
@@ -76,22 +78,50 @@ def find_outline(
     PictureError
         When the picture shows no heap, or one that a border crops.
     """
-    contrast, threshold = contrast_with_background(picture, place)
+    contrast, thresholds = contrast_with_background(picture, place)
+    errors = []
+    for threshold in thresholds:
+        try:
+            return _outline(contrast, threshold, ground_row, meters_per_pixel, place)
+        except PictureError as error:
+            errors.append(error)
+    raise errors[0]
+
+
+def _outline(
+    contrast: FloatArray, threshold: float, ground_row: float | None, meters_per_pixel: float | None, place: str
+) -> Outline:
+    """Outline of the heap in a contrast picture."""
     body = _largest_component(contrast > threshold, place)
-    if ground_row is None:
-        plate = find_plate(top_edge(body, contrast, threshold), bottom_edge(body, contrast, threshold), place)
-    else:
-        plate = PlateLine(row=ground_row, slope=0.0)
-    heap = _standing_on(plate, body, place)
+    plate, heap = _heap_on_plate(body, contrast, threshold, ground_row, place)
+    if not plate.visible:
+        threshold = 0.5 * _inner_contrast(heap, contrast)
+        near = cv2.dilate(heap.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
+        body = _largest_component(near & (contrast > threshold), place)
+        plate, heap = _heap_on_plate(body, contrast, threshold, ground_row, place)
+    rows = top_edge(heap, contrast, threshold)
+    if not plate.visible:
+        rows = _refine_thin(rows, heap, contrast, plate)
     columns = np.flatnonzero(heap.any(axis=0))
-    rows = top_edge(heap, contrast, threshold)[columns]
-    position, height = plate.level(columns.astype(np.float64), rows)
+    position, height = plate.level(columns.astype(np.float64), rows[columns])
     if np.ptp(position) < MINIMUM_HEAP_WIDTH:
-        raise PictureError(
-            f"a heap is at least {MINIMUM_HEAP_WIDTH} pixels wide", f"{np.ptp(position):.0f}", place
-        )
+        rule = f"a heap is at least {MINIMUM_HEAP_WIDTH} pixels wide"
+        raise PictureError(rule, f"{np.ptp(position):.0f}", place)
     order = np.argsort(position, kind="stable")
     return Outline(position[order], np.maximum(height[order], 0.0), plate, meters_per_pixel)
+
+
+def _heap_on_plate(
+    body: NDArray[np.bool_], contrast: FloatArray, threshold: float, ground_row: float | None, place: str
+) -> tuple[PlateLine, NDArray[np.bool_]]:
+    """The plate, and the pixels of the heap that stands on it."""
+    if ground_row is not None:
+        plate = PlateLine(row=ground_row, slope=0.0, visible=False)
+    else:
+        plate = find_plate(
+            top_edge(body, contrast, threshold), bottom_edge(body, contrast, threshold), place
+        )
+    return plate, _standing_on(plate, body, place)
 
 
 def top_edge(mask: NDArray[np.bool_], contrast: FloatArray, threshold: float) -> FloatArray:
@@ -112,6 +142,31 @@ def top_edge(mask: NDArray[np.bool_], contrast: FloatArray, threshold: float) ->
 def bottom_edge(mask: NDArray[np.bool_], contrast: FloatArray, threshold: float) -> FloatArray:
     """The same for the lowest masked pixel of each column."""
     return mask.shape[0] - 1.0 - top_edge(mask[::-1], contrast[::-1], threshold)
+
+
+def _refine_thin(
+    rows: FloatArray, heap: NDArray[np.bool_], contrast: FloatArray, plate: PlateLine
+) -> FloatArray:
+    """Upper edge whose thin columns, at most `THIN` high, are as high as their summed contrast says.
+
+    No pixel of such a column need be covered whole, so that a threshold says little about its height.
+    """
+    columns = np.arange(heap.shape[1])
+    line = plate.row + plate.slope * columns
+    thin = line - rows <= THIN
+    share = contrast / _inner_contrast(heap, contrast)
+    total = np.vstack([np.zeros(heap.shape[1]), np.cumsum(share, axis=0)])
+    first = np.clip(heap.argmax(axis=0) - 2, 0, heap.shape[0])
+    last = np.clip(np.ceil(line + 2.5), 0, heap.shape[0]).astype(np.intp)
+    return np.where(thin, line - (total[last, columns] - total[first, columns]), rows)
+
+
+def _inner_contrast(heap: NDArray[np.bool_], contrast: FloatArray) -> float:
+    """Contrast of a pixel that the heap covers whole: typical of those with the heap above and below them."""
+    inner = heap.copy()
+    inner[1:] &= heap[:-1]
+    inner[:-1] &= heap[1:]
+    return float(np.median(contrast[inner]) if inner.any() else contrast[heap].max())
 
 
 def _largest_component(mask: NDArray[np.bool_], place: str) -> NDArray[np.bool_]:
