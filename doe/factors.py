@@ -69,8 +69,8 @@ class Factor:
 
     @property
     def label(self) -> str:
-        """Name and unit for an axis or a table head."""
-        return f"{self.name} [{self.unit}]" if self.unit else self.name
+        """Name and unit for an axis or a table head; the unit 1 is not written."""
+        return self.name if self.unit in ("", "1") else f"{self.name} [{self.unit}]"
 
     def to_natural(self, coded: Values) -> Values:
         """Return natural values; -1 and +1 give ``low`` and ``high`` to the last bit."""

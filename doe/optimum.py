@@ -122,6 +122,10 @@ def _refined(
     extent: float,
 ) -> NDArray[np.float64]:
     """Return the contour's point nearest to the origin, searched from a point of the contour."""
+
+    def squared_distance(x: NDArray[np.float64]) -> float:
+        return float((x - origin) @ (x - origin))
+
     settings: dict[str, Any] = {
         "jac": lambda x: 2.0 * (x - origin),
         "bounds": [(-extent, extent)] * len(start),
@@ -129,6 +133,6 @@ def _refined(
         "method": "SLSQP",
         "options": {"ftol": 1e-15, "maxiter": 200},
     }
-    result = optimize.minimize(lambda x: float((x - origin) @ (x - origin)), start, **settings)
+    result = optimize.minimize(squared_distance, start, **settings)
     solved = result.success and abs(form.value(result.x) - target) <= 1e-9 * max(1.0, abs(target))
     return result.x if solved else start

@@ -48,6 +48,20 @@ class Region:
         """Share of the box that belongs."""
         return float(self.mask.mean())
 
+    def projection(self, x: str, y: str) -> NDArray[np.bool_]:
+        """Return the region's shadow on the plane of two factors, shape (cells of x, cells of y).
+
+        A cell of the plane belongs when the region holds it for some values of the other factors.
+        """
+        names = [factor.name for factor in self.factors]
+        unknown = [name for name in (x, y) if name not in names]
+        if unknown or x == y:
+            raise DesignError(f"a projection takes two of {', '.join(names)}, received {x!r} and {y!r}")
+        box = self.mask.reshape((self.resolution,) * len(names))
+        others = tuple(axis for axis, name in enumerate(names) if name not in (x, y))
+        shadow = np.asarray(box.any(axis=others))
+        return shadow if names.index(x) < names.index(y) else shadow.T
+
     @property
     def ranges(self) -> pd.DataFrame:
         """Natural low and high of each factor over the cells that belong, to their edges; NaN when none does.

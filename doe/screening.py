@@ -163,10 +163,9 @@ def _error_term(
     }[rule]
     if chosen.df <= 0:
         raise DesignError(
-            f"no degrees of freedom for the error {rule!r}: {len(response)} observations of "
-            f"{len(design.names)} factors, {len(design.dummies)} dummies, {replicates.df:.0f} from replicates; "
-            "use a larger design (its spare columns are dummies), replicate the runs, or "
-            "choose error='lenth'"
+            f"no degrees of freedom for the error {rule!r}: {len(response)} observations, "
+            f"{len(design.names)} factors, {len(design.dummies)} dummies, {replicates.df:g} df of replicates; "
+            "use a larger design (spare columns are dummies), replicate the runs, or choose error='lenth'"
         )
     return chosen
 
