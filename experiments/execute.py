@@ -7,17 +7,15 @@ import math
 import os
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pandas as pd
 
+from dem_warp import Case, CaseResult, Progress, simulate
 from experiments.errors import StudyError
+from experiments.store import Store
+from experiments.study import Study
 from imaging import HeapAngle, PictureError, heap_angle
-
-if TYPE_CHECKING:
-    from dem_warp import Case, CaseResult, Progress
-    from experiments.store import Store
-    from experiments.study import Study
 
 RESULT_COLUMNS = ("status", "reason", "angle", "angle_se", "case_key")
 """Columns that `run_cases` adds, beside one for every observable of the scene."""
@@ -57,9 +55,9 @@ def run_cases(
     Returns
     -------
     pandas.DataFrame
-        The same rows and index with ``status``, ``reason``, ``angle`` and ``angle_se`` [deg], ``case_key`` and
-        one column an observable. A case that fails is a row with its status and reason, and without an angle;
-        so is a heap that cannot be measured.
+        The same rows and index with ``status``, ``reason``, ``angle`` and ``angle_se`` [deg], ``case_key``,
+        and one column an observable. A case that fails is a row with its status and reason, and without an
+        angle; so is a heap that cannot be measured.
 
     Raises
     ------
@@ -134,9 +132,7 @@ def _simulate_missing(
     workers: int | None,
     progress: Callable[[Progress], None] | None,
 ) -> dict[str, Future[dict[str, Any]]]:
-    """Simulate what the store lacks, in one call; save each result as it finishes and measure it meanwhile."""
-    from dem_warp import simulate
-
+    """Simulate what the store lacks, in one call; save each result as it finishes, and measure it."""
     for key in cases:
         if damage := store.damage(key):
             _log.warning("%s; it is simulated again", damage)

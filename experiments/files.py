@@ -3,26 +3,37 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 
-def write_whole(path: Path, data: bytes) -> None:
-    """Write a file under a temporary name, then rename it: after a crash it is whole or absent.
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Name a temporary file beside a file, and rename it over the file when the block ends without an error.
 
     Parameters
     ----------
     path
         The file; its folder is made when it is missing, and an older file is replaced.
-    data
-        Everything that the file will hold.
+
+    Yields
+    ------
+    Path
+        The temporary name, with the same ending: after a crash the file itself is whole or absent.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f"{path.name}.{os.getpid()}.part")
+    temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
     try:
-        with temporary.open("wb") as file:
-            file.write(data)
-            file.flush()
+        yield temporary
+        with temporary.open("rb+") as file:
             os.fsync(file.fileno())
         temporary.replace(path)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file in UTF-8, whole or not at all."""
+    with replacing(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from experiments.errors import StoreError
-from experiments.files import write_whole
+from experiments.files import write_text
 from experiments.places import KeyPath, dotted
 from experiments.store import Store
 from experiments.study import Study
@@ -49,14 +49,29 @@ def open_folder(folder: Path, study: Study, resume: bool = False) -> tuple[Store
     manifest = folder / MANIFEST
     described = describe(study)
     changes: list[str] = []
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        if not resume:
-            raise StoreError(
-                "the output folder must be new or empty; --resume goes on in it", "a used one", str(folder)
-            )
+    if not resume:
+        require_unused(folder, "; --resume goes on in it")
+    elif is_used(folder):
         changes = list(differences(_read_manifest(manifest), described))
-    write_whole(manifest, json.dumps(described, indent=1, allow_nan=False).encode())
+    write_text(manifest, json.dumps(described, indent=1, allow_nan=False))
     return Store(folder / CASES), changes
+
+
+def is_used(folder: Path) -> bool:
+    """Whether a folder, or a file of that name, holds something."""
+    return folder.exists() and (not folder.is_dir() or any(folder.iterdir()))
+
+
+def require_unused(folder: Path, advice: str = "") -> None:
+    """Refuse a folder that holds something, so that nothing is overwritten.
+
+    Raises
+    ------
+    StoreError
+        When the folder is not new or empty.
+    """
+    if is_used(folder):
+        raise StoreError(f"the output folder must be new or empty{advice}", "a used one", str(folder))
 
 
 def describe(study: Study) -> dict[str, Any]:

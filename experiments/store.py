@@ -5,21 +5,18 @@ from __future__ import annotations
 import hashlib
 import importlib.metadata
 import importlib.util
-import io
 import json
 import zipfile
 from dataclasses import fields
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from dem_warp import Case, CaseResult
 from experiments.errors import StoreError
-from experiments.files import write_whole
-
-if TYPE_CHECKING:
-    from dem_warp import Case, CaseResult
+from experiments.files import replacing
 
 FORMAT = 1
 """Version of the case files; an older one is not read."""
@@ -76,10 +73,9 @@ class Store:
             else:
                 record[field.name] = value
         text = json.dumps(record, allow_nan=False).encode()
-        buffer = io.BytesIO()
         arrays[_RECORD] = np.frombuffer(text, dtype=np.uint8)
-        np.savez(buffer, **arrays)
-        write_whole(self.path(key), buffer.getvalue())
+        with replacing(self.path(key)) as temporary:
+            np.savez(temporary, **arrays)
 
     def load(self, key: str) -> CaseResult:
         """Load the result of a case.
@@ -91,8 +87,6 @@ class Store:
         StoreError
             When its file is damaged.
         """
-        from dem_warp import CaseResult
-
         path = self.path(key)
         if not path.is_file():
             raise KeyError(key)

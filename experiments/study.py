@@ -150,15 +150,22 @@ class Study(Physics):
         """Hard physical limits of every factor in its natural unit, infinite where there is none."""
         return {section.name: section.limits for section in self.factor_sections}
 
-    def natural_settings(self, settings: Mapping[str, object]) -> dict[str, float]:
-        """Read factor values with their units (``{"B": "34 MPa", "E": 0.46}``) as numbers in natural units.
+    def natural_settings(self, settings: Mapping[str, object], source: str = "settings") -> dict[str, float]:
+        """Read factor values with their units as numbers in natural units.
+
+        Parameters
+        ----------
+        settings
+            Quantities by factor name, as ``{"B": "34 MPa", "E": 0.46}``.
+        source
+            Where they come from, for error messages.
 
         Raises
         ------
         StudyError
             When there is no such factor, or a value is no quantity of its dimension.
         """
-        return natural_settings(self.factor_sections, settings, Places(self.file, {}))
+        return natural_settings(self.factor_sections, settings, Places(Path(source), {}))
 
     def case(self, settings: Mapping[str, float], seed: int) -> Case:
         """Build one case.

@@ -1,0 +1,168 @@
+"""The command line ``dem-warp``: each command checks its input, calls public functions and shows the result.
+
+Imports of the simulator, the statistics and the pictures are inside the commands: ``--help`` needs none.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from experiments.console import FAILED_RUN, CaseProgress, clear_errors, fail, messages
+
+app = typer.Typer(
+    name="dem-warp",
+    help="Calibrate discrete element models of grain: simulated heaps, designed experiments, repose angles.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+)
+
+StudyFile = Annotated[
+    Path | None, typer.Argument(metavar="[STUDY.toml]", help="Study file; left out: the paper's buckwheat.")
+]
+Scale = Annotated[
+    str | None,
+    typer.Option(
+        help="A scale of the study; the paper's has bench, soft and paper. Left out: paper with a CUDA "
+        "device, bench without, where the study has it.",
+    ),
+]
+Device = Annotated[str | None, typer.Option(help="cpu, cuda or cuda:N. Left out: the GPU if there is one.")]
+Workers = Annotated[int | None, typer.Option(min=1, help="Processes on the CPU. Left out: one a core.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Write the result to standard output as JSON.")]
+
+
+@app.command(epilog="Example: [bold]dem-warp calibrate mygrain.toml --out out/mygrain[/]")
+def calibrate(
+    study: StudyFile = None,
+    out: Annotated[Path | None, typer.Option(help="Folder of the results, new or empty.")] = None,
+    scale: Scale = None,
+    device: Device = None,
+    workers: Workers = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on in the folder of an earlier run.")] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Run a whole calibration: noise floor, screening, climb, surface, optimum, verification, report."""
+    with clear_errors():
+        from experiments.run import calibrate_study, chosen_device, chosen_study, default_folder
+
+        device = chosen_device(device)
+        chosen = chosen_study(study, scale, device)
+        folder = out or default_folder(chosen)
+    with clear_errors(resume=_resume_command(study, folder, chosen.scale, device)):
+        campaign = calibrate_study(chosen, folder, device, workers, resume)
+    if as_json:
+        typer.echo(json.dumps(campaign.to_dict(), allow_nan=False))
+    messages.print(f"{campaign.outcome}: {campaign.reason}")
+    messages.print(f"Report: {folder / 'report.html'}")
+    if campaign.outcome == "too-many-failed-runs":
+        raise typer.Exit(FAILED_RUN)
+
+
+@app.command(epilog="Example: [bold]dem-warp heap --scale bench --set E=0.48 --set F=0.45 --seed 7[/]")
+def heap(
+    study: StudyFile = None,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="NAME=VALUE", help="Value of a factor."),
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of sizes, places and orientations.")] = 1,
+    out: Annotated[Path | None, typer.Option(help="Folder of the results, new or empty.")] = None,
+    scale: Scale = None,
+    device: Device = None,
+    as_json: AsJson = False,
+) -> None:
+    """Simulate one heap: heap.vtp (ParaView), snapshot.png with the fitted flanks, angle.json."""
+    with clear_errors():
+        from experiments.folder import require_unused
+        from experiments.heap import simulate_heap, write_heap
+        from experiments.run import chosen_device, chosen_study, default_folder
+
+        device = chosen_device(device)
+        chosen = chosen_study(study, scale, device)
+        values = chosen.natural_settings(_assignments(settings or []), "--set")
+        folder = out or default_folder(chosen, f"heap-{seed}")
+        require_unused(folder)
+        with CaseProgress("heap") as progress:
+            simulated = simulate_heap(chosen, values, seed, device, progress)
+        write_heap(simulated, folder)
+    if as_json:
+        typer.echo(json.dumps(simulated.to_dict(), allow_nan=False))
+    messages.print(f"Files: {folder}")
+    if simulated.angle is None:
+        fail(f"no angle, the case {simulated.result.status}: {simulated.reason}", FAILED_RUN)
+    elif not as_json:
+        typer.echo(f"{simulated.angle.mean:.2f} +- {simulated.angle.se:.2f} degrees")
+
+
+@app.command(epilog="Example: [bold]dem-warp angle photos/*.jpg --fit middle --overlay measured[/]")
+def angle(
+    pictures: Annotated[list[Path], typer.Argument(metavar="PICTURE...", help="Photographs of heaps.")],
+    fit: Annotated[str, typer.Option(help="Part of the flanks: flank, middle, lower or upper.")] = "flank",
+    overlay: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Draw the fitted flanks on copies in this folder.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Measure repose angles on photographs."""
+    with clear_errors():
+        from experiments.photographs import measure_pictures
+
+        rows = measure_pictures(pictures, fit, overlay)
+    if as_json:
+        typer.echo(json.dumps(rows, allow_nan=False))
+    else:
+        _print_angles(rows, fit)
+    if rejected := [row["reason"] for row in rows if row["reason"]]:
+        fail("\n".join(rejected))
+
+
+@app.command(epilog="Example: [bold]dem-warp new mygrain[/] writes mygrain.toml")
+def new(name: Annotated[str, typer.Argument(help="Name of the grain, and of the file.")]) -> None:
+    """Write a commented study file to start from."""
+    with clear_errors():
+        from experiments.template import write_template
+
+        path = write_template(name)
+    typer.echo(f"Wrote {path}. Fill it in, then: dem-warp calibrate {path}")
+
+
+def main() -> None:
+    """Run the command line."""
+    app()
+
+
+def _assignments(texts: list[str]) -> dict[str, str]:
+    """Split ``NAME=VALUE`` options."""
+    from experiments.errors import InputError
+
+    pairs = [text.partition("=") for text in texts]
+    for text, (name, equals, value) in zip(texts, pairs, strict=True):
+        if not (name.strip() and equals and value.strip()):
+            raise InputError("needs NAME=VALUE, for example E=0.48", text, "--set")
+    return {name.strip(): value.strip() for name, _, value in pairs}
+
+
+def _resume_command(study: Path | None, folder: Path, scale: str | None, device: str) -> str:
+    words = ["dem-warp calibrate", *([str(study)] if study else []), f"--out {folder}"]
+    return " ".join([*words, *([f"--scale {scale}"] if scale else []), f"--device {device}", "--resume"])
+
+
+def _print_angles(rows: list[dict[str, Any]], fit: str) -> None:
+    table = Table(title=f"Repose angles [degrees], {fit} fit")
+    table.add_column("picture", overflow="fold")
+    for name in ("left", "right", "mean", "se"):
+        table.add_column(name, justify="right")
+    for row in rows:
+        if not row["reason"]:
+            values = [f"{row[name]:.2f}" for name in ("left", "right", "mean", "se")]
+            table.add_row(row["picture"], *values)
+    if table.row_count:
+        Console().print(table)

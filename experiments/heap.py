@@ -1,0 +1,147 @@
+"""One heap: simulated, measured, and written as spheres, as a picture with its flanks, and as its angle."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dem_warp import CaseResult, Progress, simulate
+from experiments.execute import measure_heap
+from experiments.files import replacing, write_text
+from experiments.study import Study
+from imaging import HeapAngle, PictureError, overlay, save_picture, snapshot
+
+
+@dataclass(frozen=True)
+class Heap:
+    """A simulated heap and its repose angle."""
+
+    study: Study
+    """What it was made from."""
+    settings: dict[str, float]
+    """Value of every factor in its natural unit."""
+    seed: int
+    """Seed of everything random in it."""
+    result: CaseResult
+    """How the case ended."""
+    angle: HeapAngle | None
+    """Its angle; None when the case failed or there is no measurable heap."""
+    reason: str
+    """Why there is no angle; empty when there is one."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything but the grains as JSON-able data: angles in degrees, observables in SI."""
+        angle = self.angle
+        return {
+            "study": self.study.name,
+            "scale": self.study.scale,
+            "settings": self.settings,
+            "units": {factor.name: factor.unit for factor in self.study.factors},
+            "seed": self.seed,
+            "status": self.result.status,
+            "reason": self.reason,
+            "fit": self.study.measurement.fit,
+            "angle": {"mean": angle.mean, "se": angle.se} if angle else None,
+            "views": _views(angle) if angle else [],
+            "observables": self.result.observables,
+            "provenance": self.result.provenance,
+        }
+
+
+def simulate_heap(
+    study: Study,
+    settings: Mapping[str, float],
+    seed: int,
+    device: str | None = None,
+    progress: Callable[[Progress], None] | None = None,
+) -> Heap:
+    """Simulate one case and measure its heap.
+
+    Parameters
+    ----------
+    study
+        What the case is made from.
+    settings
+        Values by factor name in natural units; a factor that is not named is at its middle.
+    seed
+        Seed of everything random in the case.
+    device
+        ``"cpu"``, ``"cuda"``, ``"cuda:1"``; None: the engine's choice.
+    progress
+        Called with the engine's progress.
+
+    Raises
+    ------
+    StudyError
+        When there is no such factor, or a value leaves what is physical.
+    """
+    [result] = simulate([study.case(settings, seed)], device=device, workers=1, on_progress=progress)
+    values = {factor.name: settings.get(factor.name, factor.center) for factor in study.factors}
+    if result.status != "finished":
+        return Heap(study, values, seed, result, None, result.reason)
+    try:
+        return Heap(study, values, seed, result, measure_heap(study, result), "")
+    except PictureError as error:
+        return Heap(study, values, seed, result, None, str(error))
+
+
+def heap_picture(study: Study, result: CaseResult, angle: HeapAngle | None, view: int = 0) -> np.ndarray:
+    """Draw a heap, with the flanks that were fitted in one of its views.
+
+    Parameters
+    ----------
+    study
+        The study whose measurement gave the angle.
+    result
+        The case.
+    angle
+        Its measured angle; None: no flanks are drawn.
+    view
+        Which of the angle's views.
+
+    Returns
+    -------
+    numpy.ndarray
+        Picture (rows, columns, 3), blue-green-red.
+    """
+    picture = snapshot(
+        result.sphere_centers,
+        result.sphere_radii,
+        azimuth=angle.azimuths[view] if angle else 0.0,
+        pixels=study.measurement.pixels,
+        grains=result.sphere_grain,
+    )
+    return overlay(picture, angle.views[view]) if angle else picture.image
+
+
+def write_heap(heap: Heap, folder: Path) -> None:
+    """Write ``heap.vtp``, ``snapshot.png`` and ``angle.json`` into a folder, made when it is missing."""
+    with replacing(folder / "heap.vtp") as temporary:
+        write_spheres(temporary, heap.result)
+    with replacing(folder / "snapshot.png") as temporary:
+        save_picture(temporary, heap_picture(heap.study, heap.result, heap.angle))
+    write_text(folder / "angle.json", json.dumps(heap.to_dict(), indent=1, allow_nan=False) + "\n")
+
+
+def write_spheres(path: Path, result: CaseResult) -> None:
+    """Write a heap's spheres as points [m] with their ``radius`` [m] and ``grain``, for ParaView."""
+    # PyVista is slow to import and absent on some machines that only calibrate.
+    import pyvista
+
+    points = pyvista.PolyData(result.sphere_centers)
+    points["radius"] = result.sphere_radii
+    points["grain"] = result.sphere_grain
+    points.save(path)
+
+
+def _views(angle: HeapAngle) -> list[dict[str, float]]:
+    return [
+        {"azimuth": math.degrees(azimuth), "left": view.left, "right": view.right}
+        for azimuth, view in zip(angle.azimuths, angle.views, strict=True)
+    ]

@@ -1,0 +1,41 @@
+"""A study file to start from."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from experiments.errors import InputError
+from experiments.files import write_text
+
+TEMPLATE = Path(__file__).parent / "studies" / "template.toml"
+
+
+def write_template(name: str, folder: Path | None = None) -> Path:
+    """Write a commented study file.
+
+    Parameters
+    ----------
+    name
+        Name of the grain; the file is ``NAME.toml``.
+    folder
+        Where it is written; None: the current folder.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    InputError
+        When the name is no plain name, or the file exists.
+    """
+    name = name.removesuffix(".toml")
+    if not name or not all(character.isalnum() or character in " _-" for character in name):
+        raise InputError("a name has letters, digits, spaces, - and _ only", name, "NAME")
+    path = (folder or Path()) / f"{name}.toml"
+    if path.exists():
+        raise InputError("a new study never overwrites a file", "one that exists", str(path))
+    text = TEMPLATE.read_text(encoding="utf-8").replace("{name}", name).replace("{file}", path.name)
+    write_text(path, text)
+    return path
