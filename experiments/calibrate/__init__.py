@@ -1,0 +1,20 @@
+"""The calibration campaign: from the noise floor to the verified optimum."""
+
+from experiments.calibrate.campaign import calibrate
+from experiments.calibrate.cases import Runner, case_seed
+from experiments.calibrate.results import Campaign, ClimbEnd, Decision, Outcome
+from experiments.calibrate.settings import CampaignSettings, CampaignStudy, MeasuredTarget, TwinTarget
+
+__all__ = [
+    "Campaign",
+    "CampaignSettings",
+    "CampaignStudy",
+    "ClimbEnd",
+    "Decision",
+    "MeasuredTarget",
+    "Outcome",
+    "Runner",
+    "TwinTarget",
+    "calibrate",
+    "case_seed",
+]

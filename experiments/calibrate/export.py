@@ -35,7 +35,7 @@ _QUALITY = ("r2", "r2_adjusted", "r2_predicted", "cv_percent", "adequate_precisi
 
 @singledispatch
 def jsonable(value: Any) -> Any:
-    """Turn a result into plain JSON data: text, finite numbers, lists, dicts; a number that is not finite is None.
+    """Turn a result into plain JSON data: text, finite numbers, lists, dicts; other numbers are None.
 
     Raises
     ------

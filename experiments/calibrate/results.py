@@ -1,13 +1,12 @@
 """What each stage of a campaign found, and the decisions that it took.
 
 A stage that simulates keeps its cases as ``cases``: one row a case as the runner returned it (every factor in
-its natural unit, ``seed``, ``stage``, ``run``, ``replicate``, ``status``, ``reason``, ``angle``, ``angle_se`` [deg],
-observables, ``case_key``). Failed cases stay in it. Runs and replicates count from 1.
+its natural unit, ``seed``, ``stage``, ``run``, ``replicate``, ``status``, ``reason``, ``angle``, ``angle_se``
+[deg], observables, ``case_key``). Failed cases stay in it. Runs and replicates count from 1.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
@@ -100,7 +99,7 @@ class SelectionResult:
     kept: tuple[str, ...]
     """Names, strongest first."""
     table: pd.DataFrame
-    """By factor: effect [deg], p, percent, rank, visible (larger than the noise can explain), kept, reason."""
+    """By factor: effect [deg], p, percent, rank, visible (larger than noise alone explains), kept, reason."""
     visible_effect: float
     """Smallest effect [deg] that the noise floor lets this design see (at the power of the settings)."""
     decisions: tuple[Decision, ...]
@@ -114,8 +113,8 @@ class ClimbResult:
     kept: tuple[str, ...]
     path: pd.DataFrame
     """By step (index ``step``; 1 is the start, an extension below it counts 0, -1, ...): value of every kept
-    factor, predicted (by the screening) and measured angle, sd [deg], n (cases measured), error (angle - target)
-    [deg], error_percent; NaN where all cases of a step failed."""
+    factor, predicted (by the screening) and measured angle, sd [deg], n (cases measured), error (angle less
+    target) [deg], error_percent; NaN where all cases of a step failed."""
     step: dict[str, float]
     """Move of every kept factor per step, natural unit."""
     end: ClimbEnd
@@ -130,7 +129,7 @@ class ClimbResult:
     @property
     def best(self) -> dict[str, float]:
         """Kept factors at the step with the smallest error, natural unit."""
-        return {name: float(self.path.at[self.best_step, name]) for name in self.kept}
+        return {name: float(self.path.loc[self.best_step, name]) for name in self.kept}
 
 
 @dataclass(frozen=True)
@@ -177,7 +176,7 @@ class OptimumResult:
     settings: dict[str, float]
     """The same with every other factor at its middle: what a case needs."""
     prediction: pd.Series
-    """The fit there [deg]: mean, se, confidence and prediction interval, as ``Surface.predict`` names them."""
+    """The fit there [deg]: mean, se, confidence and prediction interval, named as by ``Surface.predict``."""
     extent: float
     """Coded half width of the box that contour and region are drawn in: the reach of the axial points."""
     contour: pd.DataFrame
@@ -228,8 +227,8 @@ class Campaign:
     outcome: Outcome
     reason: str
     """The outcome as a sentence: what happened and, where it failed, what to change."""
-    unanalysed_cases: pd.DataFrame
-    """Cases of the stage that could not be analysed; empty in a campaign that was not cut short by failures."""
+    cases: pd.DataFrame
+    """Every case, one row each, in the order of simulation."""
     target: TargetResult | None = None
     noise_floor: NoiseFloorResult | None = None
     screening: ScreeningResult | None = None
@@ -250,26 +249,12 @@ class Campaign:
         return tuple(decision for result in self.stages.values() for decision in result.decisions)
 
     @property
-    def cases(self) -> pd.DataFrame:
-        """Every case of the campaign, one row each."""
-        tables = [*self._case_tables(), self.unanalysed_cases]
-        filled = [table for table in tables if len(table)]
-        return pd.concat(filled, ignore_index=True) if filled else self.unanalysed_cases
-
-    @property
     def failed_cases(self) -> pd.DataFrame:
         """Cases that gave no angle."""
-        cases = self.cases
-        return cases[cases["angle"].isna()] if len(cases) else cases
-
-    def _case_tables(self) -> Iterator[pd.DataFrame]:
-        for result in self.stages.values():
-            table = getattr(result, "cases", None)
-            if table is not None:
-                yield table
+        return self.cases[self.cases["angle"].isna()]
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything as plain JSON data: finite numbers, text, lists and dicts; what is not finite is null."""
+        """Everything as plain JSON data: text, finite numbers, lists and dicts; other numbers are null."""
         return {field.name: jsonable(getattr(self, field.name)) for field in fields(self)}
 
     def tables(self) -> dict[str, pd.DataFrame]:

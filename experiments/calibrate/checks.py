@@ -1,0 +1,53 @@
+"""Settings against the study's factors: what is wrong is said before anything is simulated."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from experiments.calibrate.screening import screening_design
+from experiments.calibrate.settings import CampaignStudy, TwinTarget
+from experiments.calibrate.values import UNLIMITED, reach_limits
+
+
+def check_study(study: CampaignStudy) -> None:
+    """Check the campaign's decisions against the factors.
+
+    Raises
+    ------
+    ValueError
+        With the rule, the value received and its key, when a setting names no factor, a fixed value leaves
+        its limits, a step or half-range is not positive, or the screening design is too small.
+    """
+    settings, hard = study.campaign, {f.name: study.limits.get(f.name, UNLIMITED) for f in study.factors}
+    for name in settings.selection.keep or ():
+        _check_name(name, hard, "campaign.selection.keep")
+    _check_values(settings.climb.start, reach_limits(study), "campaign.climb.start")
+    _check_values(settings.surface.center, hard, "campaign.surface.center")
+    _check_values(settings.optimum.point, hard, "campaign.optimum.point")
+    positive = dict.fromkeys(hard, (0.0, float("inf")))
+    for place, sizes in (
+        ("climb.step", settings.climb.step),
+        ("surface.half_range", settings.surface.half_range),
+    ):
+        _check_values(sizes, positive, f"campaign.{place}")
+        for name, size in (sizes or {}).items():
+            if not size > 0.0:
+                raise ValueError(f"campaign.{place}.{name}: must be positive (received {size:g})")
+    if isinstance(study.target, TwinTarget):
+        _check_values(study.target.truth, hard, "target.twin.truth")
+    screening_design(study.factors, settings.screening)
+
+
+def _check_name(name: str, known: Mapping[str, object], place: str) -> None:
+    if name not in known:
+        raise ValueError(f"{place}: must name a factor, one of {', '.join(known)} (received {name!r})")
+
+
+def _check_values(
+    values: Mapping[str, float] | None, limits: Mapping[str, tuple[float, float]], place: str
+) -> None:
+    for name, value in (values or {}).items():
+        _check_name(name, limits, place)
+        low, high = limits[name]
+        if not low <= value <= high:
+            raise ValueError(f"{place}.{name}: must lie within {low:g} and {high:g} (received {value:g})")

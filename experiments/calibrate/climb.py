@@ -1,0 +1,279 @@
+"""Stage (d): the path of steepest ascent, until it has crossed the target or turned."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from scipy import stats
+
+from doe import NoiseFloor, Sample, ScreenResult, steepest_path
+from experiments.calibrate.cases import (
+    Runner,
+    StageEnd,
+    failure_summary,
+    measured,
+    plan_cases,
+    simulate,
+    too_many_failed,
+)
+from experiments.calibrate.results import ClimbEnd, ClimbResult, Decision, Outcome
+from experiments.calibrate.settings import CampaignStudy, ClimbSettings
+from experiments.calibrate.values import fixed_values, kept_factors, listed, numbered_values, reach_limits
+
+STAGE = "climb"
+
+LEAST_STEPS = 2
+"""Steps with an angle below which a path tells nothing."""
+
+
+@dataclass(frozen=True)
+class _Line:
+    """Where a climb starts and how it moves."""
+
+    screen: ScreenResult
+    kept: tuple[str, ...]
+    start: Mapping[str, float]
+    step: float | Mapping[str, float]
+    """Coded move of the strongest factor, or natural moves; the screening gives the signs."""
+    limits: Mapping[str, tuple[float, float]]
+
+    def walk(self, start: Mapping[str, float], moves: int, descend: bool = False) -> pd.DataFrame:
+        """Return the points of a path, the start first: kept factors (natural) and predicted angle [deg]."""
+        limits = {name: self.limits[name] for name in self.kept}
+        path = steepest_path(
+            self.screen, moves, factors=self.kept, step=self.step, start=start, limits=limits, descend=descend
+        )
+        return path.natural.assign(predicted=path.predicted)
+
+
+def climb(
+    study: CampaignStudy,
+    screen: ScreenResult,
+    kept: tuple[str, ...],
+    noise: NoiseFloor,
+    target: Sample,
+    runner: Runner,
+) -> ClimbResult:
+    """Walk along the steepest path, every step at once, and on where the target is still ahead.
+
+    Raises
+    ------
+    StageEnd
+        When fewer than two steps gave an angle.
+    """
+    settings = study.campaign.climb
+    line, rule = _line(study, screen, kept)
+    points = _first_points(line, settings)
+    cases = _simulate_steps(study, points, kept, runner)
+    path = _path_table(points, cases, target.mean)
+    end = _end(path, cases, noise, settings)
+    for _ in range(settings.extensions):
+        more = _further_points(line, points, path, settings) if end is ClimbEnd.BOUNDED else points.iloc[:0]
+        if more.empty:
+            break
+        points = pd.concat([points, more]).sort_index()
+        cases = pd.concat([cases, _simulate_steps(study, more, kept, runner)], ignore_index=True)
+        path = _path_table(points, cases, target.mean)
+        end = _end(path, cases, noise, settings)
+    place, crossing = _crossing(path, kept) if end is ClimbEnd.CROSSED else (None, None)
+    best = int(path["error"].abs().idxmin())
+    step = _stride(points, kept)
+    decisions = (
+        Decision(
+            STAGE,
+            rule,
+            numbered_values("start", line.start) | numbered_values("step", step),
+            _direction(step),
+        ),
+        _end_decision(path, cases, end, target, crossing, place, best),
+    )
+    return ClimbResult(cases, kept, path, step, end, crossing, place, best, decisions)
+
+
+def require_crossing(study: CampaignStudy, result: ClimbResult, target: Sample) -> None:
+    """Go on when the climb crossed the target, or when the study fixes the centre of the surface.
+
+    Raises
+    ------
+    StageEnd
+        When it turned, was flat, or ended before the target.
+    """
+    center = fixed_values(study.campaign.surface.center, result.kept)
+    if result.end is ClimbEnd.CROSSED or center is not None:
+        return
+    nearest = result.path.loc[result.best_step, "angle"]
+    best = f"{nearest:.2f} deg at best ({listed(result.best)}) against {target.mean:.2f} deg"
+    if result.end is ClimbEnd.BOUNDED:
+        at_bound = _factors_at_bound(study, result)
+        where = f"{', '.join(at_bound)} stand(s) at the bound" if at_bound else "all batches were used up"
+        raise StageEnd(
+            Outcome.TARGET_NOT_REACHED,
+            f"The climb never reached the target: {best}; {where}. Widen the ranges of "
+            f"{', '.join(result.kept)}, raise climb.reach or climb.extensions, or keep further factors; if the ranges are physical, the "
+            "model lacks a mechanism.",
+        )
+    what = (
+        "turned before"
+        if result.end is ClimbEnd.TURNED
+        else "shows no slope beyond the noise and never meets"
+    )
+    raise StageEnd(
+        Outcome.PLATEAU,
+        f"The angle {what} the target: {best}. More of {', '.join(result.kept)} does not help: keep further "
+        "factors, or look for a mechanism that the model lacks.",
+    )
+
+
+def _line(study: CampaignStudy, screen: ScreenResult, kept: tuple[str, ...]) -> tuple[_Line, str]:
+    """Return the path to walk and the rule that chose it."""
+    settings, limits = study.campaign.climb, reach_limits(study)
+    start, step = fixed_values(settings.start, kept), fixed_values(settings.step, kept)
+    if start is not None and step is not None:
+        rule = "The study fixes start and step of the climb; the screening gives the signs."
+        return _Line(screen, kept, start, step, limits), rule
+    slopes = screen.coded_coefficients[list(kept)]
+    direction = slopes / slopes.abs().max()
+    start = {f.name: float(f.to_natural(-direction[f.name])) for f in kept_factors(study, kept)}
+    rule = (
+        f"The climb follows the line through the middle along the screening effects; {settings.steps} points "
+        "take the strongest factor through its range."
+    )
+    return _Line(screen, kept, start, 2.0 / (settings.steps - 1), limits), rule
+
+
+def _first_points(line: _Line, settings: ClimbSettings) -> pd.DataFrame:
+    points = line.walk(line.start, settings.steps - 1)
+    return points.set_axis(pd.RangeIndex(1, len(points) + 1, name="step"))
+
+
+def _further_points(
+    line: _Line, points: pd.DataFrame, path: pd.DataFrame, settings: ClimbSettings
+) -> pd.DataFrame:
+    """Return the next batch: past the last step when all angles are too low, else before the first."""
+    descend = bool(path["error"].min() > 0.0)
+    edge = points.iloc[0 if descend else -1]
+    start = {name: float(edge[name]) for name in line.kept}
+    more = line.walk(start, settings.steps, descend).iloc[1:]
+    counts = np.arange(1, len(more) + 1)
+    labels = points.index[0] - counts if descend else points.index[-1] + counts
+    return more.set_axis(pd.Index(labels, name="step"))
+
+
+def _simulate_steps(
+    study: CampaignStudy, points: pd.DataFrame, kept: tuple[str, ...], runner: Runner
+) -> pd.DataFrame:
+    settings = study.campaign
+    plan = plan_cases(
+        study.factors, STAGE, points[list(kept)], settings.climb.replicates, settings.seeds.campaign
+    )
+    return simulate(runner, plan)[0]
+
+
+def _path_table(points: pd.DataFrame, cases: pd.DataFrame, target: float) -> pd.DataFrame:
+    """Return the points with what was measured at each.
+
+    Raises
+    ------
+    StageEnd
+        When fewer than two steps gave an angle.
+    """
+    used = measured(cases).groupby("run")["angle"].agg(["mean", "std", "size"]).reindex(points.index)
+    if used["mean"].count() < LEAST_STEPS:
+        raise too_many_failed(cases, STAGE, f"needs at least {LEAST_STEPS} measured steps")
+    path = points.assign(angle=used["mean"], sd=used["std"], n=used["size"].fillna(0).astype(int))
+    path["error"] = path["angle"] - target
+    path["error_percent"] = 100.0 * path["error"].abs() / target
+    return path
+
+
+def _end(path: pd.DataFrame, cases: pd.DataFrame, noise: NoiseFloor, settings: ClimbSettings) -> ClimbEnd:
+    """Judge a path: crossed, else turned, else flat, else it ends where it is bounded."""
+    known = path.dropna(subset="angle")
+    error, count = known["error"].to_numpy(), known["n"].to_numpy()
+    if _sign_changes(error).size:
+        return ClimbEnd.CROSSED
+    sd, df = _pooled_noise(measured(cases), noise)
+    gap = np.abs(error)
+    best, last = int(gap.argmin()), (len(gap) - 1 if error[0] < 0.0 else 0)
+    fall = float(stats.t.isf(settings.alpha, df)) * sd * math.sqrt(1.0 / count[best] + 1.0 / count[last])
+    if gap[last] - gap[best] > fall:
+        return ClimbEnd.TURNED
+    step = known.index.to_numpy(dtype=np.float64)
+    centered = step - np.average(step, weights=count)
+    leverage = float((count * centered**2).sum())
+    slope = float((count * centered * error).sum()) / leverage
+    if abs(slope) <= float(stats.t.isf(0.5 * settings.alpha, df)) * sd / math.sqrt(leverage):
+        return ClimbEnd.FLAT
+    return ClimbEnd.BOUNDED
+
+
+def _pooled_noise(used: pd.DataFrame, noise: NoiseFloor) -> tuple[float, int]:
+    """Return the standard deviation of one case [deg] from the noise floor and the climb's own replicates."""
+    within = used["angle"] - used.groupby("run")["angle"].transform("mean")
+    df = noise.sample.df + len(used) - used["run"].nunique()
+    return math.sqrt((noise.sample.df * noise.sd**2 + float((within**2).sum())) / df), df
+
+
+def _sign_changes(error: np.ndarray) -> np.ndarray:
+    """Return the positions after which the error changes its sign (or is zero)."""
+    return np.flatnonzero(error[:-1] * error[1:] <= 0.0)
+
+
+def _crossing(path: pd.DataFrame, kept: tuple[str, ...]) -> tuple[float, dict[str, float]]:
+    """Return the first place where the path crosses the target, interpolated: fractional step and values."""
+    known = path.dropna(subset="angle")
+    error = known["error"].to_numpy()
+    before = int(_sign_changes(error)[0])
+    span = error[before] - error[before + 1]
+    share = float(error[before] / span) if span else 0.0
+    labels = known.index.to_numpy(dtype=np.float64)
+    values = known[list(kept)].to_numpy()
+    place = (1.0 - share) * labels[before] + share * labels[before + 1]
+    point = (1.0 - share) * values[before] + share * values[before + 1]
+    return float(place), dict(zip(kept, point.tolist(), strict=True))
+
+
+def _stride(points: pd.DataFrame, kept: tuple[str, ...]) -> dict[str, float]:
+    """Return the largest move of each factor between two steps (a bound may have shortened others)."""
+    moves = points[list(kept)].diff().iloc[1:]
+    return {name: float(moves[name].iloc[int(moves[name].abs().argmax())]) for name in kept}
+
+
+def _direction(step: Mapping[str, float]) -> str:
+    return "One step moves " + ", ".join(f"{name} by {move:+.4g}" for name, move in step.items()) + "."
+
+
+def _factors_at_bound(study: CampaignStudy, result: ClimbResult) -> list[str]:
+    """Return the kept factors that stand at their bound at the end which the climb was heading for."""
+    edge = result.path.iloc[0 if result.path["error"].min() > 0.0 else -1]
+    limits = reach_limits(study)
+    return [name for name in result.kept if any(math.isclose(edge[name], bound) for bound in limits[name])]
+
+
+def _end_decision(
+    path: pd.DataFrame,
+    cases: pd.DataFrame,
+    end: ClimbEnd,
+    target: Sample,
+    crossing: Mapping[str, float] | None,
+    place: float | None,
+    best: int,
+) -> Decision:
+    numbers = {f"angle at step {step} [deg]": angle for step, angle in path["angle"].items()}
+    numbers |= {"target [deg]": target.mean, "nearest step": best}
+    if crossing is not None:
+        numbers |= {"crossing step": place} | numbered_values("crossing", crossing)
+        outcome = f"The path crosses the target at {listed(crossing)} (step {place:.2f}, interpolated)."
+    else:
+        outcome = {
+            ClimbEnd.TURNED: "The path turned away before the target.",
+            ClimbEnd.FLAT: "The path shows no slope beyond the noise and does not meet the target.",
+            ClimbEnd.BOUNDED: "The path ends before the target.",
+        }[end]
+    outcome += f" The nearest step is {best} ({path.loc[best, 'angle']:.2f} deg). {failure_summary(cases)}"
+    rule = "The climb goes on until its mean angle has crossed the target, turned away, or met its bounds."
+    return Decision(STAGE, rule, numbers, outcome.strip())

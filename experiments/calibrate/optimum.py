@@ -1,0 +1,165 @@
+"""Stage (g): the chosen point of the target contour, and everything that is as good."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from doe import Region, Surface, TargetError
+from experiments.calibrate.cases import StageEnd, middle
+from experiments.calibrate.results import (
+    Decision,
+    OptimumResult,
+    Outcome,
+    SurfaceResult,
+    TargetResult,
+    TruthCheck,
+)
+from experiments.calibrate.settings import CampaignStudy, OptimumSettings
+from experiments.calibrate.values import fixed_values, listed, numbered_values
+
+STAGE = "optimum"
+
+
+def find_optimum(study: CampaignStudy, surface: SurfaceResult, target: TargetResult) -> OptimumResult:
+    """Choose a point on the target contour and map the compatible region.
+
+    Raises
+    ------
+    StageEnd
+        When the fitted surface does not reach the target where the design explored it.
+    """
+    settings, fit, sample = study.campaign.optimum, surface.reduced, target.sample
+    # The box of the two-level part first: inside it the fit is at its best. The axial points reach further.
+    extents = sorted({1.0, float(surface.design.coded.abs().to_numpy().max())})
+    point, rule, extent = _choose(settings, surface, sample.mean, extents)
+    region = fit.compatible_region(sample, alpha=1.0 - settings.confidence, extent=extent)
+    prediction = fit.predict(point, alpha=1.0 - settings.confidence).iloc[0]
+    unidentified = _unidentified(settings, region)
+    truth = None if target.truth is None else _check_truth(fit, region, target.truth, sample.mean)
+    decisions = [
+        Decision(
+            STAGE,
+            rule,
+            numbered_values("chosen", point)
+            | {"predicted [deg]": prediction["mean"], "se of the fit [deg]": prediction["se"]},
+            f"Chosen: {listed(point)}; the surface predicts {prediction['mean']:.2f} deg "
+            f"({prediction['confidence_low']:.2f} to {prediction['confidence_high']:.2f}).",
+        ),
+        _region_decision(settings, region, unidentified),
+    ]
+    if truth is not None:
+        decisions.append(_truth_decision(truth, sample.mean))
+    return OptimumResult(
+        point=point,
+        settings=middle(study.factors, point),
+        prediction=prediction,
+        extent=extent,
+        contour=fit.contour(sample.mean, extent),
+        region=region,
+        unidentified=unidentified,
+        truth=truth,
+        decisions=tuple(decisions),
+    )
+
+
+def _choose(
+    settings: OptimumSettings, surface: SurfaceResult, target: float, extents: list[float]
+) -> tuple[dict[str, float], str, float]:
+    """Return the chosen point, the rule that chose it, and the extent that holds it."""
+    fit = surface.reduced
+    fixed = fixed_values(settings.point, surface.center)
+    if fixed is not None:
+        return fixed, "The study fixes the chosen point.", extents[-1] if _reach(fit, fixed) > 1.0 else 1.0
+    rule = "The chosen point is the one of the target contour nearest to the design's centre, in coded units."
+    radius = float(np.linalg.norm(surface.design.points.to_numpy(), axis=1).max())
+    for extent in extents:
+        try:
+            point = {str(name): float(value) for name, value in fit.nearest(target, extent=extent).items()}
+        except TargetError as error:
+            missed = str(error)
+            continue
+        if np.linalg.norm(_coded(fit, point)) <= radius * (1.0 + 1e-9):
+            return point, rule, extent
+        missed = f"the target contour lies beyond the design's runs, nearest at {listed(point)}"
+    raise StageEnd(
+        Outcome.NO_CONTOUR,
+        f"No point of the composite design's region gives the target: {missed}. Fix surface.center nearer to "
+        "the contour, widen surface.half_range, or replicate the climb so that its crossing is better known.",
+    )
+
+
+def _coded(fit: Surface, point: Mapping[str, float]) -> np.ndarray:
+    return np.array([float(factor.to_coded(point[factor.name])) for factor in fit.design.factors])
+
+
+def _reach(fit: Surface, point: Mapping[str, float]) -> float:
+    """Return the largest coded coordinate of a point, by size."""
+    return float(np.abs(_coded(fit, point)).max())
+
+
+def _unidentified(settings: OptimumSettings, region: Region) -> tuple[str, ...]:
+    """Return the factors whose compatible values span too much of the design's region."""
+    if not region.mask.any():
+        return ()
+    span = region.coded[region.mask].max() - region.coded[region.mask].min()
+    cell = 2.0 * region.extent / region.resolution
+    share = (span + cell) / (2.0 * region.extent)
+    return tuple(str(name) for name in share.index[share > settings.unidentified_span])
+
+
+def _check_truth(fit: Surface, region: Region, truth: Mapping[str, float], target: float) -> TruthCheck:
+    """Say where the hidden settings lie; factors that were not kept are at their middle in the fit."""
+    values = {name: truth[name] for name in fit.design.names}
+    coded = _coded(fit, values)
+    inside = bool(np.abs(coded).max() <= region.extent)
+    nearest = fit.nearest(target, to=values, extent=max(region.extent, float(np.abs(coded).max())))
+    distance = float(np.linalg.norm(_coded(fit, dict(nearest)) - coded))
+    predicted = float(fit.predict(values)["mean"].iloc[0])
+    return TruthCheck(values, inside, _belongs(region, coded) if inside else None, distance, predicted)
+
+
+def _belongs(region: Region, coded: np.ndarray) -> bool:
+    """Whether the region's cell that holds a coded point belongs to it (the last factor varies fastest)."""
+    position = (coded + region.extent) / (2.0 * region.extent) * region.resolution
+    cell = np.clip(position.astype(int), 0, region.resolution - 1)
+    return bool(region.mask[np.ravel_multi_index(tuple(cell), (region.resolution,) * len(cell))])
+
+
+def _region_decision(settings: OptimumSettings, region: Region, unidentified: tuple[str, ...]) -> Decision:
+    ranges = region.ranges
+    numbers = {"share of the region": region.fraction, "extent, coded": region.extent}
+    numbers |= {
+        f"{bound} of {name}": ranges[bound][name] for name in ranges.index for bound in ("low", "high")
+    }
+    outcome = f"{region.fraction:.0%} of the explored region is compatible with the target."
+    if len(region.factors) > 1:
+        outcome += " The target is one equation: the factors trade off along its contour."
+    if unidentified:
+        outcome += f" Not pinned down by this target alone: {', '.join(unidentified)}."
+    return Decision(
+        STAGE,
+        f"A setting is compatible when fit and target differ by no more than their errors together explain "
+        f"({settings.confidence:.0%}); a factor is pinned down when its compatible values span at most "
+        f"{settings.unidentified_span:.0%} of the region.",
+        numbers,
+        outcome,
+    )
+
+
+def _truth_decision(truth: TruthCheck, target: float) -> Decision:
+    verdict = {
+        True: "The hidden truth lies in the compatible region: recovered as far as the target can tell.",
+        False: "The hidden truth lies outside the compatible region: it was not recovered.",
+        None: "The hidden truth lies outside the region that the design explored: nothing can be said.",
+    }[truth.compatible]
+    return Decision(
+        STAGE,
+        "A twin study: the hidden settings are looked up in the compatible region.",
+        numbered_values("hidden", truth.values)
+        | {"distance to the contour, coded": truth.distance, "predicted at the truth [deg]": truth.predicted}
+        | {"target [deg]": target},
+        f"{verdict} It is {truth.distance:.2f} coded units from the contour; the surface predicts "
+        f"{truth.predicted:.2f} deg there, the target is {target:.2f} deg.",
+    )

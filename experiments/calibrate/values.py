@@ -1,0 +1,50 @@
+"""Factor values by name: those that the study fixes, their bounds, and how a sentence writes them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING
+
+from doe import Factor
+
+if TYPE_CHECKING:
+    from experiments.calibrate.settings import CampaignStudy
+
+UNLIMITED = (float("-inf"), float("inf"))
+
+
+def fixed_values(values: Mapping[str, float] | None, kept: Iterable[str]) -> dict[str, float] | None:
+    """Return the study's values of the kept factors; None where it fixes none or lacks one of them."""
+    kept = tuple(kept)
+    if values is None or not set(kept) <= set(values):
+        return None
+    return {name: float(values[name]) for name in kept}
+
+
+def listed(values: Mapping[str, float]) -> str:
+    """Write values as ``E = 0.48, F = 0.45``."""
+    return ", ".join(f"{name} = {value:.4g}" for name, value in values.items())
+
+
+def numbered_values(prefix: str, values: Mapping[str, float]) -> dict[str, float]:
+    """Return values keyed for a decision's numbers: ``start E``, ``start F``."""
+    return {f"{prefix} {name}": float(value) for name, value in values.items()}
+
+
+def kept_factors(study: CampaignStudy, kept: Iterable[str]) -> tuple[Factor, ...]:
+    """Return the study's factors of these names, in the order of the names."""
+    by_name = {factor.name: factor for factor in study.factors}
+    return tuple(by_name[name] for name in kept)
+
+
+def reach_limits(study: CampaignStudy) -> dict[str, tuple[float, float]]:
+    """Return how far a climb may go: the reach of the settings inside the hard physical limits."""
+    reach = study.campaign.climb.reach
+    limits = {}
+    for factor in study.factors:
+        low, high = study.limits.get(factor.name, UNLIMITED)
+        limits[factor.name] = (
+            max(low, float(factor.to_natural(-reach))),
+            min(high, float(factor.to_natural(reach))),
+        )
+    return limits
