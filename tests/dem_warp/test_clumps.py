@@ -88,8 +88,8 @@ def test_many_overlapping_spheres_agree_with_a_fine_voxel_sum():
     for center, radius in zip(centers, radii, strict=True):
         inside |= ((points - center) ** 2).sum(axis=1) < radius**2
     moments = union_moments(centers, radii)
-    # The surface cuts about 50,000 voxels; their errors, independent and of half a voxel at most, sum to
-    # some 100 of the 1e6 inside: 1e-4. Three times that.
+    # The surface cuts about 60,000 voxels; their errors, independent and of half a voxel at most, sum to
+    # some 70 of the 650,000 inside: 1e-4. Three times that.
     assert moments.volume == pytest.approx(inside.mean() * (2.0 * reach) ** 3, rel=3e-4)
     np.testing.assert_allclose(moments.center, points[inside].mean(axis=0), atol=3e-4)
     np.testing.assert_allclose(moments.second, np.cov(points[inside].T), atol=3e-4)

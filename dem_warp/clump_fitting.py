@@ -1,0 +1,217 @@
+"""Fill a grain's contour with inscribed spheres: chosen greedily, exchanged, and moved to cover the most."""
+
+from dataclasses import dataclass
+from itertools import product
+from typing import TYPE_CHECKING
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from dem_warp.clumps import ClumpShape
+from dem_warp.kernels.mesh_depth import mesh_depth
+from dem_warp.sphere_union import Array
+
+if TYPE_CHECKING:
+    from trimesh import Trimesh
+
+Cover = NDArray[np.bool_]
+
+_CANDIDATES = 1500  # about so many samples are tried as centres: the exchange stays below some seconds
+_CHUNK = 256  # candidates handled at once, which bounds the memory
+_MAX_SWEEPS = 100
+_STEPS = np.array([step for step in product((-1.0, 0.0, 1.0), repeat=3) if any(step)])
+
+
+@dataclass(frozen=True)
+class ClumpFit:
+    """A clump and how well it fills the solid it was made for."""
+
+    shape: ClumpShape
+    """The clump."""
+    solid_volume: float
+    """Volume of the solid [m3]."""
+    coverage: float
+    """Part of the solid's volume inside the spheres, 0 to 1."""
+    overshoot: float
+    """Volume of the spheres outside the solid over the solid's volume."""
+
+
+def fit_clump(solid: "Trimesh", sphere_count: int, protrusion: float = 0.0, resolution: int = 40) -> ClumpFit:
+    """Fill a closed surface with spheres so that they cover much of its volume.
+
+    Each sphere in turn covers the most of what is left. Then each is exchanged for a better one, and moved,
+    its radius following the distance to the surface, as long as the covered volume grows. Nothing is random:
+    the same solid gives the same clump.
+
+    Parameters
+    ----------
+    solid
+        Closed surface [m], from `solids.read_mesh` or `solids.parse_solid`.
+    sphere_count
+        Spheres wanted; fewer come back when further ones would cover nothing new.
+    protrusion
+        How far a sphere may pass the surface [m]: sharp edges are covered better, for some overshoot.
+    resolution
+        Samples along the solid's longest side. Coverage and overshoot are known to some 1 / resolution^1.5.
+
+    Returns
+    -------
+    ClumpFit
+        The clump in its principal frame, its coverage and overshoot.
+
+    Raises
+    ------
+    ValueError
+        If the solid is not closed, the sphere count or the resolution too small, or the protrusion negative.
+    """
+    _check_request(solid, sphere_count, protrusion, resolution)
+    surface = _Surface(solid)
+    samples, depths, spacing = _sample_box(surface, resolution, protrusion / surface.extent)
+    inside = depths > 0.0
+    filling = _Filling(surface, samples[inside], protrusion / surface.extent)
+    centers = filling.pick(_thinned(samples[inside], spacing), sphere_count)
+    centers = filling.settle(centers, first_step=spacing, last_step=0.1 * spacing)
+    centers = filling.prune(centers)
+    radii = filling.radii(centers)
+    covered: Cover = np.logical_or.reduce(_within(samples, centers, radii))
+    return ClumpFit(
+        shape=ClumpShape.from_spheres(centers * surface.extent + surface.origin, radii * surface.extent),
+        solid_volume=float(solid.volume),
+        coverage=float(covered[inside].mean()),
+        overshoot=float(covered[~inside].sum() / inside.sum()),
+    )
+
+
+class _Surface:
+    """Signed distance to a closed surface, in units of its longest side from the corner of its box."""
+
+    def __init__(self, solid: "Trimesh") -> None:
+        self.origin = np.array(solid.bounds[0])
+        self.extent = float(np.ptp(solid.bounds, axis=0).max())
+        self.box = np.ptp(solid.bounds, axis=0) / self.extent
+        points = (np.asarray(solid.vertices) - self.origin) / self.extent
+        self._mesh = wp.Mesh(
+            points=wp.array(points, dtype=wp.vec3, device="cpu"),
+            indices=wp.array(np.asarray(solid.faces).ravel(), dtype=wp.int32, device="cpu"),
+            support_winding_number=True,
+        )
+
+    def depth(self, points: Array) -> Array:
+        """Distance of points (N, 3) to the surface, positive inside."""
+        depths = wp.empty(len(points), dtype=wp.float32, device="cpu")
+        queries: wp.array = wp.array(points, dtype=wp.vec3, device="cpu")
+        wp.launch(mesh_depth, len(points), inputs=[self._mesh.id, queries], outputs=[depths], device="cpu")
+        return depths.numpy().astype(np.float64)
+
+
+class _Filling:
+    """The samples of a solid and the spheres that cover them."""
+
+    def __init__(self, surface: _Surface, samples: Array, protrusion: float) -> None:
+        self._surface = surface
+        self._samples = samples
+        self._protrusion = protrusion
+
+    def radii(self, centers: Array) -> Array:
+        """Largest radii that keep the protrusion; zero for a centre outside the solid."""
+        depths = self._surface.depth(centers)
+        return np.where(depths > 0.0, depths + self._protrusion, 0.0)
+
+    def cover(self, centers: Array) -> Cover:
+        """Mark the samples that each sphere covers, shape (S, N)."""
+        return _within(self._samples, centers, self.radii(centers))
+
+    def pick(self, candidates: Array, sphere_count: int) -> Array:
+        """Choose centres greedily, each for the most samples still open, then exchange them one by one."""
+        chunks = np.split(candidates, range(_CHUNK, len(candidates), _CHUNK))
+        covers = np.concatenate([self.cover(chunk) for chunk in chunks])
+        chosen: list[int] = []
+        for _ in range(sphere_count):
+            chosen.append(_best_cover(covers, chosen)[0])
+        for _ in range(_MAX_SWEEPS):
+            before = list(chosen)
+            for index, old in enumerate(chosen):
+                others = chosen[:index] + chosen[index + 1 :]
+                new, gain = _best_cover(covers, others)
+                if gain > _own_gain(covers[old], covers[others]):
+                    chosen[index] = new
+            if chosen == before:
+                break
+        return candidates[chosen]
+
+    def settle(self, centers: Array, first_step: float, last_step: float) -> Array:
+        """Move centres to neighbouring points while that covers more, with ever smaller steps."""
+        centers, covers = centers.copy(), self.cover(centers)
+        step = first_step
+        for _ in range(_MAX_SWEEPS):
+            moved = False
+            for index in range(len(centers)):
+                others = np.delete(covers, index, axis=0)
+                trials = centers[index] + step * _STEPS
+                trial_covers = self.cover(trials)
+                gains = [_own_gain(cover, others) for cover in trial_covers]
+                best = int(np.argmax(gains))
+                if gains[best] > _own_gain(covers[index], others):
+                    centers[index], covers[index], moved = trials[best], trial_covers[best], True
+            step = step if moved else 0.5 * step
+            if step < last_step:
+                break
+        return centers
+
+    def prune(self, centers: Array) -> Array:
+        """Leave out the spheres that cover nothing of their own, the smallest first."""
+        for center in centers[np.argsort(self.radii(centers), kind="stable")]:
+            rest = centers[(centers != center).any(axis=1)]
+            if len(rest) and _own_gain(self.cover(center[None])[0], self.cover(rest)) == 0:
+                centers = rest
+        return centers
+
+
+def _best_cover(covers: Cover, chosen: list[int]) -> tuple[int, int]:
+    """Return the candidate that covers the most beside those chosen, and how many samples that is."""
+    open_samples = ~covers[chosen].any(axis=0)
+    gains = np.count_nonzero(covers[:, open_samples], axis=1)
+    best = int(gains.argmax())
+    return best, int(gains[best])
+
+
+def _own_gain(cover: Cover, others: Cover) -> int:
+    """Count the samples that one sphere covers and no other does."""
+    return int(np.count_nonzero(cover & ~others.any(axis=0)))
+
+
+def _within(samples: Array, centers: Array, radii: Array) -> Cover:
+    """Mark the samples inside each sphere, shape (S, N)."""
+    squared = (samples**2).sum(axis=1) - 2.0 * centers @ samples.T + (centers**2).sum(axis=1)[:, None]
+    return squared < (radii**2)[:, None]
+
+
+def _sample_box(surface: _Surface, resolution: int, margin: float) -> tuple[Array, Array, float]:
+    """Cell centres of a grid over the solid's box and a margin, their depths, and the spacing."""
+    spacing = 1.0 / resolution
+    counts = np.ceil((surface.box + 2.0 * margin) / spacing).astype(int)
+    lowest = np.floor(-margin / spacing)
+    axes = [(np.arange(count + 1) + lowest + 0.5) * spacing for count in counts]
+    samples = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    return samples, surface.depth(samples), spacing
+
+
+def _thinned(samples: Array, spacing: float) -> Array:
+    """Every n-th sample along each axis, n such that about `_CANDIDATES` are left."""
+    stride = max(1, round((len(samples) / _CANDIDATES) ** (1.0 / 3.0)))
+    cells = np.rint(samples / spacing - 0.5).astype(int)
+    return samples[(cells % stride == stride // 2).all(axis=1)]
+
+
+def _check_request(solid: "Trimesh", sphere_count: int, protrusion: float, resolution: int) -> None:
+    if not solid.is_watertight or solid.volume <= 0.0:
+        raise ValueError(
+            f"the solid must be a closed surface turned outward, got volume {solid.volume:.3g} m3"
+        )
+    if sphere_count < 1:
+        raise ValueError(f"sphere_count must be 1 or more, got {sphere_count!r}")
+    if resolution < 8:
+        raise ValueError(f"resolution must be 8 or more, got {resolution!r}")
+    if not (np.isfinite(protrusion) and protrusion >= 0.0):
+        raise ValueError(f"protrusion must be finite and 0 or more [m], got {protrusion!r}")
