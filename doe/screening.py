@@ -164,8 +164,9 @@ def _error_term(
     if chosen.df <= 0:
         raise DesignError(
             f"no degrees of freedom for the error {rule!r}: {len(response)} observations, "
-            f"{len(design.names)} factors, {len(design.dummies)} dummies, {replicates.df:g} df of replicates; "
-            "use a larger design (spare columns are dummies), replicate the runs, or choose error='lenth'"
+            f"{len(design.names)} factors, {len(design.dummies)} dummies, {replicates.df:g} df of "
+            "replicates; use a larger design (spare columns are dummies), replicate the runs, or choose "
+            "error='lenth'"
         )
     return chosen
 
