@@ -1,0 +1,113 @@
+"""Studies and results that the tests of `experiments` share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dem_warp import CaseResult
+from experiments.study import Study, load_study
+
+SMALL_STUDY = """
+name = "Small"
+
+[grain]
+sphere = "2 mm"
+density = "700 kg/m^3"
+shear_modulus = "10 MPa"
+poisson_ratio = 0.25
+
+[wall]
+density = "7800 kg/m^3"
+shear_modulus = "70 GPa"
+poisson_ratio = 0.3
+
+[contact.grain-grain]
+restitution = 0.2
+rolling_friction = 0.05
+
+[contact.grain-wall]
+restitution = 0.5
+static_friction = 0.4
+rolling_friction = 0.05
+
+[scene.lifted-cylinder]
+diameter = "28 mm"
+height = "28 mm"
+grain_count = 30
+
+[numerics]
+modulus_scale = 400.0
+
+[measurement]
+azimuths = 2
+pixels = 200
+
+[target]
+mean = "30 deg"
+sd = "0.5 deg"
+n = 5
+
+[[factor]]
+name = "E"
+label = "grain-grain static friction"
+parameter = "contact.grain-grain.static_friction"
+low = 0.2
+high = 0.6
+
+[scale.stiff]
+numerics.modulus_scale = 1.0
+"""
+
+
+@pytest.fixture
+def write_study(tmp_path: Path) -> Callable[..., Path]:
+    """Write the small study, some of its text replaced and some added."""
+
+    def write(*replacements: tuple[str, str], add: str = "") -> Path:
+        text = SMALL_STUDY
+        for old, new in replacements:
+            assert text.count(old) == 1, old
+            text = text.replace(old, new)
+        path = tmp_path / "small.toml"
+        path.write_text(text + add, encoding="utf-8")
+        return path
+
+    return write
+
+
+@pytest.fixture
+def small_study(write_study: Callable[..., Path]) -> Study:
+    """The small study: spheres, one factor."""
+    return load_study(write_study())
+
+
+@pytest.fixture
+def cone() -> Callable[..., CaseResult]:
+    """Build the result of a case that ended in a cone of spheres with a given slope."""
+
+    def build(slope: float = 0.5, status: str = "finished", reason: str = "") -> CaseResult:
+        radius, base = 0.5e-3, 20e-3
+        grid = np.arange(-base, base, radius)
+        x, y = (axis.ravel() for axis in np.meshgrid(grid, grid))
+        top = slope * (base - np.hypot(x, y))
+        x, y, top = (values[top > 0.0] for values in (x, y, top))
+        count = len(x)
+        return CaseResult(
+            status=status,
+            reason=reason,
+            positions=np.column_stack([x, y, top]),
+            orientations=np.tile([0.0, 0.0, 0.0, 1.0], (count, 1)),
+            sizes=np.ones(count),
+            sphere_centers=np.column_stack([x, y, top]),
+            sphere_radii=np.full(count, radius),
+            sphere_grain=np.arange(count),
+            observables={"grain_count": float(count), "time_to_rest": 0.5},
+            phases=[{"name": "fill", "time": 0.1, "steps": 1000}],
+            provenance={"device": "CPU"},
+        )
+
+    return build
