@@ -157,7 +157,7 @@ def _checked_table(table: pd.DataFrame, names: list[str]) -> pd.DataFrame:
         raise DesignError(f"no column for factor {missing[0]!r}; the table has {list(table.columns)}")
     for what, labels in (("run label", table.index), ("column", table.columns)):
         if labels.has_duplicates:
-            raise DesignError(f"each {what} comes once, received again: {labels[labels.duplicated()][0]!r}")
+            raise DesignError(f"each {what} comes once, received again: {labels[labels.duplicated()][0]}")
     if table.empty:
         raise DesignError("a design has at least one run, received an empty table")
     further = [name for name in table.columns if name not in names]
@@ -165,11 +165,12 @@ def _checked_table(table: pd.DataFrame, names: list[str]) -> pd.DataFrame:
         table = table[names + further].astype(np.float64)
     except (TypeError, ValueError) as error:
         raise DesignError(f"every column of a design holds numbers: {error}") from None
-    bad = np.argwhere(~np.isfinite(table.to_numpy()))
+    values = table.to_numpy()
+    bad = np.argwhere(~np.isfinite(values))
     if len(bad):
         row, column = bad[0]
         raise DesignError(
-            f"settings must be finite: {table.iloc[row, column]!r} in run {table.index[row]}, "
+            f"settings must be finite: {values[row, column]} in run {table.index[row]}, "
             f"column {table.columns[column]!r}"
         )
     return table

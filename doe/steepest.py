@@ -13,6 +13,9 @@ from doe.factors import Factor, coded_points
 from doe.screening import ScreenResult
 from doe.surface import Surface
 
+ROUNDING = 1e-12
+"""Slope relative to the largest coefficient below which it is a rounding error of the fit."""
+
 
 @dataclass(frozen=True, eq=False)
 class ClimbPath(Design):
@@ -65,7 +68,10 @@ def steepest_path(
     _check_names(
         names, step=step if isinstance(step, Mapping) else {}, start=start or {}, limits=limits or {}
     )
-    slopes = fit.coded_coefficients[names].to_numpy() * (-1.0 if descend else 1.0)
+    coefficients = fit.coded_coefficients
+    slopes = coefficients[names].to_numpy() * (-1.0 if descend else 1.0)
+    if not np.abs(slopes).max() > ROUNDING * coefficients.abs().max():
+        raise DesignError(f"no direction to climb: the response has no slope in {', '.join(names)}")
     stride = _natural_stride(moving, slopes, step)
     begin = np.array([(start or {}).get(factor.name, factor.center) for factor in moving])
     low, high = _limit_arrays(names, begin, limits or {})
@@ -98,13 +104,10 @@ def _natural_stride(
     factors: list[Factor], slopes: NDArray, step: float | Mapping[str, float]
 ) -> NDArray[np.float64]:
     """Return the signed natural move of each factor in one step."""
-    strongest = np.abs(slopes).max()
-    if not strongest > 0.0:
-        raise DesignError("no direction to climb: every coded coefficient is zero")
     if not isinstance(step, Mapping):
         if not (np.isfinite(step) and step > 0.0):
             raise DesignError(f"step must be positive and finite, received {step}")
-        return step * slopes / strongest * np.array([factor.half_range for factor in factors])
+        return step * slopes / np.abs(slopes).max() * np.array([factor.half_range for factor in factors])
     for factor in factors:
         size = step.get(factor.name)
         if size is None or not (np.isfinite(size) and size > 0.0):

@@ -1,0 +1,87 @@
+"""Comparison of means: scipy's t-tests, the interval, equivalence and its error rate."""
+
+import numpy as np
+import pytest
+from scipy import stats
+from statsmodels.stats.weightstats import ttost_ind
+
+from doe import DesignError, Sample, compare_means
+
+A = np.array([30.1, 31.6, 29.3, 30.4])
+B = np.array([29.8, 30.2, 30.0, 30.6, 29.9, 30.1])
+
+
+@pytest.mark.parametrize(("method", "equal"), [("pooled", True), ("welch", False)])
+def test_two_sample_tests_are_those_of_scipy(method, equal):
+    ours = compare_means(A, B, method=method)
+    theirs = stats.ttest_ind(A, B, equal_var=equal)
+    assert (ours.t, ours.p, ours.df) == pytest.approx((theirs.statistic, theirs.pvalue, theirs.df), rel=1e-12)
+    assert ours.interval == pytest.approx(tuple(theirs.confidence_interval()), rel=1e-12)
+
+
+def test_one_sample_test_is_that_of_scipy():
+    theirs = stats.ttest_1samp(A, 30.0)
+    ours = compare_means(A, 30.0, method="one-sample")
+    assert (ours.t, ours.p, ours.df) == pytest.approx((theirs.statistic, theirs.pvalue, 3), rel=1e-12)
+    assert compare_means(A, Sample(30.0, 0.5, 5), method="one-sample").p == pytest.approx(ours.p, rel=1e-12)
+
+
+def test_a_sample_is_its_values_or_its_summary():
+    summaries = compare_means(Sample.of(A), Sample.of(B), margin=1.0)
+    assert summaries == compare_means(list(A), B, margin=1.0)
+
+
+@pytest.mark.parametrize("margin", [0.3, 1.0, 3.0])
+def test_equivalence_is_that_of_statsmodels(margin):
+    ours = compare_means(A, B, margin=margin)
+    p, _, _ = ttost_ind(A, B, -margin, margin)
+    assert ours.equivalence_p == pytest.approx(p, rel=1e-10)
+    assert ours.equivalent == (p < 0.05)
+
+
+def test_smallest_margin_is_where_equivalence_begins():
+    limit = compare_means(A, B).smallest_margin
+    assert compare_means(A, B, margin=limit).equivalence_p == pytest.approx(0.05, rel=1e-9)
+    assert compare_means(A, B, margin=1.001 * limit).equivalent
+    assert not compare_means(A, B, margin=0.999 * limit).equivalent
+
+
+def test_equivalence_is_symmetric_and_silent_without_a_margin():
+    there, back = compare_means(A, B, margin=1.0), compare_means(B, A, margin=1.0)
+    assert there.difference == -back.difference
+    assert there.equivalence_p == pytest.approx(back.equivalence_p, rel=1e-12)
+    assert compare_means(A, B).equivalent is None
+
+
+def test_means_that_differ_by_the_margin_pass_as_equivalent_in_five_percent():
+    rng = np.random.default_rng(31)
+    trials = 1500
+    passed = [
+        compare_means(1.0 + rng.normal(scale=0.3, size=8), rng.normal(scale=0.3, size=8), 1.0).equivalent
+        for _ in range(trials)
+    ]
+    # At the border of the margin the test's level is exact; 3.5 binomial standard deviations.
+    assert np.mean(passed) == pytest.approx(0.05, abs=3.5 * np.sqrt(0.05 * 0.95 / trials))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (([1.0], [1.0, 2.0]), "at least 2 values"),
+        (([1.0, np.nan], [1.0, 2.0]), "nan at position 2"),
+        (([1.0, 1.0], [1.0, 1.0]), "no test without spread"),
+        (([1.0, 2.0], [1.0, 3.0], 0.0), "margin must be positive, received 0"),
+        (([1.0, 2.0], [1.0, 3.0], 1.0, "paired"), "received 'paired'"),
+        (([1.0, 2.0], [1.0, 3.0], 1.0, "welch", 5.0), "alpha lies between 0 and 1, received 5"),
+        (([1.0, 2.0], 1.5), "a plain number has no spread"),
+    ],
+)
+def test_refuses(arguments, message):
+    with pytest.raises(DesignError, match=message):
+        compare_means(*arguments)
+
+
+@pytest.mark.parametrize("arguments", [(np.nan, 1.0, 3), (1.0, -1.0, 3), (1.0, 1.0, 1), (1.0, 1.0, 2.5)])
+def test_sample_refuses(arguments):
+    with pytest.raises(DesignError, match="received"):
+        Sample(*arguments)

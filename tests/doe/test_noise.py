@@ -1,0 +1,92 @@
+"""Noise floor, variance ratio, curvature and power."""
+
+import numpy as np
+import pytest
+from scipy import stats
+from statsmodels.stats.power import TTestIndPower
+
+from doe import (
+    DesignError,
+    Sample,
+    central_composite,
+    curvature_test,
+    detectable_effect,
+    effect_power,
+    fit_surface,
+    noise_floor,
+    variance_ratio,
+)
+from doe.factors import Factor
+
+
+def test_noise_floor_of_five_by_tables():
+    floor = noise_floor(Sample(30.0, 2.0, 5))
+    # Tables: t(0.975, 4) = 2.7764, chi2(4) quantiles 0.4844 and 11.1433.
+    assert floor.mean_interval == pytest.approx(
+        (30.0 - 2.7764 * 2.0 / np.sqrt(5.0), 30.0 + 2.7764 * 2.0 / np.sqrt(5.0)), abs=1e-4
+    )
+    assert floor.sd_interval == pytest.approx(
+        (2.0 * np.sqrt(4.0 / 11.1433), 2.0 * np.sqrt(4.0 / 0.4844)), rel=1e-4
+    )
+
+
+def test_noise_floor_covers():
+    rng = np.random.default_rng(41)
+    trials = 1500
+    hits = np.zeros(2)
+    for _ in range(trials):
+        floor = noise_floor(rng.normal(5.0, 1.3, size=5))
+        hits += [
+            floor.mean_interval[0] <= 5.0 <= floor.mean_interval[1],
+            floor.sd_interval[0] <= 1.3 <= floor.sd_interval[1],
+        ]
+    # 3.5 binomial standard deviations.
+    assert hits / trials == pytest.approx(0.95, abs=3.5 * np.sqrt(0.95 * 0.05 / trials))
+
+
+def test_variance_ratio_of_equal_squares_on_equal_degrees_is_even():
+    ratio = variance_ratio(2.0, 7, 2.0, 7)
+    assert (ratio.F, ratio.p) == pytest.approx((1.0, 0.5), rel=1e-12)
+
+
+def test_curvature_is_the_lack_of_fit_of_a_plane_with_centers():
+    design = central_composite([Factor("A", 0.0, 1.0), Factor("B", 0.0, 1.0)], center=4)
+    runs = design.select([1, 2, 3, 4, 9, 10, 11, 12])
+    response = np.random.default_rng(42).normal(size=8)
+    test = curvature_test(response[:4], response[4:])
+    # Corners with interaction fit four means: what is left over the centers' spread is curvature alone.
+    lack = fit_surface(runs, response, "interaction").anova.loc["lack of fit"]
+    assert (test.F, test.p) == pytest.approx((lack["F"], lack["p"]), rel=1e-9)
+    assert test.df == (1.0, 3.0)
+
+
+def test_power_is_that_of_a_two_sample_test():
+    """Two levels of six runs each are two samples of six; the effect in standard deviations is Cohen's d."""
+    expected = TTestIndPower().power(effect_size=1.5, nobs1=6, alpha=0.05)
+    # Two evaluations of the noncentral t distribution.
+    assert effect_power(3.0, 2.0, 12, error_df=10) == pytest.approx(expected, rel=1e-6)
+    assert effect_power(0.0, 2.0, 12, error_df=10, alpha=0.05) == pytest.approx(0.05, rel=1e-9)
+
+
+def test_detectable_effect_has_its_power():
+    effect = detectable_effect(1.3, 12, error_df=3, alpha=0.10, power=0.8)
+    assert effect_power(effect, 1.3, 12, error_df=3, alpha=0.10) == pytest.approx(0.8, abs=1e-9)
+    # With very many degrees of freedom: (z_0.95 + z_0.8) standard errors (the far tail is below 1e-4).
+    z = stats.norm.isf(0.05) + stats.norm.isf(0.2)
+    assert detectable_effect(1.0, 400, error_df=1e6, alpha=0.10) == pytest.approx(0.1 * z, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: noise_floor([1.0, 2.0], confidence=95.0), "received 95"),
+        (lambda: variance_ratio(1.0, 3, 0.0, 4), "error_ms must be positive and finite, received 0"),
+        (lambda: curvature_test([1.0, 2.0], [3.0, 3.0]), "centers that spread"),
+        (lambda: effect_power(1.0, -2.0, 12, 3), "sd must be positive and finite, received -2"),
+        (lambda: detectable_effect(0.0, 12, 3), "sd must be positive and finite, received 0"),
+        (lambda: detectable_effect(1.0, 12, 3, power=0.01), "power lies between alpha"),
+    ],
+)
+def test_refuses(call, message):
+    with pytest.raises(DesignError, match=message):
+        call()

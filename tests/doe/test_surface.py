@@ -1,0 +1,183 @@
+"""Response surfaces: agreement with statsmodels formulas, invariances, reduction, prediction, refusals."""
+
+import numpy as np
+import pandas as pd
+import pytest
+import statsmodels.api as sm
+import statsmodels.formula.api as smf
+
+from doe import Design, DesignError, Factor, central_composite, fit_surface
+
+FACTORS = [Factor("A", 2.0, 5.0), Factor("B", -0.3, 0.9), Factor("C", 10.0, 80.0)]
+FORMULA = "y ~ A + B + C + A:B + A:C + B:C + I(A**2) + I(B**2) + I(C**2)"
+
+
+@pytest.fixture
+def design() -> Design:
+    return central_composite(FACTORS, center=4)
+
+
+@pytest.fixture
+def response(design) -> np.ndarray:
+    a, b, c = design.points.to_numpy().T
+    mean = 30.0 + 2.0 * a - b + 0.5 * c + 0.7 * a * b - 0.4 * a**2 + 0.2 * c**2
+    return mean + np.random.default_rng(11).normal(scale=0.3, size=len(mean))
+
+
+def test_natural_coefficients_are_those_of_a_natural_fit(design, response):
+    surface = fit_surface(design, response)
+    fit = smf.ols(FORMULA, design.natural.assign(y=response)).fit()
+    # The natural fit is the ill-conditioned one of the two: 1e-7 is its accuracy.
+    assert surface.coefficients.to_numpy() == pytest.approx(fit.params.to_numpy(), rel=1e-7, abs=1e-9)
+    assert surface.r2 == pytest.approx(fit.rsquared, rel=1e-10)
+
+
+def test_partial_tests_are_type_three_of_the_coded_fit(design, response):
+    surface = fit_surface(design, response)
+    fit = smf.ols(FORMULA, design.points.assign(y=response)).fit()
+    table = sm.stats.anova_lm(fit, typ=3)
+    ours = surface.anova.iloc[1:-4]
+    theirs = table.iloc[1:-1]
+    assert ours["sum_sq"].to_numpy() == pytest.approx(theirs["sum_sq"].to_numpy(), rel=1e-8)
+    assert ours["p"].to_numpy() == pytest.approx(theirs["PR(>F)"].to_numpy(), rel=1e-8)
+
+
+def test_lack_of_fit_compares_with_one_mean_a_setting(design, response):
+    surface = fit_surface(design, response)
+    coded = design.points.round(6).assign(y=response)
+    coded["setting"] = coded.groupby(["A", "B", "C"]).ngroup()
+    nested = sm.stats.anova_lm(surface.fit, smf.ols("y ~ C(setting)", coded.drop(columns="C")).fit())
+    row = surface.anova.loc["lack of fit"]
+    assert row["F"] == pytest.approx(nested["F"].iloc[1], rel=1e-9)
+    assert row["p"] == pytest.approx(nested["Pr(>F)"].iloc[1], rel=1e-9)
+
+
+def test_predicted_r2_leaves_each_run_out(design, response):
+    surface = fit_surface(design, response)
+    errors = []
+    for run in design.coded.index:
+        others = design.coded.index.drop(run)
+        left_out = fit_surface(design.select(others), response[others - 1])
+        errors.append(response[run - 1] - left_out.predict(design.natural.loc[[run]])["mean"].iloc[0])
+    assert surface.press == pytest.approx(np.square(errors).sum(), rel=1e-9)
+
+
+def test_prediction_is_that_of_statsmodels(design, response):
+    surface = fit_surface(design, response)
+    points = pd.DataFrame({"A": [2.5, 4.0], "B": [0.0, 0.5], "C": [20.0, 90.0]}, index=["p", "q"])
+    fit = smf.ols(FORMULA, design.natural.assign(y=response)).fit()
+    expected = fit.get_prediction(points).summary_frame(alpha=0.10)
+    ours = surface.predict(points, alpha=0.10)
+    assert list(ours.index) == ["p", "q"]
+    # The natural fit's conditioning again.
+    assert ours.to_numpy() == pytest.approx(expected.to_numpy(), rel=1e-6)
+
+
+def test_diagnostics_are_those_of_statsmodels(design, response):
+    surface = fit_surface(design, response)
+    influence = surface.fit.get_influence()
+    # The same projection by two routes.
+    assert surface.leverage.to_numpy() == pytest.approx(influence.hat_matrix_diag, rel=1e-9)
+    assert surface.leverage.sum() == pytest.approx(10.0, rel=1e-12)
+    assert surface.residuals.sum() == pytest.approx(0.0, abs=1e-11)
+    assert surface.studentized_residuals.to_numpy() == pytest.approx(
+        influence.resid_studentized_internal, rel=1e-9
+    )
+
+
+def test_units_of_the_factors_do_not_matter(design, response):
+    factors = [Factor(f.name, 1e6 * f.low, 1e6 * f.high) for f in FACTORS]
+    scaled = fit_surface(Design.from_table(design.coded, factors), response)
+    pd.testing.assert_frame_equal(scaled.anova, fit_surface(design, response).anova)
+
+
+def test_replicates_as_columns_or_as_rows_are_the_same_fit(design, response):
+    pair = np.column_stack([response, response[::-1]])
+    columns = fit_surface(design, pair, "interaction")
+    rows = fit_surface(design.select(np.tile(design.coded.index, 2)), pair.T.ravel(), "interaction")
+    pd.testing.assert_frame_equal(columns.anova, rows.anova)
+    # 15 settings: 14 once and the center four times, each in pairs.
+    assert columns.pure_error.df == 2 * len(design.coded) - 15
+
+
+@pytest.mark.parametrize(("model", "count"), [("first-order", 4), ("interaction", 7), ("quadratic", 10)])
+def test_models_have_their_terms(design, response, model, count):
+    surface = fit_surface(design, response, model)
+    assert len(surface.coded_coefficients) == count
+    assert surface.residual_df == len(response) - count
+
+
+def test_exact_polynomial_comes_back():
+    """One factor too: the smallest composite design."""
+    factor = Factor("A", 1.0, 3.0)
+    design = central_composite([factor], center=3)
+    a = design.natural["A"].to_numpy()
+    surface = fit_surface(design, 5.0 - 2.0 * a + 0.5 * a**2)
+    assert surface.coefficients.to_numpy() == pytest.approx([5.0, -2.0, 0.5], rel=1e-10)
+    assert surface.nearest(3.5, extent=1.5)["A"] == pytest.approx(1.0, abs=1e-9)
+
+
+def test_elimination_keeps_the_hierarchy(design):
+    a, b, _ = design.points.to_numpy().T
+    response = 3.0 * a * b + np.random.default_rng(12).normal(scale=0.1, size=len(a))
+    reduced = fit_surface(design, response).reduce(0.01)
+    assert list(reduced.coded_coefficients.index) == ["intercept", "A", "B", "A:B"]
+    assert reduced.anova.loc["A", "p"] > 0.01
+    with pytest.raises(DesignError, match="hierarchical: A cannot go while A:B stays"):
+        reduced.drop("A")
+    assert list(reduced.drop("A", "B:A").terms) == [("B",)]
+
+
+def test_elimination_of_everything_leaves_the_mean(design):
+    response = 7.0 + np.random.default_rng(13).normal(size=len(design.coded))
+    surface = fit_surface(design, response).reduce(1e-9)
+    assert surface.terms == ()
+    assert surface.coded_coefficients["intercept"] == pytest.approx(response.mean(), rel=1e-12)
+    assert np.isnan(surface.anova.loc["model", "F"])
+
+
+def test_prediction_intervals_cover():
+    """Monte Carlo: 95 % intervals hold the true mean and a new observation in 95 % of experiments."""
+    design = central_composite(FACTORS[:2])
+    a, b = design.points.to_numpy().T
+    mean = 30.0 + a + 2.0 * b + 0.5 * a * b
+    rng = np.random.default_rng(14)
+    point = {"A": 4.0, "B": 0.7}
+    coded = [f.to_coded(point[f.name]) for f in FACTORS[:2]]
+    truth = 30.0 + coded[0] + 2.0 * coded[1] + 0.5 * coded[0] * coded[1]
+    hits = np.zeros(2)
+    trials = 600
+    for _ in range(trials):
+        row = fit_surface(design, mean + rng.normal(size=len(mean))).predict(point).iloc[0]
+        fresh = truth + rng.normal()
+        hits += [
+            row["confidence_low"] <= truth <= row["confidence_high"],
+            row["prediction_low"] <= fresh <= row["prediction_high"],
+        ]
+    # 3.5 binomial standard deviations of 600 trials: 0.031.
+    assert hits / trials == pytest.approx(0.95, abs=3.5 * np.sqrt(0.95 * 0.05 / trials))
+
+
+def test_refuses_what_cannot_be_estimated():
+    design = central_composite(FACTORS[:2])
+    corners = design.select([1, 2, 3, 4, 9, 10, 11])
+    with pytest.raises(DesignError, match=r"cannot tell these terms apart: B\^2 with A\^2"):
+        fit_surface(corners, np.arange(7.0))
+    with pytest.raises(DesignError, match="6 observations leave no residual for intercept, A, B"):
+        fit_surface(design.select([1, 2, 3, 5, 7, 9]), np.arange(6.0))
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda s: s.drop("A^3"), r"no term 'A\^3'; it has A, B"),
+        (lambda s: s.predict({"A": 1.0}), "no value for factor 'B'"),
+        (lambda s: s.equation("metric"), "natural or coded, received 'metric'"),
+        (lambda s: fit_surface(s.design, s.response, "cubic"), "received 'cubic'"),
+        (lambda s: fit_surface(s.design, s.response.replace(1.0, np.nan)), "nan in run 2"),
+    ],
+)
+def test_refuses(call, message):
+    design = central_composite(FACTORS[:2])
+    with pytest.raises(DesignError, match=message):
+        call(fit_surface(design, np.arange(13.0), "first-order"))
