@@ -7,13 +7,16 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
 from rich.table import Table
 
 from experiments.console import FAILED_RUN, CaseProgress, clear_errors, fail, messages
+
+if TYPE_CHECKING:
+    from experiments.calibrate.results import StageResult
 
 app = typer.Typer(
     name="dem-warp",
@@ -51,13 +54,17 @@ def calibrate(
 ) -> None:
     """Run a whole calibration: noise floor, screening, climb, surface, optimum, verification, report."""
     with clear_errors():
-        from experiments.run import calibrate_study, chosen_device, chosen_study, default_folder
+        from experiments.choices import chosen_device, chosen_study, default_folder
+        from experiments.run import run_campaign
 
         device = chosen_device(device)
         chosen = chosen_study(study, scale, device)
         folder = out or default_folder(chosen)
     with clear_errors(resume=_resume_command(study, folder, chosen.scale, device)):
-        campaign = calibrate_study(chosen, folder, device, workers, resume)
+        messages.print(f"{chosen.name}, on {device}. {chosen.note}")
+        campaign = run_campaign(
+            chosen, folder, device, workers, resume, watch=CaseProgress, on_stage=_show_stage
+        )
     if as_json:
         typer.echo(json.dumps(campaign.to_dict(), allow_nan=False))
     messages.print(f"{campaign.outcome}: {campaign.reason}")
@@ -81,9 +88,9 @@ def heap(
 ) -> None:
     """Simulate one heap: heap.vtp (ParaView), snapshot.png with the fitted flanks, angle.json."""
     with clear_errors():
+        from experiments.choices import chosen_device, chosen_study, default_folder
         from experiments.folder import require_unused
         from experiments.heap import simulate_heap, write_heap
-        from experiments.run import chosen_device, chosen_study, default_folder
 
         device = chosen_device(device)
         chosen = chosen_study(study, scale, device)
@@ -124,6 +131,42 @@ def angle(
         fail("\n".join(rejected))
 
 
+@app.command(epilog="Example: [bold]dem-warp clump tri-pyramid:5.90x3.93 --spheres 9 --out clump.txt[/]")
+def clump(
+    shape: Annotated[
+        str,
+        typer.Argument(
+            metavar="SHAPE",
+            help="A mesh file in mm; a solid by its dimensions in mm (sphere:D, ellipsoid:LxWxT, "
+            "cylinder:LxD, capsule:LxD, tri-pyramid:HxEDGE); or a file of spheres (x y z r in mm), "
+            "to be described.",
+        ),
+    ],
+    spheres: Annotated[int | None, typer.Option(min=1, help="Spheres to fill the solid with.")] = None,
+    protrusion: Annotated[
+        str, typer.Option(help="How far a sphere may pass the surface: sharp edges are covered better.")
+    ] = "0 mm",
+    density: Annotated[str | None, typer.Option(help='For the mass, as "698 kg/m^3".')] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="File of spheres to write, for a study's grain.clump.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Make a grain of spheres from a mesh or measured dimensions: volume, mass, inertia, spheres."""
+    with clear_errors():
+        from experiments.shapes import make_clump, write_clump
+
+        reach = _quantity(protrusion, "length", "--protrusion")
+        mass_density = _quantity(density, "density", "--density") if density else None
+        made = make_clump(shape, spheres, reach)
+        if out:
+            write_clump(made.shape, out)
+    if as_json:
+        typer.echo(json.dumps(made.to_dict(mass_density), allow_nan=False))
+    else:
+        _print_clump(made.to_dict(mass_density))
+
+
 @app.command(epilog="Example: [bold]dem-warp new mygrain[/] writes mygrain.toml")
 def new(name: Annotated[str, typer.Argument(help="Name of the grain, and of the file.")]) -> None:
     """Write a commented study file to start from."""
@@ -148,6 +191,35 @@ def _assignments(texts: list[str]) -> dict[str, str]:
         if not (name.strip() and equals and value.strip()):
             raise InputError("needs NAME=VALUE, for example E=0.48", text, "--set")
     return {name.strip(): value.strip() for name, _, value in pairs}
+
+
+def _quantity(text: str, dimension: str, option: str) -> float:
+    """Read an option's quantity in SI."""
+    from experiments.errors import InputError
+    from experiments.units import Quantity
+
+    try:
+        return Quantity.parse(text).to_base(dimension)
+    except ValueError as error:
+        raise InputError(str(error), text, option) from None
+
+
+def _show_stage(name: str, result: StageResult) -> None:
+    """Show what a stage decided, as it ends."""
+    for decision in result.decisions:
+        messages.print(f"{name.replace('_', ' ')}: {decision.outcome}", markup=False)
+
+
+def _print_clump(facts: dict[str, Any]) -> None:
+    """Show a clump's facts, one a line, without its spheres."""
+    moments = ", ".join(f"{moment:.4f}" for moment in facts["inertia_over_mass_mm2"])
+    typer.echo(f"spheres {facts['sphere_count']}, bounding radius {facts['bounding_radius_mm']:.3f} mm")
+    typer.echo(f"volume {facts['volume_mm3']:.4f} mm3 (overlaps counted once)")
+    typer.echo(f"inertia over mass {moments} mm2 (principal)")
+    if facts["mass_mg"] is not None:
+        typer.echo(f"mass {facts['mass_mg']:.4f} mg")
+    if facts["coverage"] is not None:
+        typer.echo(f"covers {facts['coverage']:.1%} of the solid, passes it by {facts['overshoot']:.1%}")
 
 
 def _resume_command(study: Path | None, folder: Path, scale: str | None, device: str) -> str:

@@ -92,7 +92,8 @@ class CaseProgress:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._bar.stop()
+        if messages.is_terminal:
+            self._bar.stop()
 
     def __call__(self, progress: BatchProgress) -> None:
         """Show the engine's progress."""

@@ -1,43 +1,95 @@
-"""What a command runs on: the chosen device, study and folder, and a whole calibration in that folder."""
+"""A whole calibration in a folder: every case stored as it finishes, the report at the end."""
 
 from __future__ import annotations
 
+import logging
+import time
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 
-from dem_warp.batch import resolve_device
-from experiments.errors import InputError
-from experiments.study import Study, load_study, study_scales
+import pandas as pd
+
+from dem_warp import Progress
+from experiments.calibrate import Campaign, calibrate
+from experiments.calibrate.campaign import StageHook
+from experiments.calibrate.checks import check_study
+from experiments.errors import StudyError
+from experiments.execute import run_cases
+from experiments.folder import open_folder
+from experiments.report import heap_pictures, write_report
+from experiments.study import Study
+
+Watch = Callable[[str], AbstractContextManager[Callable[[Progress], None] | None]]
+"""Opens the display of one batch, named by its stages, and hands out what its progress is reported to."""
+
+_log = logging.getLogger(__name__)
 
 
-def chosen_device(device: str | None) -> str:
-    """Name of the device to run on: the one asked for, or the GPU if there is one.
+def run_campaign(
+    study: Study,
+    folder: Path,
+    device: str | None = None,
+    workers: int | None = None,
+    resume: bool = False,
+    watch: Watch = lambda title: nullcontext(),
+    on_stage: StageHook | None = None,
+) -> Campaign:
+    """Calibrate a study and write its report.
 
-    Raises
-    ------
-    InputError
-        When there is no such device.
-    """
-    try:
-        return resolve_device(device)
-    except ValueError as error:
-        raise InputError(str(error), device, "--device") from None
+    Parameters
+    ----------
+    study
+        What to calibrate.
+    folder
+        Where everything goes: the cases, ``report.html``, ``results.json``, ``tables/*.csv``.
+    device
+        ``"cpu"``, ``"cuda"``, ``"cuda:1"``; None: the engine's choice.
+    workers
+        Processes on the CPU; None: the engine's choice.
+    resume
+        Go on in the folder of an earlier run: what it has simulated is not simulated again.
+    watch
+        Display of each batch of cases.
+    on_stage
+        Called with the name and the result of every finished stage.
 
-
-def chosen_study(path: Path | None, scale: str | None, device: str) -> Study:
-    """Load a study at the scale asked for, or at the one for the device: paper on a GPU, bench on a CPU.
+    Returns
+    -------
+    Campaign
+        What every stage found, and how the campaign ended.
 
     Raises
     ------
     StudyError
-        When the study breaks a rule, or has no such scale.
+        When the study cannot be calibrated; nothing is written then.
+    StoreError
+        When the folder is in use, or is not one to resume; nothing is written then.
     """
-    if scale is None:
-        suited = "paper" if device.startswith("cuda") else "bench"
-        scale = suited if suited in study_scales(path) else None
-    return load_study(path, scale)
+    _require_calibratable(study)
+    store, changes = open_folder(folder, study, resume)
+    for change in changes:
+        _log.warning("The study has changed since the earlier run: %s", change)
+    started = time.perf_counter()
+
+    def runner(table: pd.DataFrame) -> pd.DataFrame:
+        title = ", ".join(str(stage).replace("_", " ") for stage in table["stage"].unique())
+        with watch(title) as progress:
+            return run_cases(study, table, store, device, workers, progress)
+
+    campaign = calibrate(study, runner, on_stage)
+    provenance = {"device": device, "workers": workers, "seconds": round(time.perf_counter() - started, 1)}
+    pictures = heap_pictures(campaign, study, store.load)
+    write_report(campaign, study, folder, pictures=pictures, provenance=provenance)
+    return campaign
 
 
-def default_folder(study: Study, what: str = "") -> Path:
-    """Folder of results when none is named: ``out/NAME-SCALE``, NAME from the study file or its folder."""
-    name = study.file.stem if study.file.stem != "study" else study.file.resolve().parent.name
-    return Path("out") / "-".join(part for part in (name, study.scale, what) if part)
+def _require_calibratable(study: Study) -> None:
+    if not study.factors:
+        raise StudyError("a calibration needs at least one [[factor]]", "none", str(study.file))
+    try:
+        check_study(study)
+    except StudyError:
+        raise
+    except ValueError as error:
+        raise StudyError("the decisions must fit the factors", str(error), str(study.file)) from error

@@ -1,0 +1,43 @@
+"""What a command runs on when nothing is named: the device, the scale of the study, the folder of results."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from dem_warp.batch import resolve_device
+from experiments.errors import InputError
+from experiments.study import Study, load_study, study_scales
+
+
+def chosen_device(device: str | None) -> str:
+    """Name of the device to run on: the one asked for, or the GPU if there is one.
+
+    Raises
+    ------
+    InputError
+        When there is no such device.
+    """
+    try:
+        return resolve_device(device)
+    except ValueError as error:
+        raise InputError(str(error), device, "--device") from None
+
+
+def chosen_study(path: Path | None, scale: str | None, device: str) -> Study:
+    """Load a study at the scale asked for, or at the one for the device: paper on a GPU, bench on a CPU.
+
+    Raises
+    ------
+    StudyError
+        When the study breaks a rule, or has no such scale.
+    """
+    if scale is None:
+        suited = "paper" if device.startswith("cuda") else "bench"
+        scale = suited if suited in study_scales(path) else None
+    return load_study(path, scale)
+
+
+def default_folder(study: Study, what: str = "") -> Path:
+    """Folder of results when none is named: ``out/NAME-SCALE``, NAME from the study file or its folder."""
+    name = study.file.stem if study.file.stem != "study" else study.file.resolve().parent.name
+    return Path("out") / "-".join(part for part in (name, study.scale, what) if part)

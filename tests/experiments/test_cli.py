@@ -1,0 +1,255 @@
+"""The command line, run as a person runs it: exit codes, messages, and what is (not) written."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import pyvista
+from typer.testing import CliRunner
+
+from experiments import run
+from experiments.cli import app
+from experiments.console import CaseProgress, describe_progress, duration
+from imaging import save_picture
+
+WriteStudy = Callable[..., Path]
+
+COMMANDS = ("calibrate", "heap", "angle", "clump", "new")
+
+
+def dem_warp(*arguments: object) -> tuple[int, str, str]:
+    """Run a command; return its exit code, what it says on standard output, and on standard error."""
+    result = CliRunner().invoke(app, [str(argument) for argument in arguments])
+    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
+    return result.exit_code, result.stdout, result.stderr
+
+
+def last_line_of(program: str) -> str:
+    """Run a program in a fresh interpreter; return the last line that it prints."""
+    command, home = [sys.executable, "-c", program], Path(run.__file__).parents[1]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=home)
+    return done.stdout.splitlines()[-1]
+
+
+def triangle(slope: float = 0.5) -> np.ndarray:
+    """Draw a dark heap on white: a triangle of a given slope."""
+    rows, columns = np.mgrid[0:300, 0:800]
+    inside = (240 - rows) < slope * (300 - np.abs(columns - 400))
+    return np.where(inside & (rows < 240), 40, 255).astype(np.uint8)
+
+
+@pytest.fixture(autouse=True)
+def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "work").mkdir()
+    monkeypatch.chdir(tmp_path / "work")
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_explains_itself_with_an_example(command: str) -> None:
+    code, out, _ = dem_warp(command, "--help")
+    assert code == 0
+    assert f"Example: dem-warp {command}" in " ".join(out.split())
+
+
+def test_help_imports_nothing_heavy() -> None:
+    program = (
+        "import sys; from experiments.cli import app; app(['--help'], standalone_mode=False); "
+        "print(sorted({'warp', 'numpy', 'cv2', 'pandas', 'statsmodels', 'pyvista'} & set(sys.modules)))"
+    )
+    assert last_line_of(program) == "[]"
+
+
+def test_a_calibration_does_not_need_pyvista() -> None:
+    assert last_line_of("import sys; import experiments.run; print('pyvista' in sys.modules)") == "False"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('sphere = "2 mm"', "sphere = 2", "unit of length"),
+        ('sphere = "2 mm"', 'sphere = "-2 mm"', "greater than 0"),
+        ("low = 0.2", "low = 0.8", "low must be below high"),
+        ("n = 5", "n = 5\nm = 6", "unknown key"),
+    ],
+)
+@pytest.mark.parametrize("command", ["calibrate", "heap"])
+def test_a_wrong_study_ends_with_2_and_writes_nothing(
+    write_study: WriteStudy, command: str, old: str, new: str, message: str
+) -> None:
+    path = write_study((old, new))
+    code, out, err = dem_warp(command, path, "--device", "cpu", "--out", "results")
+    assert (code, out) == (2, "")
+    assert message in err
+    assert f"{path}:" in err
+    assert list(Path().iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["absent.toml"], "readable file"),
+        (["--scale", "bnch"], "did you mean 'bench'"),
+        (["--device", "tpu"], "--device"),
+        (["--scale", "bench", "--set", "E"], "NAME=VALUE"),
+        (["--scale", "bench", "--set", "Z=1"], "must name a factor"),
+        (["--scale", "bench", "--set", "B=34"], "unit of pressure"),
+        (["--scale", "bench", "--set", "E=-1"], "greater than or equal to 0"),
+    ],
+)
+def test_wrong_options_end_with_2_and_write_nothing(arguments: list[str], message: str) -> None:
+    code, out, err = dem_warp("heap", *arguments)
+    assert (code, out) == (2, "")
+    assert message in err
+    assert list(Path().iterdir()) == []
+
+
+def test_decisions_that_do_not_fit_the_factors_end_with_2(write_study: WriteStudy) -> None:
+    path = write_study(add="[campaign.surface]\ncenter = { E = -0.5 }\n")
+    code, _, err = dem_warp("calibrate", path, "--device", "cpu", "--out", "results")
+    assert code == 2
+    assert "campaign.surface.center" in err
+    assert not Path("results").exists()
+
+
+def test_a_study_without_a_target_cannot_be_calibrated(write_study: WriteStudy) -> None:
+    path = write_study(('[target]\nmean = "30 deg"\nsd = "0.5 deg"\nn = 5\n', ""))
+    code, _, err = dem_warp("calibrate", path, "--device", "cpu", "--out", "results")
+    assert (code, Path("results").exists()) == (2, False)
+    assert "[target]" in err
+
+
+def test_a_used_folder_is_refused(write_study: WriteStudy) -> None:
+    Path("results").mkdir()
+    Path("results/mine.txt").write_text("mine", encoding="utf-8")
+    for command in ("calibrate", "heap"):
+        code, _, err = dem_warp(command, write_study(), "--device", "cpu", "--out", "results")
+        assert code == 2
+        assert "new or empty" in err
+    assert [path.name for path in Path("results").iterdir()] == ["mine.txt"]
+
+
+def test_an_interruption_says_how_to_go_on(write_study: WriteStudy, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupt(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(run, "run_campaign", interrupt)
+    path = write_study()
+    code, _, err = dem_warp("calibrate", path, "--scale", "stiff", "--device", "cpu", "--out", "results")
+    assert code == 130
+    assert f"dem-warp calibrate {path} --out results --scale stiff --device cpu --resume" in err
+
+
+def test_a_small_real_heap_is_simulated_and_written(write_study: WriteStudy) -> None:
+    path = write_study()
+    command = ("heap", path, "--set", "E=0.5", "--seed", 3, "--device", "cpu", "--json")
+    code, out, _ = dem_warp(*command, "--out", "one")
+    assert code == 0
+    heap = json.loads(out)
+    assert heap == json.loads(Path("one/angle.json").read_text(encoding="utf-8"))
+    assert (heap["settings"], heap["seed"], heap["status"]) == ({"E": 0.5}, 3, "finished")
+    assert heap["observables"]["grain_count"] == 30
+    views = [0.5 * (view["left"] + view["right"]) for view in heap["views"]]
+    assert heap["angle"]["mean"] == pytest.approx(np.mean(views), rel=1e-12)
+    spheres = pyvista.read("one/heap.vtp")
+    assert spheres.n_points == 30
+    # Every sphere rests on the plate or on others: Hertz overlaps are far below a tenth of a radius.
+    assert (spheres.points[:, 2] > 0.9 * spheres["radius"]).all()
+    assert Path("one/snapshot.png").stat().st_size > 1000
+    # The same case gives the same bits.
+    assert json.loads(dem_warp(*command, "--out", "two")[1])["views"] == heap["views"]
+
+
+def test_photographs_become_angles_and_overlays() -> None:
+    save_picture("a.png", triangle(0.5))
+    save_picture("b.png", triangle(0.3))
+    code, out, _ = dem_warp("angle", "a.png", "b.png", "--json", "--overlay", "drawn")
+    assert code == 0
+    angles = [row["mean"] for row in json.loads(out)]
+    # The smooth-heap tolerance of `imaging` at this width.
+    assert angles == pytest.approx(np.degrees(np.arctan([0.5, 0.3])), abs=0.3)
+    assert sorted(path.name for path in Path("drawn").iterdir()) == ["a-angle.png", "b-angle.png"]
+    code, out, _ = dem_warp("angle", "a.png")
+    assert code == 0
+    assert f"{angles[0]:.2f}" in out
+
+
+def test_a_photograph_without_a_heap_ends_with_2() -> None:
+    save_picture("empty.png", np.full((300, 800), 255, dtype=np.uint8))
+    code, out, err = dem_warp("angle", "empty.png", "--overlay", "drawn")
+    assert (code, out) == (2, "")
+    assert "empty.png" in err
+    assert not Path("drawn").exists()
+
+
+def test_one_bad_photograph_does_not_hide_the_others() -> None:
+    save_picture("a.png", triangle())
+    code, out, err = dem_warp("angle", "a.png", "absent.png", "--json")
+    assert code == 2
+    assert [row["mean"] is None for row in json.loads(out)] == [False, True]
+    assert "absent.png" in err
+
+
+def test_an_unknown_fit_ends_with_2() -> None:
+    save_picture("a.png", triangle())
+    code, _, err = dem_warp("angle", "a.png", "--fit", "wide")
+    assert code == 2
+    assert "flank, middle" in err
+
+
+def test_a_new_study_is_written_once_and_loads() -> None:
+    assert dem_warp("new", "rye")[0] == 0
+    code, _, err = dem_warp("new", "rye")
+    assert code == 2
+    assert "never overwrites" in err
+    assert dem_warp("new", "../rye")[0] == 2
+    assert [path.name for path in Path().iterdir()] == ["rye.toml"]
+
+
+def test_a_clump_is_made_written_and_described() -> None:
+    solid = ("clump", "ellipsoid:6x3x3", "--spheres", 3, "--density", "1000 kg/m^3", "--json")
+    code, out, _ = dem_warp(*solid, "--out", "grain.txt")
+    assert code == 0
+    fitted = json.loads(out)
+    assert len(fitted["spheres_mm"]) == 3
+    # Water: a milligram a cubic millimetre.
+    assert fitted["mass_mg"] == pytest.approx(fitted["volume_mm3"], rel=1e-12)
+    assert 0.5 < fitted["coverage"] < 1.0
+    code, out, _ = dem_warp("clump", "grain.txt", "--json")
+    # The file holds nine decimals of a millimetre.
+    assert json.loads(out)["volume_mm3"] == pytest.approx(fitted["volume_mm3"], rel=1e-7)
+    assert dem_warp(*solid, "--out", "grain.txt")[0] == 2
+
+
+@pytest.mark.parametrize(
+    "arguments", [["sphere:2"], ["cube:2", "--spheres", "3"], ["grain.stl", "--spheres", "3"], ["grain.txt"]]
+)
+def test_a_wrong_shape_ends_with_2(arguments: list[str]) -> None:
+    code, out, err = dem_warp("clump", *arguments)
+    assert (code, out) == (2, "")
+    assert "received" in err
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"), [(0.4, "0 s"), (59.4, "59 s"), (80.0, "1 min 20 s"), (7500.0, "2 h 5 min")]
+)
+def test_times_read_well(seconds: float, text: str) -> None:
+    assert duration(seconds) == text
+
+
+def test_progress_tells_the_time_left(capsys: pytest.CaptureFixture[str]) -> None:
+    from dem_warp import Progress
+
+    halfway = Progress(done=3, total=12, fraction=0.25, phase_counts={"lift": 2, "waiting": 7}, seconds=20.0)
+    assert describe_progress(halfway) == "3 of 12 cases, 2 lift, 7 waiting, 1 min 0 s left"
+    with CaseProgress("climb") as show:
+        show(Progress(0, 12, 0.01, {}, 1.0))
+        show(halfway)
+        show(Progress(3, 12, 0.26, {}, 21.0))
+    # Without a terminal: nothing in the first two seconds, then a line every ten.
+    assert capsys.readouterr().err.split() == f"climb: 25 %, {describe_progress(halfway)}".split()
