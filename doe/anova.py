@@ -39,13 +39,16 @@ def least_squares(matrix: pd.DataFrame, response: pd.Series) -> RegressionResult
     Raises
     ------
     DesignError
-        Fewer observations than columns, or columns that are combinations of others (all are named).
+        Fewer observations than columns, a response that does not vary, or columns that are combinations of
+        others (all are named).
     """
     if len(matrix) < matrix.shape[1]:
         raise DesignError(
             f"too few runs for the terms: {matrix.shape[1]} coefficients ({', '.join(matrix.columns)}) "
             f"from {len(matrix)} observations"
         )
+    if response.min() == response.max():
+        raise DesignError(f"nothing to fit: all {len(response)} observations are {response.iloc[0]:g}")
     aliased = _aliased_columns(matrix)
     if aliased:
         raise DesignError(f"the design cannot tell these terms apart: {'; '.join(aliased)}")

@@ -111,7 +111,8 @@ def compatible_region(
     points, count = box_cells(len(surface.design.factors), extent, resolution)
     mean, se = surface.evaluate(points)
     total = se**2 + goal_se**2
-    df = total**2 / (se**4 / surface.residual_df + goal_se**4 / goal_df)
+    spread = se**4 / surface.residual_df + goal_se**4 / goal_df
+    df = total**2 / np.maximum(spread, np.finfo(float).tiny)
     mask = np.abs(mean - goal) <= stats.t.isf(0.5 * alpha, df) * np.sqrt(total)
     return _region(surface, points, mask, count, extent)
 

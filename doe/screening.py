@@ -120,8 +120,8 @@ def screen(design: Design, response: ArrayLike, error: str = "pooled") -> Screen
     Raises
     ------
     DesignError
-        A response that is not finite, terms that the runs cannot tell apart, or no degrees of freedom for the
-        error that was asked for.
+        A response that is not finite or does not vary, terms that the runs cannot tell apart, or no degrees
+        of freedom for the error that was asked for.
     """
     if error not in ERRORS:
         raise DesignError(f"error is one of {', '.join(ERRORS)}, received {error!r}")

@@ -152,8 +152,9 @@ class Surface:
 
     @property
     def cv_percent(self) -> float:
-        """Coefficient of variation: residual standard deviation in percent of the mean response."""
-        return float(100.0 * np.sqrt(self.residual_ms) / self.response.mean())
+        """Coefficient of variation: residual standard deviation in percent of the mean response's size."""
+        mean = abs(float(self.response.mean()))
+        return 100.0 * float(np.sqrt(self.residual_ms)) / mean if mean > 0.0 else np.inf
 
     @property
     def adequate_precision(self) -> float:
@@ -194,7 +195,7 @@ class Surface:
         table = pd.DataFrame(np.atleast_2d(np.asarray(coded, dtype=np.float64)), columns=self.design.names)
         matrix = model_matrix(table, self.terms).to_numpy()
         variance = np.einsum("ij,jk,ik->i", matrix, self.fit.cov_params().to_numpy(), matrix)
-        return matrix @ self.fit.params.to_numpy(), np.sqrt(variance)
+        return matrix @ self.fit.params.to_numpy(), np.sqrt(np.maximum(variance, 0.0))
 
     def predict(
         self, points: pd.DataFrame | Mapping[str, float], alpha: float = 0.05, coded: bool = False
@@ -271,7 +272,8 @@ def fit_surface(design: Design, response: ArrayLike, model: str = "quadratic") -
     Raises
     ------
     DesignError
-        A response that is not finite, too few runs for the terms, or terms that the runs cannot tell apart.
+        A response that is not finite or does not vary, too few runs for the terms, or terms that the runs
+        cannot tell apart.
     """
     coded, values = observations(design, response)
     return Surface(design, coded[design.names], values, model_terms(design.names, model))

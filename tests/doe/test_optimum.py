@@ -144,5 +144,5 @@ def test_compatible_region_holds_the_truth_as_often_as_it_says():
         region = surface.compatible_region(target, resolution=5)  # cell centers at multiples of 0.4
         truth = np.isclose(region.coded, [0.4, -0.4]).all(axis=1)
         hits += int(region.mask[truth].item())
-    # 3.5 binomial standard deviations of 400 trials: 0.038 (Welch's degrees of freedom are good to 0.01 here).
+    # 3.5 binomial standard deviations of 400 trials: 0.038; Welch's degrees of freedom are good to 0.01.
     assert hits / trials == pytest.approx(0.95, abs=3.5 * np.sqrt(0.95 * 0.05 / trials))

@@ -1,7 +1,7 @@
 """The paper's statistics from its printed tables.
 
-The expected numbers were computed twice, in Python and in R (lm, car, rsm), and are compared to their last printed
-digit. Where the print differs, the computed number stands.
+The expected numbers were computed twice, in Python and in R (lm, car, rsm), and are compared to their last
+printed digit. Where the print differs, the computed number stands.
 """
 
 import itertools
@@ -187,8 +187,8 @@ def test_contour_and_nearest_point_of_the_printed_equation(composite, agrees):
 
 
 def test_contour_of_the_fit_differs_by_the_printed_rounding_only(reduced):
-    # Rounding eq. (9) to three decimals moves it by up to 0.0005 (1 + E + F + EF + E^2) = 0.0012 degrees; along
-    # the gradient (1.43 degrees a coded unit) that is 0.0008 coded units, 5e-5 in E and 8e-5 in F.
+    # Rounding eq. (9) to three decimals moves it by up to 0.0005 (1 + E + F + EF + E^2) = 0.0012 degrees;
+    # along the gradient (1.43 degrees a coded unit) that is 0.0008 coded units, 5e-5 in E and 8e-5 in F.
     nearest = reduced.nearest(TARGET)
     assert nearest["E"] == pytest.approx(0.479518, abs=5e-5)
     assert nearest["F"] == pytest.approx(0.448979, abs=8e-5)

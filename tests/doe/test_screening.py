@@ -83,7 +83,7 @@ def test_false_alarms_come_at_the_stated_rate():
 def test_saturated_design_needs_another_error():
     design = plackett_burman([Factor(f"x{i}", 0.0, 1.0) for i in range(11)])
     response = np.random.default_rng(7).normal(size=12)
-    with pytest.raises(DesignError, match="no degrees of freedom for the error 'pooled'.*error='lenth'"):
+    with pytest.raises(DesignError, match=r"no degrees of freedom for the error 'pooled'.*error='lenth'"):
         screen(design, response)
     assert screen(design, response, error="lenth").error_df == pytest.approx(11 / 3)
     assert screen(design, np.column_stack([response, response + 0.1])).error_df == 12
@@ -122,6 +122,8 @@ def test_rule_and_aliased_factors_are_named():
     design = plackett_burman(FACTORS)
     with pytest.raises(DesignError, match="error is one of pooled, dummies, pure, lenth, received 'none'"):
         screen(design, np.zeros(12), error="none")
+    with pytest.raises(DesignError, match="nothing to fit: all 12 observations are 5"):
+        screen(design, np.full(12, 5.0))
     half = design.select(design.coded.index[design.coded["A"] > 0.0].repeat(2))
     with pytest.raises(DesignError, match="A with intercept"):
         screen(half, np.arange(12.0))
@@ -129,7 +131,5 @@ def test_rule_and_aliased_factors_are_named():
 
 def test_too_few_runs_are_counted():
     design = plackett_burman(FACTORS).select([1, 2, 3])
-    with pytest.raises(
-        DesignError, match="too few runs for the terms: 9 coefficients .* from 3 observations"
-    ):
+    with pytest.raises(DesignError, match=r"too few runs for the terms: 9 coefficients .* 3 observations"):
         screen(design, pd.Series([1.0, 2.0, 3.0]))
