@@ -109,22 +109,21 @@ def require_crossing(study: CampaignStudy, result: ClimbResult, target: Sample) 
     best = f"{nearest:.2f} deg at best ({listed(result.best)}) against {target.mean:.2f} deg"
     if result.end is ClimbEnd.BOUNDED:
         at_bound = _factors_at_bound(study, result)
-        where = f"{', '.join(at_bound)} stand(s) at the bound" if at_bound else "all batches were used up"
+        where = f"at the bound: {', '.join(at_bound)}" if at_bound else "all batches were used up"
         raise StageEnd(
             Outcome.TARGET_NOT_REACHED,
             f"The climb never reached the target: {best}; {where}. Widen the ranges of "
-            f"{', '.join(result.kept)}, raise climb.reach or climb.extensions, or keep further factors; if the ranges are physical, the "
-            "model lacks a mechanism.",
+            f"{', '.join(result.kept)}, raise climb.reach or climb.extensions, or keep further factors; if "
+            "the ranges are physical, the model lacks a mechanism.",
         )
-    what = (
-        "turned before"
-        if result.end is ClimbEnd.TURNED
-        else "shows no slope beyond the noise and never meets"
-    )
+    what = {
+        ClimbEnd.TURNED: "turned before",
+        ClimbEnd.FLAT: "does not change beyond the noise and never meets",
+    }
     raise StageEnd(
         Outcome.PLATEAU,
-        f"The angle {what} the target: {best}. More of {', '.join(result.kept)} does not help: keep further "
-        "factors, or look for a mechanism that the model lacks.",
+        f"The angle {what[result.end]} the target: {best}. More of {', '.join(result.kept)} does not "
+        "help: keep further factors, or look for a mechanism that the model lacks.",
     )
 
 
@@ -191,31 +190,30 @@ def _path_table(points: pd.DataFrame, cases: pd.DataFrame, target: float) -> pd.
 
 
 def _end(path: pd.DataFrame, cases: pd.DataFrame, noise: NoiseFloor, settings: ClimbSettings) -> ClimbEnd:
-    """Judge a path: crossed, else turned, else flat, else it ends where it is bounded."""
+    """Judge a path: crossed, else flat, else turned, else it ends where it is bounded."""
     known = path.dropna(subset="angle")
     error, count = known["error"].to_numpy(), known["n"].to_numpy()
     if _sign_changes(error).size:
         return ClimbEnd.CROSSED
-    sd, df = _pooled_noise(measured(cases), noise)
-    gap = np.abs(error)
-    best, last = int(gap.argmin()), (len(gap) - 1 if error[0] < 0.0 else 0)
-    fall = float(stats.t.isf(settings.alpha, df)) * sd * math.sqrt(1.0 / count[best] + 1.0 / count[last])
-    if gap[last] - gap[best] > fall:
-        return ClimbEnd.TURNED
-    step = known.index.to_numpy(dtype=np.float64)
-    centered = step - np.average(step, weights=count)
-    leverage = float((count * centered**2).sum())
-    slope = float((count * centered * error).sum()) / leverage
-    if abs(slope) <= float(stats.t.isf(0.5 * settings.alpha, df)) * sd / math.sqrt(leverage):
+    variance, df = _pooled_variance(measured(cases), noise)
+    others = len(error) - 1
+    between = float((count * (error - np.average(error, weights=count)) ** 2).sum()) / others
+    if between <= float(stats.f.isf(settings.alpha, others, df)) * variance:
         return ClimbEnd.FLAT
+    gap = np.abs(error)
+    best, last = int(gap.argmin()), (others if error[0] < 0.0 else 0)
+    # The best of all steps is compared with one other: the level is shared among the comparisons it could be.
+    critical = float(stats.t.isf(settings.alpha / others, df))
+    if gap[last] - gap[best] > critical * math.sqrt(variance * (1.0 / count[best] + 1.0 / count[last])):
+        return ClimbEnd.TURNED
     return ClimbEnd.BOUNDED
 
 
-def _pooled_noise(used: pd.DataFrame, noise: NoiseFloor) -> tuple[float, int]:
-    """Return the standard deviation of one case [deg] from the noise floor and the climb's own replicates."""
+def _pooled_variance(used: pd.DataFrame, noise: NoiseFloor) -> tuple[float, int]:
+    """Return the variance of one case [deg^2] from the noise floor and the climb's replicates, and its df."""
     within = used["angle"] - used.groupby("run")["angle"].transform("mean")
     df = noise.sample.df + len(used) - used["run"].nunique()
-    return math.sqrt((noise.sample.df * noise.sd**2 + float((within**2).sum())) / df), df
+    return (noise.sample.df * noise.sd**2 + float((within**2).sum())) / df, df
 
 
 def _sign_changes(error: np.ndarray) -> np.ndarray:
@@ -271,7 +269,7 @@ def _end_decision(
     else:
         outcome = {
             ClimbEnd.TURNED: "The path turned away before the target.",
-            ClimbEnd.FLAT: "The path shows no slope beyond the noise and does not meet the target.",
+            ClimbEnd.FLAT: "The angle does not change beyond the noise and does not meet the target.",
             ClimbEnd.BOUNDED: "The path ends before the target.",
         }[end]
     outcome += f" The nearest step is {best} ({path.loc[best, 'angle']:.2f} deg). {failure_summary(cases)}"

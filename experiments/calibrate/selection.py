@@ -55,9 +55,9 @@ def require_kept(settings: SelectionSettings, selection: SelectionResult) -> Non
     raise StageEnd(
         Outcome.NO_SIGNIFICANT_FACTOR,
         f"No factor has p below {settings.alpha:g}; the strongest, {selection.table.index[0]}, has an effect "
-        f"of {strongest['effect']:+.2f} deg (p = {strongest['p']:.3f}). With this noise the design sees effects "
-        f"from about {selection.visible_effect:.2f} deg on: widen the ranges, add screening replicates or "
-        "dummies, or name the factors to keep in selection.keep.",
+        f"of {strongest['effect']:+.2f} deg (p = {strongest['p']:.3f}). With this noise the design sees "
+        f"effects from about {selection.visible_effect:.2f} deg on: widen the ranges, add screening "
+        "replicates or dummies, or name the factors to keep in selection.keep.",
     )
 
 

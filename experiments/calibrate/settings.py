@@ -97,7 +97,7 @@ class ClimbSettings(_Settings):
     reach: float = Field(default=2.0, ge=1.0)
     """How far from the middle the climb may go, in half-ranges (hard limits hold in any case)."""
     alpha: float = Field(default=0.05, gt=0.0, lt=1.0)
-    """A fall from the best step, or a slope, counts when it is significant at this level."""
+    """A fall from the best step, or any change along the path, counts when significant at this level."""
 
     @model_validator(mode="after")
     def _start_with_step(self) -> ClimbSettings:

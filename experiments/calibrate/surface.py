@@ -84,7 +84,8 @@ def require_slope(result: SurfaceResult) -> None:
         raise StageEnd(
             Outcome.PLATEAU,
             f"Around {listed(result.center)} no term of the surface is significant: the angle does not "
-            f"depend on {', '.join(result.center)} beyond the noise. Widen surface.half_range or add replicates.",
+            f"depend on {', '.join(result.center)} beyond the noise. Widen surface.half_range or add "
+            "replicates.",
         )
 
 

@@ -1,0 +1,364 @@
+"""The campaign on analytic heaps: a known surface and a noise that each seed determines."""
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from doe import Factor
+from experiments.calibrate import (
+    Campaign,
+    CampaignSettings,
+    ClimbEnd,
+    MeasuredTarget,
+    Outcome,
+    TwinTarget,
+    calibrate,
+)
+from experiments.calibrate.results import STAGES
+
+NOISE = 0.3
+"""Standard deviation of one analytic heap [deg]."""
+
+FACTORS = (
+    Factor("A", 0.16, 0.42),
+    Factor("B", 6.81, 61.84, "MPa"),
+    Factor("E", 0.32, 0.60),
+    Factor("F", 0.18, 0.58),
+    Factor("G", 0.03, 0.08),
+)
+Angle = Callable[[Mapping[str, float]], float]
+
+
+@dataclass(frozen=True)
+class AnalyticStudy:
+    target: MeasuredTarget | TwinTarget = field(
+        default_factory=lambda: MeasuredTarget(mean=26.0, sd=0.4, n=5)
+    )
+    campaign: CampaignSettings = field(default_factory=CampaignSettings)
+    factors: tuple[Factor, ...] = FACTORS
+    limits: Mapping[str, tuple[float, float]] = field(
+        default_factory=lambda: {name: (0.0, float("inf")) for name in "EFG"}
+    )
+
+
+class AnalyticHeaps:
+    """A runner: the angle is a function of the settings, plus noise from the case's seed."""
+
+    def __init__(
+        self, angle: Angle, sd: float = NOISE, fails: Callable[[pd.Series], bool] | None = None
+    ) -> None:
+        self.angle, self.sd, self.fails = angle, sd, fails or (lambda row: False)
+        self.tables: list[pd.DataFrame] = []
+
+    def __call__(self, table: pd.DataFrame) -> pd.DataFrame:
+        self.tables.append(table)
+        rows = [row for _, row in table.iterrows()]
+        noise = [self.sd * np.random.default_rng(int(row["seed"])).standard_normal() for row in rows]
+        angle = [
+            np.nan if self.fails(row) else self.angle(row) + n for row, n in zip(rows, noise, strict=True)
+        ]
+        failed = np.isnan(angle)
+        return table.assign(
+            status=np.where(failed, "diverged", "finished"),
+            reason=np.where(failed, "the energy grew without bound", ""),
+            angle=angle,
+            angle_se=0.1,
+        )
+
+
+def coded(row: Mapping[str, float], name: str) -> float:
+    return float(next(f for f in FACTORS if f.name == name).to_coded(row[name]))
+
+
+def two_frictions(row: Mapping[str, float]) -> float:
+    """A saturating heap: both frictions matter, the rest does not."""
+    e, f = coded(row, "E"), coded(row, "F")
+    return 24.0 + 2.5 * e + 5.0 * f + 0.8 * e * f - 1.0 * f * f
+
+
+def settings(**sections: Mapping) -> CampaignSettings:
+    return CampaignSettings.model_validate(sections)
+
+
+def finished(campaign: Campaign) -> list[str]:
+    return list(campaign.stages)
+
+
+def test_the_whole_chain_finds_a_known_contour() -> None:
+    heaps = AnalyticHeaps(two_frictions)
+    campaign = calibrate(AnalyticStudy(), heaps)
+    assert campaign.outcome is Outcome.CALIBRATED
+    assert finished(campaign) == list(STAGES)
+    assert set(campaign.selection.kept) == {"E", "F"}
+    # The standard error of the fit near the centre is about NOISE / sqrt(5); four of them are allowed.
+    assert two_frictions(campaign.optimum.settings) == pytest.approx(26.0, abs=4.0 * NOISE / np.sqrt(5))
+    assert campaign.optimum.settings["A"] == pytest.approx(0.29)
+    assert campaign.climb.end is ClimbEnd.CROSSED
+    crossing = {**campaign.optimum.settings, **campaign.climb.crossing}
+    # The crossing is interpolated between means of two heaps over a step of less than 3 deg.
+    assert two_frictions(crossing) == pytest.approx(26.0, abs=1.0)
+
+
+def test_contour_and_region_belong_to_the_reduced_surface() -> None:
+    campaign = calibrate(AnalyticStudy(), AnalyticHeaps(two_frictions))
+    optimum, fit = campaign.optimum, campaign.surface.reduced
+    assert fit.predict(optimum.point)["mean"].iloc[0] == pytest.approx(26.0, abs=1e-9)
+    np.testing.assert_allclose(fit.predict(optimum.contour)["mean"], 26.0, atol=1e-9)
+    assert 0.0 < optimum.region.fraction < 1.0
+    distance = [
+        np.linalg.norm([f.to_coded(point[f.name]) for f in fit.design.factors])
+        for point in optimum.contour.to_dict("records")
+    ]
+    chosen = np.linalg.norm([f.to_coded(optimum.point[f.name]) for f in fit.design.factors])
+    assert chosen <= min(distance) + 1e-9
+
+
+def test_same_seeds_give_the_same_campaign_and_other_seeds_another() -> None:
+    first, again = (calibrate(AnalyticStudy(), AnalyticHeaps(two_frictions)).to_dict() for _ in range(2))
+    other_study = AnalyticStudy(campaign=settings(seeds={"campaign": 11}))
+    other = calibrate(other_study, AnalyticHeaps(two_frictions)).to_dict()
+    assert first == again
+    assert first["noise_floor"]["floor"]["mean"] != other["noise_floor"]["floor"]["mean"]
+
+
+def test_every_case_has_its_own_seed_and_a_batch_holds_a_whole_stage() -> None:
+    heaps = AnalyticHeaps(two_frictions)
+    study = AnalyticStudy(target=TwinTarget(truth={"E": 0.5, "F": 0.4}))
+    campaign = calibrate(study, heaps)
+    assert campaign.cases["seed"].is_unique
+    assert [sorted(set(table["stage"])) for table in heaps.tables] == [
+        ["noise_floor", "screening", "target"],
+        ["climb"],
+        ["surface"],
+        ["verification"],
+    ]
+    assert len(campaign.cases) == sum(map(len, heaps.tables))
+
+
+def test_more_replicates_change_no_other_case() -> None:
+    def cases(replicates: int) -> pd.DataFrame:
+        study = AnalyticStudy(campaign=settings(screening={"replicates": replicates}))
+        table = calibrate(study, AnalyticHeaps(two_frictions)).screening.cases
+        return table[table["replicate"] == 1].reset_index(drop=True)
+
+    pd.testing.assert_frame_equal(cases(1), cases(3))
+
+
+def test_a_twin_recovers_its_hidden_truth_in_the_compatible_region() -> None:
+    truth = {"E": 0.50, "F": 0.42}
+    inside = []
+    for seed in range(10, 50, 2):
+        seeds = {"campaign": seed, "target": seed + 1}
+        study = AnalyticStudy(target=TwinTarget(truth=truth), campaign=settings(seeds=seeds))
+        campaign = calibrate(study, AnalyticHeaps(two_frictions))
+        assert campaign.target.truth["A"] == pytest.approx(0.29)
+        inside.append(campaign.optimum is not None and campaign.optimum.truth.compatible is True)
+    # Each region holds the truth with probability 0.95: 16 or fewer of 20 come once in 60 times.
+    assert sum(inside) >= 17
+
+
+def test_a_truth_that_is_not_where_the_angle_says_is_called_incompatible() -> None:
+    def shifted(row: Mapping[str, float]) -> float:
+        # The target heaps stand 1.5 deg higher than the same settings do later: a model error of 5 noise sd.
+        return two_frictions(row) + (1.5 if row["stage"] == "target" else 0.0)
+
+    study = AnalyticStudy(target=TwinTarget(truth={"E": 0.46, "F": 0.38}))
+    check = calibrate(study, AnalyticHeaps(shifted)).optimum.truth
+    assert check.inside_design
+    assert check.compatible is False
+    # The gradient is about sqrt(2.5^2 + 5^2) = 5.6 deg per screening unit; a design unit is 0.4 of one.
+    assert check.distance > 0.4
+
+
+def test_no_significant_factor() -> None:
+    # At the default level of 0.10, one of five null factors is kept in 4 of 10 campaigns.
+    strict = settings(selection={"alpha": 0.01})
+    campaign = calibrate(AnalyticStudy(campaign=strict), AnalyticHeaps(lambda row: 24.0))
+    assert campaign.outcome is Outcome.NO_SIGNIFICANT_FACTOR
+    assert finished(campaign) == ["target", "noise_floor", "screening", "selection"]
+    assert campaign.climb is None
+    assert "keep" in campaign.reason
+    # Two-sided test of 12 heaps: effects of a few standard errors 2 sd / sqrt(12) can be seen.
+    assert (
+        1.0 < campaign.selection.visible_effect / (2.0 * campaign.noise_floor.floor.sd / np.sqrt(12)) < 10.0
+    )
+
+
+def test_all_factors_significant_keeps_the_strongest_and_says_so() -> None:
+    weights = dict(zip("ABEFG", (1.0, 1.5, 3.0, 2.5, 2.0), strict=True))
+    heaps = AnalyticHeaps(lambda row: 25.0 + sum(w * coded(row, n) for n, w in weights.items()))
+    study = AnalyticStudy(campaign=settings(selection={"at_most": 2}))
+    campaign = calibrate(study, heaps)
+    assert campaign.selection.kept == ("E", "F")
+    assert "Every factor is significant" in campaign.selection.decisions[0].outcome
+    assert campaign.outcome is Outcome.CALIBRATED
+
+
+def test_a_climb_that_never_reaches_the_target() -> None:
+    study = AnalyticStudy(target=MeasuredTarget(mean=60.0, sd=0.5, n=5))
+    heaps = AnalyticHeaps(lambda row: 24.0 + 3.0 * coded(row, "E") + 3.0 * coded(row, "F"))
+    campaign = calibrate(study, heaps)
+    assert campaign.outcome is Outcome.TARGET_NOT_REACHED
+    assert campaign.climb.end is ClimbEnd.BOUNDED
+    assert len([table for table in heaps.tables if "climb" in set(table["stage"])]) == 2
+    assert campaign.climb.path[["E", "F"]].max().to_dict() == pytest.approx({"E": 0.74, "F": 0.78}, abs=0.08)
+    assert "Widen" in campaign.reason
+    assert campaign.surface is None
+
+
+def test_a_target_below_the_first_step_extends_the_climb_downward() -> None:
+    study = AnalyticStudy(target=MeasuredTarget(mean=16.5, sd=0.5, n=5))
+    heaps = AnalyticHeaps(lambda row: 24.0 + 3.0 * coded(row, "E") + 3.0 * coded(row, "F"))
+    campaign = calibrate(study, heaps)
+    assert campaign.climb.path.index.min() < 1
+    assert campaign.climb.path.index.is_monotonic_increasing
+    assert campaign.climb.crossing_step < 1.0
+    assert campaign.outcome is Outcome.CALIBRATED
+    assert campaign.cases["seed"].is_unique
+
+
+def test_a_climb_that_turns_is_a_plateau() -> None:
+    heaps = AnalyticHeaps(
+        lambda row: 24.0 + 4.0 * coded(row, "F") - 4.0 * max(coded(row, "F") - 0.2, 0.0) ** 2 * 5
+    )
+    study = AnalyticStudy(
+        campaign=settings(selection={"keep": ["F"]}), target=MeasuredTarget(mean=30.0, sd=0.4, n=5)
+    )
+    campaign = calibrate(study, heaps)
+    assert campaign.outcome is Outcome.PLATEAU
+    assert campaign.climb.end is ClimbEnd.TURNED
+
+
+def test_a_climb_without_slope_is_a_plateau() -> None:
+    study = AnalyticStudy(campaign=settings(selection={"keep": ["G"]}))
+    campaign = calibrate(study, AnalyticHeaps(lambda row: 20.0))
+    assert campaign.outcome is Outcome.PLATEAU
+    assert campaign.climb.end is ClimbEnd.FLAT
+
+
+def test_a_design_far_from_the_target_has_no_contour() -> None:
+    study = AnalyticStudy(campaign=settings(surface={"center": {"E": 0.36, "F": 0.22}}))
+    campaign = calibrate(study, AnalyticHeaps(two_frictions))
+    assert campaign.outcome is Outcome.NO_CONTOUR
+    assert campaign.surface is not None
+    assert campaign.optimum is None
+
+
+def test_heaps_that_change_at_the_optimum_are_not_verified() -> None:
+    heaps = AnalyticHeaps(lambda row: two_frictions(row) + (2.0 if row["stage"] == "verification" else 0.0))
+    campaign = calibrate(AnalyticStudy(), heaps)
+    assert campaign.outcome is Outcome.NOT_VERIFIED
+    assert campaign.verification.comparison.different
+
+
+def test_equivalence_can_be_required() -> None:
+    demand = {"require_equivalence": True, "margin": 0.05}
+    campaign = calibrate(AnalyticStudy(campaign=settings(verification=demand)), AnalyticHeaps(two_frictions))
+    assert campaign.outcome is Outcome.NOT_VERIFIED
+    assert not campaign.verification.comparison.different
+
+
+@pytest.mark.parametrize("names", [("F",), ("E", "F", "G")])
+def test_one_and_three_kept_factors(names: tuple[str, ...]) -> None:
+    heaps = AnalyticHeaps(lambda row: 25.0 + sum(3.0 * coded(row, name) for name in names))
+    study = AnalyticStudy(campaign=settings(selection={"alpha": 0.01}))
+    campaign = calibrate(study, heaps)
+    assert set(campaign.selection.kept) == set(names)
+    assert campaign.outcome is Outcome.CALIBRATED
+    assert campaign.optimum.contour.shape[1] == len(names)
+    unidentified = campaign.optimum.unidentified
+    # One equation: it fixes one factor and leaves three free to trade off.
+    assert set(unidentified) == (set() if len(names) == 1 else set(names))
+
+
+@pytest.mark.parametrize("stage", ["target", "noise_floor", "screening", "climb", "surface", "verification"])
+def test_a_stage_whose_cases_all_fail_ends_the_campaign(stage: str) -> None:
+    heaps = AnalyticHeaps(two_frictions, fails=lambda row: row["stage"] == stage)
+    campaign = calibrate(AnalyticStudy(target=TwinTarget(truth={"E": 0.5, "F": 0.42})), heaps)
+    assert campaign.outcome is Outcome.TOO_MANY_FAILED_RUNS
+    assert stage not in campaign.stages
+    assert "diverged" in campaign.reason
+    assert set(campaign.failed_cases["stage"]) == {stage}
+
+
+def test_a_few_failed_cases_are_stated_and_do_not_stop_the_campaign() -> None:
+    lost = {
+        ("noise_floor", 1, 2),
+        ("screening", 3, 1),
+        ("climb", 2, 1),
+        ("surface", 1, 1),
+        ("verification", 1, 4),
+    }
+    heaps = AnalyticHeaps(
+        two_frictions, fails=lambda row: (row["stage"], row["run"], row["replicate"]) in lost
+    )
+    campaign = calibrate(AnalyticStudy(), heaps)
+    assert campaign.outcome is Outcome.CALIBRATED
+    assert len(campaign.failed_cases) == len(lost)
+    assert np.isnan(campaign.screening.response[2, 0])
+    assert campaign.climb.path.loc[2, "n"] == 1
+    assert np.isnan(campaign.surface.response[0])
+    assert len(campaign.surface.full.response) == 12
+    stated = [d.stage for d in campaign.decisions if "cases failed (1 diverged)" in d.outcome]
+    assert stated == ["noise_floor", "screening", "climb", "surface", "verification"]
+
+
+def test_points_stay_inside_hard_limits_and_leave_stated_ranges_openly() -> None:
+    study = AnalyticStudy(
+        campaign=settings(surface={"center": {"E": 0.46, "F": 0.05}, "half_range": {"E": 0.15, "F": 0.08}}),
+        target=MeasuredTarget(mean=15.0, sd=0.5, n=5),
+    )
+    campaign = calibrate(study, AnalyticHeaps(two_frictions))
+    surface = campaign.surface
+    assert surface.design.natural["F"].min() >= 0.0
+    assert surface.half_range["F"] < 0.08
+    listed = surface.outside.set_index(["run", "factor"])["value"]
+    natural = surface.design.natural
+    assert set(listed.index) == {
+        (run, f.name)
+        for f in FACTORS
+        if f.name in natural
+        for run, value in natural[f.name].items()
+        if not f.low <= value <= f.high
+    }
+    assert len(listed) > 0
+
+
+def test_results_are_plain_finite_json_and_tables() -> None:
+    stages: list[str] = []
+    campaign = calibrate(
+        AnalyticStudy(target=TwinTarget(truth={"E": 0.5, "F": 0.42})),
+        AnalyticHeaps(two_frictions, fails=lambda row: row["stage"] == "climb" and row["run"] == 1),
+        on_stage=lambda name, result: stages.append(name),
+    )
+    text = json.dumps(campaign.to_dict(), allow_nan=False)
+    assert json.loads(text)["outcome"] == campaign.outcome.value
+    assert json.loads(text)["climb"]["path"][0]["angle"] is None
+    assert stages == list(STAGES)
+    tables = campaign.tables()
+    assert len(tables["cases"]) == len(campaign.cases)
+    assert len(tables["decisions"]) == len(campaign.decisions)
+    assert list(tables["surface_anova_full"]["source"])[:1] == ["model"]
+
+
+@pytest.mark.parametrize(
+    ("section", "place"),
+    [
+        ({"selection": {"keep": ["X"]}}, "selection.keep"),
+        ({"climb": {"start": {"E": 5.0}, "step": {"E": 0.1}}}, "climb.start.E"),
+        ({"climb": {"start": {"E": 0.4}, "step": {"E": -0.1}}}, "climb.step.E"),
+        ({"surface": {"half_range": {"F": 0.0}}}, "surface.half_range.F"),
+        ({"surface": {"center": {"F": -0.1}}}, "surface.center.F"),
+        ({"optimum": {"point": {"Q": 1.0}}}, "optimum.point"),
+        ({"screening": {"runs": 4}}, "factors"),
+    ],
+)
+def test_settings_that_do_not_fit_the_factors_stop_before_any_case(section: dict, place: str) -> None:
+    heaps = AnalyticHeaps(two_frictions)
+    with pytest.raises(ValueError, match=place):
+        calibrate(AnalyticStudy(campaign=settings(**section)), heaps)
+    assert heaps.tables == []
