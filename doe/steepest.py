@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from doe.design import Design, observations
+from doe.design import Design, numbered, observations
 from doe.errors import DesignError
 from doe.factors import Factor, coded_points
 from doe.screening import ScreenResult
@@ -74,11 +74,7 @@ def steepest_path(
         raise DesignError(f"no direction to climb: the response has no slope in {', '.join(names)}")
     stride = _natural_stride(moving, slopes, step)
     begin = np.array([(start or {}).get(factor.name, factor.center) for factor in moving])
-    low, high = _limit_arrays(names, begin, limits or {})
-    natural = np.clip(begin + np.arange(steps + 1)[:, None] * stride, low, high)
-    moved = np.r_[True, np.any(np.diff(natural, axis=0) != 0.0, axis=1)]
-    table = pd.DataFrame(natural[moved], columns=names)
-    table.index = pd.RangeIndex(1, len(table) + 1, name="run")
+    table = numbered(pd.DataFrame(_walk(names, begin, stride, steps, limits or {}), columns=names))
     coded = coded_points(moving, table)
     return ClimbPath(tuple(moving), coded, predicted=_predicted(fit, coded))
 
@@ -117,17 +113,23 @@ def _natural_stride(
     return np.sign(slopes) * np.array([step[factor.name] for factor in factors])
 
 
-def _limit_arrays(
-    names: list[str], begin: NDArray, limits: Mapping[str, tuple[float, float]]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the limits as two arrays; raise DesignError when the start is outside them."""
+def _walk(
+    names: list[str],
+    begin: NDArray[np.float64],
+    stride: NDArray[np.float64],
+    steps: int,
+    limits: Mapping[str, tuple[float, float]],
+) -> NDArray[np.float64]:
+    """Return the natural points of a path inside the limits, shape (points, factors)."""
     low, high = np.array([limits.get(name, (-np.inf, np.inf)) for name in names], dtype=float).T
     for name, value, bottom, top in zip(names, begin, low, high, strict=True):
         if not bottom <= value <= top:
             raise DesignError(
                 f"the start lies inside the limits: {name!r} is {value}, limits {bottom} to {top}"
             )
-    return low, high
+    points = np.clip(begin + np.arange(steps + 1)[:, None] * stride, low, high)
+    moved = np.r_[True, np.any(np.diff(points, axis=0) != 0.0, axis=1)]
+    return points[moved]
 
 
 def _predicted(fit: ScreenResult | Surface, coded: pd.DataFrame) -> pd.Series:
