@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from imaging.errors import PictureError
 from imaging.geometry import FloatArray, Picture
 
-BLUR = 1.0
+BLUR = 0.5
 """Standard deviation [pixels] of the horizontal smoothing: along a flat outline, so that it does not lower it."""
 BORDER_SHARE = 0.08
 """Part of the width and height, at the top and the upper sides, that starts the background fit."""

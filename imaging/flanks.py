@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,10 @@ from imaging.silhouette import Outline
 
 MINIMUM_FLANK_COLUMNS = 3
 """A line is not fitted to fewer columns."""
+APEX_ZONE = 0.6
+"""The apex is sought where the outline is at least this share of its greatest height."""
+TOE_ROUNDS = 10
+"""Rounds in which the line, its roughness and the flank's base are brought to agree."""
 
 
 @dataclass(frozen=True)
@@ -26,21 +30,22 @@ class FitSettings:
         Name in reports.
     lower, upper : float
         Part of the heap's height that the fit covers, 0 to 1.
-    toe_area : float
-        Share of the flank's silhouette area that is left out at its outer end before anything is fitted: single
-        grains that rolled away lie there. On a straight flank the line is the same with and without it.
+    toe : float
+        A flank begins where its line is this many times higher than the outline is rough (root mean square about
+        the line). Lower down lie single grains that rolled away, and gaps between them that the plate cuts off.
+        On a smooth flank this leaves nothing out.
     """
 
     name: str
     lower: float
     upper: float
-    toe_area: float = 0.01
+    toe: float = 1.0
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.lower < self.upper <= 1.0:
             raise PictureError("0 <= lower < upper <= 1", (self.lower, self.upper), f"fit {self.name!r}")
-        if not 0.0 <= self.toe_area < 0.2:
-            raise PictureError("0 <= toe_area < 0.2", self.toe_area, f"fit {self.name!r}")
+        if not 0.0 <= self.toe <= 5.0:
+            raise PictureError("0 <= toe <= 5", self.toe, f"fit {self.name!r}")
 
     @classmethod
     def of(cls, fit: str | FitSettings) -> FitSettings:
@@ -94,78 +99,67 @@ class FlankLine:
 
 def fit_flanks(outline: Outline, settings: FitSettings, place: str) -> tuple[FlankLine, FlankLine]:
     """Fit a line to the left and to the right flank of an outline; `place` names it in errors."""
-    left, right = _flanks(outline, settings, place)
-    return _fit_flank(left, settings, place, "left"), _fit_flank(right, settings, place, "right")
-
-
-@dataclass(frozen=True)
-class _Flank:
-    """Outline of one flank from its base to the apex, in the order of the picture's columns."""
-
-    position: FloatArray
-    height: FloatArray
-    rising: bool
-
-
-def _flanks(outline: Outline, settings: FitSettings, place: str) -> tuple[_Flank, _Flank]:
     x, h = outline.position, outline.height
+    if len(x) < 2 * MINIMUM_FLANK_COLUMNS:
+        rule = f"an outline has at least {2 * MINIMUM_FLANK_COLUMNS} columns"
+        raise PictureError(rule, len(x), place)
     apex = apex_column(x, h)
-    first, last = _base(h[:apex], settings.toe_area), len(x) - _base(h[apex:][::-1], settings.toe_area)
-    if apex - first < MINIMUM_FLANK_COLUMNS or last - apex < MINIMUM_FLANK_COLUMNS:
-        rule = f"either flank has at least {MINIMUM_FLANK_COLUMNS} columns"
-        raise PictureError(rule, f"{apex - first} and {last - apex}", place)
-    return _Flank(x[first:apex], h[first:apex], True), _Flank(x[apex:last], h[apex:last], False)
-
-
-def _base(height: FloatArray, toe_area: float) -> int:
-    """Columns, from the outside, that hold the share `toe_area` of a flank's area."""
-    area = np.cumsum(height)
-    return int(np.searchsorted(area, toe_area * area[-1])) if len(area) else 0
+    left = _fit_flank(x[:apex], h[:apex], settings, f"{place}, left flank")
+    right = _fit_flank(-x[apex:][::-1], h[apex:][::-1], settings, f"{place}, right flank")
+    return left, replace(right, slope=-right.slope, start=-right.stop, stop=-right.start)
 
 
 def apex_column(x: FloatArray, h: FloatArray) -> int:
-    """First column of the right flank: the split into two lines with the least squared error, near the top."""
-    high = np.flatnonzero(h >= 0.75 * h.max())
-    splits = np.arange(max(high[0], 3), min(high[-1] + 1, len(x) - 3))
-    if len(splits) == 0:
-        return int(np.argmax(h))
-    error = _line_error(x, h)[splits - 1] + _line_error(-x[::-1], h[::-1])[len(x) - splits - 1]
-    return int(splits[np.argmin(error)])
+    """First column of the right flank: the corner of the roof, two lines that meet, of least squared error.
 
-
-def _line_error(x: FloatArray, h: FloatArray) -> FloatArray:
-    """Squared error of the line through the first 1, 2, ..., n points."""
+    The lines meet, so that the roughness of grains cannot choose a split that suits each flank alone (which would
+    flatten both). The roof over every column near the top is fitted at once, from running sums.
+    """
+    high = np.flatnonzero(h >= APEX_ZONE * h.max())
+    first = max(int(high[0]), MINIMUM_FLANK_COLUMNS)
+    last = min(int(high[-1]), len(x) - MINIMUM_FLANK_COLUMNS)
+    splits = np.arange(first, max(last, first) + 1)
     x = x - x.mean()
-    count = np.arange(1, len(x) + 1)
-    sx, sh, sxx, sxh, shh = (np.cumsum(term) for term in (x, h, x * x, x * h, h * h))
-    cross, spread = sxh - sx * sh / count, sxx - sx**2 / count
-    explained = np.divide(cross**2, spread, out=np.zeros(len(x)), where=spread > 1e-9)
-    return shh - sh**2 / count - explained
+    corner = x[splits]
+    count, sx, sxx, sh, sxh = (np.cumsum(term) for term in (np.ones_like(x), x, x * x, h, x * h))
+    left = [total[splits] for total in (count, sx, sxx, sh, sxh)]
+    right = [total[-1] - part for total, part in zip((count, sx, sxx, sh, sxh), left, strict=True)]
+    sums = [
+        (s - corner * n, ss - 2.0 * corner * s + corner**2 * n, p - corner * q)
+        for n, s, ss, q, p in (left, right)
+    ]
+    (left_1, left_2, left_h), (right_1, right_2, right_h) = sums
+    nothing = np.zeros_like(corner)
+    gram = np.array(
+        [
+            [np.full_like(corner, len(x)), left_1, right_1],
+            [left_1, left_2, nothing],
+            [right_1, nothing, right_2],
+        ]
+    ).transpose(2, 0, 1)
+    moments = np.stack([np.full_like(corner, h.sum()), left_h, right_h], axis=-1)
+    roof = np.linalg.solve(gram, moments[:, :, None])[:, :, 0]
+    explained = np.einsum("ij,ij->i", roof, moments)
+    return int(splits[np.argmax(explained)])
 
 
-def _fit_flank(flank: _Flank, settings: FitSettings, place: str, side: str) -> FlankLine:
-    chosen = _fit_region(flank, settings)
-    x, h = flank.position[chosen], flank.height[chosen]
+def _fit_flank(x: FloatArray, h: FloatArray, settings: FitSettings, place: str) -> FlankLine:
+    """Fit the line of a flank that rises to the right."""
+    base = _base_column(x, h, settings.toe)
+    chosen = _fit_region(h[base:], settings)
+    x, h = x[base:][chosen], h[base:][chosen]
     if len(x) < MINIMUM_FLANK_COLUMNS:
-        rule = (
-            f"the fit {settings.name!r} covers at least {MINIMUM_FLANK_COLUMNS} columns of the {side} flank"
-        )
+        rule = f"the fit {settings.name!r} covers at least {MINIMUM_FLANK_COLUMNS} columns"
         raise PictureError(rule, len(x), place)
-    middle = x.mean()
-    spread = float(((x - middle) ** 2).sum())
-    slope = float(((x - middle) * h).sum()) / spread
-    intercept = float(h.mean()) - slope * float(middle)
-    if slope == 0.0 or (slope > 0.0) != flank.rising:
-        raise PictureError(f"the {side} flank rises towards the apex", f"slope {slope:.3g}", place)
-    residual = h - intercept - slope * x
+    slope, intercept, residual = _line(x, h)
+    if slope <= 0.0:
+        raise PictureError("the flank rises towards the apex", f"slope {slope:.3g}", place)
     step = float(np.median(np.diff(x)))
-    pieces = len(x) / _correlation_length(residual)
-    dof = max(pieces - 2.0, 1.0)
-    variance = float(residual @ residual) / dof / spread
-    scale = np.degrees(1.0) / (1.0 + slope**2)
+    dof = max(len(x) / _correlation_length(residual) - 2.0, 1.0)
+    variance = float(residual @ residual) / dof / float(((x - x.mean()) ** 2).sum())
     return FlankLine(
-        angle=float(np.degrees(np.arctan(abs(slope)))),
-        se=float(np.sqrt(variance) * scale),
+        angle=float(np.degrees(np.arctan(slope))),
+        se=float(np.degrees(np.sqrt(variance)) / (1.0 + slope**2)),
         slope=slope,
         intercept=intercept,
         start=float(x[0] - 0.5 * step),
@@ -175,16 +169,37 @@ def _fit_flank(flank: _Flank, settings: FitSettings, place: str, side: str) -> F
     )
 
 
-def _fit_region(flank: _Flank, settings: FitSettings) -> NDArray[np.bool_]:
-    """Columns of the flank between the fit's two heights.
+def _line(x: FloatArray, h: FloatArray) -> tuple[float, float, FloatArray]:
+    """Slope, intercept and residuals of the least-squares line."""
+    away = x - x.mean()
+    slope = float(away @ h) / float(away @ away)
+    intercept = float(h.mean()) - slope * float(x.mean())
+    return slope, intercept, h - intercept - slope * x
 
-    The heights are read from the non-decreasing curve nearest to the outline (isotonic regression): choosing columns
-    by the rough outline itself would choose by the error, and flatten the line.
+
+def _base_column(x: FloatArray, h: FloatArray, toe: float) -> int:
+    """First column of a flank that rises to the right: where its line is `toe` times as high as it is rough."""
+    base = 0
+    for _ in range(TOE_ROUNDS):
+        slope, intercept, residual = _line(x[base:], h[base:])
+        low = intercept + slope * x < toe * float(np.sqrt(residual @ residual / len(residual)))
+        before, base = (
+            base,
+            min(int(np.count_nonzero(low)) if slope > 0.0 else base, len(x) - MINIMUM_FLANK_COLUMNS),
+        )
+        if base == before:
+            break
+    return base
+
+
+def _fit_region(h: FloatArray, settings: FitSettings) -> NDArray[np.bool_]:
+    """Columns of a rising flank between the fit's two heights.
+
+    The heights are read from the non-decreasing curve nearest to the outline (isotonic regression): choosing
+    columns by the rough outline itself would choose by its error, and flatten the line.
     """
-    height = flank.height if flank.rising else flank.height[::-1]
-    smooth = optimize.isotonic_regression(height).x
-    chosen = (smooth >= settings.lower * smooth[-1]) & (smooth <= settings.upper * smooth[-1])
-    return chosen if flank.rising else chosen[::-1]
+    smooth = optimize.isotonic_regression(h).x
+    return (smooth >= settings.lower * smooth[-1]) & (smooth <= settings.upper * smooth[-1])
 
 
 def _correlation_length(residual: FloatArray) -> float:

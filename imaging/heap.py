@@ -15,6 +15,9 @@ from imaging.render import silhouette
 from imaging.repose import ReposeAngle, confidence_interval, measure
 from imaging.silhouette import find_outline
 
+LEAST_DOF = 3.0
+"""Satterthwaite's formula tends to no degrees of freedom at all for a small difference of variances."""
+
 
 @dataclass(frozen=True)
 class HeapAngle:
@@ -23,9 +26,10 @@ class HeapAngle:
     Attributes
     ----------
     mean, se : float
-        Mean over the views and its standard error [degrees]: how well these views give the mean over all
-        azimuths of this heap. Neighbouring views share grains, so their correlation round the heap, where it is
-        positive, widens the error. What another heap of the same grains would give, only replicates tell.
+        Mean over the views and its standard error [degrees], as an estimate of what these grains give: the scatter
+        between heaps of the same grains, other seeds, that this heap's own roughness lets expect.
+    dof : float
+        Degrees of freedom of `se`.
     views : tuple of ReposeAngle
         One for each measured azimuth.
     azimuths : tuple of float
@@ -37,15 +41,11 @@ class HeapAngle:
 
     mean: float
     se: float
+    dof: float
     views: tuple[ReposeAngle, ...]
     azimuths: tuple[float, ...]
     rejections: tuple[str, ...]
     fit: FitSettings
-
-    @property
-    def dof(self) -> float:
-        """Degrees of freedom of `se`."""
-        return len(self.views) - 1.0
 
     def interval(self, level: float = 0.95) -> tuple[float, float]:
         """Confidence interval of the mean [degrees]."""
@@ -97,10 +97,11 @@ def heap_angle(
             rejections.append(str(error))
     if len(views) < 2:
         raise PictureError("at least two views show a measurable heap", "; ".join(rejections), "heap")
-    values = np.array([view.mean for view in views])
+    se, dof = _heap_error(views)
     return HeapAngle(
-        mean=float(values.mean()),
-        se=_circular_se(values),
+        mean=float(np.mean([view.mean for view in views])),
+        se=se,
+        dof=dof,
         views=tuple(views),
         azimuths=tuple(seen),
         rejections=tuple(rejections),
@@ -119,15 +120,21 @@ def _directions(azimuths: int | Sequence[float]) -> FloatArray:
     return directions
 
 
-def _circular_se(values: FloatArray) -> float:
-    """Standard error of the mean of views round a heap, widened by the correlation of neighbours.
+def _heap_error(views: Sequence[ReposeAngle]) -> tuple[float, float]:
+    """Standard error of the mean of views of one heap, and its degrees of freedom.
 
-    The raw estimate of that correlation is 1/n too low on average, as the mean came from the same views.
+    All views share the apex and much of the flanks, so that their scatter alone understates the error. What they
+    share is what the fits' own variance V holds beyond the variance W between the n views; hence the mean's is
+    (V - W) + W / n, or W / n where that is larger. The degrees of freedom are Satterthwaite's,
+    for a difference of variances.
     """
-    count = len(values)
-    deviation = values - values.mean()
-    power = float(deviation @ deviation)
-    if power == 0.0:
-        return 0.0
-    neighbours = float(deviation @ np.roll(deviation, 1)) / power + 1.0 / count if count > 3 else 0.0
-    return float(np.sqrt(power / (count * (count - 1)) * (1.0 + 2.0 * max(neighbours, 0.0))))
+    count = len(views)
+    fit = float(np.mean([view.se**2 for view in views]))
+    between = float(np.var([view.mean for view in views], ddof=1))
+    averaged = between * (1.0 - 1.0 / count)
+    variance = fit - averaged
+    if variance <= between / count:
+        return float(np.sqrt(between / count)), count - 1.0
+    fit_dof = float(np.mean([view.dof for view in views]))
+    dof = variance**2 / (fit**2 / fit_dof + averaged**2 / (count - 1.0))
+    return float(np.sqrt(variance)), max(dof, LEAST_DOF)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from imaging.errors import PictureError
 from imaging.geometry import FloatArray, Frame, Picture, Spheres
@@ -120,7 +121,7 @@ def _sphere_mesh(spheres: Spheres, colors: FloatArray, azimuth: float) -> pyvist
     return mesh
 
 
-def _hemisphere() -> tuple[FloatArray, np.ndarray]:
+def _hemisphere() -> tuple[FloatArray, NDArray[np.int64]]:
     """Points and triangles of the half sphere towards -y; its rim is a polygon with the area of the circle."""
     step = 2.0 * np.pi / SECTORS
     rim = np.sqrt(step / np.sin(step))
@@ -137,7 +138,7 @@ def _hemisphere() -> tuple[FloatArray, np.ndarray]:
     return unit.reshape(-1, 3), np.concatenate([lower.reshape(-1, 3), upper.reshape(-1, 3)])
 
 
-def _reduced(picture: np.ndarray, shape: tuple[int, int]) -> Picture:
+def _reduced(picture: Picture, shape: tuple[int, int]) -> Picture:
     """Average of the fine pixels: red-green-blue-opacity in, blue-green-red and opacity out."""
     layer = picture[:, :, [2, 1, 0, 3]].astype(np.float32)
     layer[:, :, :3] *= layer[:, :, 3:] / 255.0

@@ -27,7 +27,7 @@ def overlay(picture: Picture | Snapshot, angle: ReposeAngle) -> Picture:
     each other. A `Snapshot` must have the scale of the one that was measured.
     """
     image = _same_scale(picture, angle).image if isinstance(picture, Snapshot) else picture
-    canvas = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR) if image.ndim == 2 else image.copy()
+    canvas: Picture = np.repeat(image[:, :, None], 3, axis=2) if image.ndim == 2 else image.copy()
     unit = max(canvas.shape[1] / REFERENCE_WIDTH, 0.5)
     outline = angle.outline
     ends = np.array([outline.position[0], outline.position[-1]])

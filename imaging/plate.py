@@ -73,20 +73,27 @@ def find_plate(top: FloatArray, bottom: FloatArray, place: str) -> PlateLine:
     """
     columns = np.flatnonzero(np.isfinite(top))
     upper, lower = top[columns], bottom[columns]
-    line = _shelf(columns, upper, lower) or _underside(columns, upper, lower)
+    spanning = len(columns) == len(top)
+    line = _shelf(columns, upper, lower, spanning) or _underside(columns, upper, lower)
     if abs(line.tilt) > MAXIMUM_TILT:
         rule = f"the plate is level within {MAXIMUM_TILT:g} degrees"
         raise PictureError(rule, f"{line.tilt:.1f} degrees", place)
     return line
 
 
-def _shelf(columns: NDArray[np.intp], upper: FloatArray, lower: FloatArray) -> PlateLine | None:
-    """The line through both ends of the upper edge, where they lie on one and are no thin toes."""
+def _shelf(
+    columns: NDArray[np.intp], upper: FloatArray, lower: FloatArray, spanning: bool
+) -> PlateLine | None:
+    """The line through both ends of the upper edge, where they lie on one and are no thin toes of the heap.
+
+    What spans the picture from border to border is no toe, however thin.
+    """
     size = max(2, round(END_SHARE * len(columns)))
     ends = np.r_[0:size, len(columns) - size : len(columns)]
     slope, row = np.polyfit(columns[ends], upper[ends], 1)
     residual = np.abs(upper[ends] - row - slope * columns[ends])
-    if residual.max() > END_TOLERANCE or (lower - upper)[ends].min() < MINIMUM_PLATE_THICKNESS:
+    thick = spanning or (lower - upper)[ends].min() >= MINIMUM_PLATE_THICKNESS
+    if residual.max() > END_TOLERANCE or not thick:
         return None
     return PlateLine(float(row), float(slope), visible=True)
 

@@ -89,7 +89,11 @@ def find_outline(
 
 
 def _outline(
-    contrast: FloatArray, threshold: float, ground_row: float | None, meters_per_pixel: float | None, place: str
+    contrast: FloatArray,
+    threshold: float,
+    ground_row: float | None,
+    meters_per_pixel: float | None,
+    place: str,
 ) -> Outline:
     """Outline of the heap in a contrast picture."""
     body = _largest_component(contrast > threshold, place)
@@ -118,9 +122,7 @@ def _heap_on_plate(
     if ground_row is not None:
         plate = PlateLine(row=ground_row, slope=0.0, visible=False)
     else:
-        plate = find_plate(
-            top_edge(body, contrast, threshold), bottom_edge(body, contrast, threshold), place
-        )
+        plate = find_plate(top_edge(body, contrast, threshold), bottom_edge(body, contrast, threshold), place)
     return plate, _standing_on(plate, body, place)
 
 
@@ -128,14 +130,14 @@ def top_edge(mask: NDArray[np.bool_], contrast: FloatArray, threshold: float) ->
     """Row at which the contrast crosses the threshold above the topmost masked pixel of each column.
 
     The crossing is interpolated between two pixels, which makes the edge of an anti-aliased picture exact to about
-    a tenth of a pixel. Columns without a masked pixel get NaN.
+    a tenth of a pixel. What touches the border ends there. Columns without a masked pixel get NaN.
     """
     first = mask.argmax(axis=0)
     columns = np.arange(mask.shape[1])
     inside = contrast[first, columns]
     outside = contrast[np.maximum(first - 1, 0), columns]
     step = np.where(first > 0, inside - outside, 0.0)
-    part = np.divide(inside - threshold, step, out=np.zeros(len(columns)), where=step > 0)
+    part = np.divide(inside - threshold, step, out=np.full(len(columns), 0.5), where=step > 0)
     return np.where(mask.any(axis=0), first - np.clip(part, 0.0, 1.0), np.nan)
 
 

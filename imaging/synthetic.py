@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from imaging.errors import PictureError
 from imaging.geometry import FloatArray, Picture
@@ -126,7 +127,9 @@ def draw(heap: DrawnHeap, camera: Camera | None = None) -> Picture:
     margin = camera.margin * heap.width
     rows = int(np.ceil(heap.apex[1] + 2.0 * abs(margin) + heap.width * abs(np.sin(np.radians(camera.tilt)))))
     shape = (max(rows, 32), int(np.ceil(heap.width + 2.0 * margin)))
-    middle = np.array([0.5 * shape[1], shape[0] - abs(margin) - 0.5 * heap.width * abs(np.tan(np.radians(camera.tilt)))])
+    middle = np.array(
+        [0.5 * shape[1], shape[0] - abs(margin) - 0.5 * heap.width * abs(np.tan(np.radians(camera.tilt)))]
+    )
     body, plate = _coverage(heap, camera.tilt, middle, shape)
     rng = np.random.default_rng(camera.seed)
     image = np.broadcast_to(np.array(camera.background, dtype=np.float64), (*shape, 3))
@@ -148,7 +151,7 @@ def _coverage(
     body, plate = (np.zeros((SUPERSAMPLING * shape[0], SUPERSAMPLING * shape[1]), np.uint8) for _ in range(2))
     cv2.fillPoly(body, [_to_fine_pixels(heap.profile(), heap, tilt, middle)], 255, shift=SUBPIXEL_BITS)
     fixed = 2**SUBPIXEL_BITS * SUPERSAMPLING
-    for (x, y, radius) in heap.grains():
+    for x, y, radius in heap.grains():
         center = _to_fine_pixels(np.array([[x, y]]), heap, tilt, middle)[0]
         cv2.circle(body, center.tolist(), round(radius * fixed), 255, -1, cv2.LINE_8, SUBPIXEL_BITS)
     cv2.fillPoly(plate, [_to_fine_pixels(low, heap, tilt, middle)], 255, shift=SUBPIXEL_BITS)
@@ -157,7 +160,9 @@ def _coverage(
     return tuple(cv2.resize(layer, size, interpolation=cv2.INTER_AREA) / 255.0 for layer in (body, plate))
 
 
-def _to_fine_pixels(points: FloatArray, heap: DrawnHeap, tilt: float, middle: FloatArray) -> np.ndarray:
+def _to_fine_pixels(
+    points: FloatArray, heap: DrawnHeap, tilt: float, middle: FloatArray
+) -> NDArray[np.int32]:
     """Heap coordinates to OpenCV's fixed-point coordinates of the fine picture, whose whole numbers are middles."""
     cosine, sine = np.cos(np.radians(tilt)), np.sin(np.radians(tilt))
     along, up = points[:, 0] - 0.5 * heap.width, points[:, 1]
