@@ -111,33 +111,6 @@ SOLIDS: MappingProxyType[str, Callable[..., "Trimesh"]] = MappingProxyType(
 """Solids that dimensions describe, by the name that `parse_solid` takes."""
 
 
-def load_solid(source: str | Path, unit: float = MILLIMETER) -> "Trimesh":
-    """Make a solid from a mesh file (see `read_mesh`) or from dimensions in mm (see `parse_solid`).
-
-    Parameters
-    ----------
-    source
-        Path of a mesh, or a text such as ``tri-pyramid:5.90x3.93``.
-    unit
-        Length of the mesh file's unit [m]; dimensions are in mm.
-
-    Returns
-    -------
-    Trimesh
-        The solid [m].
-
-    Raises
-    ------
-    ValueError
-        If the source is neither, or not a good one of its kind.
-    """
-    if Path(source).is_file():
-        return read_mesh(source, unit)
-    if str(source).partition(":")[0] in SOLIDS:
-        return parse_solid(str(source))
-    raise ValueError(f"a solid is a mesh file or one of {_PATTERNS} [mm], got {str(source)!r}")
-
-
 def parse_solid(text: str) -> "Trimesh":
     """Make a solid from a name and its dimensions in mm, as in ``tri-pyramid:5.90x3.93``.
 
@@ -158,7 +131,7 @@ def parse_solid(text: str) -> "Trimesh":
     """
     name, _, dimensions = text.partition(":")
     if name not in SOLIDS:
-        raise ValueError(f"a solid is one of {_PATTERNS} [mm], got {text!r}")
+        raise ValueError(f"a solid is one of {', '.join(map(describe_solid, SOLIDS))} [mm], got {text!r}")
     try:
         lengths = [MILLIMETER * float(word) for word in dimensions.split("x")]
         if len(lengths) != len(inspect.signature(SOLIDS[name]).parameters):
@@ -172,9 +145,6 @@ def describe_solid(name: str) -> str:
     """Return the pattern of a solid's text, such as ``cylinder:LENGTHxDIAMETER``."""
     dimensions = inspect.signature(SOLIDS[name]).parameters
     return f"{name}:{'x'.join(dimension.upper() for dimension in dimensions)}"
-
-
-_PATTERNS = ", ".join(map(describe_solid, SOLIDS))
 
 
 def _check_lengths(**lengths: float) -> None:

@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from dem_warp.clump_fitting import fit_clump
-from dem_warp.solids import load_solid, parse_solid, read_mesh
+from dem_warp.solids import parse_solid, read_mesh
 
 # Resolution 40 leaves samples 1/40 of the longest side apart, and a polyhedron of 48 sides to a circle is
 # 0.3 % short of its area: relative volumes of these solids are known to about a percent.
@@ -90,15 +90,6 @@ def test_a_mesh_file_comes_back_in_metres(tmp_path):
     inches = read_mesh(tmp_path / "grain.stl", unit=25.4e-3)
     assert inches.volume == pytest.approx(8.0 * 25.4e-3**3, rel=1e-6)
     assert fit_clump(read, 1).shape.radii[0] == pytest.approx(0.5e-3, rel=0.02)  # a tenth of a sample
-
-
-def test_a_source_is_a_mesh_file_or_dimensions(tmp_path):
-    box = trimesh.creation.box((4.0, 2.0, 1.0))
-    box.export(tmp_path / "grain.stl")
-    assert load_solid(tmp_path / "grain.stl").volume == read_mesh(tmp_path / "grain.stl").volume
-    assert load_solid("cylinder:6x2").volume == parse_solid("cylinder:6x2").volume
-    with pytest.raises(ValueError, match=r"a solid is a mesh file or one of sphere.* got 'grain\.stl'"):
-        load_solid("grain.stl")
 
 
 def test_bad_mesh_files_are_refused(tmp_path):
