@@ -47,7 +47,9 @@ class _Line:
         path = steepest_path(
             self.screen, moves, factors=self.kept, step=self.step, start=start, limits=limits, descend=descend
         )
-        return path.natural.assign(predicted=path.predicted)
+        # Coding and back may round a value that was clipped at zero to -1e-17, which no physics accepts.
+        low, high = (pd.Series({name: limits[name][end] for name in self.kept}) for end in (0, 1))
+        return path.natural.clip(low, high, axis=1).assign(predicted=path.predicted)
 
 
 def climb(

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from doe import Region, Surface, TargetError
+from doe import Region, Sample, Surface, TargetError
 from experiments.calibrate.cases import StageEnd, middle
 from experiments.calibrate.results import (
     Decision,
@@ -31,13 +31,15 @@ def find_optimum(study: CampaignStudy, surface: SurfaceResult, target: TargetRes
         When the fitted surface does not reach the target where the design explored it.
     """
     settings, fit, sample = study.campaign.optimum, surface.reduced, target.sample
+    reach = float(surface.design.coded.abs().to_numpy().max())
     # The box of the two-level part first: inside it the fit is at its best. The axial points reach further.
-    extents = sorted({1.0, float(surface.design.coded.abs().to_numpy().max())})
-    point, rule, extent = _choose(settings, surface, sample.mean, extents)
+    point, rule, extent = _choose(settings, surface, sample.mean, sorted({1.0, reach}))
     region = fit.compatible_region(sample, alpha=1.0 - settings.confidence, extent=extent)
     prediction = fit.predict(point, alpha=1.0 - settings.confidence).iloc[0]
     unidentified = _unidentified(settings, region)
-    truth = None if target.truth is None else _check_truth(fit, region, target.truth, sample.mean)
+    truth = (
+        None if target.truth is None else _check_truth(fit, target.truth, sample, settings.confidence, reach)
+    )
     decisions = [
         Decision(
             STAGE,
@@ -109,15 +111,23 @@ def _unidentified(settings: OptimumSettings, region: Region) -> tuple[str, ...]:
     return tuple(str(name) for name in share.index[share > settings.unidentified_span])
 
 
-def _check_truth(fit: Surface, region: Region, truth: Mapping[str, float], target: float) -> TruthCheck:
+def _check_truth(
+    fit: Surface, truth: Mapping[str, float], target: Sample, confidence: float, reach: float
+) -> TruthCheck:
     """Say where the hidden settings lie; factors that were not kept are at their middle in the fit."""
     values = {name: truth[name] for name in fit.design.names}
-    coded = _coded(fit, values)
-    inside = bool(np.abs(coded).max() <= region.extent)
-    nearest = fit.nearest(target, to=values, extent=max(region.extent, float(np.abs(coded).max())))
-    distance = float(np.linalg.norm(_coded(fit, dict(nearest)) - coded))
+    coded, far = _coded(fit, values), _reach(fit, values)
+    try:
+        nearest = fit.nearest(target.mean, to=values, extent=max(reach, far))
+    except TargetError:  # a point fixed in the study needs no contour
+        distance = None
+    else:
+        distance = float(np.linalg.norm(_coded(fit, dict(nearest)) - coded))
     predicted = float(fit.predict(values)["mean"].iloc[0])
-    return TruthCheck(values, inside, _belongs(region, coded) if inside else None, distance, predicted)
+    if far > reach:
+        return TruthCheck(values, False, None, distance, predicted)
+    region = fit.compatible_region(target, alpha=1.0 - confidence, extent=reach)
+    return TruthCheck(values, True, _belongs(region, coded), distance, predicted)
 
 
 def _belongs(region: Region, coded: np.ndarray) -> bool:
@@ -133,7 +143,7 @@ def _region_decision(settings: OptimumSettings, region: Region, unidentified: tu
     numbers |= {
         f"{bound} of {name}": ranges[bound][name] for name in ranges.index for bound in ("low", "high")
     }
-    outcome = f"{region.fraction:.0%} of the explored region is compatible with the target."
+    outcome = f"{region.fraction:.0%} of the design region is compatible with the target."
     if len(region.factors) > 1:
         outcome += " The target is one equation: the factors trade off along its contour."
     if unidentified:
@@ -160,6 +170,12 @@ def _truth_decision(truth: TruthCheck, target: float) -> Decision:
         numbered_values("hidden", truth.values)
         | {"distance to the contour, coded": truth.distance, "predicted at the truth [deg]": truth.predicted}
         | {"target [deg]": target},
-        f"{verdict} It is {truth.distance:.2f} coded units from the contour; the surface predicts "
+        f"{verdict} {_distance(truth.distance)}; the surface predicts "
         f"{truth.predicted:.2f} deg there, the target is {target:.2f} deg.",
     )
+
+
+def _distance(distance: float | None) -> str:
+    if distance is None:
+        return "The surface has no contour of the target"
+    return f"It is {distance:.2f} coded units from the contour"

@@ -97,9 +97,10 @@ class SelectionResult:
     """The factors that the later stages vary."""
 
     kept: tuple[str, ...]
-    """Names, strongest first."""
+    """Names, in the study's order (``table`` ranks them)."""
     table: pd.DataFrame
-    """By factor: effect [deg], p, percent, rank, visible (larger than noise alone explains), kept, reason."""
+    """By factor, strongest first: effect [deg], p, percent, rank, visible (larger than noise alone explains),
+    kept, reason."""
     visible_effect: float
     """Smallest effect [deg] that the noise floor lets this design see (at the power of the settings)."""
     decisions: tuple[Decision, ...]
@@ -161,8 +162,8 @@ class TruthCheck:
     """Whether the composite design reaches so far."""
     compatible: bool | None
     """Whether the truth lies in the compatible region; None outside the design, where nothing can be said."""
-    distance: float
-    """Coded distance from the truth to the nearest point of the target contour."""
+    distance: float | None
+    """Coded distance from the truth to the target contour; None when there is no contour."""
     predicted: float
     """The surface's angle at the truth [deg]."""
 

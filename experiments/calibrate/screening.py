@@ -58,14 +58,15 @@ def _screen(design: Design, angles: pd.Series) -> ScreenResult:
 def _decision(design: Design, cases: pd.DataFrame, result: ScreenResult) -> Decision:
     ranked = result.table.sort_values("rank")
     strongest = ranked.index[0]
+    replicates = int(cases["replicate"].max())
     against = {
         "pooled": "what the factors leave unexplained (dummy columns and replicates)",
         "lenth": "Lenth's pseudo standard error, the design having neither dummies nor replicates",
     }[result.error_rule]
     return Decision(
         STAGE,
-        f"A Plackett-Burman design of {len(design.coded)} runs, {int(cases['replicate'].max())} "
-        f"case(s) each; effects are tested against {against}.",
+        f"A Plackett-Burman design of {len(design.coded)} runs, {replicates} "
+        f"{'case' if replicates == 1 else 'cases'} each; effects are tested against {against}.",
         {
             "runs": len(design.coded),
             "dummy columns": len(design.dummies),

@@ -27,7 +27,8 @@ def select_factors(
     """Keep the factors that the study names, or those that the rule finds significant."""
     ranked = screening.screen.table.sort_values("rank")
     significant = [str(name) for name in ranked.index[ranked["p"] < settings.alpha]]
-    kept = _kept(settings, [str(name) for name in ranked.index], significant)
+    chosen = _chosen(settings, [str(name) for name in ranked.index], significant)
+    kept = tuple(name for name in screening.design.names if name in chosen)
     cases = len(screening.screen.response)
     table = ranked[["effect", "p", "percent", "rank"]].copy()
     table["visible"] = table["effect"].abs() > _noise_effect(noise.floor, cases, settings.alpha)
@@ -61,11 +62,11 @@ def require_kept(settings: SelectionSettings, selection: SelectionResult) -> Non
     )
 
 
-def _kept(settings: SelectionSettings, ranked: list[str], significant: list[str]) -> tuple[str, ...]:
+def _chosen(settings: SelectionSettings, ranked: list[str], significant: list[str]) -> set[str]:
     if settings.keep is not None:
-        return tuple(sorted(settings.keep, key=ranked.index))
+        return set(settings.keep)
     count = min(max(len(significant), settings.at_least), settings.at_most)
-    return tuple(ranked[:count])
+    return set(ranked[:count])
 
 
 def _reason(settings: SelectionSettings, name: str, kept: tuple[str, ...], significant: list[str]) -> str:

@@ -25,6 +25,9 @@ from experiments.calibrate.values import UNLIMITED, fixed_values, kept_factors, 
 
 STAGE = "surface"
 
+ROUNDING = 1e-12
+"""A shrunk design keeps this share of its half-range away from a limit, so that rounding cannot cross it."""
+
 
 @dataclass(frozen=True)
 class _Placement:
@@ -161,7 +164,8 @@ def fit_inside(
     """
     least = min(0.5 * half_range, (high - low) / (2.0 * reach))
     center = min(max(center, low + reach * least), high - reach * least)
-    return center, min(half_range, (center - low) / reach, (high - center) / reach)
+    room = (1.0 - ROUNDING) * min(center - low, high - center) / reach
+    return center, min(half_range, room)
 
 
 def _axial_reach(factors: tuple[Factor, ...], settings: SurfaceSettings) -> float:

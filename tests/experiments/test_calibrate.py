@@ -151,14 +151,14 @@ def test_more_replicates_change_no_other_case() -> None:
 def test_a_twin_recovers_its_hidden_truth_in_the_compatible_region() -> None:
     truth = {"E": 0.50, "F": 0.42}
     inside = []
-    for seed in range(10, 50, 2):
+    for seed in range(10, 34, 2):
         seeds = {"campaign": seed, "target": seed + 1}
         study = AnalyticStudy(target=TwinTarget(truth=truth), campaign=settings(seeds=seeds))
         campaign = calibrate(study, AnalyticHeaps(two_frictions))
         assert campaign.target.truth["A"] == pytest.approx(0.29)
         inside.append(campaign.optimum is not None and campaign.optimum.truth.compatible is True)
-    # Each region holds the truth with probability 0.95: 16 or fewer of 20 come once in 60 times.
-    assert sum(inside) >= 17
+    # Each region holds the truth with probability 0.95: fewer than 10 of 12 come once in 50 times.
+    assert sum(inside) >= 10
 
 
 def test_a_truth_that_is_not_where_the_angle_says_is_called_incompatible() -> None:
@@ -172,6 +172,25 @@ def test_a_truth_that_is_not_where_the_angle_says_is_called_incompatible() -> No
     assert check.compatible is False
     # The gradient is about sqrt(2.5^2 + 5^2) = 5.6 deg per screening unit; a design unit is 0.4 of one.
     assert check.distance > 0.4
+
+
+def test_a_truth_beyond_the_design_is_neither_compatible_nor_not() -> None:
+    # On the same contour near F = 0.42, but E lies four half-ranges of the design away.
+    study = AnalyticStudy(target=TwinTarget(truth={"E": 0.74, "F": 0.30}))
+    check = calibrate(study, AnalyticHeaps(two_frictions)).optimum.truth
+    assert not check.inside_design
+    assert check.compatible is None
+
+
+def test_a_fixed_point_is_taken_even_where_the_surface_misses_the_target() -> None:
+    fixed = settings(surface={"center": {"E": 0.36, "F": 0.22}}, optimum={"point": {"E": 0.38, "F": 0.25}})
+    study = AnalyticStudy(target=TwinTarget(truth={"E": 0.5, "F": 0.45}), campaign=fixed)
+    campaign = calibrate(study, AnalyticHeaps(two_frictions))
+    assert campaign.optimum.point == {"E": 0.38, "F": 0.25}
+    assert campaign.optimum.contour.empty
+    assert campaign.optimum.region.fraction == 0.0
+    assert campaign.outcome is Outcome.NOT_VERIFIED
+    json.dumps(campaign.to_dict(), allow_nan=False)
 
 
 def test_no_significant_factor() -> None:
@@ -219,6 +238,17 @@ def test_a_target_below_the_first_step_extends_the_climb_downward() -> None:
     assert campaign.climb.crossing_step < 1.0
     assert campaign.outcome is Outcome.CALIBRATED
     assert campaign.cases["seed"].is_unique
+
+
+def test_a_climb_that_meets_a_hard_limit_stays_inside_it() -> None:
+    study = AnalyticStudy(
+        target=MeasuredTarget(mean=8.0, sd=0.5, n=5), campaign=settings(climb={"reach": 3.0})
+    )
+    heaps = AnalyticHeaps(lambda row: 24.0 + 3.0 * coded(row, "E") + 5.0 * coded(row, "F"))
+    campaign = calibrate(study, heaps)
+    assert campaign.climb.path["F"].min() == 0.0
+    assert campaign.outcome is Outcome.TARGET_NOT_REACHED
+    assert "at the bound: F" in campaign.reason
 
 
 def test_a_climb_that_turns_is_a_plateau() -> None:

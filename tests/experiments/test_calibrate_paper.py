@@ -126,7 +126,7 @@ def surface(study: PaperStudy, path: ClimbResult) -> SurfaceResult:
 
 
 def test_the_screening_keeps_the_two_static_frictions(selection: SelectionResult) -> None:
-    assert selection.kept == ("F", "E")
+    assert selection.kept == ("E", "F")
     # The recomputed p values of the published table.
     assert selection.table["p"]["E"] == pytest.approx(0.093891, rel=1e-5)
     assert selection.table["p"]["F"] == pytest.approx(0.002426, rel=1e-3)

@@ -1,0 +1,103 @@
+"""Rules of single stages: seeds, tables of cases, and how a design is fitted into hard limits."""
+
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from doe import Factor
+from experiments.calibrate import TwinTarget, calibrate, case_seed
+from experiments.calibrate.cases import plan_cases, response_table
+from experiments.calibrate.results import STAGES
+from experiments.calibrate.screening import screening_design
+from experiments.calibrate.settings import ScreeningSettings
+from experiments.calibrate.surface import fit_inside
+from experiments.study import load_study
+
+
+def factors(count: int) -> list[Factor]:
+    return [Factor(f"x{number}", 0.0, 1.0) for number in range(count)]
+
+
+def test_seeds_are_pinned() -> None:
+    # A change here makes every stored case of every user a stranger: it must be deliberate.
+    assert case_seed(1, "noise_floor", 1, 1) == 830202287
+    assert case_seed(1, "climb", -1, 2) == 455331711
+
+
+def test_seeds_differ_over_stages_runs_and_replicates() -> None:
+    seeds = [
+        case_seed(root, stage, run, replicate)
+        for root in (1, 2)
+        for stage in STAGES
+        for run in range(-6, 30)
+        for replicate in (1, 2, 3)
+    ]
+    assert len(set(seeds)) == len(seeds)
+    assert all(0 <= seed < 2**31 for seed in seeds)
+
+
+def test_a_plan_holds_every_factor_and_its_replicates() -> None:
+    points = pd.DataFrame({"x1": [0.2, 0.9]}, index=[1, 2])
+    plan = plan_cases(factors(3), "climb", points, {1: 2, 2: 1}, seed=1)
+    assert plan[["run", "replicate"]].to_numpy().tolist() == [[1, 1], [1, 2], [2, 1]]
+    assert plan["x1"].tolist() == [0.2, 0.2, 0.9]
+    assert plan[["x0", "x2"]].eq(0.5).all(axis=None)
+
+
+def test_a_response_has_a_place_for_every_case_and_nothing_where_it_failed() -> None:
+    cases = pd.DataFrame(
+        {
+            "run": [1, 1, 2, 2, 3, 3],
+            "replicate": [1, 2] * 3,
+            "status": ["finished", "diverged", "finished", "finished", "diverged", "diverged"],
+            "angle": [20.0, np.nan, 21.0, 22.0, np.nan, np.nan],
+        }
+    )
+    expected = [[20.0, np.nan], [21.0, 22.0], [np.nan, np.nan]]
+    np.testing.assert_array_equal(response_table(cases, [1, 2, 3]), expected)
+
+
+@pytest.mark.parametrize(
+    ("count", "chosen", "runs"),
+    [(1, {}, 8), (4, {}, 8), (8, {}, 12), (9, {}, 16), (11, {"dummies": 0}, 12), (3, {"runs": 20}, 20)],
+)
+def test_a_screening_has_as_few_runs_as_leave_the_dummies(count: int, chosen: dict, runs: int) -> None:
+    assert len(screening_design(factors(count), ScreeningSettings(**chosen)).coded) == runs
+
+
+@pytest.mark.parametrize(
+    ("center", "half_range", "low", "high", "expected"),
+    [
+        (0.45, 0.10, 0.0, math.inf, (0.45, 0.10)),
+        (0.12, 0.10, 0.0, math.inf, (0.12, 0.08)),
+        (0.02, 0.10, 0.0, math.inf, (0.075, 0.05)),
+        (0.98, 0.10, 0.0, 1.0, (0.925, 0.05)),
+        (0.50, 0.90, 0.4, 0.6, (0.50, 1.0 / 15.0)),
+    ],
+)
+def test_a_design_is_fitted_into_its_limits(
+    center: float, half_range: float, low: float, high: float, expected: tuple[float, float]
+) -> None:
+    fitted = fit_inside(center, half_range, 1.5, low, high)
+    assert fitted == pytest.approx(expected)
+    axial = Factor.around("x", *fitted).to_natural(np.array([-1.5, 1.5]))
+    assert axial[0] >= low
+    assert axial[1] <= high
+
+
+@pytest.mark.parametrize("scale", ["bench", "soft", "paper"])
+def test_the_buckwheat_study_runs_through_all_stages(scale: str) -> None:
+    study = load_study(scale=scale)
+
+    def heaps(table: pd.DataFrame) -> pd.DataFrame:
+        coded = {f.name: f.to_coded(table[f.name]) for f in study.factors}
+        noise = [np.random.default_rng(seed).normal(0.0, 0.4) for seed in table["seed"]]
+        angle = 26.0 + 2.5 * coded["E"] + 7.0 * coded["F"] + noise
+        return table.assign(status="finished", reason="", angle=angle)
+
+    campaign = calibrate(study, heaps)
+    assert list(campaign.stages) == list(STAGES)
+    assert {"E", "F"} <= set(campaign.selection.kept)
+    assert (campaign.optimum.truth is None) == (not isinstance(study.target, TwinTarget))
