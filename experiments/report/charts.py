@@ -1,0 +1,166 @@
+"""Charts of the noise floor, the screening, the climb and the verification."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import plotly.graph_objects as go
+
+from doe import ScreenResult
+from doe.plot_data import half_normal_points, pareto_points
+from experiments.calibrate.results import ClimbResult, NoiseFloorResult, TargetResult, VerificationResult
+from experiments.report.theme import (
+    ANGLE_AXIS,
+    BLUE,
+    GREEN,
+    INK,
+    MUTED,
+    ORANGE,
+    VERMILION,
+    Chart,
+    add_line,
+    add_points,
+    add_target,
+    new_figure,
+)
+
+
+def noise_floor_chart(result: NoiseFloorResult, target: TargetResult) -> Chart:
+    """Draw the replicates at the centre, their mean and spread, and the target."""
+    figure = new_figure("heap", ANGLE_AXIS, legend=False)
+    add_target(figure, target.sample.mean, target.sample.sd)
+    add_points(figure, result.cases["replicate"], result.cases["angle"], "heap", BLUE)
+    figure.add_hline(y=result.floor.mean, line={"color": BLUE, "dash": "dot"})
+    figure.update_xaxes(dtick=1)
+    caption = "Heaps with every factor at its middle, their mean (dotted), and the target ± 1 sd (green)."
+    return Chart("noise-chart", caption, figure)
+
+
+def pareto_chart(screen: ScreenResult, alpha: float) -> Chart:
+    """Draw |t| of every effect, largest first, with the critical values."""
+    points = pareto_points(screen)[::-1]
+    rises = points["effect"] >= 0.0
+    figure = new_figure("|t| of the effect")
+    for name, color, rows in (
+        ("raises the angle", BLUE, points[rises]),
+        ("lowers the angle", ORANGE, points[~rises]),
+    ):
+        figure.add_bar(
+            x=rows["abs_t"],
+            y=rows.index,
+            orientation="h",
+            name=name,
+            marker={"color": color},
+            customdata=rows[["effect"]],
+            hovertemplate="%{y}: effect %{customdata[0]:.2f}°, |t| = %{x:.2f}<extra></extra>",
+        )
+    ends = [points.index[0], points.index[-1]]
+    for (name, value), dash in zip(
+        _critical_values(screen, alpha).items(), ("dot", "dash", "solid"), strict=False
+    ):
+        # Entries of the legend, as labels at near lines would run into one another.
+        add_line(figure, [value, value], ends, f"{name}: {value:.2f}", INK, dash)
+    figure.update_yaxes(
+        categoryorder="array", categoryarray=list(points.index), ticks="", ticklabelstandoff=6
+    )
+    figure.update_layout(bargap=0.35)
+    return Chart(
+        "pareto-chart", "Pareto chart: effects in standard errors, with the critical values.", figure
+    )
+
+
+def half_normal_chart(screen: ScreenResult, alpha: float) -> Chart:
+    """Draw the ordered sizes of all effects against half-normal quantiles, with the line of pure noise."""
+    points = half_normal_points(screen.effects)
+    figure = new_figure("half-normal quantile", "|effect| [°]")
+    top = float(points["quantile"].max()) * 1.08
+    add_line(
+        figure, [0.0, top], [0.0, top * float(screen.standard_error.mean())], "noise alone", MUTED, "dot"
+    )
+    dummy = points.index.isin(screen.design.dummies)
+    active = points.index.isin(screen.significant(alpha))
+    for name, rows, symbol, color in (
+        ("significant", active, "diamond", VERMILION),
+        ("not significant", ~active & ~dummy, "circle", BLUE),
+        ("dummy column", dummy, "circle-open", MUTED),
+    ):
+        if rows.any():
+            _add_effects(figure, points[rows], name, symbol, color)
+    caption = "Half-normal plot: effects of pure noise lie along the dotted line, real ones stand above it."
+    return Chart("half-normal-chart", caption, figure)
+
+
+def climb_chart(climb: ClimbResult, target: TargetResult) -> Chart:
+    """Draw the angle along the climb, the target and where the path crosses it."""
+    path = climb.path
+    figure = new_figure("step of the climb", ANGLE_AXIS)
+    add_target(figure, target.sample.mean, target.sample.sd)
+    add_line(figure, path.index, path["predicted"], "predicted by the screening", MUTED, "dot")
+    add_points(figure, climb.cases["run"], climb.cases["angle"], "heap", BLUE, size=7, opacity=0.6)
+    hover = "<br>".join(f"{name} = %{{customdata[{i}]:.4g}}" for i, name in enumerate(climb.kept))
+    add_points(
+        figure,
+        path.index,
+        path["angle"],
+        "mean of the step",
+        BLUE,
+        mode="lines+markers",
+        line={"color": BLUE, "width": 2},
+        customdata=path[list(climb.kept)],
+        hovertemplate=f"step %{{x}}: %{{y:.2f}}°<br>{hover}<extra></extra>",
+    )
+    if climb.crossing_step is not None:
+        crossing = [climb.crossing_step], [target.sample.mean]
+        add_points(figure, *crossing, "crosses the target", VERMILION, "diamond", 13)
+    figure.update_xaxes(dtick=1)
+    return Chart("climb-chart", "Angle along the climb; the green band is the target ± 1 sd.", figure)
+
+
+def verification_chart(result: VerificationResult) -> Chart:
+    """Draw the interval of the difference from the target between the equivalence margins."""
+    comparison, margin = result.comparison, result.margin
+    low, high = comparison.interval
+    deviations = result.angles - comparison.b.mean
+    figure = new_figure("heaps less target [°]")
+    figure.add_vrect(x0=-margin, x1=margin, fillcolor=GREEN, opacity=0.13, line_width=0, layer="below")
+    figure.add_vline(x=0.0, line={"color": GREEN, "width": 2})
+    heights = np.full(len(deviations), "heaps")
+    add_points(figure, deviations, heights, "single heap", BLUE, opacity=0.7)
+    sides = {"array": [high - comparison.difference], "arrayminus": [comparison.difference - low]}
+    add_points(
+        figure,
+        [comparison.difference],
+        ["mean"],
+        f"mean and its {100.0 * (1.0 - comparison.alpha):g} % interval",
+        VERMILION,
+        "diamond",
+        12,
+        error_x={"type": "data", "symmetric": False, "thickness": 2, **sides},
+    )
+    reach = 1.2 * max(margin, abs(low), abs(high), float(np.abs(deviations).max()))
+    figure.update_xaxes(range=[-reach, reach])
+    figure.update_yaxes(ticks="", ticklabelstandoff=6, range=[-0.7, 1.7])
+    caption = f"Verification heaps less target; the green band is the equivalence margin of ± {margin:.2f}°."
+    return Chart("verification-chart", caption, figure)
+
+
+def _critical_values(screen: ScreenResult, alpha: float) -> dict[str, float]:
+    """Critical |t| of the campaign's own level, of 0.05, and of 0.05 shared among all columns."""
+    values = {f"p = {level:g}": screen.critical_t(level) for level in sorted({alpha, 0.05}, reverse=True)}
+    return values | {"Bonferroni 0.05": screen.critical_t(0.05, bonferroni=True)}
+
+
+def _add_effects(figure: go.Figure, points: pd.DataFrame, name: str, symbol: str, color: str) -> None:
+    """Draw effects; those that matter carry their names, the others tell them under the pointer."""
+    written = {"mode": "markers+text", "textposition": "middle left", "textfont": {"color": color}}
+    add_points(
+        figure,
+        points["quantile"],
+        points["abs_effect"],
+        name,
+        color,
+        symbol,
+        text=list(points.index),
+        hovertemplate="%{text}: %{y:.2f}°<extra></extra>",
+        **(written if name == "significant" else {}),
+    )

@@ -1,0 +1,83 @@
+"""Pictures of a campaign's heaps, with the fitted flanks drawn on them."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+import pandas as pd
+
+from dem_warp import CaseResult
+from experiments.calibrate.results import Campaign
+from experiments.execute import measure_heap
+from experiments.heap import heap_picture
+from experiments.report.numbers import significant
+from experiments.study import Study
+
+JPEG_QUALITY = 88
+
+SHOWN_OF_A_STAGE = {"target": 1, "screening": 2, "climb": 2, "verification": 3}
+"""Heaps shown of each stage, evenly from its flattest to its steepest."""
+
+STAGE_NAMES = {"target": "Target", "screening": "Screening", "climb": "Climb", "verification": "Verification"}
+
+
+@dataclass(frozen=True)
+class HeapPicture:
+    """One picture of the page."""
+
+    title: str
+    caption: str
+    image: np.ndarray
+    """Rows, columns, blue-green-red; uint8."""
+
+    @property
+    def data_uri(self) -> str:
+        """The picture as a JPEG inside the page."""
+        _, data = cv2.imencode(".jpg", self.image, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+        return "data:image/jpeg;base64," + base64.b64encode(data.tobytes()).decode("ascii")
+
+
+def heap_pictures(campaign: Campaign, study: Study, load: Callable[[str], CaseResult]) -> list[HeapPicture]:
+    """Draw heaps of every stage that say most: the flattest and steepest, and those of the verification.
+
+    Parameters
+    ----------
+    campaign, study
+        What was run.
+    load
+        Finds the result of a case by its ``case_key``, as ``Store.load`` does.
+    """
+    cases = campaign.cases
+    kept = campaign.selection.kept if campaign.selection else ()
+    pictures = []
+    for stage, count in SHOWN_OF_A_STAGE.items():
+        shown = _spread(cases[(cases["stage"] == stage) & cases["angle"].notna()], count)
+        for case in shown.to_dict("records"):
+            pictures.append(_picture(case, study, load(str(case["case_key"])), kept))
+    return pictures
+
+
+def _spread(cases: pd.DataFrame, count: int) -> pd.DataFrame:
+    """Pick `count` cases evenly from the flattest to the steepest (the middle one when it is one)."""
+    ordered = cases.sort_values("angle")
+    places = np.linspace(0.0, 1.0, count) if count > 1 else np.array([0.5])
+    picked = np.unique(np.rint(places * max(len(ordered) - 1, 0)).astype(int))
+    return ordered.iloc[picked[picked < len(ordered)]]
+
+
+def _picture(case: Mapping[str, Any], study: Study, result: CaseResult, kept: tuple[str, ...]) -> HeapPicture:
+    """Draw a heap in the view whose angle is nearest to the mean over all views."""
+    angle = measure_heap(study, result)
+    view = int(np.argmin([abs(seen.mean - angle.mean) for seen in angle.views]))
+    values = "".join(f", {name} = {significant(case[name], 3)}" for name in kept)
+    return HeapPicture(
+        title=f"{STAGE_NAMES[case['stage']]}, run {case['run']}, heap {case['replicate']}",
+        caption=f"{angle.mean:.2f}° ± {angle.se:.2f}° over {len(angle.views)} views{values}; "
+        f"this view: left {angle.views[view].left:.1f}°, right {angle.views[view].right:.1f}°.",
+        image=heap_picture(study, result, angle, view),
+    )

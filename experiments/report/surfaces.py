@@ -1,0 +1,292 @@
+"""Charts of the fitted surface: response surface, contours with the compatible region, residuals."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import plotly.graph_objects as go
+
+from doe import Design, Surface
+from doe.plot_data import SurfaceGrid, normal_points, surface_grid
+from experiments.calibrate.results import OptimumResult, SurfaceResult, TargetResult
+from experiments.report.theme import (
+    ANGLE_AXIS,
+    BLUE,
+    GREEN,
+    LANDSCAPE,
+    MUTED,
+    PURPLE,
+    VERMILION,
+    Chart,
+    add_line,
+    add_points,
+    add_target,
+    new_figure,
+)
+
+REGION_FILL = "rgba(0,121,90,0.28)"
+"""Translucent green of the compatible region."""
+
+CURVE_POINTS = 121
+"""Points of a drawn curve."""
+
+
+@dataclass(frozen=True)
+class _Slice:
+    """A plane through the surface along two factors, the others held."""
+
+    surface: Surface
+    x: str
+    y: str
+    point: Mapping[str, float]
+    """Natural values at which the other factors are held."""
+
+    def grid(self) -> SurfaceGrid:
+        """Fitted angles [deg] over a square that shows every run."""
+        return surface_grid(self.surface, self.x, self.y, self.point, _extent(self.surface.design))
+
+    @property
+    def hover(self) -> str:
+        """What plotly.js shows under the pointer."""
+        return f"{self.x} %{{x:.4g}}<br>{self.y} %{{y:.4g}}<br>%{{z:.2f}}°<extra></extra>"
+
+    @property
+    def held_text(self) -> str:
+        """Where the factors that are not shown are held, as a sentence."""
+        held = [factor for factor in self.surface.design.factors if factor.name not in (self.x, self.y)]
+        values = ", ".join(f"{f.name} = {self.point[f.name]:.4g} {f.unit}".rstrip() for f in held)
+        return f" Held: {values}." if values else ""
+
+
+def surface_charts(result: SurfaceResult, optimum: OptimumResult | None, target: TargetResult) -> list[Chart]:
+    """Draw the reduced surface: a curve for one factor; for more a relief, and contours for every pair.
+
+    Factors that a chart does not show are held at the chosen point, or at the centre when there is none.
+    """
+    design = result.design
+    if len(design.names) == 1:
+        return [_curve_chart(result, optimum, target)]
+    point = optimum.point if optimum else result.center
+    slices = [_Slice(result.reduced, x, y, point) for x, y in itertools.combinations(design.names, 2)]
+    return [_relief_chart(slices[0], result, optimum, target)] + [
+        _contour_chart(plane, result, optimum, target) for plane in slices
+    ]
+
+
+def residual_charts(surface: Surface) -> list[Chart]:
+    """Draw the four usual checks of a fit."""
+    fitted, residuals = surface.fitted, surface.studentized_residuals
+    order = np.arange(1, len(fitted) + 1)
+    points = normal_points(residuals)
+    charts = [
+        _residual_chart(
+            "normal",
+            "normal quantile",
+            points["quantile"],
+            points["value"],
+            "Normal plot: points along a line.",
+        ),
+        _residual_chart(
+            "fitted", "fitted angle [°]", fitted, residuals, "Against the fit: no trend, no funnel."
+        ),
+        _residual_chart("order", "row of the design", order, residuals, "Against the row: no drift."),
+    ]
+    line = [
+        float(min(fitted.min(), surface.response.min())),
+        float(max(fitted.max(), surface.response.max())),
+    ]
+    figure = new_figure("simulated angle [°]", "fitted angle [°]", legend=False)
+    figure.add_scatter(x=line, y=line, mode="lines", line={"color": MUTED, "dash": "dot"}, hoverinfo="skip")
+    _add_runs(figure, surface.response, fitted)
+    return [*charts, Chart("residual-actual", "Fitted against simulated angles.", figure)]
+
+
+def _relief_chart(
+    plane: _Slice, result: SurfaceResult, optimum: OptimumResult | None, target: TargetResult
+) -> Chart:
+    grid = plane.grid()
+    figure = new_figure()
+    figure.add_surface(
+        x=grid.x,
+        y=grid.y,
+        z=grid.mean,
+        colorscale=LANDSCAPE,
+        opacity=0.9,
+        showscale=False,
+        contours={"z": {"show": True, "color": "rgba(255,255,255,0.5)", "width": 1}},
+        hovertemplate=plane.hover,
+        name="fitted surface",
+    )
+    measured = result.full.design.natural
+    if len(measured.columns) == 2:
+        _add_points_3d(figure, plane, measured, result.full.response, "heaps", BLUE)
+        if optimum is not None:
+            _add_target_curve(figure, plane, optimum, target.sample.mean)
+    if optimum is not None:
+        chosen = pd.DataFrame([optimum.point])
+        _add_points_3d(figure, plane, chosen, [optimum.prediction["mean"]], "optimum", VERMILION, "diamond")
+    axis = {"backgroundcolor": "#ffffff", "gridcolor": "#dfe3e8", "tickfont": {"size": 11}}
+    figure.update_layout(
+        scene={
+            "xaxis": axis | {"title": {"text": grid.x_factor.label}},
+            "yaxis": axis | {"title": {"text": grid.y_factor.label}},
+            "zaxis": axis | {"title": {"text": "angle [°]"}},
+            "camera": {"eye": {"x": -1.6, "y": -1.75, "z": 0.9}, "center": {"x": 0.0, "y": 0.0, "z": -0.12}},
+            "dragmode": "turntable",
+        },
+        margin={"l": 0, "r": 0, "t": 36, "b": 0},
+    )
+    caption = f"Fitted repose angle; drag to turn it.{plane.held_text}"
+    return Chart("surface-relief", caption, figure, tall=True)
+
+
+def _contour_chart(
+    plane: _Slice, result: SurfaceResult, optimum: OptimumResult | None, target: TargetResult
+) -> Chart:
+    grid, level = plane.grid(), target.sample.mean
+    figure = new_figure(grid.x_factor.label, grid.y_factor.label)
+    if optimum is not None:
+        _add_region(figure, plane, optimum)
+    lines = {"coloring": "none", "showlabels": True, "labelfont": {"size": 11, "color": MUTED}}
+    _add_contours(figure, grid, "fitted angle", lines, "#9aa3af", 1, ncontours=12, hovertemplate=plane.hover)
+    at_target = {"coloring": "none", "start": level, "end": level, "size": 1.0}
+    _add_contours(figure, grid, f"target {level:.2f}°", at_target, GREEN, 3, hoverinfo="skip")
+    _add_design(figure, plane, result.design)
+    if target.truth is not None:
+        add_points(figure, *_at(plane, target.truth), "hidden truth", PURPLE, "star", 16)
+    if optimum is not None:
+        add_points(figure, *_at(plane, optimum.point), "optimum", VERMILION, "diamond", 13)
+    caption = "Fitted angle, target curve and compatible region (green); the dotted box is coded −1 to +1."
+    return Chart(f"contour-{plane.x}-{plane.y}", caption + plane.held_text, figure, tall=True)
+
+
+def _curve_chart(result: SurfaceResult, optimum: OptimumResult | None, target: TargetResult) -> Chart:
+    (factor,) = result.design.factors
+    x = factor.to_natural(np.linspace(-1.0, 1.0, CURVE_POINTS) * _extent(result.design))
+    fit = result.reduced.predict(pd.DataFrame({factor.name: x}))
+    figure = new_figure(factor.label, ANGLE_AXIS)
+    add_target(figure, target.sample.mean, target.sample.se)
+    around = np.r_[fit["confidence_low"], fit["confidence_high"][::-1]]
+    shade = {"fill": "toself", "fillcolor": "rgba(0,114,178,0.15)", "hoverinfo": "skip"}
+    figure.add_scatter(
+        x=np.r_[x, x[::-1]],
+        y=around,
+        line={"width": 0},
+        mode="lines",
+        name="95 % confidence of the fit",
+        **shade,
+    )
+    add_line(figure, x, fit["mean"], "fit", BLUE)
+    add_points(figure, result.full.design.natural[factor.name], result.full.response, "heap", BLUE, size=8)
+    if target.truth is not None:
+        hidden = [target.truth[factor.name]], [target.sample.mean]
+        add_points(figure, *hidden, "hidden truth", PURPLE, "star", 16)
+    if optimum is not None:
+        chosen = [optimum.point[factor.name]], [optimum.prediction["mean"]]
+        add_points(figure, *chosen, "optimum", VERMILION, "diamond", 13)
+    caption = "Fitted curve; the green band is the target ± its standard error."
+    return Chart("surface-curve", caption, figure, tall=True)
+
+
+def _add_points_3d(
+    figure: go.Figure,
+    plane: _Slice,
+    rows: pd.DataFrame,
+    z: Any,
+    name: str,
+    color: str,
+    symbol: str = "circle",
+) -> None:
+    marker = {"size": 4, "color": color, "symbol": symbol, "line": {"color": "#ffffff", "width": 1}}
+    figure.add_scatter3d(x=rows[plane.x], y=rows[plane.y], z=z, mode="markers", name=name, marker=marker)
+
+
+def _add_target_curve(figure: go.Figure, plane: _Slice, optimum: OptimumResult, level: float) -> None:
+    for piece, (_, points) in enumerate(optimum.contour.groupby(level=0)):
+        figure.add_scatter3d(
+            x=points[plane.x],
+            y=points[plane.y],
+            z=np.full(len(points), level),
+            mode="lines",
+            name="target",
+            line={"color": GREEN, "width": 7},
+            showlegend=piece == 0,
+        )
+
+
+def _add_contours(
+    figure: go.Figure, grid: SurfaceGrid, name: str, lines: dict, color: str, width: int, **more: Any
+) -> None:
+    figure.add_contour(
+        x=grid.x,
+        y=grid.y,
+        z=grid.mean,
+        name=name,
+        showscale=False,
+        showlegend=True,
+        contours=lines,
+        line={"color": color, "width": width},
+        **more,
+    )
+
+
+def _add_region(figure: go.Figure, plane: _Slice, optimum: OptimumResult) -> None:
+    """Fill the cells of the region in the plane."""
+    region = optimum.region
+    cells = region.mask.reshape([region.resolution] * len(region.factors))
+    centers = region.extent * ((2.0 * np.arange(region.resolution) + 1.0) / region.resolution - 1.0)
+    chosen = tuple(
+        slice(None)
+        if factor.name in (plane.x, plane.y)
+        else int(np.abs(centers - factor.to_coded(plane.point[factor.name])).argmin())
+        for factor in region.factors
+    )
+    x, y = (plane.surface.design.factor(name).to_natural(centers) for name in (plane.x, plane.y))
+    figure.add_heatmap(
+        x=x,
+        y=y,
+        z=cells[chosen].T.astype(np.uint8),  # x comes before y among the factors, and rows are y
+        zmin=0,
+        zmax=1,
+        colorscale=[[0.0, "rgba(0,0,0,0)"], [1.0, REGION_FILL]],
+        showscale=False,
+        hoverinfo="skip",
+    )
+    square = {"symbol": "square", "size": 13, "color": REGION_FILL}
+    figure.add_scatter(x=[None], y=[None], mode="markers", name="compatible region", marker=square)
+
+
+def _add_design(figure: go.Figure, plane: _Slice, design: Design) -> None:
+    runs = design.natural.drop_duplicates([plane.x, plane.y])
+    add_points(figure, runs[plane.x], runs[plane.y], "design", BLUE, "circle-open")
+    x, y = design.factor(plane.x), design.factor(plane.y)
+    border = {"color": MUTED, "dash": "dot", "width": 1}
+    figure.add_shape(type="rect", x0=x.low, x1=x.high, y0=y.low, y1=y.high, line=border)
+
+
+def _at(plane: _Slice, point: Mapping[str, float]) -> tuple[list[float], list[float]]:
+    return [point[plane.x]], [point[plane.y]]
+
+
+def _residual_chart(name: str, x_title: str, x: Any, y: pd.Series, caption: str) -> Chart:
+    figure = new_figure(x_title, "studentized residual", legend=False)
+    figure.add_hline(y=0.0, line={"color": MUTED, "width": 1})
+    _add_runs(figure, x, y)
+    return Chart(f"residual-{name}", caption, figure)
+
+
+def _add_runs(figure: go.Figure, x: Any, y: pd.Series) -> None:
+    labels = [f"run {run}" for run in y.index]
+    add_points(
+        figure, x, y, "run", BLUE, text=labels, hovertemplate="%{text}: %{x:.2f}, %{y:.2f}<extra></extra>"
+    )
+
+
+def _extent(design: Design) -> float:
+    """Coded half width that shows every run."""
+    return max(1.0, float(design.points.abs().to_numpy().max())) * 1.05

@@ -1,0 +1,72 @@
+"""The report's files: one page, the results as JSON, the tables as CSV."""
+
+from __future__ import annotations
+
+import json
+import platform
+from collections.abc import Mapping, Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from experiments.calibrate.export import jsonable
+from experiments.calibrate.results import Campaign
+from experiments.files import write_text
+from experiments.report.page import render_page
+from experiments.report.pictures import HeapPicture
+from experiments.study import Study
+
+LIBRARIES = ("warp-lang", "numpy", "scipy", "pandas", "statsmodels", "opencv-python-headless")
+"""Packages whose version may change a number."""
+
+
+def write_report(
+    campaign: Campaign,
+    study: Study,
+    out_dir: str | Path,
+    pictures: Sequence[HeapPicture] = (),
+    provenance: Mapping[str, Any] | None = None,
+) -> Path:
+    """Write ``report.html``, ``results.json`` and ``tables/*.csv``, each whole or not at all.
+
+    Parameters
+    ----------
+    campaign, study
+        What was run.
+    out_dir
+        Folder of the files; it is made when it is missing.
+    pictures
+        Heaps to show, from `heap_pictures`.
+    provenance
+        What the caller knows of the run (device, seconds, ...), nested as it comes; versions are added.
+
+    Returns
+    -------
+    Path
+        The page.
+    """
+    folder = Path(out_dir)
+    made_by = {**(provenance or {}), "versions": library_versions()}
+    page = render_page(campaign, study, pictures, made_by)
+    for name, table in campaign.tables().items():
+        write_text(folder / "tables" / f"{name}.csv", table.to_csv(index=False))
+    results = {
+        "study": {
+            "name": study.name,
+            "file": study.file.name,
+            "scale": study.scale,
+            "document": study.document,
+        },
+        "campaign": campaign.to_dict(),
+        "provenance": jsonable(made_by),
+    }
+    write_text(
+        folder / "results.json", json.dumps(results, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
+    )
+    write_text(folder / "report.html", page)
+    return folder / "report.html"
+
+
+def library_versions() -> dict[str, str]:
+    """Return the versions of Python and of the packages that the numbers depend on."""
+    return {"python": platform.python_version()} | {name: version(name) for name in LIBRARIES}
