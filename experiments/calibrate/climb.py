@@ -65,25 +65,23 @@ def climb(
     Raises
     ------
     StageEnd
-        When fewer than two steps gave an angle.
+        When the path has no room, or fewer than two steps gave an angle.
     """
     settings = study.campaign.climb
     line, rule = _line(study, screen, kept)
-    points = _first_points(line, settings)
-    cases = _simulate_steps(study, points, kept, runner)
-    path = _path_table(points, cases, target.mean)
-    end = _end(path, cases, noise, settings)
-    for _ in range(settings.extensions):
-        more = _further_points(line, points, path, settings) if end is ClimbEnd.BOUNDED else points.iloc[:0]
-        if more.empty:
-            break
-        points = pd.concat([points, more]).sort_index()
-        cases = pd.concat([cases, _simulate_steps(study, more, kept, runner)], ignore_index=True)
+    batches, tables = [_first_points(line, settings)], []
+    for _ in range(1 + settings.extensions):
+        tables.append(_simulate_steps(study, batches[-1], kept, runner))
+        points, cases = pd.concat(batches).sort_index(), pd.concat(tables, ignore_index=True)
         path = _path_table(points, cases, target.mean)
         end = _end(path, cases, noise, settings)
+        more = _further_points(line, path, settings)
+        if end is not ClimbEnd.BOUNDED or more.empty:
+            break
+        batches.append(more)
     place, crossing = _crossing(path, kept) if end is ClimbEnd.CROSSED else (None, None)
     best = int(path["error"].abs().idxmin())
-    step = _stride(points, kept)
+    step = _stride(path, kept)
     decisions = (
         Decision(
             STAGE,
@@ -148,19 +146,23 @@ def _line(study: CampaignStudy, screen: ScreenResult, kept: tuple[str, ...]) -> 
 
 def _first_points(line: _Line, settings: ClimbSettings) -> pd.DataFrame:
     points = line.walk(line.start, settings.steps - 1)
+    if len(points) < LEAST_STEPS:
+        raise StageEnd(
+            Outcome.TARGET_NOT_REACHED,
+            f"The climb cannot leave its start ({listed(line.start)}), which stands at its bounds: fix "
+            "another climb.start, or raise climb.reach.",
+        )
     return points.set_axis(pd.RangeIndex(1, len(points) + 1, name="step"))
 
 
-def _further_points(
-    line: _Line, points: pd.DataFrame, path: pd.DataFrame, settings: ClimbSettings
-) -> pd.DataFrame:
+def _further_points(line: _Line, path: pd.DataFrame, settings: ClimbSettings) -> pd.DataFrame:
     """Return the next batch: past the last step when all angles are too low, else before the first."""
     descend = bool(path["error"].min() > 0.0)
-    edge = points.iloc[0 if descend else -1]
+    edge = path.iloc[0 if descend else -1]
     start = {name: float(edge[name]) for name in line.kept}
     more = line.walk(start, settings.steps, descend).iloc[1:]
     counts = np.arange(1, len(more) + 1)
-    labels = points.index[0] - counts if descend else points.index[-1] + counts
+    labels = path.index[0] - counts if descend else path.index[-1] + counts
     return more.set_axis(pd.Index(labels, name="step"))
 
 
@@ -237,9 +239,9 @@ def _crossing(path: pd.DataFrame, kept: tuple[str, ...]) -> tuple[float, dict[st
     return float(place), dict(zip(kept, point.tolist(), strict=True))
 
 
-def _stride(points: pd.DataFrame, kept: tuple[str, ...]) -> dict[str, float]:
+def _stride(path: pd.DataFrame, kept: tuple[str, ...]) -> dict[str, float]:
     """Return the largest move of each factor between two steps (a bound may have shortened others)."""
-    moves = points[list(kept)].diff().iloc[1:]
+    moves = path[list(kept)].diff().iloc[1:]
     return {name: float(moves[name].iloc[int(moves[name].abs().argmax())]) for name in kept}
 
 

@@ -16,7 +16,7 @@ from pydantic import BaseModel
 from doe import Comparison, Design, NoiseFloor, Region, Sample, ScreenResult, Surface
 
 if TYPE_CHECKING:
-    from experiments.calibrate.results import Campaign
+    from experiments.calibrate.results import Campaign, ScreeningResult, SurfaceResult
 
 _COMPARISON = (
     "difference",
@@ -170,7 +170,7 @@ def campaign_tables(campaign: Campaign) -> dict[str, pd.DataFrame]:
     return {name: indexed(table) for name, table in tables.items()}
 
 
-def _screening_tables(screening: Any) -> dict[str, pd.DataFrame]:
+def _screening_tables(screening: ScreeningResult) -> dict[str, pd.DataFrame]:
     design = screening.design.coded.copy()
     for replicate in range(screening.response.shape[1]):
         design[f"angle_{replicate + 1}"] = screening.response[:, replicate]
@@ -181,7 +181,7 @@ def _screening_tables(screening: Any) -> dict[str, pd.DataFrame]:
     }
 
 
-def _surface_tables(surface: Any) -> dict[str, pd.DataFrame]:
+def _surface_tables(surface: SurfaceResult) -> dict[str, pd.DataFrame]:
     coded = surface.design.coded.add_suffix("_coded")
     design = pd.concat([surface.design.natural, coded], axis=1).assign(angle=surface.response)
     return {

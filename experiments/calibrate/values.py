@@ -43,8 +43,7 @@ def reach_limits(study: CampaignStudy) -> dict[str, tuple[float, float]]:
     limits = {}
     for factor in study.factors:
         low, high = study.limits.get(factor.name, UNLIMITED)
-        limits[factor.name] = (
-            max(low, float(factor.to_natural(-reach))),
-            min(high, float(factor.to_natural(reach))),
-        )
+        # Twelve digits: a bound of 0.78 must admit the 0.78 that a person writes.
+        first, last = (float(f"{factor.to_natural(side * reach):.12g}") for side in (-1.0, 1.0))
+        limits[factor.name] = (max(low, first), min(high, last))
     return limits

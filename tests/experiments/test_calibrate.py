@@ -10,7 +10,6 @@ import pytest
 
 from doe import Factor
 from experiments.calibrate import (
-    Campaign,
     CampaignSettings,
     ClimbEnd,
     MeasuredTarget,
@@ -84,15 +83,11 @@ def settings(**sections: Mapping) -> CampaignSettings:
     return CampaignSettings.model_validate(sections)
 
 
-def finished(campaign: Campaign) -> list[str]:
-    return list(campaign.stages)
-
-
 def test_the_whole_chain_finds_a_known_contour() -> None:
     heaps = AnalyticHeaps(two_frictions)
     campaign = calibrate(AnalyticStudy(), heaps)
     assert campaign.outcome is Outcome.CALIBRATED
-    assert finished(campaign) == list(STAGES)
+    assert list(campaign.stages) == list(STAGES)
     assert set(campaign.selection.kept) == {"E", "F"}
     # The standard error of the fit near the centre is about NOISE / sqrt(5); four of them are allowed.
     assert two_frictions(campaign.optimum.settings) == pytest.approx(26.0, abs=4.0 * NOISE / np.sqrt(5))
@@ -198,7 +193,7 @@ def test_no_significant_factor() -> None:
     strict = settings(selection={"alpha": 0.01})
     campaign = calibrate(AnalyticStudy(campaign=strict), AnalyticHeaps(lambda row: 24.0))
     assert campaign.outcome is Outcome.NO_SIGNIFICANT_FACTOR
-    assert finished(campaign) == ["target", "noise_floor", "screening", "selection"]
+    assert list(campaign.stages) == ["target", "noise_floor", "screening", "selection"]
     assert campaign.climb is None
     assert "keep" in campaign.reason
     # Two-sided test of 12 heaps: effects of a few standard errors 2 sd / sqrt(12) can be seen.
@@ -249,6 +244,14 @@ def test_a_climb_that_meets_a_hard_limit_stays_inside_it() -> None:
     assert campaign.climb.path["F"].min() == 0.0
     assert campaign.outcome is Outcome.TARGET_NOT_REACHED
     assert "at the bound: F" in campaign.reason
+
+
+def test_a_climb_whose_start_is_its_bound_says_so() -> None:
+    fixed = {"start": {"F": 0.78}, "step": {"F": 0.1}}
+    study = AnalyticStudy(campaign=settings(selection={"keep": ["F"]}, climb=fixed))
+    campaign = calibrate(study, AnalyticHeaps(two_frictions))
+    assert campaign.outcome is Outcome.TARGET_NOT_REACHED
+    assert "cannot leave its start (F = 0.78)" in campaign.reason
 
 
 def test_a_climb_that_turns_is_a_plateau() -> None:
