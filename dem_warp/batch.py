@@ -253,9 +253,7 @@ class Batch:
         if self.running and now - self._reported < REPORT_EVERY:
             return
         self._reported = now
-        parts = [
-            self.controllers[w].fraction(chunk * CHUNK * self.setups[w].time_step) for w in self.running
-        ]
+        parts = [self.controllers[w].fraction(chunk * CHUNK * self.setups[w].time_step) for w in self.running]
         done = len(self.cases) - len(self.running)
         on_progress(
             Progress(

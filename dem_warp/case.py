@@ -86,7 +86,10 @@ class Numerics:
         _require(self.skin is None or self.skin > 0, "Numerics.skin", "must be positive [m]", self.skin)
         _require(self.modulus_scale >= 1, "Numerics.modulus_scale", "must be at least 1", self.modulus_scale)
         _require(
-            self.precision in PRECISIONS, "Numerics.precision", f"must be one of {sorted(PRECISIONS)}", self.precision
+            self.precision in PRECISIONS,
+            "Numerics.precision",
+            f"must be one of {sorted(PRECISIONS)}",
+            self.precision,
         )
 
 
@@ -125,7 +128,9 @@ class Case:
     @property
     def time_step(self) -> float:
         """[s]"""
-        return self.numerics.time_step_fraction * rayleigh_time(self.grains.smallest_sphere, self.grain_material)
+        return self.numerics.time_step_fraction * rayleigh_time(
+            self.grains.smallest_sphere, self.grain_material
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Everything that determines the result, as plain JSON values; the device and the skin do not."""
@@ -145,5 +150,3 @@ def _plain(value: Any) -> Any:
 def _require(holds: bool, place: str, rule: str, value: Any) -> None:
     if not holds:
         raise ValueError(f"{place}: {rule}, got {value!r}")
-
-

@@ -7,7 +7,7 @@ import numpy as np
 
 from dem_warp.clumps import ClumpShape
 from dem_warp.materials import Interaction, Material, damping_coefficient, effective_moduli
-from dem_warp.types import MAX_SPHERES_PER_GRAIN, MAX_SPHERES_PER_WORLD
+from dem_warp.types import MAX_PARTNERS, MAX_SPHERES_PER_GRAIN
 from dem_warp.walls import Wall
 
 AT_ONCE = 0
@@ -145,13 +145,16 @@ class WorldSetup:
             raise ValueError(f"WorldSetup.domain: lower corner must lie below the upper, got {self.domain!r}")
         for wall, pair in self.walls:
             if not 1 <= pair < len(self.contacts):
-                raise ValueError(f"WorldSetup.walls: {wall!r} names contact {pair}; there are 1 to {len(self.contacts) - 1}")
+                raise ValueError(
+                    f"WorldSetup.walls: {wall!r} names contact {pair}; there are 1 to {len(self.contacts) - 1}"
+                )
         spheres = max(shape.sphere_count for shape in self.shapes)
         if spheres > MAX_SPHERES_PER_GRAIN:
             raise ValueError(f"ClumpShape: at most {MAX_SPHERES_PER_GRAIN} spheres a grain, got {spheres}")
-        if spheres * self.grains.count > MAX_SPHERES_PER_WORLD:
+        partners = spheres * self.grains.count + len(self.walls)
+        if partners > MAX_PARTNERS:
             raise ValueError(
-                f"WorldSetup.grains: at most {MAX_SPHERES_PER_WORLD} spheres a world, got {spheres * self.grains.count}"
+                f"WorldSetup.grains: at most {MAX_PARTNERS} spheres and walls a world, got {partners}"
             )
 
     @property

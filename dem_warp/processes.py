@@ -42,7 +42,9 @@ def run_in_processes(
     results: dict[int, CaseResult] = {}
     started = time.perf_counter()
     with ProcessPoolExecutor(workers, context, _start_worker, (fractions, phases)) as pool:
-        futures: dict[Future[CaseResult], int] = {pool.submit(_run_case, i, case): i for i, case in enumerate(cases)}
+        futures: dict[Future[CaseResult], int] = {
+            pool.submit(_run_case, i, case): i for i, case in enumerate(cases)
+        }
         pending = set(futures)
         try:
             while pending:

@@ -20,7 +20,7 @@ from dem_warp.state import (
     struct_array,
     wall_rows,
 )
-from dem_warp.types import PRECISIONS, device_structs
+from dem_warp.types import PRECISIONS, Build, device_structs
 
 CHUNK = 256
 """Steps that `advance` takes at the least; a multiple of every length of a cycle."""
@@ -78,14 +78,19 @@ class Solver:
     """
 
     def __init__(
-        self, worlds: Sequence[WorldSetup], device: Any = "cpu", precision: str = "mixed", capacity: int | None = None
+        self,
+        worlds: Sequence[WorldSetup],
+        device: Any = "cpu",
+        precision: str = "mixed",
+        capacity: int | None = None,
     ) -> None:
         self.worlds = list(worlds)
         self.device = wp.get_device(device)
         self.precision = PRECISIONS[precision]
         self.layout = Layout.of(worlds)
-        self._step_kernels = step_kernels(self.precision, self.device.is_cuda)
-        self._list_kernels = neighbour_kernels(self.precision)
+        build = Build(self.precision, self.layout.sphere_count, self.layout.wall_count, self.device.is_cuda)
+        self._step_kernels = step_kernels(build)
+        self._list_kernels = neighbour_kernels(build)
         found, row = _neighbour_capacities(worlds)
         with wp.ScopedDevice(self.device):
             self._build_state(capacity or row, found)
@@ -120,6 +125,7 @@ class Solver:
         cells.cursor = wp.zeros(layout.world_count, dtype=int)
         for name in ("bucket", "rank", "order", "found_count"):
             setattr(cells, name, wp.zeros(layout.sphere_total, dtype=int))
+        cells.ordered = wp.zeros(layout.sphere_total, dtype=self.precision.sphere)
         cells.found = wp.zeros(layout.sphere_total * found_capacity, dtype=int)
         cells.found_capacity = found_capacity
         return cells
@@ -161,10 +167,10 @@ class Solver:
         grains = self.grains[0]
         self._launch(k.bin_spheres, spheres, [self.model, grains, self.alive, self.stale, self.cells])
         self._launch(k.open_buckets, spheres, [self.model, self.stale, self.cells])
-        self._launch(k.fill_buckets, spheres, [self.model, self.stale, self.cells])
+        self._launch(k.fill_buckets, spheres, [self.model, grains, self.stale, self.cells])
         self._launch(k.search, spheres, [self.model, grains, self.stale, self.cells, self.flags])
         self._launch(k.write_lists, spheres, [self.model, self.stale, self.cells, self.hood, self.flags])
-        finish = [self.cells, self.hood, self.stale, self.any_stale, self.rebuilds]
+        finish = [grains, self.cells, self.hood, self.stale, self.any_stale, self.rebuilds]
         self._launch(k.finish, self.layout.world_count, finish)
 
     def _cycle(self) -> None:
@@ -212,7 +218,9 @@ class Solver:
         rows = np.asarray(grains, dtype=np.int32) + world * self.layout.grain_count
         if rows.size:
             removed = wp.array(rows.astype(np.int32), dtype=int, device=self.device)
-            self._launch(self._step_kernels.remove, rows.size, [self.model, removed, self.alive, *self.grains])
+            self._launch(
+                self._step_kernels.remove, rows.size, [self.model, removed, self.alive, *self.grains]
+            )
 
     def move_wall(self, world: int, wall: int, velocity: Sequence[float]) -> None:
         """Let a wall move with a constant velocity [m/s] from the present step on."""
@@ -268,9 +276,7 @@ def _padded_ones(worlds: Sequence[WorldSetup], layout: Layout, device: Any) -> w
 
 def _cycle_length(worlds: Sequence[WorldSetup]) -> int:
     """Steps between two checks of the neighbour lists: a power of two, short enough for every world."""
-    free = min(
-        SKIN_PER_CYCLE * world.skin / (world.time_step * expected_speed(world)) for world in worlds
-    )
+    free = min(SKIN_PER_CYCLE * world.skin / (world.time_step * expected_speed(world)) for world in worlds)
     return int(2 ** np.clip(np.floor(np.log2(max(free, 1.0))), 1, np.log2(LONGEST_CYCLE)))
 
 

@@ -27,7 +27,9 @@ class Layout:
         walls = {len(world.walls) for world in worlds}
         pairs = {len(world.contacts) for world in worlds}
         if len(walls) > 1 or len(pairs) > 1:
-            raise ValueError(f"worlds of one batch must have the same number of walls and contacts, got {walls} and {pairs}")
+            raise ValueError(
+                f"worlds of one batch must have the same number of walls and contacts, got {walls} and {pairs}"
+            )
         return cls(
             len(worlds),
             max(world.grains.count for world in worlds),
@@ -47,7 +49,9 @@ class Layout:
         return self.grain_total * self.sphere_count
 
 
-def _padded(worlds: Sequence[WorldSetup], layout: Layout, rows: Sequence[np.ndarray], fill: Any, width: int) -> np.ndarray:
+def _padded(
+    worlds: Sequence[WorldSetup], layout: Layout, rows: Sequence[np.ndarray], fill: Any, width: int
+) -> np.ndarray:
     """Stack one array a world into (grain slots, width), the free slots filled."""
     out = np.empty((layout.world_count, layout.grain_count, width))
     out[:] = fill
@@ -122,8 +126,7 @@ def build_model(worlds: Sequence[WorldSetup], layout: Layout, precision: Precisi
         _padded(worlds, layout, inertia, 1.0, 4).astype(real), dtype=precision.vec4, device=device
     )
     model.release_step = _ints(worlds, layout, [world.grains.release_steps for world in worlds], 0, device)
-    model.grain_count, model.sphere_count = layout.grain_count, layout.sphere_count
-    model.wall_count, model.pair_count = layout.wall_count, layout.pair_count
+    model.grain_count, model.pair_count = layout.grain_count, layout.pair_count
     return model
 
 
@@ -133,7 +136,9 @@ def _cell_rate(world: WorldSetup, precision: Precision) -> float:
     return unit / (1.01 * (2 * world.largest_sphere + world.skin))
 
 
-def _ints(worlds: Sequence[WorldSetup], layout: Layout, rows: Sequence[np.ndarray], fill: int, device: Any) -> wp.array:
+def _ints(
+    worlds: Sequence[WorldSetup], layout: Layout, rows: Sequence[np.ndarray], fill: int, device: Any
+) -> wp.array:
     return wp.array(_padded(worlds, layout, rows, fill, 1)[:, 0].astype(np.int32), dtype=int, device=device)
 
 
@@ -142,7 +147,9 @@ def build_grains(worlds: Sequence[WorldSetup], layout: Layout, precision: Precis
     types = device_structs(precision)
     real = np.float32 if precision.real is wp.float32 else np.float64
     positions = _padded(worlds, layout, [world.grains.positions for world in worlds], 0.0, 3)
-    orientations = _padded(worlds, layout, [_unit(world.grains.orientations) for world in worlds], [0, 0, 0, 1], 4)
+    orientations = _padded(
+        worlds, layout, [_unit(world.grains.orientations) for world in worlds], [0, 0, 0, 1], 4
+    )
     velocity = [np.column_stack([world.grains.velocities, world.masses]) for world in worlds]
     spin = [np.column_stack([world.grains.spins, np.zeros(world.grains.count)]) for world in worlds]
     sizes = _padded(worlds, layout, [world.grains.sizes for world in worlds], 1.0, 1)[:, 0].astype(real)
@@ -153,8 +160,12 @@ def build_grains(worlds: Sequence[WorldSetup], layout: Layout, precision: Precis
     grains.step = wp.zeros(layout.world_count, dtype=int, device=device)
     grains.position = wp.array(positions, dtype=wp.vec3d, device=device)
     grains.orientation = wp.array(orientations, dtype=wp.quatd, device=device)
-    grains.velocity = wp.array(_padded(worlds, layout, velocity, 1.0, 4).astype(real), dtype=precision.vec4, device=device)
-    grains.spin = wp.array(_padded(worlds, layout, spin, 0.0, 4).astype(real), dtype=precision.vec4, device=device)
+    grains.velocity = wp.array(
+        _padded(worlds, layout, velocity, 1.0, 4).astype(real), dtype=precision.vec4, device=device
+    )
+    grains.spin = wp.array(
+        _padded(worlds, layout, spin, 0.0, 4).astype(real), dtype=precision.vec4, device=device
+    )
     grains.center = wp.array(center, dtype=precision.sphere, device=device)
     grains.spheres = wp.zeros(layout.sphere_total, dtype=precision.sphere, device=device)
     return grains
@@ -177,8 +188,8 @@ def build_neighbours(layout: Layout, capacity: int, precision: Precision, device
     hood.count = wp.zeros(2 * layout.grain_total, dtype=int, device=device)
     hood.entry = wp.zeros(slots, dtype=int, device=device)
     # all zero is a displacement of zero, remembered at step 0: no history
-    hood.history = wp.zeros(slots + layout.sphere_total * layout.wall_count, dtype=precision.vec4, device=device)
-    hood.first_wall = slots
+    hood.history = wp.zeros(slots, dtype=precision.vec4, device=device)
+    hood.rebuilt = wp.zeros(layout.world_count, dtype=int, device=device)
     hood.travel = wp.zeros(layout.grain_total, dtype=precision.real, device=device)
     return hood
 

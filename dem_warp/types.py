@@ -13,10 +13,10 @@ from typing import Any
 import warp as wp
 
 SPHERE_BITS = 23
-"""Bits of a neighbour entry that hold the partner's sphere index; the bits above hold the own sphere's number."""
+"""Bits of a neighbour entry that hold the partner (a sphere, or a wall, of the world); above is the own sphere's number."""
 
 SPHERE_MASK = (1 << SPHERE_BITS) - 1
-MAX_SPHERES_PER_WORLD = 1 << SPHERE_BITS
+MAX_PARTNERS = 1 << SPHERE_BITS
 MAX_SPHERES_PER_GRAIN = 1 << (31 - SPHERE_BITS)
 
 
@@ -54,6 +54,24 @@ class Precision:
 
 MIXED = Precision("mixed", wp.float32, wp.vec3f, wp.vec4f, wp.quatf, wp.vec4i)
 DOUBLE = Precision("double", wp.float64, wp.vec3d, wp.vec4d, wp.quatd, wp.vec4d)
+
+
+@dataclass(frozen=True)
+class Build:
+    """What kernels are compiled for; worlds of one build run in one batch, and their bits do not depend on the others."""
+
+    precision: Precision
+    sphere_count: int
+    wall_count: int
+    cooperative: bool
+
+    @property
+    def name(self) -> str:
+        """Name of the compiled module."""
+        way = "warp" if self.cooperative else "serial"
+        return f"{self.precision.name}_{way}_{self.sphere_count}_{self.wall_count}"
+
+
 PRECISIONS = {precision.name: precision for precision in (MIXED, DOUBLE)}
 
 
@@ -104,9 +122,7 @@ def device_structs(precision: Precision) -> SimpleNamespace:
         inertia: wp.array(dtype=vec4)  # principal moments [kg m2] and bounding radius [m], (grains,)
         release_step: wp.array(dtype=int)  # a grain moves at constant velocity before it, (grains,)
         grain_count: int  # slots of a world
-        sphere_count: int  # slots of a grain
-        wall_count: int
-        pair_count: int
+        pair_count: int  # contact parameters of a world
 
     @wp.struct
     class Grains:
@@ -123,9 +139,11 @@ def device_structs(precision: Precision) -> SimpleNamespace:
         capacity: int  # entries a grain
         list: wp.array(dtype=int)  # which of the two lists holds, (worlds,)
         count: wp.array(dtype=int)  # (2 * grains,)
-        entry: wp.array(dtype=int)  # own sphere's number and partner's sphere, (2 * grains * capacity,)
-        history: wp.array(dtype=vec4)  # tangential displacement [m] and its step: one an entry, then one a wall and sphere
-        first_wall: int  # where the histories of the walls begin, (grains * walls * spheres,)
+        entry: wp.array(dtype=int)  # own sphere's number and partner, (2 * grains * capacity,)
+        history: wp.array(
+            dtype=vec4
+        )  # tangential displacement [m] and the step it was written in, one an entry
+        rebuilt: wp.array(dtype=int)  # step of the last rebuild, (worlds,)
         travel: wp.array(dtype=real)  # path of a grain's farthest point since the rebuild [m], (grains,)
 
     return SimpleNamespace(

@@ -1,7 +1,6 @@
-"""One candidate of a grain: does it touch, and what does it do.
+"""One entry of a grain's neighbour list: does it touch, and what does it do.
 
-The candidates of a grain are numbered through: first the entries of its neighbour list, then, wall by wall, its spheres
-against the walls that it is near. Their order depends on the world alone, and the sum over them is taken in this order.
+An entry names one of the grain's spheres and a partner: a sphere of another grain or, numbered after these, a wall.
 """
 
 import functools
@@ -13,68 +12,35 @@ from dem_warp.kernels.packing import packing
 from dem_warp.kernels.walls import wall_functions
 from dem_warp.laws.hertz_mindlin import contact_force
 from dem_warp.laws.rolling import rolling_torque
-from dem_warp.types import SPHERE_BITS, SPHERE_MASK, Precision, device_structs
+from dem_warp.types import SPHERE_BITS, SPHERE_MASK, Build, device_structs
 
 
 @functools.cache
-def contact_functions(precision: Precision) -> SimpleNamespace:
-    """`near_walls`, `candidate_count`, `touches` and `contact` in one precision."""
+def contact_functions(build: Build) -> SimpleNamespace:
+    """`touches` and `contact` of one build."""
+    precision = build.precision
     real, vec3, vec4 = precision.real, precision.vec3, precision.vec4
+    Sphere = precision.sphere  # noqa: N806
     types = device_structs(precision)
     Model, World, Grains, Neighbours = types.Model, types.World, types.Grains, types.Neighbours  # noqa: N806
-    Sphere = precision.sphere  # noqa: N806
     pack = packing(precision)
     walls = wall_functions(precision)
+    spheres_each = wp.constant(build.sphere_count)
+    walls_each = wp.constant(build.wall_count)
 
     @wp.func
-    def near_walls(model: Model, w: int, position: wp.vec3d, reach: real, step: int, time_step: real) -> int:
-        """Bit set of the walls that the grain may touch."""
-        near = int(0)
-        for i in range(model.wall_count):
-            if walls.is_near(model.wall[w * model.wall_count + i], position, reach, step, time_step):
-                near = near | (1 << i)
-        return near
-
-    @wp.func
-    def near_count(model: Model, near: int) -> int:
-        count = int(0)
-        for i in range(model.wall_count):
-            count += (near >> i) & 1
-        return count
-
-    @wp.func
-    def nth_wall(model: Model, near: int, n: int) -> int:
-        found = int(0)
-        left = int(n)
-        for i in range(model.wall_count):
-            if (near >> i) & 1 == 1:
-                if left == 0:
-                    found = i
-                left -= 1
-        return found
-
-    @wp.func
-    def touches(
-        model: Model, world: World, grains: Grains, hood: Neighbours, w: int, g: int, c: int, count: int, first: int,
-        near: int, step: int,
-    ) -> bool:  # fmt: skip
-        """Whether candidate `c` of grain `g` overlaps it; `count` entries of its list begin at `first`."""
-        if c < count:
-            entry = hood.entry[first + c]
-            a = pack.load_sphere(grains.spheres, g * model.sphere_count + (entry >> SPHERE_BITS))
-            b = pack.load_sphere(grains.spheres, w * model.grain_count * model.sphere_count + (entry & SPHERE_MASK))
-            d = pack.difference(a, b, world)
-            reach = pack.last(a) + pack.last(b)
-            return wp.dot(d, d) < reach * reach
-        i = nth_wall(model, near, (c - count) // model.sphere_count)
-        s = (c - count) % model.sphere_count
-        if s >= model.shape_sphere_count[model.shape[g]]:
-            return False
-        a = pack.load_sphere(grains.spheres, g * model.sphere_count + s)
-        overlap, _normal = walls.wall_overlap(
-            model.wall[w * model.wall_count + i], pack.place(a, world), pack.last(a), step, world.time_step
-        )
-        return overlap > real(0.0)
+    def touches(model: Model, world: World, grains: Grains, w: int, g: int, entry: int, step: int) -> bool:
+        """Whether the two partners of an entry overlap."""
+        partner = entry & SPHERE_MASK
+        wall_base = model.grain_count * spheres_each
+        a = pack.load_sphere(grains.spheres, g * spheres_each + (entry >> SPHERE_BITS))
+        if partner >= wall_base:
+            wall = model.wall[w * walls_each + partner - wall_base]
+            return walls.overlaps(wall, pack.place(a, world), pack.last(a), step, world.time_step)
+        b = pack.load_sphere(grains.spheres, w * wall_base + partner)
+        d = pack.difference(a, b, world)
+        reach = pack.last(a) + pack.last(b)
+        return wp.dot(d, d) < reach * reach
 
     @wp.func
     def surface_velocity(grains: Grains, g: int, lever: vec3) -> vec3:
@@ -96,46 +62,40 @@ def contact_functions(precision: Precision) -> SimpleNamespace:
 
     @wp.func
     def contact(
-        model: Model, world: World, grains: Grains, hood: Neighbours, w: int, g: int, c: int, count: int, first: int,
-        near: int, step: int,
-    ):  # fmt: skip
-        """Force [N], torque [N m] and rolling torque [N m] of touching candidate `c` on grain `g`; moves its history on."""
-        slot = first + c
-        pair = w * model.pair_count
-        own = int(0)
-        i = int(0)
-        if c < count:
-            own = hood.entry[slot] >> SPHERE_BITS
-        else:
-            own = (c - count) % model.sphere_count
-            i = w * model.wall_count + nth_wall(model, near, (c - count) // model.sphere_count)
-            slot = hood.first_wall + (g * model.wall_count + i - w * model.wall_count) * model.sphere_count + own
-            pair += model.wall[i].pair
-        a = pack.load_sphere(grains.spheres, g * model.sphere_count + own)
+        model: Model, world: World, grains: Grains, hood: Neighbours, w: int, g: int, slot: int, step: int
+    ):
+        """Force [N], torque [N m] and rolling torque [N m] of the touching entry in `slot`; moves its history on."""
+        entry = hood.entry[slot]
+        partner = entry & SPHERE_MASK
+        wall_base = model.grain_count * spheres_each
+        a = pack.load_sphere(grains.spheres, g * spheres_each + (entry >> SPHERE_BITS))
         radius = pack.last(a)
         effective_radius = pack.last(a)
         mass = pack.load_vec4(grains.velocity, g)[3]
         normal = vec3()
         overlap = real(0.0)
         partner_velocity = vec3()
-        if c < count:
-            partner = hood.entry[slot] & SPHERE_MASK
-            b = pack.load_sphere(grains.spheres, w * model.grain_count * model.sphere_count + partner)
+        pair = w * model.pair_count
+        if partner < wall_base:
+            b = pack.load_sphere(grains.spheres, w * wall_base + partner)
             d = pack.difference(a, b, world)
             distance = wp.length(d)
             normal = d / distance
             rb = pack.last(b)
             overlap = radius + rb - distance
-            j = w * model.grain_count + partner // model.sphere_count
+            effective_radius = radius * rb / (radius + rb)
+            j = w * model.grain_count + partner // spheres_each
             to_contact = normal * (rb - real(0.5) * overlap)
             partner_velocity = surface_velocity(grains, j, lever_of(grains, world, j, b, to_contact))
             mb = pack.load_vec4(grains.velocity, j)[3]
             mass = mass * mb / (mass + mb)
-            effective_radius = radius * rb / (radius + rb)
         else:
-            wall = model.wall[i]
-            overlap, normal = walls.wall_overlap(wall, pack.place(a, world), radius, step, world.time_step)
+            wall = model.wall[w * walls_each + partner - wall_base]
+            overlap, normal = walls.overlap_and_normal(
+                wall, pack.place(a, world), radius, step, world.time_step
+            )
             partner_velocity = walls.wall_velocity(wall, step)
+            pair += wall.pair
         lever = lever_of(grains, world, g, a, normal * (real(0.5) * overlap - radius))
         params = model.contact[pair]
         force, displacement, normal_force = contact_force(
@@ -151,4 +111,4 @@ def contact_functions(precision: Precision) -> SimpleNamespace:
         pack.store_vec4(hood.history, slot, pack.stamp(displacement, step + 1))
         return force, wp.cross(lever, force), rolling_torque(params.rolling_friction, normal_force, lever)
 
-    return SimpleNamespace(near_walls=near_walls, near_count=near_count, touches=touches, contact=contact)
+    return SimpleNamespace(touches=touches, contact=contact)

@@ -1,4 +1,6 @@
-"""Neighbour lists: every pair of spheres of two grains nearer than the skin, each pair in both grains' lists.
+"""Neighbour lists: every sphere of another grain, and every wall, nearer to a sphere than the skin.
+
+Two grains have each other in their lists. Walls are numbered after the spheres of their world.
 
 A list is sorted by the own sphere's number and then by the partner's, so its order, and with it the order of a grain's force
 sum, depends on the grains alone: not on cells, skin, moment of the rebuild, batch or device. The cells are the buckets of a
@@ -12,20 +14,26 @@ from types import SimpleNamespace
 import warp as wp
 
 from dem_warp.kernels.packing import packing
-from dem_warp.types import SPHERE_BITS, SPHERE_MASK, Precision, WorldFlag, device_structs
+from dem_warp.kernels.walls import wall_functions
+from dem_warp.types import SPHERE_BITS, Build, WorldFlag, device_structs
 
 NEVER = -1
+CELLS_AROUND = 27
 NEIGHBOUR_OVERFLOW = wp.constant(int(WorldFlag.NEIGHBOUR_OVERFLOW))
 
 
 @functools.cache
-def neighbour_kernels(precision: Precision) -> SimpleNamespace:
-    """`mark_stale`, `bin_spheres`, `open_buckets`, `fill_buckets`, `search`, `write_lists` and `finish`, in order of launch."""
+def neighbour_kernels(build: Build) -> SimpleNamespace:
+    """`mark_stale`, then in order of launch `bin_spheres`, `open_buckets`, `fill_buckets`, `search`, `write_lists`, `finish`."""
+    precision = build.precision
     real, vec4 = precision.real, precision.vec4
     types = device_structs(precision)
     Model, World, Grains, Neighbours = types.Model, types.World, types.Grains, types.Neighbours  # noqa: N806
     pack = packing(precision)
-    module = wp.get_module(f"dem_warp_neighbours_{precision.name}")
+    walls = wall_functions(precision)
+    spheres_each = wp.constant(build.sphere_count)
+    walls_each = wp.constant(build.wall_count)
+    module = wp.get_module(f"dem_warp_neighbours_{build.name}")
     wp.set_module_options({"enable_backward": False}, module)
 
     @wp.struct
@@ -37,6 +45,7 @@ def neighbour_kernels(precision: Precision) -> SimpleNamespace:
         bucket: wp.array(dtype=int)  # of a sphere, (spheres,)
         rank: wp.array(dtype=int)  # of a sphere in its bucket, (spheres,)
         order: wp.array(dtype=int)  # spheres by bucket, (spheres,)
+        ordered: wp.array(dtype=precision.sphere)  # their positions, (spheres,)
         found: wp.array(dtype=int)  # partners of a sphere, sorted, (spheres * found_capacity,)
         found_count: wp.array(dtype=int)  # (spheres,)
         found_capacity: int
@@ -45,7 +54,9 @@ def neighbour_kernels(precision: Precision) -> SimpleNamespace:
     def cell_of(a: precision.sphere, world: World) -> wp.vec3i:
         rate = world.cell_rate
         return wp.vec3i(
-            int(wp.floor(real(a[0]) * rate)), int(wp.floor(real(a[1]) * rate)), int(wp.floor(real(a[2]) * rate))
+            int(wp.floor(real(a[0]) * rate)),
+            int(wp.floor(real(a[1]) * rate)),
+            int(wp.floor(real(a[2]) * rate)),
         )
 
     @wp.func
@@ -73,16 +84,28 @@ def neighbour_kernels(precision: Precision) -> SimpleNamespace:
         stale: wp.array(dtype=int),
         any_stale: wp.array(dtype=int),
     ):
-        """Marks a world in which a grain may use up its half of the skin within the next `ahead` steps."""
+        """Marks a world in which a grain or a wall may use up its half of the skin within the next `ahead` steps."""
         g = wp.tid()
         w = g // model.grain_count
-        if idle[w] != 0 or alive[g] <= 0:
+        if idle[w] != 0:
             return
         world = model.world[w]
+        if g % model.grain_count == 0:
+            for i in range(walls_each):
+                wall = model.wall[w * walls_each + i]
+                steps = grains.step[w] + ahead - wp.max(wall.start_step, hood.rebuilt[w])
+                path = wp.length(wall.velocity) * wp.float64(steps) * wp.float64(world.time_step)
+                if wp.float64(2.0) * path > wp.float64(world.skin):
+                    stale[w] = 1
+                    any_stale[0] = 1
+        if alive[g] <= 0:
+            return
         v = pack.load_vec4(grains.velocity, g)
         omega = pack.load_vec4(grains.spin, g)
         speed = wp.length(wp.vec3(float(v[0]), float(v[1]), float(v[2])))
-        speed += wp.length(wp.vec3(float(omega[0]), float(omega[1]), float(omega[2]))) * float(model.inertia[g][3])
+        speed += wp.length(wp.vec3(float(omega[0]), float(omega[1]), float(omega[2]))) * float(
+            model.inertia[g][3]
+        )
         # a grain may be pushed on the way: allow for half as much again
         reach = hood.travel[g] + real(1.5 * speed) * real(ahead) * world.time_step
         if real(2.0) * reach > world.skin:
@@ -94,11 +117,11 @@ def neighbour_kernels(precision: Precision) -> SimpleNamespace:
         model: Model, grains: Grains, alive: wp.array(dtype=int), stale: wp.array(dtype=int), cells: Cells
     ):
         i = wp.tid()
-        g = i // model.sphere_count
+        g = i // spheres_each
         w = g // model.grain_count
         if stale[w] == 0:
             return
-        if not exists(model, alive, g, i - g * model.sphere_count):
+        if not exists(model, alive, g, i - g * spheres_each):
             cells.rank[i] = NEVER
             return
         c = cell_of(pack.load_sphere(grains.spheres, i), model.world[w])
@@ -110,28 +133,32 @@ def neighbour_kernels(precision: Precision) -> SimpleNamespace:
     def open_buckets(model: Model, stale: wp.array(dtype=int), cells: Cells):
         """Gives each occupied bucket its place; which place is a race, and nothing depends on it."""
         i = wp.tid()
-        w = i // (model.sphere_count * model.grain_count)
+        w = i // (spheres_each * model.grain_count)
         if stale[w] != 0 and cells.rank[i] == 0:
             b = cells.bucket[i]
             cells.bucket_start[b] = wp.atomic_add(cells.cursor, w, cells.bucket_size[b])
 
     @wp.kernel(module=module)
-    def fill_buckets(model: Model, stale: wp.array(dtype=int), cells: Cells):
+    def fill_buckets(model: Model, grains: Grains, stale: wp.array(dtype=int), cells: Cells):
         i = wp.tid()
-        w = i // (model.sphere_count * model.grain_count)
+        w = i // (spheres_each * model.grain_count)
         if stale[w] != 0 and cells.rank[i] >= 0:
-            first = w * model.sphere_count * model.grain_count
-            cells.order[first + cells.bucket_start[cells.bucket[i]] + cells.rank[i]] = i
+            first = w * spheres_each * model.grain_count
+            slot = first + cells.bucket_start[cells.bucket[i]] + cells.rank[i]
+            cells.order[slot] = i
+            pack.store_sphere(cells.ordered, slot, pack.load_sphere(grains.spheres, i))
 
     @wp.func
-    def insert(cells: Cells, i: int, count: int, partner: int):
-        """Puts `partner` into its place among the sorted partners of sphere `i`."""
-        k = int(count)
+    def sort_found(cells: Cells, i: int, count: int):
+        """Sorts the partners of sphere `i`, which are few, by insertion."""
         first = i * cells.found_capacity
-        while k > 0 and cells.found[first + k - 1] > partner:
-            cells.found[first + k] = cells.found[first + k - 1]
-            k -= 1
-        cells.found[first + k] = partner
+        for n in range(1, count):
+            partner = cells.found[first + n]
+            k = int(n)
+            while k > 0 and cells.found[first + k - 1] > partner:
+                cells.found[first + k] = cells.found[first + k - 1]
+                k -= 1
+            cells.found[first + k] = partner
 
     @wp.kernel(module=module)
     def search(
@@ -139,32 +166,40 @@ def neighbour_kernels(precision: Precision) -> SimpleNamespace:
     ):
         """Partners of each sphere; threads follow the buckets, so that neighbours read the same memory."""
         slot = wp.tid()
-        w = slot // (model.sphere_count * model.grain_count)
-        first = w * model.sphere_count * model.grain_count
+        w = slot // (spheres_each * model.grain_count)
+        first = w * spheres_each * model.grain_count
         if stale[w] == 0 or slot - first >= cells.cursor[w]:
             return
         i = cells.order[slot]
-        g = i // model.sphere_count
+        g = i // spheres_each
         world = model.world[w]
-        a = pack.load_sphere(grains.spheres, i)
-        radius = pack.last(a) + world.skin
+        a = pack.load_sphere(cells.ordered, slot)
+        reach = pack.last(a) + world.skin
         c = cell_of(a, world)
         count = int(0)
-        for dz in range(-1, 2):
-            for dy in range(-1, 2):
-                for dx in range(-1, 2):
-                    b = bucket_of(c[0] + dx, c[1] + dy, c[2] + dz, cells.bits, w)
-                    for k in range(cells.bucket_size[b]):
-                        j = cells.order[first + cells.bucket_start[b] + k]
-                        q = pack.load_sphere(grains.spheres, j)
-                        d = pack.difference(a, q, world)
-                        reach = radius + pack.last(q)
-                        if wp.dot(d, d) < reach * reach and j // model.sphere_count != g:
-                            if count < cells.found_capacity:
-                                insert(cells, i, count, j - first)
-                                count += 1
-                            else:
-                                wp.atomic_or(flags, w, NEIGHBOUR_OVERFLOW)
+        for n in range(CELLS_AROUND):
+            b = bucket_of(c[0] + n % 3 - 1, c[1] + (n // 3) % 3 - 1, c[2] + n // 9 - 1, cells.bits, w)
+            begin = first + cells.bucket_start[b]
+            for k in range(begin, begin + cells.bucket_size[b]):
+                q = pack.load_sphere(cells.ordered, k)
+                d = pack.difference(a, q, world)
+                touching = reach + pack.last(q)
+                if wp.dot(d, d) < touching * touching:
+                    j = cells.order[k]
+                    if j // spheres_each != g:
+                        if count < cells.found_capacity:
+                            cells.found[i * cells.found_capacity + count] = j - first
+                        count += 1
+        for k in range(walls_each):
+            wall = model.wall[w * walls_each + k]
+            if walls.overlaps(wall, pack.place(a, world), reach, grains.step[w], world.time_step):
+                if count < cells.found_capacity:
+                    cells.found[i * cells.found_capacity + count] = model.grain_count * spheres_each + k
+                count += 1
+        if count > cells.found_capacity:
+            wp.atomic_or(flags, w, NEIGHBOUR_OVERFLOW)
+            count = cells.found_capacity
+        sort_found(cells, i, count)
         cells.found_count[i] = count
 
     @wp.func
@@ -186,15 +221,17 @@ def neighbour_kernels(precision: Precision) -> SimpleNamespace:
     ):
         """A sphere's part of its grain's new list; histories come over from the old list, both being sorted."""
         i = wp.tid()
-        g = i // model.sphere_count
-        s = i - g * model.sphere_count
+        g = i // spheres_each
+        s = i - g * spheres_each
         w = g // model.grain_count
         if stale[w] == 0 or cells.rank[i] < 0:
             return
-        cells.bucket_size[cells.bucket[i]] = 0  # every sphere of the bucket writes the same: empty for the next time
+        cells.bucket_size[cells.bucket[i]] = (
+            0  # every sphere of the bucket writes the same: empty for the next time
+        )
         before = int(0)
         for k in range(s):
-            before += cells.found_count[g * model.sphere_count + k]
+            before += cells.found_count[g * spheres_each + k]
         own = cells.found_count[i]
         if before + own > hood.capacity:
             wp.atomic_or(flags, w, NEIGHBOUR_OVERFLOW)
@@ -221,12 +258,13 @@ def neighbour_kernels(precision: Precision) -> SimpleNamespace:
 
     @wp.kernel(module=module)
     def finish(
-        cells: Cells, hood: Neighbours, stale: wp.array(dtype=int), any_stale: wp.array(dtype=int),
+        grains: Grains, cells: Cells, hood: Neighbours, stale: wp.array(dtype=int), any_stale: wp.array(dtype=int),
         rebuilds: wp.array(dtype=int),
     ):  # fmt: skip
         w = wp.tid()
         if stale[w] != 0:
             hood.list[w] = 1 - hood.list[w]
+            hood.rebuilt[w] = grains.step[w]
             stale[w] = 0
             cells.cursor[w] = 0
             rebuilds[w] = rebuilds[w] + 1

@@ -156,6 +156,8 @@ def packing(precision: Precision) -> SimpleNamespace:
 
     functions.place = place
     short = precision.is_fixed_point
-    functions.load_sphere, functions.store_sphere = _memory_access(sphere, "int" if short else "", "wp::int32")
+    functions.load_sphere, functions.store_sphere = _memory_access(
+        sphere, "int" if short else "", "wp::int32"
+    )
     functions.load_vec4, functions.store_vec4 = _memory_access(vec4, "float" if short else "", "wp::float32")
     return functions

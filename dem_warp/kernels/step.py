@@ -5,11 +5,10 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from dem_warp.kernels.contacts import contact_functions
 from dem_warp.kernels.integration import integration_functions
 from dem_warp.kernels.packing import packing
 from dem_warp.kernels.summation import WARP, cooperative_sum, serial_sum
-from dem_warp.types import Precision, WorldFlag, device_structs
+from dem_warp.types import Build, WorldFlag, device_structs
 
 DIVERGED = wp.constant(int(WorldFlag.DIVERGED))
 LEAVING = -2  # a grain whose spheres have yet to be taken out of both copies of the state
@@ -17,19 +16,22 @@ LATE_REBUILD = wp.constant(int(WorldFlag.LATE_REBUILD))
 
 
 @functools.cache
-def step_kernels(precision: Precision, cooperative: bool) -> SimpleNamespace:
-    """`step`, `remove` and `place_spheres` in one precision, for a GPU warp (`cooperative`) or a single thread."""
+def step_kernels(build: Build) -> SimpleNamespace:
+    """`step`, `remove` and `place_spheres` of one build."""
+    precision = build.precision
     real, vec3, vec4, quat, sphere = (
         precision.real, precision.vec3, precision.vec4, precision.quat, precision.sphere,
     )  # fmt: skip
     types = device_structs(precision)
     Model, World, Grains, Neighbours = types.Model, types.World, types.Grains, types.Neighbours  # noqa: N806
     pack = packing(precision)
-    contacts = contact_functions(precision)
     motion = integration_functions(precision)
-    sum_contacts = (cooperative_sum if cooperative else serial_sum)(precision)
-    module = wp.get_module(f"dem_warp_step_{precision.name}_{'warp' if cooperative else 'serial'}")
-    wp.set_module_options({"fast_math": cooperative and precision.is_fixed_point, "enable_backward": False}, module)
+    sum_contacts = (cooperative_sum if build.cooperative else serial_sum)(build)
+    spheres_each = wp.constant(build.sphere_count)
+    module = wp.get_module(f"dem_warp_step_{build.name}")
+    wp.set_module_options(
+        {"fast_math": build.cooperative and precision.is_fixed_point, "enable_backward": False}, module
+    )
 
     @wp.func
     def spread_spheres(
@@ -39,19 +41,19 @@ def step_kernels(precision: Precision, cooperative: bool) -> SimpleNamespace:
         size = pack.last(center)
         shape = model.shape[g]
         for i in range(lane, model.shape_sphere_count[shape], lanes):
-            local = model.shape_spheres[shape * model.sphere_count + i] * size
+            local = model.shape_spheres[shape * spheres_each + i] * size
             offset = wp.quat_rotate(q, vec3(local[0], local[1], local[2]))
             pack.store_sphere(
-                out.spheres, g * model.sphere_count + i, pack.pack_offset(center, offset, local[3], world)
+                out.spheres, g * spheres_each + i, pack.pack_offset(center, offset, local[3], world)
             )
 
     @wp.func
     def clear_spheres(model: Model, out: Grains, g: int):
         """Takes a grain's spheres out: compared with a radius that is not a number, nothing touches."""
-        for i in range(model.sphere_count):
-            none = pack.load_sphere(out.spheres, g * model.sphere_count + i)
+        for i in range(spheres_each):
+            none = pack.load_sphere(out.spheres, g * spheres_each + i)
             none[3] = pack.no_radius()
-            pack.store_sphere(out.spheres, g * model.sphere_count + i, none)
+            pack.store_sphere(out.spheres, g * spheres_each + i, none)
 
     @wp.func
     def left_domain(world: World, position: wp.vec3d) -> bool:
@@ -123,7 +125,6 @@ def step_kernels(precision: Precision, cooperative: bool) -> SimpleNamespace:
         g = int(0)
         count = int(0)
         first = int(0)
-        near = int(0)
         step = int(0)
         moving = bool(False)
         if slot < slot_count:
@@ -138,13 +139,26 @@ def step_kernels(precision: Precision, cooperative: bool) -> SimpleNamespace:
             row = hood.list[w] * model.shape.shape[0] + g
             count = hood.count[row]
             first = row * hood.capacity
-            near = contacts.near_walls(model, w, grains_in.position[g], model.inertia[g][3], step, world.time_step)
         force, torque, rolling = sum_contacts(
-            model, world, grains_in, hood, w, g, count, first, near, step, thread & (WARP - 1), lane, lanes
+            model, world, grains_in, hood, w, g, count, first, step, thread & (WARP - 1), lane, lanes
         )
         if moving:
             move(
-                model, world, grains_in, grains_out, hood, alive, flags, w, g, step, force, torque, rolling, lane, lanes
+                model,
+                world,
+                grains_in,
+                grains_out,
+                hood,
+                alive,
+                flags,
+                w,
+                g,
+                step,
+                force,
+                torque,
+                rolling,
+                lane,
+                lanes,
             )
 
         elif slot < slot_count and alive[g] < 0 and lane == 0:

@@ -1,23 +1,30 @@
-"""Sum of a grain's contacts, in the order of its candidates, on one thread or by a warp of the GPU.
+"""Sum of a grain's contacts, in the order of its neighbour list, on one thread or by a warp of the GPU.
 
-A single thread walks through the candidates and evaluates those that touch. A GPU warp would leave most of its lanes idle
-that way, as about one candidate in four touches. So the warp first searches, each grain by its own few lanes, and queues
-what touches; then all lanes evaluate the queue, 32 contacts at once; then the grains' lanes add up, component by component,
-in the order of the candidates. Both ways, and any number of lanes, give the same float sum.
+A single thread walks through the list and evaluates what touches. A GPU warp would leave most of its lanes idle that way,
+as about one entry in four touches. So the warp first searches, each lane a stretch of its grain's list, and queues what
+touches; then all lanes evaluate the queue, 32 contacts at once; then the grains' lanes add up, component by component, in
+the order of the list. Both ways, and any number of lanes, add the same floats in the same order.
 """
 
 import functools
+from types import SimpleNamespace
 
 import warp as wp
 
 from dem_warp.kernels.contacts import contact_functions
-from dem_warp.types import Precision, device_structs
+from dem_warp.types import Build, device_structs
 
 WARP = 32
 BLOCK = 128
 MIN_LANES = 2
+STRETCH = 16
+"""Entries that a lane searches before the queue is emptied; a multiple of QUAD."""
+
+QUAD = 4
+"""List entries that a lane loads at once."""
+
 COMPONENTS = 7  # force, torque, rolling torque
-QUEUE = WARP * WARP // MIN_LANES  # a round of 32 candidates of every grain of the warp, all touching
+QUEUE = WARP * STRETCH  # every lane's stretch, all touching
 SUMS = COMPONENTS * WARP // MIN_LANES
 
 SHARED = """
@@ -42,12 +49,12 @@ def queue(index: int, value: int, write: bool) -> int: ...
 
 @wp.func_native("""
 #if defined(__CUDA_ARCH__)
-    return (int)__ballot_sync(0xffffffffu, value);
+    return __any_sync(0xffffffffu, value);
 #else
     return value;
 #endif
 """)
-def ballot(value: bool) -> int: ...
+def any_lane(value: bool) -> bool: ...
 
 
 @wp.func_native("""
@@ -62,6 +69,16 @@ def bit_count(bits: int) -> int: ...
 
 @wp.func_native("""
 #if defined(__CUDA_ARCH__)
+    return __ffs(bits) - 1;
+#else
+    return __builtin_ffs(bits) - 1;
+#endif
+""")
+def lowest_bit(bits: int) -> int: ...
+
+
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
     __syncwarp();
 #endif
 """)
@@ -71,14 +88,14 @@ def sync_warp(): ...
 @wp.func_native("""
 #if defined(__CUDA_ARCH__)
     int lane = threadIdx.x & 31;
-    for (int o = lanes; o < 32; o <<= 1) {
-        int before = __shfl_up_sync(0xffffffffu, count, o);
-        if (lane >= o) count += before;
+    for (int o = 1; o < 32; o <<= 1) {
+        int before = __shfl_up_sync(0xffffffffu, value, o);
+        if (lane >= o) value += before;
     }
 #endif
-    return count;
+    return value;
 """)
-def sum_before_and_own(count: int, lanes: int) -> int: ...
+def running_sum(value: int) -> int: ...
 
 
 @wp.func_native("""
@@ -91,33 +108,36 @@ def sum_before_and_own(count: int, lanes: int) -> int: ...
 def from_lane(value: int, lane: int) -> int: ...
 
 
-@wp.func_native("return (int)(~0u >> (32 - count));")
-def low_bits(count: int) -> int: ...
-
-
-@wp.func_native("return (int)((1u << bit) - 1u);")
-def bits_below(bit: int) -> int: ...
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
+    int4 t = reinterpret_cast<const int4*>(a.data + i)[0];
+    return wp::vec_t<4, wp::int32>(t.x, t.y, t.z, t.w);
+#else
+    return wp::vec_t<4, wp::int32>(a.data[i], a.data[i + 1], a.data[i + 2], a.data[i + 3]);
+#endif
+""")
+def load_quad(a: wp.array(dtype=int), i: int) -> wp.vec4i: ...
 
 
 @functools.cache
-def serial_sum(precision: Precision):
+def serial_sum(build: Build):
     """Function that sums a grain's contacts on one thread."""
-    real, vec3 = precision.real, precision.vec3
-    types = device_structs(precision)
+    real, vec3 = build.precision.real, build.precision.vec3
+    types = device_structs(build.precision)
     Model, World, Grains, Neighbours = types.Model, types.World, types.Grains, types.Neighbours  # noqa: N806
-    contacts = contact_functions(precision)
+    contacts = contact_functions(build)
 
     @wp.func
     def sum_contacts(
         model: Model, world: World, grains: Grains, hood: Neighbours, w: int, g: int, count: int, first: int,
-        near: int, step: int, thread: int, lane: int, lanes: int,
+        step: int, thread: int, lane: int, lanes: int,
     ):  # fmt: skip
         force = vec3()
         torque = vec3()
         rolling = real(0.0)
-        for c in range(count + contacts.near_count(model, near) * model.sphere_count):
-            if contacts.touches(model, world, grains, hood, w, g, c, count, first, near, step):
-                f, t, r = contacts.contact(model, world, grains, hood, w, g, c, count, first, near, step)
+        for slot in range(first, first + count):
+            if contacts.touches(model, world, grains, w, g, hood.entry[slot], step):
+                f, t, r = contacts.contact(model, world, grains, hood, w, g, slot, step)
                 force += f
                 torque += t
                 rolling += r
@@ -127,74 +147,108 @@ def serial_sum(precision: Precision):
 
 
 @functools.cache
-def cooperative_sum(precision: Precision):
-    """Function that sums the contacts of a warp's grains; every lane of the warp must call it."""
-    real, vec3 = precision.real, precision.vec3
-    types = device_structs(precision)
-    Model, World, Grains, Neighbours = types.Model, types.World, types.Grains, types.Neighbours  # noqa: N806
-    contacts = contact_functions(precision)
-    kind = "float" if precision.is_fixed_point else "double"
+def _totals(build: Build) -> SimpleNamespace:
+    """Results of 32 contacts and sums of the grains, in the shared memory of a warp."""
+    real, vec3 = build.precision.real, build.precision.vec3
+    kind = "float" if build.precision.is_fixed_point else "double"
 
-    @wp.func_native(_shared(kind, COMPONENTS * WARP))
+    @wp.func_native(_shared(kind, COMPONENTS * (WARP + 1)))
     def result(index: int, value: real, write: bool) -> real: ...
 
     @wp.func_native(_shared(kind, SUMS))
     def total(index: int, value: real, write: bool) -> real: ...
 
     @wp.func
-    def write_result(lane: int, f: vec3, t: vec3, r: real):
-        for i in range(3):
-            result(i * WARP + lane, f[i], True)
-            result((i + 3) * WARP + lane, t[i], True)
-        result(6 * WARP + lane, r, True)
+    def clear(group: int, lane: int, lanes: int):
+        for i in range(lane, COMPONENTS, lanes):
+            total(group * COMPONENTS + i, real(0.0), True)
 
     @wp.func
-    def add_results(group: int, lane: int, lanes: int, begin: int, end: int):
+    def write(thread: int, f: vec3, t: vec3, r: real):
+        for i in range(3):
+            result(i * (WARP + 1) + thread, f[i], True)
+            result((i + 3) * (WARP + 1) + thread, t[i], True)
+        result(6 * (WARP + 1) + thread, r, True)
+
+    @wp.func
+    def add(group: int, lane: int, lanes: int, begin: int, end: int):
         """Adds results `begin` to `end` to the group's sums, one component a lane, in order."""
         for i in range(lane, COMPONENTS, lanes):
             value = total(group * COMPONENTS + i, real(0.0), False)
             for k in range(begin, end):
-                value += result(i * WARP + k, real(0.0), False)
+                value += result(i * (WARP + 1) + k, real(0.0), False)
             total(group * COMPONENTS + i, value, True)
 
     @wp.func
-    def touching_bits(
-        model: Model, world: World, grains: Grains, hood: Neighbours, w: int, g: int, count: int, first: int,
-        near: int, step: int, begin: int, candidates: int, group: int, lane: int, lanes: int,
-    ) -> int:  # fmt: skip
-        """Which of the grain's 32 candidates from `begin` on touch, known to each of its lanes."""
+    def read(group: int, i: int) -> real:
+        return total(group * COMPONENTS + i, real(0.0), False)
+
+    return SimpleNamespace(clear=clear, write=write, add=add, read=read)
+
+
+@functools.cache
+def cooperative_sum(build: Build):
+    """Function that sums the contacts of a warp's grains; every lane of the warp must call it."""
+    vec3 = build.precision.vec3
+    types = device_structs(build.precision)
+    Model, World, Grains, Neighbours = types.Model, types.World, types.Grains, types.Neighbours  # noqa: N806
+    contacts = contact_functions(build)
+    totals = _totals(build)
+
+    @wp.func
+    def search(
+        model: Model,
+        world: World,
+        grains: Grains,
+        hood: Neighbours,
+        w: int,
+        g: int,
+        begin: int,
+        end: int,
+        step: int,
+    ) -> int:
+        """Bit set of the slots from `begin` to `end` that touch."""
         bits = int(0)
-        for offset in range(0, WARP, lanes):
-            c = begin + offset + lane
-            touching = bool(False)
-            if c < candidates:
-                touching = contacts.touches(model, world, grains, hood, w, g, c, count, first, near, step)
-            bits = bits | (((ballot(touching) >> (group * lanes)) & low_bits(lanes)) << offset)
+        for slot in range(begin, end, QUAD):
+            quad = load_quad(hood.entry, slot)
+            for k in range(QUAD):
+                if slot + k < end:
+                    if contacts.touches(model, world, grains, w, g, quad[k], step):
+                        bits = bits | (1 << (slot + k - begin))
         return bits
+
+    @wp.func
+    def enqueue(bits: int, position: int, item: int):
+        """Queues the items `item` + bit in order."""
+        left = int(bits)
+        at = int(position)
+        while left != 0:
+            queue(at, item + lowest_bit(left), True)
+            left = left & (left - 1)
+            at += 1
 
     @wp.func
     def sum_contacts(
         model: Model, world: World, grains: Grains, hood: Neighbours, w: int, g: int, count: int, first: int,
-        near: int, step: int, thread: int, lane: int, lanes: int,
+        step: int, thread: int, lane: int, lanes: int,
     ):  # fmt: skip
-        """`count` and `near` are 0 for a lane whose grain takes no part; w, g, count, first, near are those of its grain."""
-        groups = WARP // lanes
+        """`count` is 0 for a lane whose grain takes no part; `thread` is the lane's number in the warp."""
         group = thread // lanes
-        candidates = count + contacts.near_count(model, near) * model.sphere_count
-        for i in range(lane, COMPONENTS, lanes):
-            total(group * COMPONENTS + i, real(0.0), True)
+        stretch = wp.min((((count + QUAD - 1) // QUAD + lanes - 1) // lanes) * QUAD, STRETCH)
+        totals.clear(group, lane, lanes)
         begin = int(0)
-        while ballot(begin < candidates) != 0:
-            bits = touching_bits(
-                model, world, grains, hood, w, g, count, first, near, step, begin, candidates, group, lane, lanes
+        while any_lane(begin < count):
+            mine = wp.min(begin + lane * stretch, count)
+            bits = search(
+                model, world, grains, hood, w, g, first + mine, first + wp.min(mine + stretch, count), step
             )
-            own = bit_count(bits)
-            end = sum_before_and_own(own, lanes)
-            start = end - own
-            queued = from_lane(end, WARP - 1)
-            for b in range(lane, WARP, lanes):
-                if (bits >> b) & 1 == 1:
-                    queue(start + bit_count(bits & (bits_below(b))), (group << 16) | (begin + b), True)
+            begin += lanes * stretch
+            through = running_sum(bit_count(bits))
+            before = through - bit_count(bits)
+            enqueue(bits, before, (group << 16) | mine)
+            start = from_lane(before, group * lanes)
+            end = from_lane(through, group * lanes + lanes - 1)
+            queued = from_lane(through, WARP - 1)
             sync_warp()
             for batch in range(0, queued, WARP):
                 item = int(0)
@@ -203,29 +257,17 @@ def cooperative_sum(precision: Precision):
                 source = (item >> 16) * lanes
                 gi = from_lane(g, source)
                 wi = from_lane(w, source)
-                count_i = from_lane(count, source)
-                first_i = from_lane(first, source)
-                near_i = from_lane(near, source)
+                slot = from_lane(first, source) + (item & 0xFFFF)
                 step_i = from_lane(step, source)
                 if batch + thread < queued:
-                    f, t, r = contacts.contact(
-                        model, model.world[wi], grains, hood, wi, gi, item & 0xFFFF, count_i, first_i, near_i, step_i
-                    )
-                    write_result(thread, f, t, r)
+                    f, t, r = contacts.contact(model, model.world[wi], grains, hood, wi, gi, slot, step_i)
+                    totals.write(thread, f, t, r)
                 sync_warp()
-                add_results(
-                    group, lane, lanes, wp.max(start, batch) - batch, wp.min(end, batch + WARP) - batch
-                )
+                totals.add(group, lane, lanes, wp.max(start - batch, 0), wp.min(end - batch, WARP))
                 sync_warp()
-            begin += WARP
         sync_warp()
-        row = group * COMPONENTS
-        force = vec3(
-            total(row, real(0.0), False), total(row + 1, real(0.0), False), total(row + 2, real(0.0), False)
-        )
-        torque = vec3(
-            total(row + 3, real(0.0), False), total(row + 4, real(0.0), False), total(row + 5, real(0.0), False)
-        )
-        return force, torque, total(row + 6, real(0.0), False)
+        force = vec3(totals.read(group, 0), totals.read(group, 1), totals.read(group, 2))
+        torque = vec3(totals.read(group, 3), totals.read(group, 4), totals.read(group, 5))
+        return force, torque, totals.read(group, 6)
 
     return sum_contacts

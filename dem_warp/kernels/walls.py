@@ -13,7 +13,7 @@ TINY = 1.0e-12  # m; nearer than this to an axis or a surface no direction is de
 
 @functools.cache
 def wall_functions(precision: Precision) -> SimpleNamespace:
-    """`displacement`, `is_near` and `wall_overlap` in one precision.
+    """`overlaps`, `overlap_and_normal` and `wall_velocity` in one precision.
 
     Geometry is in float64: an overlap is 1e-3 to 1e-6 of the distances that it is the difference of.
     """
@@ -27,39 +27,60 @@ def wall_functions(precision: Precision) -> SimpleNamespace:
         return position - wall.point - wall.velocity * (wp.float64(steps) * wp.float64(time_step))
 
     @wp.func
-    def from_cylinder(wall: Wall, r: wp.vec3d) -> wp.vec3d:
-        """Vector from the nearest point of the cylinder's surface to `r` (relative to the centre of its lower rim)."""
-        along = wp.dot(r, wall.axis)
+    def from_rim(wall: Wall, r: wp.vec3d, along: wp.float64) -> wp.vec3d:
+        """Vector to `r` from the nearest point of the rims of a cylinder, beyond which `r` lies."""
         across = r - wall.axis * along
         distance = wp.max(wp.length(across), wp.float64(TINY))
         beyond = along - wp.clamp(along, wp.float64(0.0), wall.length)
         return across * ((distance - wall.radius) / distance) + wall.axis * beyond
 
     @wp.func
-    def is_near(wall: Wall, position: wp.vec3d, reach: real, step: int, time_step: real) -> bool:
-        """Whether a grain whose spheres lie within `reach` of its centre may touch the wall."""
+    def overlaps(wall: Wall, position: wp.vec3d, radius: real, step: int, time_step: real) -> bool:
+        """Whether a sphere touches the wall; away from a cylinder's rims without a root."""
         r = from_wall(wall, position, step, time_step)
+        reach = wp.float64(radius)
+        along = wp.dot(r, wall.axis)
         if wall.kind == CYLINDER:
-            return wp.length(from_cylinder(wall, r)) < wp.float64(reach)
-        return wp.dot(r, wall.axis) < wp.float64(reach)
+            if along < wp.float64(0.0) or along > wall.length:
+                d = from_rim(wall, r, along)
+                return wp.dot(d, d) < reach * reach
+            across2 = wp.dot(r, r) - along * along
+            inner = wall.radius - reach
+            outer = wall.radius + reach
+            return (inner < wp.float64(0.0) or across2 > inner * inner) and across2 < outer * outer
+        return along < reach
 
     @wp.func
-    def wall_overlap(wall: Wall, position: wp.vec3d, radius: real, step: int, time_step: real):
+    def rounded(v: wp.vec3d) -> vec3:
+        return vec3(real(v[0]), real(v[1]), real(v[2]))
+
+    @wp.func
+    def overlap_and_normal(wall: Wall, position: wp.vec3d, radius: real, step: int, time_step: real):
         """Overlap [m] (positive when touching) and unit normal from the wall to the sphere."""
         r = from_wall(wall, position, step, time_step)
-        distance = wp.dot(r, wall.axis)
-        normal = wall.axis
+        along = wp.dot(r, wall.axis)
+        distance = along
+        normal = rounded(wall.axis)
         if wall.kind == CYLINDER:
-            d = from_cylinder(wall, r)
-            distance = wp.max(wp.length(d), wp.float64(TINY))
-            normal = d / distance
-        return real(wp.float64(radius) - distance), vec3(real(normal[0]), real(normal[1]), real(normal[2]))
+            if along < wp.float64(0.0) or along > wall.length:
+                d = from_rim(wall, r, along)
+                distance = wp.max(wp.length(d), wp.float64(TINY))
+                normal = rounded(d) / real(distance)
+            else:
+                across = r - wall.axis * along
+                off_axis = wp.max(wp.length(across), wp.float64(TINY))
+                distance = wp.abs(off_axis - wall.radius)
+                outward = rounded(across) / real(off_axis)
+                normal = wp.where(off_axis > wall.radius, outward, -outward)
+        return real(wp.float64(radius) - distance), normal
 
     @wp.func
     def wall_velocity(wall: Wall, step: int) -> vec3:
         moving = real(0.0)
         if step >= wall.start_step:
             moving = real(1.0)
-        return vec3(real(wall.velocity[0]), real(wall.velocity[1]), real(wall.velocity[2])) * moving
+        return rounded(wall.velocity) * moving
 
-    return SimpleNamespace(is_near=is_near, wall_overlap=wall_overlap, wall_velocity=wall_velocity)
+    return SimpleNamespace(
+        overlaps=overlaps, overlap_and_normal=overlap_and_normal, wall_velocity=wall_velocity
+    )

@@ -43,7 +43,11 @@ def contact_force(
     stiffness = hertz_stiffness(params.modulus, radius, overlap)
     normal_velocity = wp.dot(velocity, normal)
     normal_force = damped_hertz(
-        stiffness, overlap, params.damping * wp.sqrt(stiffness * mass), normal_velocity, params.clamp_attraction
+        stiffness,
+        overlap,
+        params.damping * wp.sqrt(stiffness * mass),
+        normal_velocity,
+        params.clamp_attraction,
     )
     tangential_velocity = velocity - normal * normal_velocity
     displacement = advance_displacement(displacement, normal, tangential_velocity, time_step)

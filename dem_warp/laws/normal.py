@@ -15,7 +15,9 @@ def hertz_stiffness(modulus: Any, radius: Any, overlap: Any):
 
 
 @wp.func
-def damped_hertz(stiffness: Any, overlap: Any, damping_rate: Any, normal_velocity: Any, clamp_attraction: Any):
+def damped_hertz(
+    stiffness: Any, overlap: Any, damping_rate: Any, normal_velocity: Any, clamp_attraction: Any
+):
     """Normal force (4/3) E* sqrt(R*) d^(3/2) - c v_n [N], with c = 2 sqrt(5/6) |beta| sqrt(S_n m*).
 
     `normal_velocity` is the separation speed. Near the end of an impact the damping exceeds the spring and attracts;

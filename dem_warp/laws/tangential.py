@@ -21,7 +21,9 @@ def advance_displacement(displacement: Any, normal: Any, tangential_velocity: An
 
 
 @wp.func
-def coulomb_spring(displacement: Any, stiffness: Any, damping_rate: Any, tangential_velocity: Any, limit: Any):
+def coulomb_spring(
+    displacement: Any, stiffness: Any, damping_rate: Any, tangential_velocity: Any, limit: Any
+):
     """Tangential force [N] and displacement [m] under the Coulomb limit |F_t| <= mu F_n.
 
     The spring slides when it alone passes the limit; then its displacement shrinks to what the limit holds and the

@@ -61,7 +61,15 @@ class LiftedCylinder:
     duration: float | None = None
 
     def __post_init__(self) -> None:
-        for name in ("diameter", "height", "lift_speed", "rain_rate", "rain_speed", "rest_speed", "rest_time"):
+        for name in (
+            "diameter",
+            "height",
+            "lift_speed",
+            "rain_rate",
+            "rain_speed",
+            "rest_speed",
+            "rest_time",
+        ):
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0):
                 raise ValueError(f"LiftedCylinder.{name}: must be positive and finite, got {value!r}")
@@ -234,7 +242,9 @@ class Controller:
         full = self.scene.grain_count is None and np.count_nonzero(free & above & slow) >= HEAPED
         last = self.setup.grains.release_steps.max() * self.setup.time_step
         if view.time > last + self.FILL_MARGIN:
-            return Decision(done=True, failure=f"the filling did not end within {self.FILL_MARGIN:g} s of the rain")
+            return Decision(
+                done=True, failure=f"the filling did not end within {self.FILL_MARGIN:g} s of the rain"
+            )
         if not (full or (rained_out and self._rests(view))):
             return Decision()
         self._enter("settle", view)
@@ -244,7 +254,9 @@ class Controller:
 
     def _settle(self, view: "WorldView") -> Decision:
         if view.time - self._phase_start > self.SETTLE_LIMIT:
-            return Decision(done=True, failure=f"the filled tube did not come to rest within {self.SETTLE_LIMIT:g} s")
+            return Decision(
+                done=True, failure=f"the filled tube did not come to rest within {self.SETTLE_LIMIT:g} s"
+            )
         if not self._rests(view):
             return Decision()
         above = view.alive & (view.positions[:, 2] > self.scene.height)
@@ -256,7 +268,11 @@ class Controller:
 
     def _measure_fill(self, view: "WorldView", kept: np.ndarray) -> None:
         positions = view.positions[kept]
-        volume = float((self.setup.masses[: len(kept)] / self.setup.grains.densities)[kept[: self.setup.grains.count]].sum())
+        volume = float(
+            (self.setup.masses[: len(kept)] / self.setup.grains.densities)[
+                kept[: self.setup.grains.count]
+            ].sum()
+        )
         level = bed_level(positions, self.scene.diameter / 2, self.case.grains.shape.bounding_radius)
         self.observables["grain_count"] = float(np.count_nonzero(kept))
         self.observables["fill_height"] = level
@@ -278,14 +294,18 @@ class Controller:
             inside = np.count_nonzero(positions[:, 2] > rise)
             return Decision(done=True, failure=f"the tube is clogged: {inside} grains rose with it")
         if elapsed > self.scene.height / self.scene.lift_speed + self.LIFT_MARGIN:
-            return Decision(done=True, failure=f"the heap did not come to rest within {elapsed:.1f} s of the lift")
+            return Decision(
+                done=True, failure=f"the heap did not come to rest within {elapsed:.1f} s of the lift"
+            )
         return Decision()
 
     def _finish(self, view: "WorldView", elapsed: float) -> None:
         rested = elapsed if self._slow_since is None else self._slow_since - self._phase_start
         self.observables["time_to_rest"] = float(rested)
         self.observables["simulated_time"] = view.time
-        self.observables["grains_lost"] = self.observables["grain_count"] - float(np.count_nonzero(view.alive))
+        self.observables["grains_lost"] = self.observables["grain_count"] - float(
+            np.count_nonzero(view.alive)
+        )
         self._enter("rest", view)
 
 
