@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pandas as pd
 import plotly.graph_objects as go
@@ -120,7 +122,7 @@ def verification_chart(result: VerificationResult) -> Chart:
     """Draw the interval of the difference from the target between the equivalence margins."""
     comparison, margin = result.comparison, result.margin
     low, high = comparison.interval
-    deviations = result.angles - comparison.b.mean
+    deviations = result.angles - (comparison.a.mean - comparison.difference)
     figure = new_figure("heaps less target [°]")
     figure.add_vrect(x0=-margin, x1=margin, fillcolor=GREEN, opacity=0.13, line_width=0, layer="below")
     figure.add_vline(x=0.0, line={"color": GREEN, "width": 2})
@@ -152,7 +154,11 @@ def _critical_values(screen: ScreenResult, alpha: float) -> dict[str, float]:
 
 def _add_effects(figure: go.Figure, points: pd.DataFrame, name: str, symbol: str, color: str) -> None:
     """Draw effects; those that matter carry their names, the others tell them under the pointer."""
-    written = {"mode": "markers+text", "textposition": "middle left", "textfont": {"color": color}}
+    written: dict[str, Any] = {
+        "mode": "markers+text",
+        "textposition": "middle left",
+        "textfont": {"color": color},
+    }
     add_points(
         figure,
         points["quantile"],

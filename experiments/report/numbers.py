@@ -62,7 +62,7 @@ def p_value(value: float | None) -> str:
 
 def shortest_decimals(values: Iterable[float], tolerance: float = COLUMN_TOLERANCE) -> int:
     """Count the decimals that a column needs: rounding stays below `tolerance` of its largest value."""
-    numbers = np.array([value for value in values if value is not None and math.isfinite(value)], dtype=float)
+    numbers = np.array([value for value in values if math.isfinite(value)], dtype=np.float64)
     if not numbers.size or not numbers.any():
         return 0
     allowed = tolerance * np.abs(numbers).max()
@@ -82,7 +82,7 @@ def _as_column(values: list[float | None]) -> list[str]:
 
 
 def _sums(values: list[float | None]) -> list[str]:
-    """Four significant digits at the column's median size, six at its largest; the same decimals in all rows."""
+    """Four significant digits at the column's median size, six at its largest; the same decimals in all."""
     sizes = [abs(value) for value in values if value is not None and math.isfinite(value) and value != 0.0]
     if not sizes:
         return [fixed(value, 0) for value in values]
@@ -119,7 +119,8 @@ def plain(value: Any) -> str:
         case int() | np.integer():
             return str(value).replace("-", "−")
         case float() | np.floating():
-            return trimmed(float(value), 5 if abs(value) >= 1e3 else 4)
+            number = float(value)
+            return trimmed(number, 5 if abs(number) >= 1e3 else 4)
         case Mapping():
             return ", ".join(f"{name} {plain(item)}" for name, item in value.items()) or MISSING
         case list() | tuple() | np.ndarray():
@@ -138,6 +139,12 @@ def prose(text: str) -> str:
     return re.sub(r"(?<![\w.])-(?=\d)", "−", re.sub(r" deg\b", "°", text))
 
 
+def enumeration(names: Iterable[str]) -> str:
+    """Write names as "B", "B and E" or "B, E and F"."""
+    *first, last = names
+    return f"{', '.join(first)} and {last}" if first else last
+
+
 def interval(ends: Iterable[float], decimals: int = 2) -> str:
     """Write an interval as "[low, high]"."""
     return f"[{', '.join(fixed(end, decimals) for end in ends)}]"
@@ -152,13 +159,11 @@ def term(name: str) -> Markup:
 
 def equation(coefficients: Mapping[str, float], digits: int = 5) -> Markup:
     """Typeset a fitted polynomial as a right-hand side, each coefficient with so many significant digits."""
-    parts = []
+    parts: list[Markup] = []
     for name, value in coefficients.items():
-        size = escape(significant(abs(value), digits))
-        body = size if name == "intercept" else Markup("{}&thinsp;<i>{}</i>").format(size, term(name))
-        sign = "−" if value < 0.0 else "+"
-        if not parts:
-            parts.append(Markup("{}{}").format(sign.strip("+"), body))
-        else:
-            parts.append(Markup("{}&nbsp;{}").format(sign, body))
+        sign = "−" if value < 0.0 else "+" if parts else ""
+        gap = Markup("&nbsp;") if parts else ""
+        size = significant(abs(value), digits)
+        factors = "" if name == "intercept" else Markup("&thinsp;<i>{}</i>").format(term(name))
+        parts.append(Markup('<span class="term">{}{}{}{}</span>').format(sign, gap, size, factors))
     return Markup(" ").join(parts)

@@ -129,6 +129,7 @@ def _environment() -> jinja2.Environment:
         "plain": numbers.plain,
         "named_number": numbers.named_number,
         "prose": numbers.prose,
+        "enumeration": numbers.enumeration,
         "equation": numbers.equation,
         "term": numbers.term,
     }

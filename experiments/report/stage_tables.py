@@ -115,6 +115,8 @@ def effects_table(
         *PAPER_TEST,
     ]
     note = f"Marked: p < {alpha:g}. The effect is the change of the mean angle from low to high."
+    if published is not None:
+        note += " The paper's columns are recomputed from its printed runs."
     return make_table("effects", frame, columns, "Effects of the factors.", note, _p_marks(frame["p"], alpha))
 
 
@@ -284,7 +286,7 @@ def tests_table(result: VerificationResult, published: Published | None) -> Tabl
     """Lay out the tests of the difference from the target, the paper's heaps beside them."""
     tests = {"this campaign": result.comparison}
     if published is not None:
-        tests["the paper's heaps"] = compare_means(published.heaps, published.measured, result.margin)
+        tests["the paper"] = compare_means(published.heaps, published.measured, result.margin)
     rows = [
         {
             "heaps": name,

@@ -60,7 +60,7 @@ class _Slice:
         """Where the factors that are not shown are held, as a sentence."""
         held = [factor for factor in self.surface.design.factors if factor.name not in (self.x, self.y)]
         values = ", ".join(f"{f.name} = {self.point[f.name]:.4g} {f.unit}".rstrip() for f in held)
-        return f" Held: {values}." if values else ""
+        return f" Held: {values} (points with other values are projected)." if values else ""
 
 
 def surface_charts(result: SurfaceResult, optimum: OptimumResult | None, target: TargetResult) -> list[Chart]:
@@ -72,10 +72,9 @@ def surface_charts(result: SurfaceResult, optimum: OptimumResult | None, target:
     if len(design.names) == 1:
         return [_curve_chart(result, optimum, target)]
     point = optimum.point if optimum else result.center
-    slices = [_Slice(result.reduced, x, y, point) for x, y in itertools.combinations(design.names, 2)]
-    return [_relief_chart(slices[0], result, optimum, target)] + [
-        _contour_chart(plane, result, optimum, target) for plane in slices
-    ]
+    planes = [_Slice(result.reduced, x, y, point) for x, y in itertools.combinations(design.names, 2)]
+    contours = [_contour_chart(plane, result, optimum, target) for plane in planes]
+    return [_relief_chart(_strongest(planes), result, optimum, target), *contours]
 
 
 def residual_charts(surface: Surface) -> list[Chart]:
@@ -104,6 +103,12 @@ def residual_charts(surface: Surface) -> list[Chart]:
     figure.add_scatter(x=line, y=line, mode="lines", line={"color": MUTED, "dash": "dot"}, hoverinfo="skip")
     _add_runs(figure, surface.response, fitted)
     return [*charts, Chart("residual-actual", "Fitted against simulated angles.", figure)]
+
+
+def _strongest(planes: list[_Slice]) -> _Slice:
+    """Return the plane along the two factors with the largest coded slopes."""
+    slopes = planes[0].surface.coded_coefficients.abs()
+    return max(planes, key=lambda plane: slopes.get(plane.x, 0.0) + slopes.get(plane.y, 0.0))
 
 
 def _relief_chart(
@@ -136,7 +141,7 @@ def _relief_chart(
             "xaxis": axis | {"title": {"text": grid.x_factor.label}},
             "yaxis": axis | {"title": {"text": grid.y_factor.label}},
             "zaxis": axis | {"title": {"text": "angle [°]"}},
-            "camera": {"eye": {"x": -1.6, "y": -1.75, "z": 0.9}, "center": {"x": 0.0, "y": 0.0, "z": -0.12}},
+            "camera": {"eye": {"x": -1.75, "y": -1.9, "z": 1.0}, "center": {"x": 0.0, "y": 0.0, "z": -0.12}},
             "dragmode": "turntable",
         },
         margin={"l": 0, "r": 0, "t": 36, "b": 0},

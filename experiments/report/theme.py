@@ -64,7 +64,14 @@ def new_figure(x: str = "", y: str = "", legend: bool = True) -> go.Figure:
         plot_bgcolor="#ffffff",
         margin={"l": 56, "r": 18, "t": 36 if legend else 14, "b": 48},
         showlegend=legend,
-        legend={"orientation": "h", "x": 0.0, "y": 1.0, "xanchor": "left", "yanchor": "bottom"},
+        legend={
+            "orientation": "h",
+            "x": 0.0,
+            "y": 1.0,
+            "xanchor": "left",
+            "yanchor": "bottom",
+            "itemsizing": "constant",
+        },
         dragmode=False,  # a finger that scrolls the page must not zoom the chart
         xaxis=axis | {"title": {"text": x, "standoff": 8}},
         yaxis=axis | {"title": {"text": y, "standoff": 8}},
