@@ -1,0 +1,1 @@
+"""The paper's buckwheat: its study file, its published numbers, and its campaign as short scripts."""

@@ -1,0 +1,74 @@
+"""The buckwheat scripts, on an engine whose angle is a known plane of the two friction values."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from dem_warp import Case, CaseResult
+from experiments import execute
+from experiments.studies.buckwheat import climb, screening, surface, verification
+
+TARGET = 30.148
+SCATTER = 0.1
+
+
+def plane(case: Case) -> float:
+    """Repose angle [degrees]: the target at the paper's fourth step, and a scatter by seed."""
+    e, f = case.grain_grain.static_friction, case.grain_wall.static_friction
+    return TARGET + 15.0 * (e - 0.48) + 25.0 * (f - 0.45) + SCATTER * math.sin(12.9898 * case.seed)
+
+
+@pytest.fixture(autouse=True)
+def _plane_engine(cone: Callable[..., CaseResult], monkeypatch: pytest.MonkeyPatch) -> None:
+    heap = cone()
+
+    def simulate(
+        cases: Sequence[Case], *, on_result: Callable[[int, CaseResult], None], **_: Any
+    ) -> list[CaseResult]:
+        results = [replace(heap, observables={"truth": plane(case)}) for case in cases]
+        for index, result in enumerate(results):
+            on_result(index, result)
+        return results
+
+    def measure(_: object, result: CaseResult) -> SimpleNamespace:
+        return SimpleNamespace(mean=result.observables["truth"], se=0.1)
+
+    monkeypatch.setattr(execute, "simulate", simulate)
+    monkeypatch.setattr(execute, "measure_heap", measure)
+
+
+def test_screening_keeps_the_two_that_matter(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    screening.main("bench", tmp_path)
+    kept = capsys.readouterr().out.splitlines()[-1]
+    assert {"E", "F"} <= set(kept.removeprefix("kept: ").split(", "))
+    assert (tmp_path / "screening-bench.csv").is_file()
+
+
+def test_the_climb_ends_at_the_fourth_point(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    climb.main("bench", TARGET, tmp_path)
+    assert capsys.readouterr().out.splitlines()[-1] == "nearest to the target: point 4"
+
+
+def test_the_surface_leads_back_to_its_center(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    surface.main("bench", TARGET, out=tmp_path)
+    lines = capsys.readouterr().out.splitlines()
+    found = {line.split()[0]: float(line.split()[1]) for line in lines[-2:]}
+    # The scatter moves the fitted mean by less than itself, so the contour by less than that over the slopes.
+    assert found["E"] == pytest.approx(0.48, abs=SCATTER / 15.0)
+    assert found["F"] == pytest.approx(0.45, abs=SCATTER / 25.0)
+
+
+def test_verification_states_the_smallest_margin(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    verification.main("bench", TARGET, out=tmp_path)
+    lines = capsys.readouterr().out.splitlines()
+    margin = float(lines[-1].split("margin of ")[1].split()[0])
+    # Pooled on 8 degrees of freedom (t = 1.86): with heaps of sd 0 to 0.1 the difference's standard error
+    # lies between 0.518 / sqrt 2 * sqrt(2/5) = 0.232 and 0.236; the difference is at most 0.07 + 0.1.
+    assert 1.86 * 0.23 < margin < 1.86 * 0.24 + 0.17
