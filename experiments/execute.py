@@ -133,10 +133,10 @@ def _simulate_missing(
     progress: Callable[[Progress], None] | None,
 ) -> dict[str, Future[dict[str, Any]]]:
     """Simulate what the store lacks, in one call; save each result as it finishes, and measure it."""
-    for key in cases:
+    missing = [key for key in cases if not store.has(key)]
+    for key in missing:
         if damage := store.damage(key):
             _log.warning("%s; it is simulated again", damage)
-    missing = [key for key in cases if not store.has(key)]
     outcomes: dict[str, Future[dict[str, Any]]] = {}
 
     def keep(index: int, result: CaseResult) -> None:

@@ -1,0 +1,124 @@
+"""A whole calibration in a folder: what it leaves there, and how it goes on after an interruption."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pandas as pd
+import pytest
+
+from dem_warp import Case, CaseResult
+from experiments import execute, run
+from experiments.calibrate import Campaign, Outcome
+from experiments.run import run_campaign
+from experiments.study import Study, load_study
+
+SLOPE = 30.0
+"""Degrees that a unit of friction adds; the target of 30 is met at a friction of 0.5."""
+
+
+class Engine:
+    """Stands in for the simulator: counts its cases, and stops dead after as many as it is told."""
+
+    def __init__(self, heap: CaseResult) -> None:
+        self.heap = heap
+        self.seeds: list[int] = []
+        self.stop_after: float = math.inf
+
+    def __call__(
+        self, cases: Sequence[Case], *, on_result: Callable[[int, CaseResult], None], **_: Any
+    ) -> list[CaseResult]:
+        for index, case in enumerate(cases):
+            if len(self.seeds) >= self.stop_after:
+                raise KeyboardInterrupt
+            self.seeds.append(case.seed)
+            angle = 15.0 + SLOPE * case.grain_grain.static_friction + 0.3 * math.sin(12.9898 * case.seed)
+            on_result(index, replace(self.heap, observables={"truth": angle}))
+        return []
+
+
+@pytest.fixture
+def engine(cone: Callable[..., CaseResult], monkeypatch: pytest.MonkeyPatch) -> Engine:
+    engine = Engine(cone())
+    monkeypatch.setattr(execute, "simulate", engine)
+    monkeypatch.setattr(
+        execute, "measure_heap", lambda _, result: SimpleNamespace(mean=result.observables["truth"], se=0.1)
+    )
+    monkeypatch.setattr(run, "heap_pictures", lambda *_: [])
+    return engine
+
+
+@pytest.fixture
+def study(write_study: Callable[..., Path]) -> Study:
+    """Load the small study with more replicates, so that the plane of one factor is calibrated."""
+    return load_study(write_study(add="[campaign.noise_floor]\nreplicates = 5\n"))
+
+
+def same_findings(a: Campaign, b: Campaign) -> bool:
+    return json.dumps(a.to_dict(), sort_keys=True) == json.dumps(b.to_dict(), sort_keys=True)
+
+
+def test_a_campaign_leaves_its_report_results_and_tables(
+    study: Study, engine: Engine, tmp_path: Path
+) -> None:
+    folder = tmp_path / "out"
+    stages: list[str] = []
+    campaign = run_campaign(study, folder, on_stage=lambda name, _: stages.append(name))
+    assert campaign.outcome == Outcome.CALIBRATED
+    assert campaign.optimum is not None
+    # The fit of a line to heaps that scatter by 0.2 degrees.
+    assert campaign.optimum.point["E"] == pytest.approx(0.5, abs=0.3 / SLOPE)
+    assert stages[0] == "target"
+    assert stages[-1] == "verification"
+    assert {"report.html", "results.json", "study.json", "tables", "cases"} == {
+        p.name for p in folder.iterdir()
+    }
+    results = json.loads((folder / "results.json").read_text(encoding="utf-8"))
+    assert results["campaign"]["outcome"] == "calibrated"
+    assert len(list((folder / "cases").iterdir())) == len(engine.seeds) == len(campaign.cases)
+
+
+@pytest.mark.parametrize("stop_after", [0, 1, 7, 20, 30])
+def test_an_interrupted_campaign_goes_on_and_repeats_nothing(
+    study: Study, engine: Engine, tmp_path: Path, stop_after: int
+) -> None:
+    whole = run_campaign(study, tmp_path / "whole")
+    total, engine.seeds = len(engine.seeds), []
+    engine.stop_after = stop_after
+    with pytest.raises(KeyboardInterrupt):
+        run_campaign(study, tmp_path / "cut")
+    engine.stop_after = math.inf
+    resumed = run_campaign(study, tmp_path / "cut", resume=True)
+    assert same_findings(resumed, whole)
+    assert len(engine.seeds) == total
+    assert len(set(engine.seeds)) == total
+
+
+def test_a_finished_campaign_is_reported_again_without_a_case(
+    study: Study, engine: Engine, tmp_path: Path
+) -> None:
+    first = run_campaign(study, tmp_path / "out")
+    count = len(engine.seeds)
+    assert same_findings(run_campaign(study, tmp_path / "out", resume=True), first)
+    assert len(engine.seeds) == count
+
+
+def test_another_replicate_simulates_only_that(
+    write_study: Callable[..., Path], engine: Engine, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    five = load_study(write_study(add="[campaign.noise_floor]\nreplicates = 5\n"))
+    first = run_campaign(five, tmp_path / "out")
+    count = len(engine.seeds)
+    six = load_study(write_study(add="[campaign.noise_floor]\nreplicates = 6\n"))
+    second = run_campaign(six, tmp_path / "out", resume=True)
+    assert "study.campaign.noise_floor.replicates: 5 -> 6" in caplog.text
+    assert first.noise_floor is not None
+    assert second.noise_floor is not None
+    pd.testing.assert_frame_equal(second.noise_floor.cases.iloc[:5], first.noise_floor.cases)
+    assert len(engine.seeds) == count + 1
