@@ -11,6 +11,7 @@ import numpy as np
 import warp as wp
 
 from dem_warp.case import Case
+from dem_warp.device import resolve_device
 from dem_warp.processes import run_in_processes
 from dem_warp.scenes.lifted_cylinder import Controller, Decision
 from dem_warp.solver import CHUNK, Solver
@@ -145,25 +146,6 @@ def simulate(
     for members in _batches(cases, one_each=name == "cpu"):
         Batch([cases[i] for i in members], name, members, len(cases)).run(keep, on_progress)
     return [result for result in results if result is not None]
-
-
-def resolve_device(device: str | None) -> str:
-    """Name of the device to run on: as asked, or the GPU if there is one.
-
-    Raises
-    ------
-    ValueError
-        If the device is not there.
-    """
-    wp.config.quiet = True
-    wp.init()
-    known = [str(d) for d in wp.get_devices()]
-    if device is None:
-        return "cuda:0" if wp.is_cuda_available() else "cpu"
-    name = "cuda:0" if device == "cuda" else device
-    if name not in known:
-        raise ValueError(f"device: must be one of {known}, got {device!r}")
-    return name
 
 
 def _batches(cases: Sequence[Case], one_each: bool) -> list[list[int]]:
