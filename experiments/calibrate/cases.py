@@ -136,8 +136,9 @@ def failure_summary(cases: pd.DataFrame) -> str:
 
 def too_many_failed(cases: pd.DataFrame, stage: str, need: str) -> StageEnd:
     """Return the end of a campaign whose stage cannot be analysed."""
+    failures = failure_summary(cases) or "no case failed"
     reason = (
-        f"{failure_summary(cases)} in stage {stage}, which {need}: see the reasons in the table of cases, "
-        "then widen the time limit or narrow the factors' ranges"
+        f"The stage {stage.replace('_', ' ')} {need}; {failures}. See the reasons in the table of cases, "
+        "then widen the time limit or narrow the factors' ranges."
     )
     return StageEnd(Outcome.TOO_MANY_FAILED_RUNS, reason)

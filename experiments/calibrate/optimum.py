@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
+import pandas as pd
 
-from doe import Region, Sample, Surface, TargetError
+from doe import Region, Sample, Surface, TargetError, compare_means
 from experiments.calibrate.cases import StageEnd, middle
 from experiments.calibrate.results import (
     Decision,
@@ -123,18 +125,20 @@ def _check_truth(
         distance = None
     else:
         distance = float(np.linalg.norm(_coded(fit, dict(nearest)) - coded))
-    predicted = float(fit.predict(values)["mean"].iloc[0])
-    if far > reach:
-        return TruthCheck(values, False, None, distance, predicted)
-    region = fit.compatible_region(target, alpha=1.0 - confidence, extent=reach)
-    return TruthCheck(values, True, _belongs(region, coded), distance, predicted)
+    predicted = fit.predict(values).iloc[0]
+    inside = far <= reach
+    compatible = _agrees(fit, predicted, target, confidence) if inside else None
+    return TruthCheck(values, inside, compatible, distance, float(predicted["mean"]))
 
 
-def _belongs(region: Region, coded: np.ndarray) -> bool:
-    """Whether the region's cell that holds a coded point belongs to it (the last factor varies fastest)."""
-    position = (coded + region.extent) / (2.0 * region.extent) * region.resolution
-    cell = np.clip(position.astype(int), 0, region.resolution - 1)
-    return bool(region.mask[np.ravel_multi_index(tuple(cell), (region.resolution,) * len(cell))])
+def _agrees(fit: Surface, predicted: pd.Series, target: Sample, confidence: float) -> bool:
+    """Whether the fit at one point and the target agree: the compatible region's rule, without its grid.
+
+    The rule is Welch's test of two means whose standard errors are the fit's and the target's.
+    """
+    count = int(fit.residual_df) + 1
+    at_point = Sample(predicted["mean"], predicted["se"] * math.sqrt(count), count)
+    return not compare_means(at_point, target, method="welch", alpha=1.0 - confidence).different
 
 
 def _region_decision(settings: OptimumSettings, region: Region, unidentified: tuple[str, ...]) -> Decision:

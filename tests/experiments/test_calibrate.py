@@ -286,6 +286,7 @@ def test_heaps_that_change_at_the_optimum_are_not_verified() -> None:
     campaign = calibrate(AnalyticStudy(), heaps)
     assert campaign.outcome is Outcome.NOT_VERIFIED
     assert campaign.verification.comparison.different
+    assert not campaign.verification.verified
 
 
 def test_equivalence_can_be_required() -> None:

@@ -6,18 +6,29 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from doe import Factor
+from doe import Design, Factor
 from experiments.calibrate import TwinTarget, calibrate, case_seed
 from experiments.calibrate.cases import plan_cases, response_table
+from experiments.calibrate.climb import _Line
 from experiments.calibrate.results import STAGES
-from experiments.calibrate.screening import screening_design
-from experiments.calibrate.settings import ScreeningSettings
+from experiments.calibrate.screening import analyse_screening, screening_design
+from experiments.calibrate.settings import ScreeningSettings, SeedSettings
 from experiments.calibrate.surface import fit_inside
+from experiments.calibrate.target import plan_target
 from experiments.study import load_study
 
 
 def factors(count: int) -> list[Factor]:
     return [Factor(f"x{number}", 0.0, 1.0) for number in range(count)]
+
+
+def slope_of(factor: Factor) -> tuple[Design, pd.DataFrame]:
+    """Return a screening design of one factor and finished cases whose angle rises with it."""
+    design = screening_design([factor], ScreeningSettings())
+    noise = np.linspace(-0.1, 0.1, len(design.coded)) ** 2
+    angle = 20.0 + 3.0 * design.coded[factor.name] + noise
+    cases = {"run": design.coded.index, "replicate": 1, "status": "finished", "angle": angle}
+    return design, pd.DataFrame(cases).reset_index(drop=True)
 
 
 def test_seeds_are_pinned() -> None:
@@ -65,6 +76,37 @@ def test_a_response_has_a_place_for_every_case_and_nothing_where_it_failed() -> 
 )
 def test_a_screening_has_as_few_runs_as_leave_the_dummies(count: int, chosen: dict, runs: int) -> None:
     assert len(screening_design(factors(count), ScreeningSettings(**chosen)).coded) == runs
+
+
+def test_a_screening_without_dummies_and_replicates_uses_lenths_error() -> None:
+    design = screening_design(factors(7), ScreeningSettings(runs=8))
+    angle = 20.0 + 3.0 * design.coded["x0"] + np.linspace(0.0, 0.1, 8) ** 2
+    cases = pd.DataFrame({"run": design.coded.index, "replicate": 1, "status": "finished", "angle": angle})
+    result = analyse_screening(design, cases.reset_index(drop=True))
+    assert result.screen.error_rule == "lenth"
+    assert result.screen.table["rank"].idxmin() == "x0"
+    assert "Lenth" in result.decisions[0].rule
+
+
+def test_a_twins_target_does_not_depend_on_the_campaigns_seed() -> None:
+    twin = TwinTarget(truth={"x0": 0.3})
+    first, other, moved = (
+        plan_target(factors(2), twin, SeedSettings(campaign=campaign, target=target))["seed"].tolist()
+        for campaign, target in ((1, 2), (3, 2), (1, 4))
+    )
+    assert first == other
+    assert not set(first) & set(moved)
+
+
+def test_a_climb_clipped_at_zero_is_not_rounded_below_it() -> None:
+    # With these levels, coding zero and back gives -5.6e-17.
+    factor = Factor("F", 0.2, 0.6)
+    assert factor.to_natural(factor.to_coded(0.0)) < 0.0
+    screening = analyse_screening(*slope_of(factor))
+    start, step = {"F": 0.1}, {"F": 0.2}
+    line = _Line(screening.screen, ("F",), start, step, {"F": (0.0, 1.0)})
+    assert line.walk(start, 2, descend=True)["F"].tolist() == pytest.approx([0.1, 0.0])
+    assert line.walk(start, 2, descend=True)["F"].min() == 0.0
 
 
 @pytest.mark.parametrize(

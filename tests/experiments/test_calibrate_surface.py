@@ -1,0 +1,126 @@
+"""The composite design and the optimum on a plane whose contours are straight lines."""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from doe import Factor, Sample
+from experiments.calibrate import CampaignSettings, ClimbEnd, MeasuredTarget, Outcome
+from experiments.calibrate.cases import StageEnd
+from experiments.calibrate.optimum import find_optimum
+from experiments.calibrate.results import ClimbResult, SurfaceResult, TargetResult
+from experiments.calibrate.surface import explore_surface, require_slope
+
+CENTER = {"E": 1.0, "F": 1.0}
+HALF_RANGE = 0.4
+"""Half-range of both factors: least share (0.4) of a screening half-range of 1, above the climb's step."""
+NOISE = 0.01
+"""Standard deviation of a heap [deg]; every slope and offset below is far larger."""
+
+
+@dataclass(frozen=True)
+class PlaneStudy:
+    campaign: CampaignSettings = field(default_factory=CampaignSettings)
+    factors: tuple[Factor, ...] = (Factor("E", 0.0, 2.0), Factor("F", 0.0, 2.0))
+    target: MeasuredTarget = field(default_factory=lambda: MeasuredTarget(mean=20.0, sd=NOISE, n=5))
+    limits: dict[str, tuple[float, float]] = field(
+        default_factory=lambda: dict.fromkeys("EF", (-math.inf, math.inf))
+    )
+
+
+def explored(slope: float, step: float = 0.1, campaign: CampaignSettings | None = None) -> SurfaceResult:
+    """Explore a plane: 20 deg at the centre, ``slope`` deg for a coded unit of either factor."""
+
+    def heaps(table: pd.DataFrame) -> pd.DataFrame:
+        noise = [np.random.default_rng(seed).normal(0.0, NOISE) for seed in table["seed"]]
+        angle = 20.0 + slope * (table["E"] + table["F"] - 2.0) / HALF_RANGE + noise
+        return table.assign(status="finished", reason="", angle=angle)
+
+    path = pd.DataFrame(CENTER, index=[1])
+    step_by_name = dict.fromkeys(CENTER, step)
+    climb = ClimbResult(
+        pd.DataFrame(), ("E", "F"), path, step_by_name, ClimbEnd.CROSSED, CENTER, 1.0, 1, decisions=()
+    )
+    return explore_surface(PlaneStudy(campaign or CampaignSettings()), climb, heaps)
+
+
+def aim(mean: float, truth: dict[str, float] | None = None) -> TargetResult:
+    return TargetResult(Sample(mean, NOISE, 5), truth, None, ())
+
+
+def at_coded(e: float, f: float) -> dict[str, float]:
+    return {"E": 1.0 + HALF_RANGE * e, "F": 1.0 + HALF_RANGE * f}
+
+
+@pytest.mark.parametrize(("step", "half_range"), [(0.1, 0.4), (-0.1, 0.4), (0.7, 0.7), (-0.7, 0.7)])
+def test_a_half_range_is_a_climb_step_but_not_too_short(step: float, half_range: float) -> None:
+    assert explored(3.0, step).half_range == pytest.approx({"E": half_range, "F": half_range})
+
+
+# The line E + F = s in coded units lies s / sqrt(2) from the centre, nearest at (s / 2, s / 2). The axial
+# points reach sqrt(2), the runs' circle too: s = 2 passes through the corner of the two-level part.
+@pytest.mark.parametrize(("line", "extent"), [(0.0, 1.0), (1.0, 1.0), (-1.9, 1.0)])
+def test_the_nearest_point_of_a_line(line: float, extent: float) -> None:
+    optimum = find_optimum(PlaneStudy(), explored(3.0), aim(20.0 + 3.0 * line))
+    # Standard error of the fit in coded units: below NOISE / slope; ten of them.
+    assert optimum.point == pytest.approx(at_coded(line / 2, line / 2), abs=10 * NOISE / 3.0 * HALF_RANGE)
+    assert optimum.extent == extent
+
+
+def test_a_contour_beyond_the_runs_is_no_optimum_although_the_box_reaches_it() -> None:
+    # s = 2.4 is 1.70 from the centre, outside the circle of the runs, inside the box of the axial points.
+    with pytest.raises(StageEnd, match="beyond the design's runs") as end:
+        find_optimum(PlaneStudy(), explored(3.0), aim(20.0 + 3.0 * 2.4))
+    assert end.value.outcome is Outcome.NO_CONTOUR
+
+
+@pytest.mark.parametrize(
+    ("truth", "inside", "compatible"),
+    [
+        ((0.0, 0.0), True, True),
+        ((-1.2, 1.2), True, True),
+        ((0.5, 0.5), True, False),
+        ((-1.5, 1.5), False, None),
+    ],
+)
+def test_where_a_hidden_truth_lies(truth: tuple[float, float], inside: bool, compatible: bool | None) -> None:
+    check = find_optimum(PlaneStudy(), explored(3.0), aim(20.0, at_coded(*truth))).truth
+    assert (check.inside_design, check.compatible) == (inside, compatible)
+    # Distance of a point to the line E + F = 0; the line itself is known to ten standard errors.
+    assert check.distance == pytest.approx(abs(sum(truth)) / math.sqrt(2.0), abs=10 * NOISE / 3.0)
+
+
+def test_a_truth_is_judged_as_the_cells_of_the_region_are() -> None:
+    surface = explored(0.02)
+    region = find_optimum(PlaneStudy(), surface, aim(20.0)).region
+    cells = np.linspace(0, len(region.mask) - 1, 15).astype(int)
+    truths = [{str(n): float(v) for n, v in region.natural.iloc[cell].items()} for cell in cells]
+    judged = [find_optimum(PlaneStudy(), surface, aim(20.0, truth)).truth.compatible for truth in truths]
+    assert judged == region.mask[cells].tolist()
+    assert {True, False} == set(judged)
+
+
+def test_a_region_of_higher_confidence_is_wider() -> None:
+    surface = explored(0.05)
+    half, most = (
+        find_optimum(
+            PlaneStudy(CampaignSettings.model_validate({"optimum": {"confidence": confidence}})),
+            surface,
+            aim(20.0),
+        ).region.fraction
+        for confidence in (0.50, 0.95)
+    )
+    assert half < most
+
+
+def test_a_surface_without_slope_is_a_plateau() -> None:
+    strict = CampaignSettings.model_validate({"surface": {"reduce_alpha": 1e-6}})
+    surface = explored(0.0, campaign=strict)
+    assert surface.reduced.terms == ()
+    with pytest.raises(StageEnd) as end:
+        require_slope(surface)
+    assert end.value.outcome is Outcome.PLATEAU
+    require_slope(explored(3.0))
