@@ -1,4 +1,4 @@
-"""How much every pixel differs from the background: evens out light, colour and polarity before the threshold."""
+"""How much every pixel differs from its background: evens out light, colour and polarity."""
 
 from __future__ import annotations
 
@@ -10,13 +10,15 @@ from imaging.errors import PictureError
 from imaging.geometry import FloatArray, Picture
 
 BLUR = 0.5
-"""Standard deviation [pixels] of the horizontal smoothing: along a flat outline, so that it does not lower it."""
+"""Standard deviation [pixels] of the smoothing, horizontal so that it does not lower a flat outline."""
 BORDER_SHARE = 0.08
 """Part of the width and height, at the top and the upper sides, that starts the background fit."""
 FIT_SAMPLES = 20_000
 """Pixels that the background surface is fitted to."""
 FIT_ROUNDS = 4
-"""Rounds of the fit, first of a plane, then of the quadratic; each takes the pixels that the last one explained."""
+"""Rounds of the fit, of a plane and then of the quadratic; each takes the pixels that the last explained."""
+ROBUST_ROUNDS = 15
+"""Rounds of reweighting of the first plane, on the border alone."""
 SEPARATION = 5.0
 """A heap differs from the background by this many times the background's noise, on average, at the least."""
 LEAST_NOISE = 1.0
@@ -26,10 +28,11 @@ LEAST_NOISE = 1.0
 def contrast_with_background(picture: Picture, place: str) -> tuple[FloatArray, list[float]]:
     """Distance of each pixel's colour from the background's, and where to cut it, most likely first.
 
-    The background is a quadratic surface in each colour channel, fitted from the border inwards to whatever looks
-    like it, so that uneven light and a coloured cloth drop out, and a heap may be darker or lighter than what is
-    behind it. The first threshold is Otsu's (IEEE Trans. SMC 9, 1979); where a plate stands out far more than the
-    heap it may cut between those two, so the second splits what is below the first once more.
+    The background is a quadratic surface in each colour channel, fitted from the border inwards to whatever
+    looks like it, so that uneven light and a coloured cloth drop out, and a heap may be darker or lighter
+    than what is behind it. The first threshold is Otsu's (IEEE Trans. SMC 9, 1979); where a plate stands
+    out far more than the heap it may cut between those two, so the second splits what is below the first
+    once more.
 
     Parameters
     ----------
@@ -68,7 +71,7 @@ def contrast_with_background(picture: Picture, place: str) -> tuple[FloatArray, 
 
 
 def otsu_threshold(values: FloatArray) -> float:
-    """Value that best splits `values` in two classes: the largest variance between the classes (Otsu 1979)."""
+    """Value that splits `values` in two classes with the largest variance between them (Otsu 1979)."""
     low, high = float(values.min()), float(values.max())
     counts, edges = np.histogram(values, bins=512, range=(low, max(high, low + 1e-9)))
     weight = np.cumsum(counts) / counts.sum()
@@ -92,22 +95,35 @@ def _channels(picture: Picture, place: str) -> NDArray[np.float32]:
 
 
 def _background(channels: FloatArray) -> tuple[FloatArray, float]:
-    """Quadratic surface (rows, columns, channels) through the background's pixels, and their median distance to it."""
+    """Quadratic surface through the background's pixels, and their median distance from it."""
     rows, columns, _ = channels.shape
     stride = max(1, int(np.sqrt(rows * columns / FIT_SAMPLES)))
     row, column = (axis.ravel() for axis in np.mgrid[0:rows:stride, 0:columns:stride])
     sample = channels[row, column]
     terms = _surface_terms(row, column, (rows, columns))
     side = (column < BORDER_SHARE * columns) | (column >= (1.0 - BORDER_SHARE) * columns)
-    chosen = (row < BORDER_SHARE * rows) | ((row < 0.5 * rows) & side)
-    for size in (1, *[3] * FIT_ROUNDS, *[6] * FIT_ROUNDS):
+    border = (row < BORDER_SHARE * rows) | ((row < 0.5 * rows) & side)
+    surface = _robust_plane(terms[border, :3], sample[border])
+    residual = np.linalg.norm(sample - terms[:, :3] @ surface, axis=1)
+    noise = float(np.median(residual[border]))
+    for size in (*[3] * FIT_ROUNDS, *[6] * FIT_ROUNDS):
+        chosen = residual <= max(4.0 * noise, 2.0 * LEAST_NOISE)
         surface = np.linalg.lstsq(terms[chosen, :size], sample[chosen], rcond=None)[0]
         residual = np.linalg.norm(sample - terms[:, :size] @ surface, axis=1)
         noise = float(np.median(residual[chosen]))
-        chosen = residual <= max(4.0 * noise, 2.0 * LEAST_NOISE)
     grid = np.mgrid[0:rows, 0:columns]
     fitted = _surface_terms(grid[0].ravel(), grid[1].ravel(), (rows, columns)) @ surface
     return fitted.reshape(channels.shape), noise
+
+
+def _robust_plane(terms: FloatArray, sample: FloatArray) -> FloatArray:
+    """Plane with the least sum of distances, by reweighting: a heap at the border hardly moves it."""
+    weight = np.ones(len(sample))
+    for _ in range(ROBUST_ROUNDS):
+        root = np.sqrt(weight)[:, None]
+        plane = np.linalg.lstsq(root * terms, root * sample, rcond=None)[0]
+        weight = 1.0 / np.maximum(np.linalg.norm(sample - terms @ plane, axis=1), LEAST_NOISE)
+    return np.asarray(plane)
 
 
 def _surface_terms(row: NDArray[np.intp], column: NDArray[np.intp], shape: tuple[int, int]) -> FloatArray:

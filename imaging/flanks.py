@@ -1,4 +1,4 @@
-"""Lines on the flanks of an outline: where a flank begins and ends, which part is fitted, and how well it is known."""
+"""Lines on the flanks of an outline: where a flank begins and ends, and how well its slope is known."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ TOE_ROUNDS = 10
 
 @dataclass(frozen=True)
 class FitSettings:
-    """Which part of a flank the line is fitted to; angles measured with different settings are not comparable.
+    """Which part of a flank the line is fitted to: angles with different settings are not comparable.
 
     Attributes
     ----------
@@ -31,9 +31,9 @@ class FitSettings:
     lower, upper : float
         Part of the heap's height that the fit covers, 0 to 1.
     toe : float
-        A flank begins where its line is this many times higher than the outline is rough (root mean square about
-        the line). Lower down lie single grains that rolled away, and gaps between them that the plate cuts off.
-        On a smooth flank this leaves nothing out.
+        A flank begins where its line is this many times higher than the outline is rough (root mean square
+        about the line). Lower down lie single grains that rolled away, and gaps between them that the plate
+        cuts off. On a smooth flank this leaves nothing out.
     """
 
     name: str
@@ -71,7 +71,7 @@ FITS = {
 
 @dataclass(frozen=True)
 class FlankLine:
-    """Line fitted to one flank: height = `intercept` + `slope` * position, in pixels along and over the plate.
+    """Line fitted to one flank: height = `intercept` + `slope` * position, in pixels of the outline.
 
     Attributes
     ----------
@@ -81,8 +81,8 @@ class FlankLine:
     start, stop : float
         Positions between which the line was fitted [pixels].
     dof : float
-        Independent pieces of outline less the line's two parameters: the outline of grains is correlated over about
-        a grain, so this is far less than the number of columns.
+        Independent pieces of outline less the line's two parameters: the outline of grains is correlated
+        over about a grain, so this is far less than the number of columns.
     rms : float
         Root mean square of the outline about the line [pixels].
     """
@@ -112,8 +112,8 @@ def fit_flanks(outline: Outline, settings: FitSettings, place: str) -> tuple[Fla
 def apex_column(x: FloatArray, h: FloatArray) -> int:
     """First column of the right flank: the corner of the roof, two lines that meet, of least squared error.
 
-    The lines meet, so that the roughness of grains cannot choose a split that suits each flank alone (which would
-    flatten both). The roof over every column near the top is fitted at once, from running sums.
+    The lines meet, so that the roughness of grains cannot choose a split that suits each flank alone (which
+    would flatten both). The roof over every column near the top is fitted at once, from running sums.
     """
     high = np.flatnonzero(h >= APEX_ZONE * h.max())
     first = max(int(high[0]), MINIMUM_FLANK_COLUMNS)
@@ -178,7 +178,7 @@ def _line(x: FloatArray, h: FloatArray) -> tuple[float, float, FloatArray]:
 
 
 def _base_column(x: FloatArray, h: FloatArray, toe: float) -> int:
-    """First column of a flank that rises to the right: where its line is `toe` times as high as it is rough."""
+    """First column of a rising flank: where its line is `toe` times as high as the outline is rough."""
     base = 0
     for _ in range(TOE_ROUNDS):
         slope, intercept, residual = _line(x[base:], h[base:])

@@ -1,4 +1,4 @@
-"""What heaps as arrays and pictures of them share: checked spheres, the camera's directions, the picture's frame."""
+"""What heaps and pictures of them share: checked spheres, the camera's directions, the picture's frame."""
 
 from __future__ import annotations
 
@@ -11,12 +11,14 @@ from imaging.errors import PictureError
 
 FloatArray = NDArray[np.float64]
 Picture = NDArray[np.uint8]
-"""A picture as OpenCV holds it: (rows, columns) grey or (rows, columns, 3) blue-green-red, row 0 at the top."""
+"""A picture as OpenCV holds it: (rows, columns) grey or (rows, columns, 3) blue-green-red, top row first."""
 
 CORE_FRACTION = 0.98
 """Share of the spheres whose distance from the axis sets the scale of a picture; the rest may be strays."""
 CORE_MARGIN = 1.1
-"""The heap is taken to end at this multiple of the core's radius (a cone's 98 % lie within 0.92 of its base)."""
+"""The heap ends at about this multiple of the core's radius: 98 % of a cone lie within 0.92 of its base."""
+TALLEST = 20.0
+"""Height of what a picture shows, in heap radii: a filled tube is some 6."""
 FIELD_OF_VIEW = 2.0
 """A picture reaches at most this multiple of the heap's radius; spheres that flew further are not drawn."""
 
@@ -57,7 +59,8 @@ class Spheres:
     def seen_from(self, azimuth: float) -> FloatArray:
         """Centres in the camera's frame (n, 3): right, away from the camera, up [m].
 
-        At azimuth 0 the picture's right is +x and the camera looks along +y; azimuth + pi gives the mirror image.
+        At azimuth 0 the picture's right is +x and the camera looks along +y; azimuth + pi gives the mirror
+        image.
         """
         cosine, sine = np.cos(azimuth), np.sin(azimuth)
         x, y, z = self.centers.T
@@ -97,10 +100,9 @@ class Frame:
         half_width = min(float(reach.max()), FIELD_OF_VIEW * heap_radius) * (1.0 + margin)
         kept = reach <= half_width
         top = float((spheres.centers[:, 2] + spheres.radii)[kept].max())
-        if top <= 0:
-            raise PictureError(
-                "the heap stands above the plate z = 0", f"highest point {top:.4g} m", "centers"
-            )
+        if not 0.0 < top <= TALLEST * heap_radius:
+            rule = f"the heap rises above the plate z = 0, by at most {TALLEST:g} of its radii"
+            raise PictureError(rule, f"{top:.4g} m at a radius of {heap_radius:.4g} m", "centers")
         return cls(
             axis=(float(middle[0]), float(middle[1])),
             half_width=half_width,

@@ -26,8 +26,8 @@ class HeapAngle:
     Attributes
     ----------
     mean, se : float
-        Mean over the views and its standard error [degrees], as an estimate of what these grains give: the scatter
-        between heaps of the same grains, other seeds, that this heap's own roughness lets expect.
+        Mean over the views and its standard error [degrees], as an estimate of what these grains give: the
+        scatter between heaps of the same grains, other seeds, that this heap's own roughness lets expect.
     dof : float
         Degrees of freedom of `se`.
     views : tuple of ReposeAngle
@@ -123,9 +123,9 @@ def _directions(azimuths: int | Sequence[float]) -> FloatArray:
 def _heap_error(views: Sequence[ReposeAngle]) -> tuple[float, float]:
     """Standard error of the mean of views of one heap, and its degrees of freedom.
 
-    All views share the apex and much of the flanks, so that their scatter alone understates the error. What they
-    share is what the fits' own variance V holds beyond the variance W between the n views; hence the mean's is
-    (V - W) + W / n, or W / n where that is larger. The degrees of freedom are Satterthwaite's,
+    All views share the apex and much of the flanks, so that their scatter alone understates the error. What
+    they share is what the fits' own variance V holds beyond the variance W between the n views; hence the
+    mean's is (V - W) + W / n, or W / n where that is larger. The degrees of freedom are Satterthwaite's,
     for a difference of variances.
     """
     count = len(views)

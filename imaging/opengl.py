@@ -102,7 +102,7 @@ def _aim(plotter: pyvista.Plotter, frame: Frame) -> None:
     plotter.camera.focal_point = (0.0, 0.0, middle)
     plotter.camera.position = (0.0, -distance, middle)
     plotter.camera.up = (0.0, 0.0, 1.0)
-    plotter.enable_parallel_projection()
+    plotter.camera.parallel_projection = True
     plotter.camera.parallel_scale = 0.5 * rows * frame.meters_per_pixel
     plotter.camera.clipping_range = (0.5 * distance, 1.5 * distance)
 
@@ -114,15 +114,16 @@ def _sphere_mesh(spheres: Spheres, colors: FloatArray, azimuth: float) -> pyvist
     unit, triangles = _hemisphere()
     count = len(spheres.radii)
     points = spheres.seen_from(azimuth)[:, None] + spheres.radii[:, None, None] * unit
-    corners = triangles + len(unit) * np.arange(count)[:, None, None]
-    mesh = pyvista.PolyData.from_regular_faces(points.reshape(-1, 3), corners.reshape(-1, 3))
+    corners = (triangles + len(unit) * np.arange(count)[:, None, None]).reshape(-1, 3)
+    faces = np.column_stack([np.full(len(corners), 3), corners])
+    mesh = pyvista.PolyData(points.reshape(-1, 3), faces=faces.ravel())
     mesh.point_data.active_normals = np.tile(unit / np.linalg.norm(unit, axis=1, keepdims=True), (count, 1))
     mesh["color"] = np.repeat(np.rint(colors[:, ::-1]).astype(np.uint8), len(unit), axis=0)
     return mesh
 
 
 def _hemisphere() -> tuple[FloatArray, NDArray[np.int64]]:
-    """Points and triangles of the half sphere towards -y; its rim is a polygon with the area of the circle."""
+    """Points and triangles of the half sphere towards -y; its rim is a polygon of the circle's area."""
     step = 2.0 * np.pi / SECTORS
     rim = np.sqrt(step / np.sin(step))
     tilt, turn = np.meshgrid(

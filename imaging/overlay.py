@@ -1,4 +1,4 @@
-"""Draws a measurement on its picture: the plate, both fitted lines, where they were fitted, and their angles."""
+"""Draws a measurement on its picture: the plate, the outline, both fitted lines and their angles."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ SUBPIXEL_BITS = 5
 def overlay(picture: Picture | Snapshot, angle: ReposeAngle) -> Picture:
     """Draw a measured angle on a copy of its picture, blue-green-red.
 
-    The outline (blue) is drawn where the lines (red) were fitted to it; the lines go on thinly to the plate and to
-    each other. A `Snapshot` must have the scale of the one that was measured.
+    The outline (blue) is drawn where the lines (red) were fitted to it; the lines go on thinly to the plate
+    and to each other. A `Snapshot` must have the scale of the one that was measured.
     """
     image = _same_scale(picture, angle).image if isinstance(picture, Snapshot) else picture
     canvas: Picture = np.repeat(image[:, :, None], 3, axis=2) if image.ndim == 2 else image.copy()
-    unit = max(canvas.shape[1] / REFERENCE_WIDTH, 0.5)
+    unit = max(canvas.shape[1] / REFERENCE_WIDTH, 0.75)
     outline = angle.outline
     ends = np.array([outline.position[0], outline.position[-1]])
     _stroke(canvas, _on_picture(angle, ends, np.zeros(2)), PLATE_COLOR, unit)
@@ -82,12 +82,12 @@ def _stroke(canvas: Picture, points: FloatArray, color: tuple[int, int, int], wi
 
 
 def _label(canvas: Picture, anchor: FloatArray, degrees: float, aside: float, unit: float) -> None:
-    """Write an angle beside the middle of its line (`aside` -1: to the left of it), in letters with a halo."""
+    """Write an angle beside its line (`aside` -1: to the left, 1: to the right), in letters with a halo."""
     text, size, weight = f"{degrees:.1f}", 0.8 * unit, max(1, round(1.6 * unit))
     (width, height), _ = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, size, weight)
     ring = 0.16 * height
     full = width + 4.0 * ring
-    corner = anchor + [aside * (0.5 * full + 1.2 * height) - 0.5 * full, -0.8 * height]
+    corner = anchor + np.array([aside * (0.5 * full + 1.2 * height) - 0.5 * full, -0.8 * height])
     room = np.array([canvas.shape[1] - full, canvas.shape[0]]) - 0.5 * height
     corner = np.clip(corner, [0.5 * height, 1.5 * height], np.maximum(room, 0.0))
     origin = (round(corner[0]), round(corner[1]))

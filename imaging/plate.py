@@ -15,7 +15,7 @@ END_SHARE = 0.05
 END_TOLERANCE = 1.0
 """A plate's edge is straight within this many pixels."""
 MINIMUM_PLATE_THICKNESS = 3.0
-"""A plate beside the heap is seen at least this thick [pixels]; a thinner end is a toe of the heap, or a thin line."""
+"""A plate beside the heap is seen at least this thick [pixels]; a thinner end is a toe of the heap."""
 THICK_SHARE = 0.4
 """The underside is taken from columns at least this thick, as a share of the thickest."""
 UNDERSIDE_ROUNDS = 5
@@ -55,9 +55,9 @@ class PlateLine:
 def find_plate(top: FloatArray, bottom: FloatArray, place: str) -> PlateLine:
     """Find the plate from the upper and lower edge of what stands out of the background.
 
-    Where a plate stands out together with the heap, the outermost parts of the upper edge lie on one line, the
-    plate. Otherwise the lower edge of the heap is taken, under its thicker columns: those of its toes are faint,
-    or end on the round undersides of single grains.
+    Where a plate stands out together with the heap, the outermost parts of the upper edge lie on one line,
+    the plate. Otherwise the lower edge of the heap is taken, under its thicker columns: those of its toes
+    are faint, or end on the round undersides of single grains.
 
     Parameters
     ----------

@@ -55,8 +55,8 @@ def coverage(spheres: Spheres, frame: Frame, azimuth: float) -> Picture:
 def shaded(spheres: Spheres, colors: FloatArray, frame: Frame, azimuth: float) -> Picture:
     """Lit spheres, seen as in `coverage`: (rows, columns, 4) blue-green-red and opacity.
 
-    Lambert's cosine law, and the depth buffer's unsharp mask (Luft et al., ACM Trans. Graphics 25, 2006) to darken
-    what lies behind its neighbours.
+    Lambert's cosine law, and the depth buffer's unsharp mask (Luft et al., ACM Trans. Graphics 25, 2006) to
+    darken what lies behind its neighbours.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def shaded(spheres: Spheres, colors: FloatArray, frame: Frame, azimuth: float) -
 def _depth_buffer(
     spheres: Spheres, frame: Frame, azimuth: float
 ) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
-    """Nearest sphere of every fine pixel (-1: none), its normal (rows, columns, 3) and distance [fine pixels].
+    """Nearest sphere of every fine pixel (-1: none), its normal and its distance [fine pixels].
 
     The normal is in the camera's frame: right, away, up.
     """

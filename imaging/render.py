@@ -83,8 +83,8 @@ def snapshot(
 ) -> Snapshot:
     """Draw a shaded picture of a heap on its plate, to look at.
 
-    Its frame is that of `silhouette`, so that lines measured on one can be drawn on the other. The parameters are
-    those of `silhouette`, and
+    Its frame is that of `silhouette`, so that lines measured on one can be drawn on the other. The
+    parameters are those of `silhouette`, and
 
     grains : (n,) array, optional
         Grain of each sphere; grains then differ a little in shade.

@@ -22,9 +22,11 @@ class HeapShape:
     width : float
         From end to end on the plate.
     r50, r90 : float
-        Radius that holds 50 and 90 % of the volume of the outline turned about the apex (the mean of both flanks).
+        Radius that holds 50 and 90 % of the volume of the outline turned about the apex (the mean of both
+        flanks).
     concavity : float
-        1 - area / (width * height / 2): 0 for straight flanks, positive for hollow, negative for bulging ones.
+        1 - area / (width * height / 2): 0 for straight flanks, positive for hollow, negative for bulging
+        ones.
     asymmetry : float
         (area right of the apex - area left of it) / area, -1 to 1.
     """

@@ -19,8 +19,8 @@ from imaging.plate import PlateLine, find_plate
 
 MINIMUM_HEAP_WIDTH = 16
 """A narrower heap [pixels] is not measured."""
-MINIMUM_HEAP_SHARE = 0.25
-"""The heap holds at least this share of everything that stands on the plate: else the picture shows no *single* heap."""
+RIVAL_SHARE = 0.5
+"""Where a second piece is larger than this share of the heap, the picture does not show one heap."""
 THIN = 4.0
 """Columns up to this high [pixels] are measured by their area."""
 PLATE_CLEARANCE = 0.25
@@ -34,7 +34,8 @@ class Outline:
     Attributes
     ----------
     position : (n,) array
-        Distance along the plate [pixels], increasing; 0 is where the plate line meets the picture's left border.
+        Distance along the plate [pixels], increasing; 0 is where the plate line meets the picture's left
+        border.
     height : (n,) array
         Height over the plate line [pixels], positive.
     plate : PlateLine
@@ -66,8 +67,8 @@ def find_outline(
     picture : (rows, columns) or (rows, columns, 3) uint8 array
         Grey or blue-green-red, as OpenCV reads it. The heap may be darker or lighter than what is behind it.
     ground_row : float, optional
-        Row of the plate's surface in a level picture, where it is known (a drawn snapshot). Otherwise the plate
-        line is sought in the picture, and it levels a tilted camera.
+        Row of the plate's surface in a level picture, where it is known (a drawn snapshot). Otherwise the
+        plate line is sought in the picture, and it levels a tilted camera.
     meters_per_pixel : float, optional
         Scale, handed on.
     place : str
@@ -96,13 +97,12 @@ def _outline(
     place: str,
 ) -> Outline:
     """Outline of the heap in a contrast picture."""
-    body = _largest_component(contrast > threshold, place)
-    plate, heap = _heap_on_plate(body, contrast, threshold, ground_row, place)
+    plate, heap = _heap_on_plate(contrast > threshold, contrast, threshold, ground_row, place)
     if not plate.visible:
         threshold = 0.5 * _inner_contrast(heap, contrast)
         near = cv2.dilate(heap.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
-        body = _largest_component(near & (contrast > threshold), place)
-        plate, heap = _heap_on_plate(body, contrast, threshold, ground_row, place)
+        front = near & (contrast > threshold)
+        plate, heap = _heap_on_plate(front, contrast, threshold, ground_row, place)
     rows = top_edge(heap, contrast, threshold)
     if not plate.visible:
         rows = _refine_thin(rows, heap, contrast, plate)
@@ -116,21 +116,22 @@ def _outline(
 
 
 def _heap_on_plate(
-    body: NDArray[np.bool_], contrast: FloatArray, threshold: float, ground_row: float | None, place: str
+    front: NDArray[np.bool_], contrast: FloatArray, threshold: float, ground_row: float | None, place: str
 ) -> tuple[PlateLine, NDArray[np.bool_]]:
-    """The plate, and the pixels of the heap that stands on it."""
-    if ground_row is not None:
-        plate = PlateLine(row=ground_row, slope=0.0, visible=False)
-    else:
+    """The plate, and the heap that stands on it, among what stands out of the background."""
+    if ground_row is None:
+        body, _ = _largest_pieces(front)
         plate = find_plate(top_edge(body, contrast, threshold), bottom_edge(body, contrast, threshold), place)
-    return plate, _standing_on(plate, body, place)
+    else:
+        plate = PlateLine(row=ground_row, slope=0.0, visible=False)
+    return plate, _standing_on(plate, front, place)
 
 
 def top_edge(mask: NDArray[np.bool_], contrast: FloatArray, threshold: float) -> FloatArray:
     """Row at which the contrast crosses the threshold above the topmost masked pixel of each column.
 
-    The crossing is interpolated between two pixels, which makes the edge of an anti-aliased picture exact to about
-    a tenth of a pixel. What touches the border ends there. Columns without a masked pixel get NaN.
+    The crossing is interpolated between two pixels, which makes the edge of an anti-aliased picture exact
+    to about a tenth of a pixel. What touches the border ends there. Columns without a masked pixel get NaN.
     """
     first = mask.argmax(axis=0)
     columns = np.arange(mask.shape[1])
@@ -159,7 +160,7 @@ def _refine_thin(
     share = contrast / _inner_contrast(heap, contrast)
     total = np.vstack([np.zeros(heap.shape[1]), np.cumsum(share, axis=0)])
     first = np.clip(heap.argmax(axis=0) - 2, 0, heap.shape[0])
-    last = np.clip(np.ceil(line + 2.5), 0, heap.shape[0]).astype(np.intp)
+    last = np.clip(np.ceil(line + 0.5), 0, heap.shape[0]).astype(np.intp)
     return np.where(thin, line - (total[last, columns] - total[first, columns]), rows)
 
 
@@ -171,26 +172,26 @@ def _inner_contrast(heap: NDArray[np.bool_], contrast: FloatArray) -> float:
     return float(np.median(contrast[inner]) if inner.any() else contrast[heap].max())
 
 
-def _largest_component(mask: NDArray[np.bool_], place: str) -> NDArray[np.bool_]:
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
-    if count < 2:
-        raise PictureError("something stands out of the background", "an even picture", place)
-    return labels == 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))
+def _largest_pieces(mask: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], float]:
+    """The largest connected piece, and the area of the next as a share of it."""
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
+    order = np.argsort(stats[1:, cv2.CC_STAT_AREA])[::-1]
+    areas = stats[1:, cv2.CC_STAT_AREA][order]
+    return labels == 1 + order[0], float(areas[1] / areas[0]) if len(areas) > 1 else 0.0
 
 
-def _standing_on(plate: PlateLine, body: NDArray[np.bool_], place: str) -> NDArray[np.bool_]:
-    """The largest part of the body above the plate line; refuse a heap that a border crops."""
-    rows, columns = body.shape
+def _standing_on(plate: PlateLine, front: NDArray[np.bool_], place: str) -> NDArray[np.bool_]:
+    """The largest piece above the plate line; refuse one of several, and one that a border crops."""
+    rows, columns = front.shape
     line = plate.row + plate.slope * np.arange(columns)
-    above = body & (np.arange(rows)[:, None] < line - PLATE_CLEARANCE)
+    above = front & (np.arange(rows)[:, None] < line - PLATE_CLEARANCE)
     if not above.any():
         raise PictureError("a heap stands on the plate", "nothing above the plate line", place)
-    heap = _largest_component(above, place)
-    if heap.sum() < MINIMUM_HEAP_SHARE * above.sum():
-        raise PictureError("one heap stands on the plate", "several pieces of like size", place)
+    heap, next_share = _largest_pieces(above)
     for border, name in ((heap[:, 0], "left"), (heap[:, -1], "right"), (heap[0], "top")):
         if border.any():
-            raise PictureError(
-                "the whole heap is in the picture", f"a heap cropped by the {name} border", place
-            )
+            rule = "the whole heap is in the picture"
+            raise PictureError(rule, f"a heap cropped by the {name} border", place)
+    if next_share > RIVAL_SHARE:
+        raise PictureError("one heap stands on the plate", "several pieces of like size", place)
     return heap

@@ -14,9 +14,11 @@ from numpy.typing import NDArray
 from imaging.errors import PictureError
 from imaging.geometry import FloatArray, Picture
 
-SUPERSAMPLING = 8
+SUPERSAMPLING = 4
 """Shapes are drawn this many times finer than the picture, then averaged."""
 SUBPIXEL_BITS = 6
+DISCS_PER_GRAIN = 3.0
+"""Grains strewn on each grain diameter of the plate, so that they hide the smooth profile below them."""
 Color = tuple[int, int, int]
 """Blue, green, red."""
 
@@ -71,17 +73,25 @@ class DrawnHeap:
         cap = (1.0 - t) ** 2 * start + 2.0 * t * (1.0 - t) * self.apex + t**2 * stop
         return np.concatenate([ends[:1], cap, ends[1:]])
 
-    def grains(self) -> FloatArray:
-        """Discs (n, 3), x, y and radius, strewn evenly along both flanks with their middles about the profile.
+    @property
+    def overhang(self) -> float:
+        """How far grains may lie beside the smooth heap: on its flanks' lines, sunk into the plate."""
+        return self.grain / float(np.tan(np.radians(min(self.left, self.right))))
 
-        Their places do not depend on the height, so they roughen a flank without tilting it.
+    def grains(self) -> FloatArray:
+        """Discs (n, 3), x, y and radius, strewn evenly along both flanks about the profile.
+
+        They go on below the plate, which cuts them off: roughness that is the same all along a flank does not
+        tilt it.
         """
         if self.grain == 0.0:
             return np.empty((0, 3))
         rng = np.random.default_rng(self.seed)
-        corners = self.profile()
-        count = round(3.0 * self.width / self.grain)
-        x = rng.uniform(0.0, self.width, count)
+        reach = self.overhang
+        drop = reach * np.tan(np.radians([self.left, self.right]))
+        corners = np.vstack([[-reach, -drop[0]], self.profile(), [self.width + reach, -drop[1]]])
+        count = round(DISCS_PER_GRAIN * (self.width + 2.0 * reach) / self.grain)
+        x = rng.uniform(-reach, self.width + reach, count)
         y = np.interp(x, corners[:, 0], corners[:, 1]) + rng.normal(0.0, 0.25 * self.grain, count)
         return np.column_stack([x, y, 0.5 * self.grain * rng.normal(1.0, 0.05, count)])
 
@@ -95,7 +105,8 @@ class Camera:
     heap, background : (int, int, int)
         Colours, blue-green-red.
     plate : (int, int, int), optional
-        Colour of the plate, which reaches from border to border; without it the heap stands on nothing visible.
+        Colour of the plate, which reaches from border to border; without it the heap stands on nothing
+        visible.
     texture : float
         Relative standard deviation of the heap's lightness from grain to grain.
     light : float
@@ -125,11 +136,13 @@ def draw(heap: DrawnHeap, camera: Camera | None = None) -> Picture:
     """Draw a photograph of a heap, (rows, columns, 3) uint8 in blue-green-red."""
     camera = camera or Camera()
     margin = camera.margin * heap.width
-    rows = int(np.ceil(heap.apex[1] + 2.0 * abs(margin) + heap.width * abs(np.sin(np.radians(camera.tilt)))))
-    shape = (max(rows, 32), int(np.ceil(heap.width + 2.0 * margin)))
-    middle = np.array(
-        [0.5 * shape[1], shape[0] - abs(margin) - 0.5 * heap.width * abs(np.tan(np.radians(camera.tilt)))]
+    beside = margin + (heap.overhang if margin > 0.0 else 0.0)
+    rise = 0.5 * heap.width * abs(np.tan(np.radians(camera.tilt)))
+    shape = (
+        max(int(np.ceil(heap.apex[1] + heap.grain + 2.0 * (abs(margin) + rise))), 32),
+        int(np.ceil(heap.width + 2.0 * beside)),
     )
+    middle = np.array([0.5 * shape[1], shape[0] - abs(margin) - rise])
     body, plate = _coverage(heap, camera.tilt, middle, shape)
     rng = np.random.default_rng(camera.seed)
     image = np.broadcast_to(np.array(camera.background, dtype=np.float64), (*shape, 3))
@@ -156,14 +169,19 @@ def _coverage(
         cv2.circle(body, center.tolist(), round(radius * fixed), 255, -1, cv2.LINE_8, SUBPIXEL_BITS)
     cv2.fillPoly(plate, [_to_fine_pixels(low, heap, tilt, middle)], 255, shift=SUBPIXEL_BITS)
     body[plate > 0] = 0
-    size = shape[::-1]
-    return tuple(cv2.resize(layer, size, interpolation=cv2.INTER_AREA) / 255.0 for layer in (body, plate))
+    return _average(body, shape), _average(plate, shape)
+
+
+def _average(layer: Picture, shape: tuple[int, int]) -> FloatArray:
+    """Fine pixels, 0 or 255, to the share of each pixel that is covered."""
+    small = cv2.resize(layer, shape[::-1], interpolation=cv2.INTER_AREA)
+    return np.asarray(small, dtype=np.float64) / 255.0
 
 
 def _to_fine_pixels(
     points: FloatArray, heap: DrawnHeap, tilt: float, middle: FloatArray
 ) -> NDArray[np.int32]:
-    """Heap coordinates to OpenCV's fixed-point coordinates of the fine picture, whose whole numbers are middles."""
+    """Heap coordinates to OpenCV's fixed-point coordinates in the fine picture."""
     cosine, sine = np.cos(np.radians(tilt)), np.sin(np.radians(tilt))
     along, up = points[:, 0] - 0.5 * heap.width, points[:, 1]
     column = middle[0] + along * cosine + up * sine

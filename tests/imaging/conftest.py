@@ -1,0 +1,19 @@
+"""A simulated heap that the tests share."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+
+class Heap(NamedTuple):
+    centers: np.ndarray
+    radii: np.ndarray
+    grains: np.ndarray
+
+
+@pytest.fixture(scope="session")
+def heap() -> Heap:
+    spheres = np.load(Path(__file__).parent / "data" / "heap.npz")["spheres"] * 1e-6
+    return Heap(spheres[:, :3], spheres[:, 3], np.repeat(np.arange(len(spheres) // 9), 9))

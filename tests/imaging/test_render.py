@@ -1,0 +1,148 @@
+"""The drawn pictures of spheres: geometry, both renderers, silence."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from imaging import (
+    PictureError,
+    find_outline,
+    heap_angle,
+    measure,
+    measure_photograph,
+    opengl,
+    overlay,
+    save_picture,
+    silhouette,
+    snapshot,
+)
+from imaging.geometry import Frame, Spheres
+
+
+@pytest.mark.parametrize("backend", ["raster", "pyvista"])
+def test_one_sphere_is_a_disc_of_its_size_at_its_place(backend: str) -> None:
+    center, radius = np.array([[0.02, -0.01, 0.004]]), np.array([0.004])
+    picture = silhouette(center, radius, azimuth=0.7, pixels=200, backend=backend)
+    dark = (255.0 - picture.image) / 255.0
+    scale = picture.meters_per_pixel
+    # 4 x 4 subpixels on a disc of 180 pixels diameter: its area to about a thousandth.
+    assert dark.sum() * scale**2 == pytest.approx(np.pi * radius[0] ** 2, rel=3e-3)
+    rows, columns = np.mgrid[0 : dark.shape[0], 0 : dark.shape[1]]
+    assert (dark * columns).sum() / dark.sum() == pytest.approx(0.5 * dark.shape[1] - 0.5, abs=0.1)
+    height = (picture.ground_row - (dark * rows).sum() / dark.sum()) * scale
+    assert height == pytest.approx(0.004, abs=0.1 * scale)
+
+
+def test_azimuth_turns_the_camera_round_the_heap() -> None:
+    spheres = Spheres.of([[0.03, 0.0, 0.001]], 0.001)
+    # At 0 the right is +x and the camera looks along +y; a quarter turn on, +x is towards the camera.
+    np.testing.assert_allclose(spheres.seen_from(0.0), [[0.03, 0.0, 0.001]], atol=1e-15)
+    np.testing.assert_allclose(spheres.seen_from(np.pi / 2), [[0.0, -0.03, 0.001]], atol=1e-15)
+
+
+def test_opposite_views_are_mirror_images(heap) -> None:
+    one = silhouette(heap.centers, heap.radii, 0.4).image.astype(int)
+    other = silhouette(heap.centers, heap.radii, 0.4 + np.pi).image.astype(int)
+    # Rounding of sphere edges on subpixel middles: single subpixels, 1/16 of a pixel each.
+    assert np.abs(one - other[:, ::-1]).mean() < 0.01
+
+
+def test_raster_and_pyvista_measure_the_same_angle(heap) -> None:
+    angles = [
+        heap_angle(heap.centers, heap.radii, azimuths=3, backend=name) for name in ("raster", "pyvista")
+    ]
+    for raster, pyvista in zip(angles[0].views, angles[1].views, strict=True):
+        assert (pyvista.left, pyvista.right) == pytest.approx((raster.left, raster.right), abs=0.1)
+
+
+@pytest.mark.parametrize("backend", ["raster", "pyvista"])
+def test_shaded_snapshot_is_as_good_as_a_photograph(heap, backend: str, tmp_path) -> None:
+    views = heap_angle(heap.centers, heap.radii, azimuths=2).views
+    picture = snapshot(heap.centers, heap.radii, np.pi / 2, backend=backend, grains=heap.grains)
+    angle = measure_photograph(save_picture(tmp_path / "heap.jpg", picture.image))
+    # Shade and compression move the edge of single grains by a fraction of a pixel.
+    assert angle.left == pytest.approx(views[1].left, abs=0.3)
+    assert angle.right == pytest.approx(views[1].right, abs=0.3)
+
+
+def test_lines_are_drawn_where_they_were_measured(heap) -> None:
+    view = heap_angle(heap.centers, heap.radii, azimuths=2).views[0]
+    picture = snapshot(heap.centers, heap.radii, backend="raster", grains=heap.grains)
+    drawn = overlay(picture, view)
+    changed = (drawn != picture.image).any(axis=2)
+    for line in (view.left_line, view.right_line):
+        middle = np.array([0.5 * (line.start + line.stop)])
+        column, row = view.outline.plate.picture_point(middle, line.intercept + line.slope * middle)
+        assert changed[round(float(row[0])), round(float(column[0]))]
+    assert not changed[0].any()
+
+
+def test_overlay_of_another_scale_is_refused(heap) -> None:
+    view = heap_angle(heap.centers, heap.radii, azimuths=2).views[0]
+    with pytest.raises(PictureError, match="scale"):
+        overlay(snapshot(heap.centers, heap.radii, pixels=300, backend="raster"), view)
+
+
+def test_frame_is_the_same_for_every_azimuth_and_follows_the_heap(heap) -> None:
+    moved = heap.centers + np.array([0.3, -0.2, 0.0])
+    here = heap_angle(heap.centers, heap.radii, azimuths=2)
+    there = heap_angle(moved, heap.radii, azimuths=2)
+    # Moving the heap shifts it against the pixels by rounding only.
+    assert there.mean == pytest.approx(here.mean, abs=1e-3)
+    frame = Frame.around(Spheres.of(heap.centers, heap.radii), 500)
+    pictures = [silhouette(heap.centers, heap.radii, azimuth, frame=frame) for azimuth in (0.0, 1.0)]
+    assert pictures[0].image.shape == pictures[1].image.shape == frame.shape
+
+
+def test_pyvista_draws_without_a_word(tmp_path) -> None:
+    script = (
+        "from imaging import silhouette, snapshot\n"
+        "snapshot([[0, 0, 1.0], [1.0, 0, 1.0]], [1.0, 1.0], backend='pyvista')\n"
+        "silhouette([[0, 0, 1.0], [1.0, 0, 1.0]], [1.0, 1.0], backend='pyvista')\n"
+    )
+    environment = {name: value for name, value in os.environ.items() if name != "DISPLAY"}
+    environment["PYTHONPATH"] = os.pathsep.join(path for path in sys.path if path)
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, env=environment, check=False
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+
+
+def test_auto_takes_the_raster_where_opengl_does_not_work(heap, monkeypatch) -> None:
+    monkeypatch.setattr(opengl, "opengl_works", lambda: False)
+    auto = silhouette(heap.centers, heap.radii, backend="auto")
+    np.testing.assert_array_equal(auto.image, silhouette(heap.centers, heap.radii, backend="raster").image)
+    with pytest.raises(PictureError, match="OpenGL"):
+        silhouette(heap.centers, heap.radii, backend="pyvista")
+
+
+def test_pictures_carry_their_scale(heap) -> None:
+    picture = silhouette(heap.centers, heap.radii)
+    outline = find_outline(picture.image, picture.ground_row, picture.meters_per_pixel)
+    top = float((heap.centers[:, 2] + heap.radii).max())
+    # One pixel, and the threshold on a single sphere's top.
+    assert outline.height.max() * outline.meters_per_pixel == pytest.approx(top, abs=picture.meters_per_pixel)
+    assert measure(outline).outline is outline
+
+
+@pytest.mark.parametrize(
+    ("centers", "radii", "words"),
+    [
+        ([[0.0, 0.0]], [1.0], "centers"),
+        ([[0.0, 0.0, 1.0]], [1.0, 2.0], "radii"),
+        ([[0.0, 0.0, 1.0], [0.0, np.nan, 1.0]], [1.0, 1.0], "sphere 1"),
+        ([[0.0, 0.0, 1.0]], [-1.0], "sphere 0"),
+        (np.empty((0, 3)), [], "centers"),
+    ],
+)
+def test_bad_spheres_are_named(centers, radii, words: str) -> None:
+    with pytest.raises(PictureError, match=words):
+        silhouette(centers, radii)
+
+
+def test_unknown_backend_is_named(heap) -> None:
+    with pytest.raises(PictureError, match=r"backend.*'opengl'"):
+        snapshot(heap.centers, heap.radii, backend="opengl")
