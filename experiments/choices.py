@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from dem_warp.batch import resolve_device
+from dem_warp.device import resolve_device
 from experiments.errors import InputError
 from experiments.study import Study, load_study, study_scales
 

@@ -61,7 +61,7 @@ def calibrate(
         chosen = chosen_study(study, scale, device)
         folder = out or default_folder(chosen)
     with clear_errors(resume=_resume_command(study, folder, chosen.scale, device)):
-        messages.print(f"{chosen.name}, on {device}. {chosen.note}")
+        messages.print(f"{chosen.name}, on {device}", chosen.note, sep="\n", markup=False)
         campaign = run_campaign(
             chosen, folder, device, workers, resume, watch=CaseProgress, on_stage=_show_stage
         )

@@ -20,6 +20,8 @@ BAD_INPUT, FAILED_RUN, INTERRUPTED = 2, 1, 130
 
 QUIET_START = 2.0
 """What ends sooner shows no progress [s]."""
+FIRST_GUESS = 0.01
+"""Part of the work that is done before the time left is guessed."""
 LINE_EVERY = 10.0
 """Time between two lines of progress where there is no terminal [s]."""
 
@@ -77,7 +79,7 @@ class CaseProgress:
         self._bar = Progress(
             SpinnerColumn(),
             TextColumn("{task.description}"),
-            BarColumn(),
+            BarColumn(bar_width=16),
             TextColumn("{task.percentage:3.0f} %  {task.fields[state]}"),
             console=messages,
             transient=True,
@@ -108,17 +110,17 @@ class CaseProgress:
 
 
 def describe_progress(progress: BatchProgress) -> str:
-    """Say how many cases are done, what the others do, and how long it will take.
+    """Say how long it will take, how many cases are done, and what those that run are doing.
 
     Examples
     --------
-    ``3 of 12 cases, 2 lift, 7 waiting, 1 min 20 s left``
+    ``1 min 20 s left, 3 of 12 cases, 2 lift``
     """
-    phases = [f"{count} {phase}" for phase, count in progress.phase_counts.items()]
-    parts = [f"{progress.done} of {progress.total} cases", *phases]
-    if 0.0 < progress.fraction < 1.0:
+    parts = [f"{progress.done} of {progress.total} cases"]
+    parts += [f"{count} {phase}" for phase, count in progress.phase_counts.items() if phase != "waiting"]
+    if FIRST_GUESS <= progress.fraction < 1.0:
         left = progress.seconds * (1.0 - progress.fraction) / progress.fraction
-        parts.append(f"{duration(left)} left")
+        parts.insert(0, f"{duration(left)} left")
     return ", ".join(parts)
 
 

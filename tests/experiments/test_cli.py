@@ -246,7 +246,7 @@ def test_progress_tells_the_time_left(capsys: pytest.CaptureFixture[str]) -> Non
     from dem_warp import Progress
 
     halfway = Progress(done=3, total=12, fraction=0.25, phase_counts={"lift": 2, "waiting": 7}, seconds=20.0)
-    assert describe_progress(halfway) == "3 of 12 cases, 2 lift, 7 waiting, 1 min 0 s left"
+    assert describe_progress(halfway) == "1 min 0 s left, 3 of 12 cases, 2 lift"
     with CaseProgress("climb") as show:
         show(Progress(0, 12, 0.01, {}, 1.0))
         show(halfway)

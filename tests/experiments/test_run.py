@@ -55,6 +55,12 @@ def engine(cone: Callable[..., CaseResult], monkeypatch: pytest.MonkeyPatch) -> 
 
 
 @pytest.fixture
+def _without_report(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Spare the megabytes of a page that the test does not read."""
+    monkeypatch.setattr(run, "write_report", lambda *_, **__: None)
+
+
+@pytest.fixture
 def study(write_study: Callable[..., Path]) -> Study:
     """Load the small study with more replicates, so that the plane of one factor is calibrated."""
     return load_study(write_study(add="[campaign.noise_floor]\nreplicates = 5\n"))
@@ -84,6 +90,7 @@ def test_a_campaign_leaves_its_report_results_and_tables(
     assert len(list((folder / "cases").iterdir())) == len(engine.seeds) == len(campaign.cases)
 
 
+@pytest.mark.usefixtures("_without_report")
 @pytest.mark.parametrize("stop_after", [0, 1, 7, 20, 30])
 def test_an_interrupted_campaign_goes_on_and_repeats_nothing(
     study: Study, engine: Engine, tmp_path: Path, stop_after: int
@@ -100,7 +107,8 @@ def test_an_interrupted_campaign_goes_on_and_repeats_nothing(
     assert len(set(engine.seeds)) == total
 
 
-def test_a_finished_campaign_is_reported_again_without_a_case(
+@pytest.mark.usefixtures("_without_report")
+def test_a_finished_campaign_is_analysed_again_without_a_case(
     study: Study, engine: Engine, tmp_path: Path
 ) -> None:
     first = run_campaign(study, tmp_path / "out")
@@ -109,6 +117,7 @@ def test_a_finished_campaign_is_reported_again_without_a_case(
     assert len(engine.seeds) == count
 
 
+@pytest.mark.usefixtures("_without_report")
 def test_another_replicate_simulates_only_that(
     write_study: Callable[..., Path], engine: Engine, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
