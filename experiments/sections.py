@@ -67,7 +67,7 @@ class GrainSection(MaterialSection):
     def shape(self) -> ClumpShape:
         """Build the grain's shape."""
         if self.sphere is not None:
-            return ClumpShape.sphere(self.sphere)
+            return _sphere(self.sphere)
         if self.clump is not None:
             return _read_clump(self.clump, self.clump.stat().st_mtime_ns)
         raise ValueError("needs a clump (a file) or a sphere (a radius)")
@@ -79,10 +79,15 @@ class GrainSection(MaterialSection):
         )
 
 
+# The integrals over a shape take milliseconds, and every case of a campaign needs them.
 @lru_cache(maxsize=8)
 def _read_clump(path: Path, modified: int) -> ClumpShape:
-    """Read a clump once: its volume integral is slow, and every case of a campaign needs it."""
     return ClumpShape.read(path)
+
+
+@lru_cache(maxsize=8)
+def _sphere(radius: float) -> ClumpShape:
+    return ClumpShape.sphere(radius)
 
 
 class InteractionSection(Section):
