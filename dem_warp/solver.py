@@ -168,7 +168,7 @@ class Solver:
         self._launch(k.bin_spheres, spheres, [self.model, grains, self.alive, self.stale, self.cells])
         self._launch(k.open_buckets, spheres, [self.model, self.stale, self.cells])
         self._launch(k.fill_buckets, spheres, [self.model, grains, self.stale, self.cells])
-        self._launch(k.search, spheres, [self.model, grains, self.stale, self.cells, self.flags])
+        self._launch(k.search, spheres, [self.model, grains, self.stale, self.cells])
         self._launch(k.write_lists, spheres, [self.model, self.stale, self.cells, self.hood, self.flags])
         finish = [grains, self.cells, self.hood, self.stale, self.any_stale, self.rebuilds]
         self._launch(k.finish, self.layout.world_count, finish)

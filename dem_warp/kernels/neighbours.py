@@ -19,6 +19,7 @@ from dem_warp.types import SPHERE_BITS, Build, WorldFlag, device_structs
 
 NEVER = -1
 CELLS_AROUND = 27
+OWN_CELL = CELLS_AROUND // 2
 NEIGHBOUR_OVERFLOW = wp.constant(int(WorldFlag.NEIGHBOUR_OVERFLOW))
 
 
@@ -127,6 +128,7 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
         c = cell_of(pack.load_sphere(grains.spheres, i), model.world[w])
         b = bucket_of(c[0], c[1], c[2], cells.bits, w)
         cells.bucket[i] = b
+        cells.found_count[i] = 0
         cells.rank[i] = wp.atomic_add(cells.bucket_size, b, 1)
 
     @wp.kernel(module=module)
@@ -160,11 +162,19 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
                 k -= 1
             cells.found[first + k] = partner
 
+    @wp.func
+    def append(cells: Cells, i: int, partner: int):
+        """Adds a partner to those of sphere `i`, in any order; past the capacity only the count goes on."""
+        n = wp.atomic_add(cells.found_count, i, 1)
+        if n < cells.found_capacity:
+            cells.found[i * cells.found_capacity + n] = partner
+
     @wp.kernel(module=module)
-    def search(
-        model: Model, grains: Grains, stale: wp.array(dtype=int), cells: Cells, flags: wp.array(dtype=int)
-    ):
-        """Partners of each sphere; threads follow the buckets, so that neighbours read the same memory."""
+    def search(model: Model, grains: Grains, stale: wp.array(dtype=int), cells: Cells):
+        """Partners of each sphere: pairs within its bucket, and with the half of the buckets around that lies ahead.
+
+        Threads follow the buckets, so that neighbouring threads read the same memory.
+        """
         slot = wp.tid()
         w = slot // (spheres_each * model.grain_count)
         first = w * spheres_each * model.grain_count
@@ -176,31 +186,25 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
         a = pack.load_sphere(cells.ordered, slot)
         reach = pack.last(a) + world.skin
         c = cell_of(a, world)
-        count = int(0)
-        for n in range(CELLS_AROUND):
+        for n in range(OWN_CELL, CELLS_AROUND):
             b = bucket_of(c[0] + n % 3 - 1, c[1] + (n // 3) % 3 - 1, c[2] + n // 9 - 1, cells.bits, w)
             begin = first + cells.bucket_start[b]
-            for k in range(begin, begin + cells.bucket_size[b]):
+            end = begin + cells.bucket_size[b]
+            if n == OWN_CELL:
+                begin = slot + 1
+            for k in range(begin, end):
                 q = pack.load_sphere(cells.ordered, k)
                 d = pack.difference(a, q, world)
                 touching = reach + pack.last(q)
                 if wp.dot(d, d) < touching * touching:
                     j = cells.order[k]
                     if j // spheres_each != g:
-                        if count < cells.found_capacity:
-                            cells.found[i * cells.found_capacity + count] = j - first
-                        count += 1
+                        append(cells, i, j - first)
+                        append(cells, j, i - first)
         for k in range(walls_each):
             wall = model.wall[w * walls_each + k]
             if walls.overlaps(wall, pack.place(a, world), reach, grains.step[w], world.time_step):
-                if count < cells.found_capacity:
-                    cells.found[i * cells.found_capacity + count] = model.grain_count * spheres_each + k
-                count += 1
-        if count > cells.found_capacity:
-            wp.atomic_or(flags, w, NEIGHBOUR_OVERFLOW)
-            count = cells.found_capacity
-        sort_found(cells, i, count)
-        cells.found_count[i] = count
+                append(cells, i, model.grain_count * spheres_each + k)
 
     @wp.func
     def first_of_sphere(entry: wp.array(dtype=int), first: int, count: int, s: int) -> int:
@@ -226,16 +230,15 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
         w = g // model.grain_count
         if stale[w] == 0 or cells.rank[i] < 0:
             return
-        cells.bucket_size[cells.bucket[i]] = (
-            0  # every sphere of the bucket writes the same: empty for the next time
-        )
+        cells.bucket_size[cells.bucket[i]] = 0  # empty for the next time; every sphere of the bucket writes the same
         before = int(0)
         for k in range(s):
-            before += cells.found_count[g * spheres_each + k]
-        own = cells.found_count[i]
-        if before + own > hood.capacity:
+            before += wp.min(cells.found_count[g * spheres_each + k], cells.found_capacity)
+        own = wp.min(cells.found_count[i], cells.found_capacity)
+        if cells.found_count[i] > cells.found_capacity or before + own > hood.capacity:
             wp.atomic_or(flags, w, NEIGHBOUR_OVERFLOW)
-            own = wp.max(hood.capacity - before, 0)
+            own = wp.clamp(own, 0, wp.max(hood.capacity - before, 0))
+        sort_found(cells, i, own)
         grain_total = model.shape.shape[0]
         old_row = hood.list[w] * grain_total + g
         new_row = (1 - hood.list[w]) * grain_total + g
