@@ -158,7 +158,7 @@ def default_skin(case: "Case") -> float:
     """Skin that keeps both the lists short and the rebuilds rare [m]; longer steps want a larger one."""
     radius = float(case.grains.shape.radii.mean()) * case.grains.size_mean
     path = case.scene.fall_speed * case.time_step
-    return float(np.clip(24.0 * path, 0.5 * radius, 1.2 * radius))
+    return float(np.clip(24.0 * path, 0.5 * radius, radius))
 
 
 @dataclass(frozen=True)
