@@ -1,4 +1,4 @@
-"""Discrete element simulation of clumped grains on NVIDIA Warp: many worlds in one batch, on a GPU or a CPU."""
+"""Discrete element simulation of clumped grains on NVIDIA Warp: many worlds at once, on a GPU or a CPU."""
 
 from dem_warp.batch import CaseResult, Progress, simulate
 from dem_warp.case import Case, GrainPopulation, Numerics

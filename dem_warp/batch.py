@@ -5,6 +5,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,8 @@ REPORT_EVERY = 0.5
 ADVICE = {
     WorldFlag.DIVERGED: (
         "diverged",
-        "a grain passed the speed limit at {time:.4f} s: lower time_step_fraction (LIGGGHTS and EDEM users halve it)",
+        "a grain passed the speed limit at {time:.4f} s: lower time_step_fraction "
+        "(LIGGGHTS and EDEM users halve it)",
     ),
     WorldFlag.NEIGHBOUR_OVERFLOW: (
         "overflow",
@@ -68,14 +70,16 @@ class CaseResult:
     positions, orientations : (n, 3) and (n, 4) arrays
         Poses of the grains left [m], quaternions x y z w.
     sizes : (n,) array
+    clump : (S, 4) array
+        Local centre and radius of each sphere of the shape [m].
     sphere_centers, sphere_radii : (n * S, 3) and (n * S,) arrays
-        [m]
+        The spheres in place [m], worked out from the poses.
     sphere_grain : (n * S,) int array
         Grain of each sphere.
     observables : dict of float
         In SI units; see the scene.
     phases : list of dict
-        Name, time [s] and last step of each phase.
+        Name, time [s] and steps of each phase.
     provenance : dict
         Versions, device and precision.
     """
@@ -85,12 +89,28 @@ class CaseResult:
     positions: np.ndarray
     orientations: np.ndarray
     sizes: np.ndarray
-    sphere_centers: np.ndarray
-    sphere_radii: np.ndarray
-    sphere_grain: np.ndarray
+    clump: np.ndarray
     observables: dict[str, float] = field(default_factory=dict)
     phases: list[dict[str, Any]] = field(default_factory=list)
     provenance: dict[str, Any] = field(default_factory=dict)
+
+    @cached_property
+    def sphere_centers(self) -> np.ndarray:
+        """Sphere centres in place [m], (n * S, 3)."""
+        vector, scalar = self.orientations[:, None, :3], self.orientations[:, None, 3:]
+        local = self.clump[None, :, :3] * self.sizes[:, None, None]
+        turned = 2.0 * np.cross(vector, local)
+        return (self.positions[:, None] + local + scalar * turned + np.cross(vector, turned)).reshape(-1, 3)
+
+    @property
+    def sphere_radii(self) -> np.ndarray:
+        """Sphere radii [m], (n * S,)."""
+        return (self.clump[None, :, 3] * self.sizes[:, None]).ravel()
+
+    @property
+    def sphere_grain(self) -> np.ndarray:
+        """Grain of each sphere, (n * S,)."""
+        return np.repeat(np.arange(len(self.sizes)), len(self.clump))
 
 
 OnResult = Callable[[int, CaseResult], None]
@@ -121,7 +141,8 @@ def simulate(
     Returns
     -------
     list of CaseResult
-        In the order of the cases. A case that goes wrong has its status; it neither raises nor changes another case.
+        In the order of the cases. A case that goes wrong has its status; it neither raises nor changes
+        another case.
 
     Raises
     ------
@@ -149,7 +170,7 @@ def simulate(
 
 
 def _batches(cases: Sequence[Case], one_each: bool) -> list[list[int]]:
-    """Cases that run in one launch: all of one precision; on a CPU one by one, which keeps a world in the cache."""
+    """Cases that run in one launch: all of one precision; on a CPU one by one, to keep a world in cache."""
     if one_each:
         return [[i] for i in range(len(cases))]
     groups: dict[str, list[int]] = {}
@@ -171,21 +192,24 @@ class Batch:
         self.solver = Solver(setups, device, cases[0].numerics.precision)
         self.controllers = [Controller(case, setup, CHUNK) for case, setup in zip(cases, setups, strict=True)]
         self.running = list(range(len(cases)))
+        self.chunk = 0
         self._started = time.perf_counter()
         self._reported = self._started
 
     def run(self, on_result: OnResult, on_progress: OnProgress) -> None:
         """Run every world to its end."""
-        chunk = 0
         while self.running:
-            step = min(self.controllers[w].period for w in self.running) // CHUNK
-            ahead = step - chunk % step
-            self.solver.advance(ahead)
-            chunk += ahead
-            due = [w for w in self.running if chunk * CHUNK % self.controllers[w].period == 0]
-            for w, result in self._look(due):
+            for w, result in self.advance():
                 on_result(self.indices[w], result)
-            self._report(on_progress, chunk)
+            self._report(on_progress)
+
+    def advance(self) -> list[tuple[int, CaseResult]]:
+        """Step until the next controller is due, let it decide, and return the worlds that ended."""
+        apart = min(self.controllers[w].period for w in self.running) // CHUNK
+        ahead = apart - self.chunk % apart
+        self.solver.advance(ahead)
+        self.chunk += ahead
+        return self._look([w for w in self.running if self.chunk * CHUNK % self.controllers[w].period == 0])
 
     def _look(self, due: Sequence[int]) -> list[tuple[int, CaseResult]]:
         """Let the controllers of the worlds that are due decide; results of those that ended."""
@@ -212,31 +236,25 @@ class Batch:
 
     def _result(self, w: int, status: str, reason: str) -> CaseResult:
         poses, setup, controller = self.solver.poses(w), self.setups[w], self.controllers[w]
-        sizes = setup.grains.sizes[poses["slots"]]
-        centers, radii, grain = place_clump(
-            self.cases[w].grains.shape, poses["positions"], poses["orientations"], sizes
-        )
+        shape = self.cases[w].grains.shape
         return CaseResult(
             status=status,
             reason=reason,
             positions=poses["positions"],
             orientations=poses["orientations"],
-            sizes=sizes,
-            sphere_centers=centers,
-            sphere_radii=radii,
-            sphere_grain=grain,
+            sizes=setup.grains.sizes[poses["slots"]],
+            clump=np.column_stack([shape.centers, shape.radii]),
             observables=dict(controller.observables, rebuilds=float(self.solver.rebuilds.numpy()[w])),
             phases=controller.phases,
             provenance=provenance(self.solver),
         )
 
-    def _report(self, on_progress: OnProgress, chunk: int) -> None:
+    def _report(self, on_progress: OnProgress) -> None:
         now = time.perf_counter()
         if self.running and now - self._reported < REPORT_EVERY:
             return
-        self._reported = now
-        parts = [self.controllers[w].fraction(chunk * CHUNK * self.setups[w].time_step) for w in self.running]
-        done = len(self.cases) - len(self.running)
+        self._reported = now parts = [self.controllers[w].fraction(self.chunk * CHUNK *
+        self.setups[w].time_step) for w in self.running] done = len(self.cases) - len(self.running)
         on_progress(
             Progress(
                 done=done,
@@ -253,19 +271,6 @@ def _verdict(flags: WorldFlag, at: float) -> tuple[str, str] | None:
         if flag in flags:
             return status, advice.format(time=at)
     return None
-
-
-def place_clump(
-    shape: Any, positions: np.ndarray, orientations: np.ndarray, sizes: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Spheres of grains in place: centres (n * S, 3) [m], radii (n * S,) [m], and the grain of each (n * S,)."""
-    n, s = len(positions), shape.sphere_count
-    vector, scalar = orientations[:, None, :3], orientations[:, None, 3:]
-    local = shape.centers[None] * sizes[:, None, None]
-    turned = 2.0 * np.cross(vector, local)
-    centers = positions[:, None] + local + scalar * turned + np.cross(vector, turned)
-    radii = shape.radii[None] * sizes[:, None]
-    return centers.reshape(n * s, 3), radii.reshape(n * s), np.repeat(np.arange(n), s)
 
 
 def provenance(solver: Solver) -> dict[str, Any]:

@@ -62,7 +62,8 @@ class Numerics:
     time_step_fraction : float
         Time step over the Rayleigh time of the smallest sphere; the paper uses 0.25.
     skin : float, optional
-        Reach of the neighbour lists beyond contact [m]; affects the speed only. By default from the time step.
+        Reach of the neighbour lists beyond contact [m]; affects the speed only. By default from the time
+        step.
     precision : "mixed" or "double"
     modulus_scale : float
         The grains' shear modulus is divided by it, for larger time steps; 1 leaves it.

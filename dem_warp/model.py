@@ -146,7 +146,8 @@ class WorldSetup:
         for wall, pair in self.walls:
             if not 1 <= pair < len(self.contacts):
                 raise ValueError(
-                    f"WorldSetup.walls: {wall!r} names contact {pair}; there are 1 to {len(self.contacts) - 1}"
+                    f"WorldSetup.walls: must name a contact from 1 to {len(self.contacts) - 1}, got {pair} "
+                    f"for {wall!r}"
                 )
         spheres = max(shape.sphere_count for shape in self.shapes)
         if spheres > MAX_SPHERES_PER_GRAIN:
@@ -193,7 +194,7 @@ class WorldSetup:
 
     @property
     def length_unit(self) -> float:
-        """Count of a fixed-point position [m]: the power of two that lets 31 bits span the domain and a margin."""
+        """Count of a fixed-point position [m]: a power of two, so that 31 bits span the domain and a margin."""
         return float(2.0 ** np.ceil(np.log2(1.05 * self.half_extent.max() / 2**31)))
 
 

@@ -29,7 +29,7 @@ LONGEST_CYCLE = 32
 SKIN_PER_CYCLE = 0.15
 """Part of the skin that the fastest expected grain may use up between two checks of the neighbour list."""
 
-FULL_DEVICE_THREADS = 200_000
+FULL_DEVICE_THREADS = 60_000
 """Threads that fill a large GPU; below it, more lanes a grain shorten a step."""
 
 
@@ -64,8 +64,9 @@ class WorldView:
 class Solver:
     """A batch of worlds on one device.
 
-    Every world steps with its own time step and parameters; worlds share nothing but the launches. The state of a world
-    after a number of steps depends on its setup alone, not on the other worlds, its place, the lanes or the skin.
+    Every world steps with its own time step and parameters; worlds share nothing but the launches. The state
+    of a world after a number of steps depends on its setup alone, not on the other worlds, its place, the
+    lanes or the skin.
 
     Parameters
     ----------
@@ -95,9 +96,8 @@ class Solver:
         with wp.ScopedDevice(self.device):
             self._build_state(capacity or row, found)
         self._running = list(range(len(worlds)))
-        self._graphs: dict[tuple[int, int], Any] = {}
+        self._graphs: dict[tuple[int, int, int], Any] = {}
         self._walls = wall_rows(worlds)
-        self.cycle = _cycle_length(worlds)
         self._place()
 
     def _build_state(self, capacity: int, found_capacity: int) -> None:
@@ -140,7 +140,7 @@ class Solver:
     def _launch(self, kernel: Any, dim: int, inputs: list[Any]) -> None:
         wp.launch(kernel, dim, inputs=inputs, device=self.device, block_dim=BLOCK)
 
-    # ---- the sequence of a step -------------------------------------------------------------------------------------
+    # ---- the sequence of a step ----------------------------------------------------------------------------
 
     @property
     def lanes(self) -> int:
@@ -177,13 +177,14 @@ class Solver:
         for step in range(self.cycle):
             self._step(step % 2)
         inputs = [
-            self.cycle, self.model, self.grains[0], self.alive, self.idle, self.hood, self.stale, self.any_stale,
+            self.cycle, self.model, self.grains[0], self.alive, self.idle, self.hood, self.stale,
+            self.any_stale,
         ]  # fmt: skip
         self._launch(self._list_kernels.mark_stale, self.layout.grain_total, inputs)
         wp.capture_if(self.any_stale, self._rebuild)
 
     def _graph(self) -> Any:
-        key = (self.lanes, len(self._running))
+        key = (self.lanes, len(self._running), self.cycle)
         if key not in self._graphs:
             with wp.ScopedCapture(self.device) as capture:
                 for _ in range(CHUNK // self.cycle):
@@ -198,10 +199,12 @@ class Solver:
             for _ in range(chunks):
                 wp.capture_launch(graph)
 
-    # ---- what a scene does between chunks ---------------------------------------------------------------------------
+    # ---- what a scene does between chunks ------------------------------------------------------------------
 
     def _set_running(self, running: Sequence[int]) -> None:
         self._running = list(running)
+        if running:
+            self.cycle = _cycle_length([self.worlds[w] for w in running])
         slots = np.zeros(self.layout.world_count, dtype=np.int32)
         slots[: len(running)] = running
         idle = np.ones(self.layout.world_count, dtype=np.int32)
@@ -217,7 +220,7 @@ class Solver:
         """Take grains (slots of the world) out of it."""
         rows = np.asarray(grains, dtype=np.int32) + world * self.layout.grain_count
         if rows.size:
-            removed = wp.array(rows.astype(np.int32), dtype=int, device=self.device)
+            removed: Any = wp.array(rows, dtype=int, device=self.device)
             self._launch(
                 self._step_kernels.remove, rows.size, [self.model, removed, self.alive, *self.grains]
             )
@@ -253,7 +256,7 @@ class Solver:
         ]
 
     def poses(self, world: int) -> dict[str, np.ndarray]:
-        """Positions [m], orientations, velocities [m/s], spins [rad/s] of the living grains, and their slots."""
+        """Slots, positions [m], orientations, velocities [m/s] and spins [rad/s] of the living grains."""
         n = self.layout.grain_count
         rows = slice(world * n, (world + 1) * n)
         slots = np.flatnonzero(self.alive.numpy()[rows] > 0)
@@ -286,7 +289,7 @@ def expected_speed(world: WorldSetup) -> float:
 
 
 def _neighbour_capacities(worlds: Sequence[WorldSetup]) -> tuple[int, int]:
-    """Partners of one sphere, and entries of one grain, that no packing of the worlds' grains is expected to pass."""
+    """Partners of a sphere, and entries of a grain, that no packing of the worlds' grains is expected to pass."""
     found, row = 16, 32
     for world in worlds:
         for shape in world.shapes:

@@ -1,4 +1,4 @@
-"""The device arrays of a batch: what stays (`Model`), what moves (`Grains`, in two copies), and the neighbour lists."""
+"""The device arrays of a batch: what stays (`Model`), what moves (`Grains`, twice), and the neighbour lists."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -28,7 +28,8 @@ class Layout:
         pairs = {len(world.contacts) for world in worlds}
         if len(walls) > 1 or len(pairs) > 1:
             raise ValueError(
-                f"worlds of one batch must have the same number of walls and contacts, got {walls} and {pairs}"
+                "worlds of one batch must have the same number of walls and contacts, "
+                f"got {sorted(walls)} and {sorted(pairs)}"
             )
         return cls(
             len(worlds),
@@ -131,7 +132,7 @@ def build_model(worlds: Sequence[WorldSetup], layout: Layout, precision: Precisi
 
 
 def _cell_rate(world: WorldSetup, precision: Precision) -> float:
-    """Cells per count of a sphere position; a cell holds the reach of a contact, and a little for rounding."""
+    """Cells per count of a sphere position; a cell holds a contact's reach, and a little for rounding."""
     unit = world.length_unit if precision.is_fixed_point else 1.0
     return unit / (1.01 * (2 * world.largest_sphere + world.skin))
 

@@ -1,7 +1,7 @@
-"""Device types: the precision of a build, the parameters of a contact, a wall and a world, the flags of a world.
+"""Device types: precision of a build; parameters of a contact, a wall and a world; flags of a world.
 
-Every struct is made for one floating type, so that the same kernel source serves the production precision and the
-float64 build used for verification.
+Every struct is made for one floating type, so that the same kernel source serves the production precision and
+the float64 build used for verification.
 """
 
 import functools
@@ -13,7 +13,7 @@ from typing import Any
 import warp as wp
 
 SPHERE_BITS = 23
-"""Bits of a neighbour entry that hold the partner (a sphere, or a wall, of the world); above is the own sphere's number."""
+"""Bits of a neighbour entry that hold the partner, a sphere or a wall; above them is the own sphere's number."""
 
 SPHERE_MASK = (1 << SPHERE_BITS) - 1
 MAX_PARTNERS = 1 << SPHERE_BITS
@@ -35,8 +35,8 @@ class WorldFlag(IntFlag):
 class Precision:
     """Floating types of a build.
 
-    `mixed` is the production build: poses in float64, sphere positions as 32-bit integers of a power-of-two length unit,
-    forces in float32. `double` is float64 throughout.
+    `mixed` is the production build: poses in float64, sphere positions as 32-bit integers of a power-of-two
+    length unit, forces in float32. `double` is float64 throughout.
     """
 
     name: str
@@ -58,7 +58,7 @@ DOUBLE = Precision("double", wp.float64, wp.vec3d, wp.vec4d, wp.quatd, wp.vec4d)
 
 @dataclass(frozen=True)
 class Build:
-    """What kernels are compiled for; worlds of one build run in one batch, and their bits do not depend on the others."""
+    """What kernels are compiled for; worlds of one build run in one batch, and no world changes another's bits."""
 
     precision: Precision
     sphere_count: int
@@ -77,7 +77,7 @@ PRECISIONS = {precision.name: precision for precision in (MIXED, DOUBLE)}
 
 @functools.cache
 def device_structs(precision: Precision) -> SimpleNamespace:
-    """Structs of the kernels in one precision: `ContactParams`, `World`, `Wall`, `Grains`, `Neighbours`, `Model`."""
+    """Structs of one precision: `ContactParams`, `World`, `Wall`, `Model`, `Grains`, `Neighbours`."""
     real, vec3, vec4, sphere = precision.real, precision.vec3, precision.vec4, precision.sphere
 
     @wp.struct
@@ -140,9 +140,7 @@ def device_structs(precision: Precision) -> SimpleNamespace:
         list: wp.array(dtype=int)  # which of the two lists holds, (worlds,)
         count: wp.array(dtype=int)  # (2 * grains,)
         entry: wp.array(dtype=int)  # own sphere's number and partner, (2 * grains * capacity,)
-        history: wp.array(
-            dtype=vec4
-        )  # tangential displacement [m] and the step it was written in, one an entry
+        history: wp.array(dtype=vec4)  # tangential displacement [m] and the step of it, one an entry
         rebuilt: wp.array(dtype=int)  # step of the last rebuild, (worlds,)
         travel: wp.array(dtype=real)  # path of a grain's farthest point since the rebuild [m], (grains,)
 

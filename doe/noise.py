@@ -107,7 +107,8 @@ def effect_power(effect: float, sd: float, observations: int, error_df: float, a
             raise DesignError(f"{name} must be positive and finite, received {value}")
     shift = abs(effect) * math.sqrt(observations) / (2.0 * sd)
     critical = float(stats.t.isf(0.5 * alpha, error_df))
-    return float(stats.nct.sf(critical, error_df, shift) + stats.nct.cdf(-critical, error_df, shift))
+    # the lower tail as an upper one: scipy's cdf is not a number far below the centre
+    return float(stats.nct.sf(critical, error_df, shift) + stats.nct.sf(critical, error_df, -shift))
 
 
 def detectable_effect(

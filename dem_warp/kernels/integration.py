@@ -20,11 +20,12 @@ def integration_functions(precision: Precision) -> SimpleNamespace:
 
     @wp.func
     def turn(orientation: wp.quatd, spin: vec3, torque: vec3, inertia: vec3, rolling: real, time_step: real):
-        """Orientation and spin [rad/s] after a step under `torque` [N m] and the rolling resistance `rolling` [N m].
+        """Orientation and spin [rad/s] after a step under `torque` and rolling resistance `rolling` [N m].
 
-        The angular momentum takes the torque and is then carried unchanged, while the body turns about the spin that
-        it has half a step on (an explicit midpoint rule): free of torque, the momentum is conserved to rounding and
-        the energy to second order. The turn is the Cayley map of the midpoint spin, a unit quaternion by construction.
+        The angular momentum takes the torque and is then carried unchanged, while the body turns about the
+        spin that it has half a step on (an explicit midpoint rule): free of torque, the momentum is conserved
+        to rounding and the energy to second order. The turn is the Cayley map of the midpoint spin, a unit
+        quaternion by construction.
         """
         q = rounded(orientation)
         body_spin = wp.quat_rotate_inv(q, spin)

@@ -2,10 +2,11 @@
 
 Two grains have each other in their lists. Walls are numbered after the spheres of their world.
 
-A list is sorted by the own sphere's number and then by the partner's, so its order, and with it the order of a grain's force
-sum, depends on the grains alone: not on cells, skin, moment of the rebuild, batch or device. The cells are the buckets of a
-hash grid that wraps around in each direction; two cells of one bucket are told apart by the distance of their spheres.
-Only worlds whose `stale` flag is set are rebuilt. A contact's history moves over to the new list with its entry.
+A list is sorted by the own sphere's number and then by the partner's, so its order, and with it the order of
+a grain's force sum, depends on the grains alone: not on cells, skin, moment of the rebuild, batch or device.
+The cells are the buckets of a hash grid that wraps around in each direction; two cells of one bucket are told
+apart by the distance of their spheres. Only worlds whose `stale` flag is set are rebuilt. A contact's history
+moves over to the new list with its entry.
 """
 
 import functools
@@ -25,7 +26,10 @@ NEIGHBOUR_OVERFLOW = wp.constant(int(WorldFlag.NEIGHBOUR_OVERFLOW))
 
 @functools.cache
 def neighbour_kernels(build: Build) -> SimpleNamespace:
-    """`mark_stale`, then in order of launch `bin_spheres`, `open_buckets`, `fill_buckets`, `search`, `write_lists`, `finish`."""
+    """`mark_stale`, and the launches of a rebuild in their order.
+
+    These are `bin_spheres`, `open_buckets`, `fill_buckets`, `search`, `write_lists` and `finish`.
+    """
     precision = build.precision
     real, vec4 = precision.real, precision.vec4
     types = device_structs(precision)
@@ -85,7 +89,7 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
         stale: wp.array(dtype=int),
         any_stale: wp.array(dtype=int),
     ):
-        """Marks a world in which a grain or a wall may use up its half of the skin within the next `ahead` steps."""
+        """Marks a world in which a grain or a wall may use up its half of the skin in the next `ahead` steps."""
         g = wp.tid()
         w = g // model.grain_count
         if idle[w] != 0:
@@ -171,7 +175,7 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
 
     @wp.kernel(module=module)
     def search(model: Model, grains: Grains, stale: wp.array(dtype=int), cells: Cells):
-        """Partners of each sphere: pairs within its bucket, and with the half of the buckets around that lies ahead.
+        """Partners of each sphere: pairs within its bucket, and with the half of those around that lies ahead.
 
         Threads follow the buckets, so that neighbouring threads read the same memory.
         """
@@ -223,14 +227,15 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
     def write_lists(
         model: Model, stale: wp.array(dtype=int), cells: Cells, hood: Neighbours, flags: wp.array(dtype=int)
     ):
-        """A sphere's part of its grain's new list; histories come over from the old list, both being sorted."""
+        """A sphere's part of its grain's new list; histories come over from the old one, both being sorted."""
         i = wp.tid()
         g = i // spheres_each
         s = i - g * spheres_each
         w = g // model.grain_count
         if stale[w] == 0 or cells.rank[i] < 0:
             return
-        cells.bucket_size[cells.bucket[i]] = 0  # empty for the next time; every sphere of the bucket writes the same
+        # empty for the next time; every sphere of the bucket writes the same
+        cells.bucket_size[cells.bucket[i]] = 0
         before = int(0)
         for k in range(s):
             before += wp.min(cells.found_count[g * spheres_each + k], cells.found_capacity)
@@ -261,8 +266,8 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
 
     @wp.kernel(module=module)
     def finish(
-        grains: Grains, cells: Cells, hood: Neighbours, stale: wp.array(dtype=int), any_stale: wp.array(dtype=int),
-        rebuilds: wp.array(dtype=int),
+        grains: Grains, cells: Cells, hood: Neighbours, stale: wp.array(dtype=int), any_stale:
+        wp.array(dtype=int), rebuilds: wp.array(dtype=int),
     ):  # fmt: skip
         w = wp.tid()
         if stale[w] != 0:

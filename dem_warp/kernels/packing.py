@@ -1,7 +1,8 @@
 """How a sphere's position, and the step number of a contact, are packed into four components.
 
-In the `mixed` precision a sphere is four 32-bit integers, three counts of the world's length unit and the bits of its
-float32 radius, so that the difference of two positions is exact wherever the heap stands. In `double` it is four floats.
+In the `mixed` precision a sphere is four 32-bit integers, three counts of the world's length unit and the
+bits of its float32 radius, so that the difference of two positions is exact wherever the heap stands. In
+`double` it is four floats.
 """
 
 import functools
@@ -29,7 +30,7 @@ STORE_16 = """
 
 
 def _memory_access(vector, kind: str, real: str) -> tuple:
-    """Load and store of a four-vector; one 16-byte access on the GPU, where Warp's types carry no alignment."""
+    """Load and store of a four-vector: 16 bytes at once on the GPU, where Warp's types carry no alignment."""
     load_code, store_code = "return a.data[i];", "a.data[i] = v;"
     if kind:
         load_code, store_code = LOAD_16.format(kind=kind, real=real), STORE_16.format(kind=kind)
@@ -142,8 +143,9 @@ def _float_spheres(precision: Precision) -> SimpleNamespace:
 def packing(precision: Precision) -> SimpleNamespace:
     """Functions on packed spheres and histories in one precision.
 
-    `pack(position, last, world)`, `pack_offset(center, offset, last, world)`, `difference(a, b, world)` [m], `last(a)` (the
-    radius of a sphere, the size factor of a centre), `place(a, world)` [m], `stamp`, `stamped_step`, and `load_*`, `store_*`.
+    `pack(position, last, world)`, `pack_offset(center, offset, last, world)`, `difference(a, b, world)` [m],
+    `last(a)` (the radius of a sphere, the size factor of a centre), `place(a, world)` [m], `stamp`,
+    `stamped_step`, and `load_*`, `store_*`.
     """
     sphere, vec4 = precision.sphere, precision.vec4
     World = device_structs(precision).World  # noqa: N806

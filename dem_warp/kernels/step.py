@@ -1,4 +1,4 @@
-"""The step: contact forces, motion and new sphere positions of every grain of every running world, in one launch."""
+"""The step: forces, motion and new sphere positions of every grain of every running world, in one launch."""
 
 import functools
 from types import SimpleNamespace
@@ -67,7 +67,7 @@ def step_kernels(build: Build) -> SimpleNamespace:
         flags: wp.array(dtype=int), w: int, g: int, step: int, force: vec3, torque: vec3, rolling: real,
         lane: int, lanes: int,
     ):  # fmt: skip
-        """New pose, velocity, spin and spheres of a grain; every lane works it out, the first one stores it."""
+        """New pose, velocity, spin and spheres of a grain; every lane works it out, the first stores it."""
         dt = world.time_step
         v4 = pack.load_vec4(grains.velocity, g)
         w4 = pack.load_vec4(grains.spin, g)
@@ -117,7 +117,7 @@ def step_kernels(build: Build) -> SimpleNamespace:
         # state out
         grains_out: Grains,
     ):
-        """Moves `slot_count` grain slots, those of the `running` worlds, on by a step; `lanes` threads a grain."""
+        """Moves the `slot_count` grain slots of the `running` worlds on by a step; `lanes` threads a grain."""
         thread = wp.tid()
         slot = thread // lanes
         lane = thread - slot * lanes
@@ -144,23 +144,10 @@ def step_kernels(build: Build) -> SimpleNamespace:
         )
         if moving:
             move(
-                model,
-                world,
-                grains_in,
-                grains_out,
-                hood,
-                alive,
-                flags,
-                w,
-                g,
-                step,
-                force,
-                torque,
-                rolling,
-                lane,
-                lanes,
-            )
-
+                model, world, grains_in, grains_out, hood, alive,
+                flags, w, g, step, force, torque, rolling,
+                lane, lanes,
+            )  # fmt: skip
         elif slot < slot_count and alive[g] < 0 and lane == 0:
             clear_spheres(model, grains_out, g)
             alive[g] = alive[g] + 1

@@ -1,9 +1,10 @@
 """Sum of a grain's contacts, in the order of its neighbour list, on one thread or by a warp of the GPU.
 
-A single thread walks through the list and evaluates what touches. A GPU warp would leave most of its lanes idle that way,
-as about one entry in four touches. So the warp first searches, each lane a stretch of its grain's list, and queues what
-touches; then all lanes evaluate the queue, 32 contacts at once; then the grains' lanes add up, component by component, in
-the order of the list. Both ways, and any number of lanes, add the same floats in the same order.
+A single thread walks through the list and evaluates what touches. A GPU warp would leave most of its lanes
+idle that way, as about one entry in four touches. So the warp first searches, each lane a stretch of its
+grain's list, and queues what touches; then all lanes evaluate the queue, 32 contacts at once; then the
+grains' lanes add up, component by component, in the order of the list. Both ways, and any number of lanes,
+add the same floats in the same order.
 """
 
 import functools
@@ -16,7 +17,7 @@ from dem_warp.types import Build, device_structs
 
 WARP = 32
 BLOCK = 128
-MIN_LANES = 2
+MIN_LANES = 4
 STRETCH = 16
 """Entries that a lane searches before the queue is emptied; a multiple of QUAD."""
 

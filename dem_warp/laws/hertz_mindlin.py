@@ -19,7 +19,7 @@ def contact_force(
     displacement: Any,
     time_step: Any,
 ):
-    """Force on a grain [N], the contact's new tangential displacement [m], and the normal part of the force [N].
+    """Force on a grain [N], the contact's new tangential displacement [m], and the force's normal part [N].
 
     Parameters
     ----------

@@ -20,9 +20,9 @@ def damped_hertz(
 ):
     """Normal force (4/3) E* sqrt(R*) d^(3/2) - c v_n [N], with c = 2 sqrt(5/6) |beta| sqrt(S_n m*).
 
-    `normal_velocity` is the separation speed. Near the end of an impact the damping exceeds the spring and attracts;
-    left alone, the chosen restitution comes back. With `clamp_attraction` the force never attracts, which raises the
-    effective restitution (0.18 becomes about 0.31).
+    `normal_velocity` is the separation speed. Near the end of an impact the damping exceeds the spring and
+    attracts; left alone, the chosen restitution comes back. With `clamp_attraction` the force never attracts,
+    which raises the effective restitution (0.18 becomes about 0.31).
 
     Source: Tsuji, Tanaka and Ishida, Powder Technology 71 (1992) 239-250; EDEM 2.7 Theory Reference Guide.
     """

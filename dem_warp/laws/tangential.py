@@ -26,8 +26,8 @@ def coulomb_spring(
 ):
     """Tangential force [N] and displacement [m] under the Coulomb limit |F_t| <= mu F_n.
 
-    The spring slides when it alone passes the limit; then its displacement shrinks to what the limit holds and the
-    damping is left out. A spring within the limit is damped, and the sum is limited again.
+    The spring slides when it alone passes the limit; then its displacement shrinks to what the limit holds
+    and the damping is left out. A spring within the limit is damped, and the sum is limited again.
 
     Source: Cundall and Strack, Geotechnique 29 (1979) 47-65; EDEM 2.7 Theory Reference Guide.
     """

@@ -1,4 +1,4 @@
-"""The lifted-cylinder test: fill an open tube that stands on a plate, strike it off, lift it, wait for the heap to rest."""
+"""The lifted-cylinder test: fill an open tube on a plate, strike it off, lift it, wait for the heap to rest."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ HEAPED = 4
 """Slow grains above the rim that show the tube to be full."""
 
 CALM = 10.0
-"""A heap rests when its root mean square speed is below `rest_speed` and its fastest grain below CALM times that."""
+"""A heap rests when its root mean square speed is below `rest_speed`, its fastest grain below CALM times that."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class LiftedCylinder:
     rest_speed, rest_time : float
         The heap rests when it has been slower than this (CALM) for this long [m/s], [s].
     duration : float, optional
-        Lift after this simulated time at the latest is over: ends the case at a fixed time [s] instead of at rest.
+        Ends the case at a fixed simulated time [s] instead of at rest.
     """
 
     diameter: float
@@ -120,7 +120,7 @@ def _world(case: "Case", rain: Rain) -> WorldSetup:
     count = len(rain.sizes)
     reach = case.grains.shape.bounding_radius * rain.sizes.max()
     release = scene.height + reach
-    positions = rain.positions + [0.0, 0.0, release + reach]
+    positions = rain.positions + np.array([0.0, 0.0, release + reach])
     velocities = np.tile([0.0, 0.0, -scene.rain_speed], (count, 1))
     grains = Grains(
         positions=positions,
@@ -218,7 +218,8 @@ class Controller:
         return {"fill": self._fill, "settle": self._settle, "lift": self._lift}[self.phase](view)
 
     def _enter(self, phase: str, view: "WorldView") -> None:
-        self.phases.append({"name": self.phase, "time": view.time - self._phase_start, "step": view.step})
+        steps = view.step - sum(done["steps"] for done in self.phases)
+        self.phases.append({"name": self.phase, "time": view.time - self._phase_start, "steps": steps})
         self.phase, self._phase_start, self._slow_since = phase, view.time, None
 
     def _rests(self, view: "WorldView") -> bool:
@@ -310,7 +311,9 @@ class Controller:
 
 
 def bed_level(positions: np.ndarray, radius: float, reach: float) -> float:
-    """Height of a bed's surface in a tube [m]: the mean over cells of a grain's size of the highest centre, plus half a grain.
+    """Height of a bed's surface in a tube [m].
+
+    It is the mean, over cells of a grain's size, of the highest centre, plus half a grain.
 
     Parameters
     ----------

@@ -1,8 +1,9 @@
 """Grains that rain into a tube: places without overlap, found one grain after another on the device.
 
-The rain is laid out in the frame that falls with it, grain i at height i times speed over rate, and each grain is tried at
-random places of the tube's cross-section until it overlaps no grain before it. In the laboratory the whole rain comes down
-at one speed; a grain is released to gravity when it crosses the release plane, so grains never overlap before that.
+The rain is laid out in the frame that falls with it, grain i at height i times speed over rate, and each
+grain is tried at random places of the tube's cross-section until it overlaps no grain before it. In the
+laboratory the whole rain comes down at one speed; a grain is released to gravity when it crosses the release
+plane, so grains never overlap before that.
 """
 
 from collections.abc import Sequence
