@@ -253,8 +253,11 @@ class Batch:
         now = time.perf_counter()
         if self.running and now - self._reported < REPORT_EVERY:
             return
-        self._reported = now parts = [self.controllers[w].fraction(self.chunk * CHUNK *
-        self.setups[w].time_step) for w in self.running] done = len(self.cases) - len(self.running)
+        self._reported = now
+        parts = [
+            self.controllers[w].fraction(self.chunk * CHUNK * self.setups[w].time_step) for w in self.running
+        ]
+        done = len(self.cases) - len(self.running)
         on_progress(
             Progress(
                 done=done,
