@@ -33,7 +33,7 @@ def resolve_device(device: str | None) -> str:
 
 
 def _start_warp() -> None:
-    """Initialise Warp without its greeting, and without its warning of a machine without a GPU, which is no fault.
+    """Initialise Warp without its greeting and without its warning that no GPU was found, which is no fault.
 
     The warning is written by native code, so the file descriptor is turned aside; anything else that comes is
     passed on.

@@ -194,7 +194,7 @@ class WorldSetup:
 
     @property
     def length_unit(self) -> float:
-        """Count of a fixed-point position [m]: a power of two, so that 31 bits span the domain and a margin."""
+        """Count of a fixed-point position [m]: a power of two; 31 bits span the domain and a margin."""
         return float(2.0 ** np.ceil(np.log2(1.05 * self.half_extent.max() / 2**31)))
 
 

@@ -35,7 +35,7 @@ def _run_case(index: int, case: "Case") -> "CaseResult":
 def run_in_processes(
     cases: Sequence["Case"], workers: int, on_result: "OnResult", on_progress: "OnProgress"
 ) -> list["CaseResult"]:
-    """Results of the cases in their order, `workers` at a time; a result is handed on as soon as it is there."""
+    """Results of the cases in their order, `workers` at a time; each is handed on as soon as it is there."""
     context = multiprocessing.get_context("spawn")
     fractions = context.Array("d", len(cases))
     phases = context.Array("i", len(cases))

@@ -177,8 +177,8 @@ class Solver:
         for step in range(self.cycle):
             self._step(step % 2)
         inputs = [
-            self.cycle, self.model, self.grains[0], self.alive, self.idle, self.hood, self.stale,
-            self.any_stale,
+            self.cycle, self.model, self.grains[0], self.alive, self.idle, self.hood,
+            self.stale, self.any_stale,
         ]  # fmt: skip
         self._launch(self._list_kernels.mark_stale, self.layout.grain_total, inputs)
         wp.capture_if(self.any_stale, self._rebuild)
@@ -289,7 +289,7 @@ def expected_speed(world: WorldSetup) -> float:
 
 
 def _neighbour_capacities(worlds: Sequence[WorldSetup]) -> tuple[int, int]:
-    """Partners of a sphere, and entries of a grain, that no packing of the worlds' grains is expected to pass."""
+    """Partners of a sphere and entries of a grain that no packing of the worlds' grains should pass."""
     found, row = 16, 32
     for world in worlds:
         for shape in world.shapes:

@@ -1,4 +1,4 @@
-"""The device arrays of a batch: what stays (`Model`), what moves (`Grains`, twice), and the neighbour lists."""
+"""The device arrays of a batch: what stays (`Model`), what moves (`Grains`, twice), the neighbour lists."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

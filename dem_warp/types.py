@@ -13,7 +13,7 @@ from typing import Any
 import warp as wp
 
 SPHERE_BITS = 23
-"""Bits of a neighbour entry that hold the partner, a sphere or a wall; above them is the own sphere's number."""
+"""Bits of a neighbour entry that hold the partner (a sphere or a wall); above is the own sphere's number."""
 
 SPHERE_MASK = (1 << SPHERE_BITS) - 1
 MAX_PARTNERS = 1 << SPHERE_BITS
@@ -58,7 +58,7 @@ DOUBLE = Precision("double", wp.float64, wp.vec3d, wp.vec4d, wp.quatd, wp.vec4d)
 
 @dataclass(frozen=True)
 class Build:
-    """What kernels are compiled for; worlds of one build run in one batch, and no world changes another's bits."""
+    """What kernels are compiled for; worlds of one build run in one batch, none changing another's bits."""
 
     precision: Precision
     sphere_count: int

@@ -1,7 +1,6 @@
 """One entry of a grain's neighbour list: does it touch, and what does it do.
 
-An entry names one of the grain's spheres and a partner: a sphere of another grain or, numbered after these, a
-wall.
+An entry names one of the grain's spheres and a partner: a sphere of another grain or, numbered after, a wall.
 """
 
 import functools
@@ -65,7 +64,7 @@ def contact_functions(build: Build) -> SimpleNamespace:
     def contact(
         model: Model, world: World, grains: Grains, hood: Neighbours, w: int, g: int, slot: int, step: int
     ):
-        """Force [N], torque and rolling torque [N m] of the touching entry in `slot`; moves its history on."""
+        """Force [N], torque and rolling torque [N m] of the touching entry in `slot`; updates its history."""
         entry = hood.entry[slot]
         partner = entry & SPHERE_MASK
         wall_base = model.grain_count * spheres_each

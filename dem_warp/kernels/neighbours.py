@@ -89,7 +89,7 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
         stale: wp.array(dtype=int),
         any_stale: wp.array(dtype=int),
     ):
-        """Marks a world in which a grain or a wall may use up its half of the skin in the next `ahead` steps."""
+        """Marks a world in which a grain or a wall may use up its half of the skin within `ahead` steps."""
         g = wp.tid()
         w = g // model.grain_count
         if idle[w] != 0:
@@ -175,7 +175,7 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
 
     @wp.kernel(module=module)
     def search(model: Model, grains: Grains, stale: wp.array(dtype=int), cells: Cells):
-        """Partners of each sphere: pairs within its bucket, and with the half of those around that lies ahead.
+        """Partners of each sphere: pairs in its own bucket, and with the half of the buckets ahead of it.
 
         Threads follow the buckets, so that neighbouring threads read the same memory.
         """
@@ -227,7 +227,7 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
     def write_lists(
         model: Model, stale: wp.array(dtype=int), cells: Cells, hood: Neighbours, flags: wp.array(dtype=int)
     ):
-        """A sphere's part of its grain's new list; histories come over from the old one, both being sorted."""
+        """A sphere's part of its grain's new list; histories come over from the old, both being sorted."""
         i = wp.tid()
         g = i // spheres_each
         s = i - g * spheres_each
@@ -266,8 +266,8 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
 
     @wp.kernel(module=module)
     def finish(
-        grains: Grains, cells: Cells, hood: Neighbours, stale: wp.array(dtype=int), any_stale:
-        wp.array(dtype=int), rebuilds: wp.array(dtype=int),
+        grains: Grains, cells: Cells, hood: Neighbours,
+        stale: wp.array(dtype=int), any_stale: wp.array(dtype=int), rebuilds: wp.array(dtype=int),
     ):  # fmt: skip
         w = wp.tid()
         if stale[w] != 0:

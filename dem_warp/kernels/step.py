@@ -117,7 +117,7 @@ def step_kernels(build: Build) -> SimpleNamespace:
         # state out
         grains_out: Grains,
     ):
-        """Moves the `slot_count` grain slots of the `running` worlds on by a step; `lanes` threads a grain."""
+        """Moves the `slot_count` grain slots of `running` worlds on by a step; `lanes` threads a grain."""
         thread = wp.tid()
         slot = thread // lanes
         lane = thread - slot * lanes

@@ -1,4 +1,4 @@
-"""Rolling resistance: a torque of constant size against the spin ("standard rolling friction"), as a limiter."""
+"""Rolling resistance: the directional constant torque ("standard rolling friction"), as a limiter."""
 
 from typing import Any
 
@@ -9,18 +9,16 @@ import warp as wp
 def rolling_torque(rolling_friction: Any, normal_force: Any, lever: Any):
     """Largest torque mu_r F_n R_i [N m] that a contact sets against a spin; an attracting contact sets none.
 
-    Source: Zhou et al., Physica A 269 (1999) 536-553; model A of Ai et al., Powder Technology 206 (2011)
-    269-282.
+    Source: Zhou et al., Physica A 269 (1999) 536-553; model A of Ai et al., Powder Technology 206 (2011) 269.
     """
     return rolling_friction * wp.max(normal_force, type(normal_force)(0.0)) * wp.length(lever)
 
 
 @wp.func
 def resist_spin(spin: Any, inertia: Any, torque: Any, time_step: Any):
-    """Body-frame spin [rad/s] after `torque` [N m] acted against it for a step, which may stop but not reverse it.
+    """Body-frame spin [rad/s] after `torque` [N m] acted against it for a step: at most it stops.
 
-    An explicit torque of constant size would reverse a slow spin in each step, and a heap would never come to
-    rest.
+    An explicit torque of constant size would reverse a slow spin each step, and no heap would come to rest.
     """
     speed = wp.length(spin)
     if torque > type(torque)(0.0) and speed > type(torque)(0.0):

@@ -1,4 +1,4 @@
-"""The lifted-cylinder test: fill an open tube on a plate, strike it off, lift it, wait for the heap to rest."""
+"""The lifted-cylinder test: fill an open tube on a plate, strike it off, lift it, wait for the heap."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ HEAPED = 4
 """Slow grains above the rim that show the tube to be full."""
 
 CALM = 10.0
-"""A heap rests when its root mean square speed is below `rest_speed`, its fastest grain below CALM times that."""
+"""A heap rests when its root mean square speed is below `rest_speed` and no grain passes CALM times that."""
 
 
 @dataclass(frozen=True)
