@@ -21,6 +21,8 @@ ROBUST_ROUNDS = 15
 """Rounds of reweighting of the first plane, on the border alone."""
 SEPARATION = 5.0
 """A heap differs from the background by this many times the background's noise, on average, at the least."""
+LIGHT_RANGE = 2.0
+"""Light that is brighter or dimmer than its median by more than this factor is not evened out further."""
 LEAST_NOISE = 1.0
 """Noise [of 255] below which a background counts as even: that of rounding and compression."""
 
@@ -55,7 +57,7 @@ def contrast_with_background(picture: Picture, place: str) -> tuple[FloatArray, 
     smooth = cv2.GaussianBlur(channels, (0, 0), sigmaX=BLUR, sigmaY=1e-6).reshape(channels.shape)
     background, noise = _background(np.asarray(smooth, dtype=np.float64))
     difference = smooth - background
-    contrast = np.sqrt(np.einsum("ijk,ijk->ij", difference, difference))
+    contrast = np.sqrt(np.einsum("ijk,ijk->ij", difference, difference)) / _light(background)
     thresholds = []
     values = contrast.ravel()
     for _ in range(2):
@@ -114,6 +116,12 @@ def _background(channels: FloatArray) -> tuple[FloatArray, float]:
     grid = np.mgrid[0:rows, 0:columns]
     fitted = _surface_terms(grid[0].ravel(), grid[1].ravel(), (rows, columns)) @ surface
     return fitted.reshape(channels.shape), noise
+
+
+def _light(background: FloatArray) -> FloatArray:
+    """Brightness of the light relative to its median: where it is dim, heap and background differ less."""
+    level = np.linalg.norm(background, axis=2)
+    return np.clip(level / max(float(np.median(level)), LEAST_NOISE), 1.0 / LIGHT_RANGE, LIGHT_RANGE)
 
 
 def _robust_plane(terms: FloatArray, sample: FloatArray) -> FloatArray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +18,10 @@ MINIMUM_PLATE_THICKNESS = 3.0
 """A plate beside the heap is seen at least this thick [pixels]; a thinner end is a toe of the heap."""
 THICK_SHARE = 0.4
 """The underside is taken from columns at least this thick, as a share of the thickest."""
-UNDERSIDE_ROUNDS = 5
+LINE_ROUNDS = 8
 """Rounds of leaving out columns that end above the line."""
+LEAST_SEEN = 0.25
+"""A plate is seen in at least this share of the columns at either end; grains may hide the others."""
 MAXIMUM_TILT = 20.0
 """A camera that is tilted by more [degrees] has not seen a plate."""
 
@@ -84,28 +86,33 @@ def find_plate(top: FloatArray, bottom: FloatArray, place: str) -> PlateLine:
 def _shelf(
     columns: NDArray[np.intp], upper: FloatArray, lower: FloatArray, spanning: bool
 ) -> PlateLine | None:
-    """The line through both ends of the upper edge, where they lie on one and are no thin toes of the heap.
+    """The line through both ends of the upper edge, where it is a plate's and not that of a heap's thin toes.
 
     What spans the picture from border to border is no toe, however thin.
     """
     size = max(2, round(END_SHARE * len(columns)))
     ends = np.r_[0:size, len(columns) - size : len(columns)]
-    slope, row = np.polyfit(columns[ends], upper[ends], 1)
-    residual = np.abs(upper[ends] - row - slope * columns[ends])
+    line, kept = _lowest_line(columns[ends], upper[ends])
+    residual = np.abs(upper[ends] - line.row - line.slope * columns[ends])[kept]
+    seen = min(kept[:size].sum(), kept[size:].sum()) >= max(2, LEAST_SEEN * size)
     thick = spanning or (lower - upper)[ends].min() >= MINIMUM_PLATE_THICKNESS
-    if residual.max() > END_TOLERANCE or not thick:
-        return None
-    return PlateLine(float(row), float(slope), visible=True)
+    return replace(line, visible=True) if seen and thick and residual.max() <= END_TOLERANCE else None
 
 
 def _underside(columns: NDArray[np.intp], upper: FloatArray, lower: FloatArray) -> PlateLine:
-    """The line along the lower edge of the thicker columns, without those that end well above it."""
+    """The line along the lower edge of the thicker columns."""
     thickness = lower - upper
-    candidate = thickness >= THICK_SHARE * thickness.max()
-    kept = candidate
-    for _ in range(UNDERSIDE_ROUNDS):
-        slope, row = np.polyfit(columns[kept], lower[kept], 1)
-        height = row + slope * columns - lower
-        limit = max(1.0, 2.0 * float(np.median(np.abs(height[kept]))))
-        kept = candidate & (height <= limit)
-    return PlateLine(float(row), float(slope), visible=False)
+    thick = thickness >= THICK_SHARE * thickness.max()
+    return _lowest_line(columns[thick], lower[thick])[0]
+
+
+def _lowest_line(columns: NDArray[np.intp], rows: FloatArray) -> tuple[PlateLine, NDArray[np.bool_]]:
+    """The line through an edge without the columns that end well above it, and which columns it keeps."""
+    kept = np.ones(len(columns), dtype=np.bool_)
+    slope, row = 0.0, float(np.median(rows))
+    for _ in range(LINE_ROUNDS):
+        height = row + slope * columns - rows
+        limit = max(END_TOLERANCE, 2.0 * float(np.median(np.abs(height[kept]))))
+        kept = height <= limit
+        slope, row = np.polyfit(columns[kept], rows[kept], 1)
+    return PlateLine(float(row), float(slope), visible=False), kept

@@ -20,6 +20,8 @@ BRIGHTNESS = 1.25
 """Overall exposure."""
 CAVITY_SHADING = 0.6
 """How much what lies behind its neighbours is darkened, at the most."""
+CAVITY_REACH = 0.02
+"""Neighbours shade over three radii, but at most over this share of the picture's width."""
 FRAGMENT_LIMIT = 4_000_000
 """Pixels of spheres held in memory at a time while a depth buffer is filled."""
 
@@ -70,7 +72,8 @@ def shaded(spheres: Spheres, colors: FloatArray, frame: Frame, azimuth: float) -
     diffuse = np.clip(normal @ (LIGHT / np.linalg.norm(LIGHT)), 0.0, None)
     light = AMBIENT + (1.0 - AMBIENT) * diffuse
     behind = np.where(visible, distance, distance[visible].max() if visible.any() else 0.0)
-    reach = 3.0 * float(np.median(spheres.radii)) * SHADING_SUPERSAMPLING / frame.meters_per_pixel
+    sphere_pixels = float(np.median(spheres.radii)) * SHADING_SUPERSAMPLING / frame.meters_per_pixel
+    reach = min(3.0 * sphere_pixels, CAVITY_REACH * owner.shape[1])
     recess = (behind - cv2.GaussianBlur(behind, (0, 0), reach)) / reach
     light *= 1.0 - CAVITY_SHADING * np.clip(recess, 0.0, 1.0)
     layer = np.zeros((*owner.shape, 4))

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from imaging.errors import PictureError
 from imaging.geometry import FloatArray, Picture
 
-SUPERSAMPLING = 4
+SUPERSAMPLING = 8
 """Shapes are drawn this many times finer than the picture, then averaged."""
 SUBPIXEL_BITS = 6
 DISCS_PER_GRAIN = 3.0

@@ -146,3 +146,14 @@ def test_bad_spheres_are_named(centers, radii, words: str) -> None:
 def test_unknown_backend_is_named(heap) -> None:
     with pytest.raises(PictureError, match=r"backend.*'opengl'"):
         snapshot(heap.centers, heap.radii, backend="opengl")
+
+
+def test_plate_is_found_beside_stray_grains(heap, tmp_path) -> None:
+    strays = np.array([[-0.045, 0.0, 0.001], [0.046, 0.0, 0.001]])
+    centers, radii = np.vstack([heap.centers, strays]), np.r_[heap.radii, 0.001, 0.001]
+    picture = snapshot(centers, radii, backend="raster")
+    angle = measure_photograph(save_picture(tmp_path / "strays.jpg", picture.image))
+    # The plate's upper edge is drawn between two rows; compression moves it by less than half a pixel.
+    plate = angle.outline.plate
+    assert plate.row == pytest.approx(picture.ground_row, abs=0.5)
+    assert plate.tilt == pytest.approx(0.0, abs=0.1)
