@@ -20,9 +20,9 @@ def contact_functions(build: Build) -> SimpleNamespace:
     """`touches` and `contact` of one build."""
     precision = build.precision
     real, vec3, vec4 = precision.real, precision.vec3, precision.vec4
-    Sphere = precision.sphere  # noqa: N806
+    Sphere = precision.sphere
     types = device_structs(precision)
-    Model, World, Grains, Neighbours = types.Model, types.World, types.Grains, types.Neighbours  # noqa: N806
+    Model, World, Grains, Neighbours = types.Model, types.World, types.Grains, types.Neighbours
     pack = packing(precision)
     walls = wall_functions(precision)
     spheres_each = wp.constant(build.sphere_count)

@@ -33,7 +33,7 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
     precision = build.precision
     real, vec4 = precision.real, precision.vec4
     types = device_structs(precision)
-    Model, World, Grains, Neighbours = types.Model, types.World, types.Grains, types.Neighbours  # noqa: N806
+    Model, World, Grains, Neighbours = types.Model, types.World, types.Grains, types.Neighbours
     pack = packing(precision)
     walls = wall_functions(precision)
     spheres_each = wp.constant(build.sphere_count)

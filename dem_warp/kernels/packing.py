@@ -46,7 +46,7 @@ def _memory_access(vector, kind: str, real: str) -> tuple:
 
 def _fixed_point_spheres(precision: Precision) -> SimpleNamespace:
     sphere, vec3, vec4, real = precision.sphere, precision.vec3, precision.vec4, precision.real
-    World = device_structs(precision).World  # noqa: N806
+    World = device_structs(precision).World
 
     @wp.func
     def pack(position: wp.vec3d, last: real, world: World) -> sphere:
@@ -97,7 +97,7 @@ def _fixed_point_spheres(precision: Precision) -> SimpleNamespace:
 
 def _float_spheres(precision: Precision) -> SimpleNamespace:
     sphere, vec3, vec4, real = precision.sphere, precision.vec3, precision.vec4, precision.real
-    World = device_structs(precision).World  # noqa: N806
+    World = device_structs(precision).World
 
     @wp.func
     def pack(position: wp.vec3d, last: real, world: World) -> sphere:
@@ -148,7 +148,7 @@ def packing(precision: Precision) -> SimpleNamespace:
     `stamped_step`, and `load_*`, `store_*`.
     """
     sphere, vec4 = precision.sphere, precision.vec4
-    World = device_structs(precision).World  # noqa: N806
+    World = device_structs(precision).World
     functions = (_fixed_point_spheres if precision.is_fixed_point else _float_spheres)(precision)
 
     @wp.func

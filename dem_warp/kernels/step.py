@@ -23,7 +23,7 @@ def step_kernels(build: Build) -> SimpleNamespace:
         precision.real, precision.vec3, precision.vec4, precision.quat, precision.sphere,
     )  # fmt: skip
     types = device_structs(precision)
-    Model, World, Grains, Neighbours = types.Model, types.World, types.Grains, types.Neighbours  # noqa: N806
+    Model, World, Grains, Neighbours = types.Model, types.World, types.Grains, types.Neighbours
     pack = packing(precision)
     motion = integration_functions(precision)
     sum_contacts = (cooperative_sum if build.cooperative else serial_sum)(build)

@@ -125,7 +125,7 @@ def serial_sum(build: Build):
     """Function that sums a grain's contacts on one thread."""
     real, vec3 = build.precision.real, build.precision.vec3
     types = device_structs(build.precision)
-    Model, World, Grains, Neighbours = types.Model, types.World, types.Grains, types.Neighbours  # noqa: N806
+    Model, World, Grains, Neighbours = types.Model, types.World, types.Grains, types.Neighbours
     contacts = contact_functions(build)
 
     @wp.func
@@ -192,7 +192,7 @@ def cooperative_sum(build: Build):
     """Function that sums the contacts of a warp's grains; every lane of the warp must call it."""
     vec3 = build.precision.vec3
     types = device_structs(build.precision)
-    Model, World, Grains, Neighbours = types.Model, types.World, types.Grains, types.Neighbours  # noqa: N806
+    Model, World, Grains, Neighbours = types.Model, types.World, types.Grains, types.Neighbours
     contacts = contact_functions(build)
     totals = _totals(build)
 

@@ -18,7 +18,7 @@ def wall_functions(precision: Precision) -> SimpleNamespace:
     Geometry is in float64: an overlap is 1e-3 to 1e-6 of the distances that it is the difference of.
     """
     real, vec3 = precision.real, precision.vec3
-    Wall = device_structs(precision).Wall  # noqa: N806
+    Wall = device_structs(precision).Wall
 
     @wp.func
     def from_wall(wall: Wall, position: wp.vec3d, step: int, time_step: real) -> wp.vec3d:
