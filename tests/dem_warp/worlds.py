@@ -1,0 +1,196 @@
+"""Builders of small worlds, closed forms of their contacts, and a step-by-step record of their motion.
+
+Every world has two walls, far-off planes where a test needs none, and its grains have one sphere or nine: so all tests
+together compile four builds of the kernels.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dem_warp.clumps import ClumpShape
+from dem_warp.device import resolve_device
+from dem_warp.materials import Interaction, Material
+from dem_warp.model import ContactCoefficients, Grains, WorldSetup
+from dem_warp.solver import Solver
+from dem_warp.walls import Plane, Wall
+
+GRAVITY = 9.81
+RADIUS = 5e-3
+"""Of the single spheres [m]."""
+
+BALL = ClumpShape.sphere(RADIUS)
+GRAIN = Material(density=1000.0, shear_modulus=10e6, poisson_ratio=0.25)
+STEEL = Material(density=7800.0, shear_modulus=70e9, poisson_ratio=0.3)
+HERTZ_DURATION = 0.8 * math.sqrt(math.pi) * math.gamma(0.4) / math.gamma(0.9)
+"""Duration of an elastic Hertz impact over (largest overlap / impact speed): 2.9432750."""
+
+_RING = np.array([[math.cos(a), math.sin(a)] for a in np.deg2rad([90.0, 210.0, 330.0])])
+PYRAMID = ClumpShape.from_spheres(
+    1e-3
+    * np.vstack(
+        [
+            np.column_stack([1.05 * _RING, np.full(3, -1.2)]),
+            np.column_stack([0.75 * _RING, np.full(3, -0.1)]),
+            [[0.0, 0.0, 1.1], [0.0, 0.0, 2.2], [0.0, 0.0, 3.2]],
+        ]
+    ),
+    1e-3 * np.array([0.85] * 6 + [1.0, 0.8, 0.6]),
+)
+"""Nine spheres that stand on three of them, like a buckwheat grain of 6 mm."""
+
+BOOT = ClumpShape.from_spheres(
+    1e-3 * np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 1.2, 0.0]]), 1e-3 * np.array([1.0, 0.8, 0.6])
+)
+"""Three unequal spheres in an L: three different moments of inertia."""
+
+BOX = ((-0.12, -0.12, -0.12), (0.12, 0.12, 0.12))
+_NOWHERE = Plane(point=(0.0, 0.0, -1.0))
+
+
+def grains(
+    positions: ArrayLike,
+    *,
+    velocities: ArrayLike = 0.0,
+    spins: ArrayLike = 0.0,
+    orientations: ArrayLike = (0.0, 0.0, 0.0, 1.0),
+    sizes: ArrayLike = 1.0,
+    shapes: ArrayLike = 0,
+    density: float = GRAIN.density,
+) -> Grains:
+    """Grains at positions [m]; what is given once holds for all of them."""
+    positions = np.atleast_2d(np.asarray(positions, dtype=float))
+    n = len(positions)
+    return Grains(
+        positions=positions,
+        orientations=np.broadcast_to(np.asarray(orientations, dtype=float), (n, 4)),
+        velocities=np.broadcast_to(np.asarray(velocities, dtype=float), (n, 3)),
+        spins=np.broadcast_to(np.asarray(spins, dtype=float), (n, 3)),
+        sizes=np.broadcast_to(np.asarray(sizes, dtype=float), (n,)),
+        densities=np.full(n, density),
+        shapes=np.broadcast_to(np.asarray(shapes, dtype=int), (n,)),
+        release_steps=np.zeros(n, dtype=int),
+    )
+
+
+def pair(
+    restitution: float = 1.0,
+    friction: float = 0.0,
+    rolling: float = 0.0,
+    clamp: bool = False,
+    partner: Material = GRAIN,
+) -> ContactCoefficients:
+    """Contact of the grains' material with a partner's."""
+    return ContactCoefficients.of_pair(GRAIN, partner, Interaction(restitution, friction, rolling), clamp)
+
+
+def world(
+    bodies: Grains,
+    contact: ContactCoefficients,
+    time_step: float,
+    *,
+    walls: Sequence[Wall] = (),
+    shapes: tuple[ClumpShape, ...] = (BALL,),
+    gravity: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    skin: float = 2e-3,
+    speed_limit: float = 20.0,
+    domain: tuple[tuple[float, float, float], tuple[float, float, float]] = BOX,
+) -> WorldSetup:
+    """A world in which one contact holds for grains and walls alike, its walls made up to two."""
+    both = (*walls, *[_NOWHERE] * (2 - len(walls)))
+    return WorldSetup(
+        grains=bodies,
+        shapes=shapes,
+        contacts=(contact, contact),
+        walls=tuple((wall, 1) for wall in both),
+        time_step=time_step,
+        skin=skin,
+        speed_limit=speed_limit,
+        domain=domain,
+        gravity=gravity,
+    )
+
+
+def downhill(degrees: float) -> tuple[float, float, float]:
+    """Gravity [m/s2] over a plane z = 0 that falls towards +y by an angle."""
+    angle = math.radians(degrees)
+    return 0.0, GRAVITY * math.sin(angle), -GRAVITY * math.cos(angle)
+
+
+def ball_mass() -> float:
+    """Of a single sphere [kg]."""
+    return GRAIN.density * BALL.volume
+
+
+def static_overlap(contact: ContactCoefficients, force: float, radius: float = RADIUS) -> float:
+    """Overlap [m] at which a Hertz contact carries a force [N]."""
+    return float((0.75 * force / (contact.modulus * math.sqrt(radius))) ** (2.0 / 3.0))
+
+
+@dataclass(frozen=True)
+class Impact:
+    """Elastic Hertz impact: Johnson, Contact Mechanics (1985), section 11.4."""
+
+    overlap: float
+    force: float
+    duration: float
+
+    @classmethod
+    def of(cls, contact: ContactCoefficients, radius: float, mass: float, speed: float) -> "Impact":
+        """Impact of an effective radius [m] and mass [kg] at a speed [m/s]."""
+        overlap = (15.0 * mass * speed**2 / (16.0 * contact.modulus * math.sqrt(radius))) ** 0.4
+        force = 4.0 / 3.0 * contact.modulus * math.sqrt(radius) * overlap**1.5
+        return cls(overlap, force, HERTZ_DURATION * overlap / speed)
+
+
+@dataclass(frozen=True)
+class Record:
+    """Motion of all grains, step by step: arrays (steps + 1, grains, 3) in SI units."""
+
+    positions: np.ndarray
+    velocities: np.ndarray
+    spins: np.ndarray
+
+
+def record(solver: Solver, steps: int) -> Record:
+    """Take steps one at a time, without a rebuild of the neighbour lists, and keep every state."""
+    shape = (steps + 1, solver.layout.grain_total, 3)
+    history = Record(*(np.full(shape, np.nan) for _ in range(3)))
+
+    def keep(row: int, state: Any) -> None:
+        history.positions[row] = state.position.numpy()
+        history.velocities[row] = state.velocity.numpy()[:, :3]
+        history.spins[row] = state.spin.numpy()[:, :3]
+
+    keep(0, solver.grains[0])
+    for step in range(steps):
+        solver._step(step % 2)
+        keep(step + 1, solver.grains[1 - step % 2])
+    return history
+
+
+def solve(*setups: WorldSetup, precision: str = "double", **options: Any) -> Solver:
+    """Solver of worlds on the CPU."""
+    return Solver(setups, resolve_device("cpu"), precision, **options)
+
+
+def run_for(solver: Solver, time: float) -> None:
+    """Advance by the least number of chunks that takes every world past a time [s]."""
+    least = min(setup.time_step for setup in solver.worlds)
+    solver.advance(math.ceil(time / (least * 256)))
+
+
+def state(solver: Solver, index: int = 0) -> dict[str, np.ndarray]:
+    """Copies of a world's final arrays: slots, poses, velocities and spins of its living grains."""
+    return {name: np.array(array) for name, array in solver.poses(index).items()}
+
+
+def assert_same_bits(a: dict[str, np.ndarray], b: dict[str, np.ndarray]) -> None:
+    """Every array of two states is equal, bit for bit."""
+    assert a.keys() == b.keys()
+    for name, array in a.items():
+        np.testing.assert_array_equal(array, b[name], err_msg=name)
