@@ -1,0 +1,252 @@
+"""How the packages hang together: who imports whom, what loads with what, how long things are."""
+
+import ast
+import re
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+PACKAGES = ("dem_warp", "doe", "imaging", "experiments")
+
+# What each package may import beside itself and the standard library; late ones only inside functions: the
+# simulator alone needs numpy and Warp, and no window system is loaded before something is drawn.
+LIBRARIES = {
+    "dem_warp": {"numpy", "warp"},
+    "doe": {"contourpy", "matplotlib", "numpy", "pandas", "scipy", "statsmodels"},
+    "imaging": {"cv2", "numpy", "scipy"},
+}
+LATE_LIBRARIES = {"dem_warp": {"trimesh"}, "doe": set(), "imaging": {"pyvista"}}
+
+# Device code: a law sees numbers only, a kernel sees laws and the structures that it works on.
+LAYERS = {
+    "dem_warp.laws": {"dem_warp.laws", "typing", "warp"},
+    "dem_warp.kernels": {
+        "dem_warp.kernels", "dem_warp.laws", "dem_warp.types", "dem_warp.walls",
+        "functools", "types", "typing", "warp",
+    },
+    "dem_warp.types": {"dataclasses", "enum", "functools", "types", "typing", "warp"},
+}  # fmt: skip
+
+DISTRIBUTIONS = {"cv2": "opencv-python-headless", "warp": "warp-lang"}
+COMES_WITH = {
+    "annotated_types": "pydantic",
+    "contourpy": "matplotlib",
+    "markupsafe": "jinja2",
+    "pydantic_core": "pydantic",
+}
+
+MAX_FILE_LINES = 450
+MAX_FUNCTION_LINES = 80
+
+Function = ast.FunctionDef | ast.AsyncFunctionDef
+
+
+@dataclass(frozen=True)
+class Import:
+    """An imported module, and whether it is loaded only when a function runs or a type is checked."""
+
+    module: str
+    late: bool
+    place: str
+
+    @property
+    def library(self) -> str:
+        return self.module.partition(".")[0]
+
+
+@dataclass(frozen=True)
+class Source:
+    """A parsed Python file."""
+
+    path: Path
+    tree: ast.Module
+    line_count: int
+
+    @property
+    def name(self) -> str:
+        return self.path.relative_to(ROOT).as_posix()
+
+    @property
+    def module(self) -> str:
+        return self.name.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
+
+    @property
+    def imports(self) -> list[Import]:
+        return list(_imports(self.tree, self.name, late=False))
+
+
+def _imports(node: ast.AST, name: str, late: bool) -> Iterator[Import]:
+    for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.Import):
+            yield from (Import(alias.name, late, f"{name}:{child.lineno}") for alias in child.names)
+        elif isinstance(child, ast.ImportFrom):
+            yield Import("." * child.level + (child.module or ""), late, f"{name}:{child.lineno}")
+        checked = isinstance(child, ast.If) and ast.unparse(child.test) == "TYPE_CHECKING"
+        yield from _imports(child, name, late or checked or isinstance(child, Function))
+
+
+@cache
+def sources(folder: str) -> tuple[Source, ...]:
+    """Every Python file under a folder of the repository; an empty folder would make each test below pass."""
+    found = []
+    for path in sorted((ROOT / folder).rglob("*.py")):
+        text = path.read_text(encoding="utf-8")
+        found.append(Source(path, ast.parse(text, path.name), text.count("\n")))
+    assert found, f"no Python files under {folder}"
+    return tuple(found)
+
+
+def everything() -> list[Source]:
+    return [source for folder in (*PACKAGES, "tests") for source in sources(folder)]
+
+
+def own_lines(function: Function) -> int:
+    """Lines of a function without its inner functions and structs, of which a kernels' builder has many."""
+    inner = [n for n in ast.iter_child_nodes(function) if isinstance(n, Function | ast.ClassDef)]
+    return _lines(function) - sum(_lines(n) for n in inner)
+
+
+def _lines(node: Function | ast.ClassDef) -> int:
+    assert node.end_lineno is not None
+    first = min([node.lineno, *(decorator.lineno for decorator in node.decorator_list)])
+    return node.end_lineno - first + 1
+
+
+@pytest.mark.parametrize("package", ["dem_warp", "doe", "imaging"])
+def test_simulation_statistics_and_pictures_do_not_know_each_other(package: str) -> None:
+    others = {*PACKAGES, "tests"} - {package}
+    assert [i for source in sources(package) for i in source.imports if i.library in others] == []
+
+
+def test_no_package_imports_the_tests() -> None:
+    assert [
+        i for p in PACKAGES for source in sources(p) for i in source.imports if i.library == "tests"
+    ] == []
+
+
+def test_imports_are_absolute() -> None:
+    assert [i for source in everything() for i in source.imports if i.module.startswith(".")] == []
+
+
+@pytest.mark.parametrize("package", sorted(LIBRARIES))
+def test_a_package_uses_its_own_libraries_only(package: str) -> None:
+    early = LIBRARIES[package] | {package}
+    late = early | LATE_LIBRARIES[package]
+    strangers = [
+        i
+        for source in sources(package)
+        for i in source.imports
+        if i.library not in sys.stdlib_module_names and i.library not in (late if i.late else early)
+    ]
+    assert strangers == []
+
+
+@pytest.mark.parametrize("layer", sorted(LAYERS))
+def test_device_code_sees_only_what_lies_below_it(layer: str) -> None:
+    inside = [s for s in sources("dem_warp") if s.module == layer or s.module.startswith(layer + ".")]
+    assert inside, f"no module {layer}"
+    allowed = LAYERS[layer]
+    above = [
+        i
+        for source in inside
+        for i in source.imports
+        if i.module not in allowed and not any(i.module.startswith(a + ".") for a in allowed)
+    ]
+    assert above == []
+
+
+def test_device_functions_stand_among_laws_and_kernels() -> None:
+    homes = {"kernel": ("dem_warp.kernels",), "func": ("dem_warp.kernels", "dem_warp.laws")}
+    strays = []
+    for source in (s for package in PACKAGES for s in sources(package)):
+        for function in (n for n in ast.walk(source.tree) if isinstance(n, Function)):
+            for decorator in map(ast.unparse, function.decorator_list):
+                kind = re.match(r"(?:wp|warp)\.(kernel|func)\b", decorator)
+                if kind and not source.module.startswith(homes[kind[1]]):
+                    strays.append(f"{source.name}:{function.lineno} {function.name}")
+    assert strays == []
+
+
+def test_every_library_is_declared() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    declared = {re.split(r"[^\w-]", requirement)[0] for requirement in project["dependencies"]}
+    used = {i.library for p in PACKAGES for source in sources(p) for i in source.imports}
+    third_party = used - set(sys.stdlib_module_names) - set(PACKAGES)
+    missing = {COMES_WITH.get(n, DISTRIBUTIONS.get(n, n)) for n in third_party} - declared
+    assert missing == set()
+
+
+@pytest.mark.parametrize(
+    ("module", "unwanted"),
+    [
+        ("dem_warp", {"pandas", "scipy", "pyvista", "cv2", "trimesh", "pydantic", "typer"}),
+        ("doe", {"warp", "pyvista", "cv2", "plotly", "matplotlib.pyplot"}),
+        ("imaging", {"warp", "pyvista", "vtkmodules", "pandas"}),
+        ("experiments.cli", {"warp", "pyvista", "pandas", "cv2", "statsmodels", "plotly"}),
+    ],
+)
+def test_an_import_loads_no_more_than_it_needs(module: str, unwanted: set[str]) -> None:
+    code = f"import sys, {module}; print(*sys.modules)"
+    loaded = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
+    ).stdout.split()
+    assert module in loaded
+    assert unwanted & set(loaded) == set()
+
+
+def test_package_files_only_hand_names_on() -> None:
+    def hands_on(node: ast.stmt) -> bool:
+        docstring = isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
+        names = isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__"
+        return docstring or names or isinstance(node, ast.Import | ast.ImportFrom)
+
+    files = [s for p in PACKAGES for s in sources(p) if s.path.name == "__init__.py"]
+    logic = [f"{s.name}:{node.lineno}" for s in files for node in s.tree.body if not hands_on(node)]
+    assert logic == []
+
+
+def test_input_is_checked_by_errors_that_python_cannot_leave_out() -> None:
+    asserts = [
+        f"{source.name}:{node.lineno}"
+        for package in PACKAGES
+        for source in sources(package)
+        for node in ast.walk(source.tree)
+        if isinstance(node, ast.Assert)
+    ]
+    assert asserts == []
+
+
+def test_files_are_short() -> None:
+    assert {s.name: s.line_count for s in everything() if s.line_count >= MAX_FILE_LINES} == {}
+
+
+def test_functions_are_short() -> None:
+    long = {
+        f"{source.name}:{node.lineno} {node.name}": own_lines(node)
+        for source in everything()
+        for node in ast.walk(source.tree)
+        if isinstance(node, Function) and own_lines(node) >= MAX_FUNCTION_LINES
+    }
+    assert long == {}
+
+
+def test_no_file_names_a_place_of_one_machine() -> None:
+    place = re.compile(r"(?<![\w.$}])/(?:home|Users|root|work|opt|mnt|srv)/\w")
+    kinds = {".py", ".toml", ".md", ".cff", ".txt", ".csv", ".j2", ".css", ".js", ".html", ".json", ".yml"}
+    top = [path for path in ROOT.iterdir() if path.is_file()]
+    below = [path for f in (*PACKAGES, "tests", ".ci") for path in (ROOT / f).rglob("*") if path.is_file()]
+    texts = [path for path in top + below if path.suffix in kinds or path.parent.name == ".ci"]
+    named = [
+        f"{path.relative_to(ROOT)}:{number}"
+        for path in texts
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1)
+        if place.search(line)
+    ]
+    assert named == []
