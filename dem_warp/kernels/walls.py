@@ -27,12 +27,17 @@ def wall_functions(precision: Precision) -> SimpleNamespace:
         return position - wall.point - wall.velocity * (wp.float64(steps) * wp.float64(time_step))
 
     @wp.func
-    def from_rim(wall: Wall, r: wp.vec3d, along: wp.float64) -> wp.vec3d:
-        """Vector to `r` from the nearest point of the rims of a cylinder, beyond which `r` lies."""
+    def from_rim(wall: Wall, r: wp.vec3d, along: wp.float64):
+        """Vector to `r`, beyond the rims of a cylinder, from the nearest point of a rim, and its length.
+
+        On the axis every point of a rim is as near: the vector is what they have in common, along the axis.
+        """
         across = r - wall.axis * along
-        distance = wp.max(wp.length(across), wp.float64(TINY))
+        off_axis = wp.length(across)
+        aside = off_axis - wall.radius
         beyond = along - wp.clamp(along, wp.float64(0.0), wall.length)
-        return across * ((distance - wall.radius) / distance) + wall.axis * beyond
+        outward = across / wp.max(off_axis, wp.float64(TINY))
+        return outward * aside + wall.axis * beyond, wp.sqrt(aside * aside + beyond * beyond)
 
     @wp.func
     def overlaps(wall: Wall, position: wp.vec3d, radius: real, step: int, time_step: real) -> bool:
@@ -42,8 +47,8 @@ def wall_functions(precision: Precision) -> SimpleNamespace:
         along = wp.dot(r, wall.axis)
         if wall.kind == CYLINDER:
             if along < wp.float64(0.0) or along > wall.length:
-                d = from_rim(wall, r, along)
-                return wp.dot(d, d) < reach * reach
+                _d, distance = from_rim(wall, r, along)
+                return distance < reach
             across2 = wp.dot(r, r) - along * along
             inner = wall.radius - reach
             outer = wall.radius + reach
@@ -63,9 +68,9 @@ def wall_functions(precision: Precision) -> SimpleNamespace:
         normal = rounded(wall.axis)
         if wall.kind == CYLINDER:
             if along < wp.float64(0.0) or along > wall.length:
-                d = from_rim(wall, r, along)
-                distance = wp.max(wp.length(d), wp.float64(TINY))
-                normal = rounded(d) / real(distance)
+                d, length = from_rim(wall, r, along)
+                distance = length
+                normal = rounded(d) / real(wp.max(length, wp.float64(TINY)))
             else:
                 across = r - wall.axis * along
                 off_axis = wp.max(wp.length(across), wp.float64(TINY))
