@@ -64,8 +64,9 @@ def test_a_sliding_ball_comes_to_roll():
     solver = solve(ball_on_plane(contact, velocity=(SPEED, 0.0, 0.0)))
     run_for(solver, 0.05)
     end = state(solver)
-    # Without rolling friction the moment of momentum about the contact is kept: v = v0 / (1 + 2 R^2 / (5 L^2)), which is
-    # 5/7 v0 up to the overlap, L = R - d / 2; the tangential spring's last swing is damped within some hundred steps.
+    # Without rolling friction the moment of momentum about the contact is kept: v = v0 / (1 + 2 R^2 / (5
+    # L^2)), which is 5/7 v0 up to the overlap, L = R - d / 2; the tangential spring's last swing is damped
+    # within some hundred steps.
     rolling = SPEED / (1.0 + 0.4 * (RADIUS / lever(contact)) ** 2)
     assert rolling == pytest.approx(5.0 / 7.0 * SPEED, rel=1e-3)
     assert end["velocities"][0, 0] == pytest.approx(rolling, rel=1e-6)
@@ -92,7 +93,8 @@ def test_rolling_friction_stops_a_ball_where_the_law_says():
     deceleration = rolling * GRAVITY / (1.0 + 0.4 * (RADIUS / arm) ** 2)
     run_for(solver, 1.2 * SPEED / deceleration)
     end = state(solver)
-    # The tangential spring gives way by mu_r m g / S_t, and swings once when the ball stops: 1e-4 of the path.
+    # The tangential spring gives way by mu_r m g / S_t, and swings once when the ball stops: 1e-4 of the
+    # path.
     assert end["positions"][0, 0] == pytest.approx(0.5 * SPEED**2 / deceleration, rel=2e-4)
     assert np.abs(end["velocities"]).max() < 1e-9
     assert np.abs(end["spins"]).max() < 1e-7
@@ -111,7 +113,8 @@ def test_a_ball_stays_on_a_slope_below_the_rolling_angle():
     assert np.abs(late["positions"] - early["positions"]).max() < 1e-15
     assert np.abs(late["velocities"]).max() < 1e-12
     assert np.abs(late["spins"]).max() < 1e-9
-    # It hangs on the tangential spring, S_t = 8 G* sqrt(R d), which carries the weight's part along the slope.
+    # It hangs on the tangential spring, S_t = 8 G* sqrt(R d), which carries the weight's part along the
+    # slope.
     weight = ball_mass() * GRAVITY
     overlap = static_overlap(contact, weight * math.cos(math.radians(slope)))
     stiffness = 8.0 * contact.shear_modulus * math.sqrt(RADIUS * overlap)
@@ -128,7 +131,8 @@ def test_a_ball_rolls_down_a_slope_above_the_rolling_angle():
     solver.advance(20)
     elapsed = 20 * 256 * TIME_STEP
     drive = GRAVITY * (math.sin(slope) - rolling * math.cos(slope))
-    # a = drive / (1 + 2/5) for a solid ball. The tangential spring swings at the start: 1e-3 of the final speed.
+    # a = drive / (1 + 2/5) for a solid ball. The tangential spring swings at the start: 1e-3 of the final
+    # speed.
     assert state(solver)["velocities"][0, 1] == pytest.approx(drive / 1.4 * elapsed, rel=2e-3)
 
 

@@ -40,7 +40,7 @@ class Seen:
         return self.speed[-1] / SPEED
 
     def errors(self) -> np.ndarray:
-        """Relative errors of largest overlap, largest force, duration, and speed after, for an elastic impact."""
+        """Relative errors of largest overlap, largest force, duration, and speed after."""
         expected = self.expected
         return np.array(
             [
@@ -112,8 +112,8 @@ def worst(impacts: list[Seen]) -> np.ndarray:
 
 @pytest.mark.parametrize("collide", [of_two_spheres, on_a_plane])
 def test_an_elastic_impact_follows_hertz(collide):
-    # The scheme is of second order: (2 pi / 200)^2 / 24 = 4e-5 is a harmonic oscillator's error at 200 steps half a period
-    # (measured here: 2e-5 at the most).
+    # The scheme is of second order: (2 pi / 200)^2 / 24 = 4e-5 is a harmonic oscillator's error at 200 steps
+    # half a period (measured here: 2e-5 at the most).
     assert (worst(collide(pair(restitution=1.0), 200)) < 4e-5).all()
 
 
@@ -126,9 +126,10 @@ def test_an_elastic_impact_converges_at_second_order():
 
 
 def test_the_chosen_restitution_comes_back():
-    # The damped Hertz contact maps onto a linear oscillator (Antypov and Elliott, EPL 94 (2011) 50004), whose restitution
-    # exp(-pi zeta / sqrt(1 - zeta^2)) is the one that was chosen. The damping takes the speed of half a step before, so the
-    # error is of first order: 1.2 % of e = 0.1, 0.7 % of 0.18, 0.2 % of 0.5 at 200 steps.
+    # The damped Hertz contact maps onto a linear oscillator (Antypov and Elliott, EPL 94 (2011) 50004), whose
+    # restitution exp(-pi zeta / sqrt(1 - zeta^2)) is the one that was chosen. The damping takes the speed of
+    # half a step before, so the error is of first order: 1.2 % of e = 0.1, 0.7 % of 0.18, 0.2 % of 0.5 at 200
+    # steps.
     tolerance = {0.1: 0.015, 0.18: 0.008, 0.3: 0.005, 0.5: 0.002, 0.7: 0.001, 0.9: 2e-4}
     for chosen, relative in tolerance.items():
         for impact in of_two_spheres(pair(restitution=chosen), 200, length=3.0):
@@ -146,7 +147,8 @@ def test_the_error_of_the_restitution_is_of_first_order():
 
 @pytest.mark.parametrize(("chosen", "comes"), [(0.1, 0.253), (0.18, 0.311), (0.5, 0.550), (0.9, 0.902)])
 def test_damping_that_may_not_attract_returns_a_higher_restitution(chosen, comes):
-    # The oscillator leaves when its force, not its overlap, is zero: exp(-2 theta cot theta) with cos theta = zeta.
+    # The oscillator leaves when its force, not its overlap, is zero: exp(-2 theta cot theta) with cos theta =
+    # zeta.
     theta = math.acos(-math.log(chosen) / math.hypot(math.log(chosen), math.pi))
     expected = math.exp(-2.0 * theta / math.tan(theta))
     assert expected == pytest.approx(comes, abs=5e-4)
@@ -170,7 +172,7 @@ def test_spheres_of_different_size_keep_their_momentum():
 
 
 def slide(restitution: float, friction: float, clamp: bool, angles: np.ndarray):
-    """Changes of velocity and spin, (steps, angles, 3), of spheres thrown on a plane at angles from its normal."""
+    """Kicks and twists, (steps, angles, 3), of spheres thrown on a plane at angles from its normal."""
     contact = pair(restitution, friction, clamp=clamp)
     dt = Impact.of(contact, RADIUS, ball_mass(), SPEED).duration / 400.0
     solver = solve(
@@ -199,7 +201,8 @@ def test_an_impact_in_full_sliding_is_that_of_rigid_bodies(restitution, clamp, c
     impulse = friction * (1.0 + comes) * SPEED
     # 400 steps an impact bring e back to 0.1 % (first order), with e = 1 to 1e-6.
     np.testing.assert_allclose(-kicks[..., 0].sum(axis=0), impulse, rtol=1e-3)
-    # A solid sphere spins up by 5/2 of the impulse; the lever is shorter than the radius by half an overlap of 1 %.
+    # A solid sphere spins up by 5/2 of the impulse; the lever is shorter than the radius by half an overlap
+    # of 1 %.
     np.testing.assert_allclose(twists[..., 1].sum(axis=0) * RADIUS, 2.5 * impulse, rtol=0.01)
 
 

@@ -42,15 +42,16 @@ def drift(time_step: float, chunks: int, precision: str = "double") -> tuple[flo
 def test_a_free_asymmetric_top_keeps_momentum_and_energy():
     moments = np.sort(BOOT.inertia_over_mass)
     assert (np.diff(moments) > 0.05 * moments[2]).all()
-    # 1e5 steps, 6 turns, at the step of production. The momentum is carried by rotations: 1e5 roundings of 1e-16.
+    # 1e5 steps, 6 turns, at the step of production. The momentum is carried by rotations: 1e5 roundings of
+    # 1e-16.
     momentum, energy = drift(TUMBLE_STEP, 391)
     assert momentum < 1e-11
     assert energy < 1e-6
 
 
 def test_a_free_top_drifts_little_in_the_production_precision():
-    # The same in float32: the roundings of 6e-8 add up at random, by their root, to 2e-5; those of the orientation, which
-    # stay the same for many steps, to a little more. Measured: 1.0e-4 and 1.9e-4.
+    # The same in float32: the roundings of 6e-8 add up at random, by their root, to 2e-5; those of the
+    # orientation, which stay the same for many steps, to a little more. Measured: 1.0e-4 and 1.9e-4.
     momentum, energy = drift(TUMBLE_STEP, 391, "mixed")
     assert momentum < 3e-4
     assert energy < 6e-4
@@ -64,7 +65,8 @@ def test_the_energy_of_a_free_top_drifts_at_second_order():
 
 
 def test_a_free_top_follows_the_equations_of_euler():
-    # Reference: Runge-Kutta of fourth order at the same step, exact to 1e-12 here; the body frame starts as the world's.
+    # Reference: Runge-Kutta of fourth order at the same step, exact to 1e-12 here; the body frame starts as
+    # the world's.
     setup = tumbling(TUMBLE_STEP)
     solver = solve(setup)
     steps = 256 * 40
@@ -129,8 +131,8 @@ def test_colliding_clumps_keep_both_momenta():
     linear_after, angular_after, energy_after = momenta()
     # They did collide, and friction and damping took their part.
     assert energy_after < 0.8 * energy_before
-    # Each contact's forces are equal and opposite and act at one point: only rounding, 5,000 steps of 1e-16 of the
-    # momentum that single grains have.
+    # Each contact's forces are equal and opposite and act at one point: only rounding, 5,000 steps of 1e-16
+    # of the momentum that single grains have.
     size = masses[0] * np.linalg.norm(bodies.velocities[0])
     np.testing.assert_allclose(linear_after, linear_before, atol=1e-12 * size)
     np.testing.assert_allclose(angular_after, angular_before, atol=1e-12 * size * np.linalg.norm(places[0]))
