@@ -14,9 +14,9 @@ import pandas as pd
 from dem_warp import CaseResult
 from experiments.calibrate.results import Campaign
 from experiments.execute import measure_heap
-from experiments.heap import heap_picture
 from experiments.report.numbers import significant
 from experiments.study import Study
+from imaging import overlay, snapshot
 
 JPEG_QUALITY = 88
 
@@ -74,10 +74,18 @@ def _picture(case: Mapping[str, Any], study: Study, result: CaseResult, kept: tu
     """Draw a heap in the view whose angle is nearest to the mean over all views."""
     angle = measure_heap(study, result)
     view = int(np.argmin([abs(seen.mean - angle.mean) for seen in angle.views]))
+    picture = snapshot(
+        result.sphere_centers,
+        result.sphere_radii,
+        angle.azimuths[view],
+        pixels=study.measurement.pixels,
+        backend="raster",  # a second each also without a GPU, and the same picture on every machine
+        grains=result.sphere_grain,
+    )
     values = "".join(f", {name} = {significant(case[name], 3)}" for name in kept)
     return HeapPicture(
         title=f"{STAGE_NAMES[case['stage']]}, run {case['run']}, heap {case['replicate']}",
         caption=f"{angle.mean:.2f}° ± {angle.se:.2f}° over {len(angle.views)} views{values}; "
         f"this view: left {angle.views[view].left:.1f}°, right {angle.views[view].right:.1f}°.",
-        image=heap_picture(study, result, angle, view),
+        image=overlay(picture, angle.views[view]),
     )

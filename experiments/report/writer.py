@@ -48,8 +48,7 @@ def write_report(
     folder = Path(out_dir)
     made_by = {**(provenance or {}), "versions": library_versions()}
     page = render_page(campaign, study, pictures, made_by)
-    for name, table in campaign.tables().items():
-        write_text(folder / "tables" / f"{name}.csv", table.to_csv(index=False))
+    tables = {name: table.to_csv(index=False) for name, table in campaign.tables().items()}
     results = {
         "study": {
             "name": study.name,
@@ -60,9 +59,10 @@ def write_report(
         "campaign": campaign.to_dict(),
         "provenance": jsonable(made_by),
     }
-    write_text(
-        folder / "results.json", json.dumps(results, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
-    )
+    text = json.dumps(results, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
+    for name, table in tables.items():
+        write_text(folder / "tables" / f"{name}.csv", table)
+    write_text(folder / "results.json", text)
     write_text(folder / "report.html", page)
     return folder / "report.html"
 
