@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
 
 from dem_warp.clumps import ClumpShape
 from dem_warp.device import resolve_device
@@ -187,6 +188,16 @@ def run_for(solver: Solver, time: float) -> None:
 def state(solver: Solver, index: int = 0) -> dict[str, np.ndarray]:
     """Copies of a world's final arrays: slots, poses, velocities and spins of its living grains."""
     return {name: np.array(array) for name, array in solver.poses(index).items()}
+
+
+def spheres_of(
+    shape: ClumpShape, poses: dict[str, np.ndarray], sizes: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Centres (n * S, 3) and radii (n * S,) of grains of one shape [m]."""
+    turns = Rotation.from_quat(poses["orientations"]).as_matrix()
+    local = shape.centers[None] * sizes[:, None, None]
+    centers = poses["positions"][:, None] + np.einsum("nij,nsj->nsi", turns, local)
+    return centers.reshape(-1, 3), (shape.radii[None] * sizes[:, None]).ravel()
 
 
 def assert_same_bits(a: dict[str, np.ndarray], b: dict[str, np.ndarray]) -> None:
