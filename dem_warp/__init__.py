@@ -1,10 +1,11 @@
 """Discrete element simulation of clumped grains on NVIDIA Warp: many worlds at once, on a GPU or a CPU."""
 
-from dem_warp.batch import CaseResult, Progress, simulate
 from dem_warp.case import Case, GrainPopulation, Numerics
 from dem_warp.clumps import ClumpShape
 from dem_warp.materials import Interaction, Material, effective_moduli, rayleigh_time
+from dem_warp.result import CaseResult, Progress
 from dem_warp.scenes.lifted_cylinder import LiftedCylinder
+from dem_warp.simulation import simulate
 
 __all__ = [
     "Case",

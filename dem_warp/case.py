@@ -1,14 +1,16 @@
 """One simulation: what is simulated (scene, grains, contacts, seed) and how (numerics)."""
 
 from dataclasses import dataclass, field, fields, is_dataclass
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
 from dem_warp.clumps import ClumpShape
 from dem_warp.materials import Interaction, Material, rayleigh_time
-from dem_warp.scenes.lifted_cylinder import LiftedCylinder
+from dem_warp.scenes.scene import Scene
 from dem_warp.types import PRECISIONS
+
+SceneT = TypeVar("SceneT", bound=Scene)
 
 SIZE_LIMIT = 3.0
 """Sizes are drawn within this many standard deviations of their mean."""
@@ -95,12 +97,13 @@ class Numerics:
 
 
 @dataclass(frozen=True)
-class Case:
+class Case(Generic[SceneT]):
     """One scene with one set of parameters and one seed.
 
     Attributes
     ----------
-    scene : LiftedCylinder
+    scene : Scene
+        Such as LiftedCylinder.
     grains : GrainPopulation
     grain_grain, grain_wall : Interaction
     seed : int
@@ -108,7 +111,7 @@ class Case:
     numerics : Numerics
     """
 
-    scene: LiftedCylinder
+    scene: SceneT
     grains: GrainPopulation
     grain_grain: Interaction
     grain_wall: Interaction

@@ -1,18 +1,23 @@
 """Cases spread over processes on a CPU: one world a task, as Warp's CPU kernels use one thread."""
 
 import multiprocessing
-import time
-from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from dem_warp.batch import CaseResult, OnProgress, OnResult
-    from dem_warp.case import Case
+from dem_warp.batch import Batch
+from dem_warp.case import Case
+from dem_warp.device import resolve_device
+from dem_warp.result import CaseResult, OnResult
 
 REPORT_EVERY = 0.5
-PHASES = ("waiting", "fill", "settle", "lift", "rest")
+"""Time between two reports of progress [s]."""
+
+PHASE_LENGTH = 16
+"""Characters of a phase's name that travel between processes."""
+
+Report = Callable[[Sequence[float], Sequence[str]], None]
+"""Takes the fraction done and the phase of every case."""
 
 _shared: dict[str, Any] = {}
 
@@ -21,26 +26,38 @@ def _start_worker(fractions: Any, phases: Any) -> None:
     _shared.update(fractions=fractions, phases=phases)
 
 
-def _run_case(index: int, case: "Case") -> "CaseResult":
-    from dem_warp.batch import simulate
-
-    def report(progress: Any) -> None:
-        _shared["fractions"][index] = progress.fraction
-        for phase in progress.phase_counts:
-            _shared["phases"][index] = PHASES.index(phase)
-
-    return simulate([case], device="cpu", workers=1, on_progress=report)[0]
+def _run_case(index: int, case: Case) -> CaseResult:
+    """Run one case in a worker, leaving its progress in the shared memory."""
+    batch = Batch([case], resolve_device("cpu"))
+    while True:
+        ended = batch.advance()
+        if ended:
+            return ended[0][1]
+        _shared["fractions"][index] = batch.fraction(0)
+        name = batch.controllers[0].phase.encode()[:PHASE_LENGTH].ljust(PHASE_LENGTH)
+        _shared["phases"][index * PHASE_LENGTH : (index + 1) * PHASE_LENGTH] = name
 
 
 def run_in_processes(
-    cases: Sequence["Case"], workers: int, on_result: "OnResult", on_progress: "OnProgress"
-) -> list["CaseResult"]:
-    """Results of the cases in their order, `workers` at a time; each is handed on as soon as it is there."""
+    cases: Sequence[Case],
+    workers: int,
+    on_result: OnResult,
+    report: Report,
+) -> None:
+    """Run cases, `workers` at a time.
+
+    Parameters
+    ----------
+    cases : sequence of Case
+    workers : int
+    on_result : callable
+        Called with index and result of each case as it ends.
+    report : callable
+        Called now and then with the fraction done and the phase of every case.
+    """
     context = multiprocessing.get_context("spawn")
     fractions = context.Array("d", len(cases))
-    phases = context.Array("i", len(cases))
-    results: dict[int, CaseResult] = {}
-    started = time.perf_counter()
+    phases = context.Array("c", b"waiting".ljust(PHASE_LENGTH) * len(cases))
     with ProcessPoolExecutor(workers, context, _start_worker, (fractions, phases)) as pool:
         futures: dict[Future[CaseResult], int] = {
             pool.submit(_run_case, i, case): i for i, case in enumerate(cases)
@@ -50,27 +67,16 @@ def run_in_processes(
             while pending:
                 finished, pending = wait(pending, REPORT_EVERY, FIRST_COMPLETED)
                 for future in finished:
-                    index = futures[future]
-                    results[index] = future.result()
-                    on_result(index, results[index])
-                on_progress(_progress(fractions, phases, results, len(cases), time.perf_counter() - started))
+                    fractions[futures[future]] = 1.0
+                    on_result(futures[future], future.result())
+                report(fractions[:], _names(bytes(phases[:])))
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             for process in multiprocessing.active_children():
                 process.terminate()
             raise
-    return [results[i] for i in range(len(cases))]
 
 
-def _progress(fractions: Any, phases: Any, results: dict[int, Any], total: int, seconds: float) -> Any:
-    from dem_warp.batch import Progress
-
-    running = [i for i in range(total) if i not in results]
-    counts = Counter(PHASES[phases[i]] for i in running)
-    return Progress(
-        done=len(results),
-        total=total,
-        fraction=(len(results) + sum(fractions[i] for i in running)) / total,
-        phase_counts=dict(counts),
-        seconds=seconds,
-    )
+def _names(phases: bytes) -> list[str]:
+    starts = range(0, len(phases), PHASE_LENGTH)
+    return [phases[i : i + PHASE_LENGTH].rstrip(b" \0").decode() for i in starts]

@@ -2,18 +2,17 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from dem_warp.case import Case
 from dem_warp.materials import Material
 from dem_warp.model import ContactCoefficients, Grains, WorldSetup
 from dem_warp.scenes.rain import Rain, place_rain
+from dem_warp.scenes.scene import Decision
+from dem_warp.solver import WorldView
 from dem_warp.walls import Cylinder, Plane
-
-if TYPE_CHECKING:
-    from dem_warp.case import Case
-    from dem_warp.solver import WorldView
 
 PLATE, TUBE = 0, 1
 GRAVITY = 9.81
@@ -88,11 +87,11 @@ class LiftedCylinder:
         """Speed of a grain that falls from the release plane to the plate [m/s]."""
         return float(np.sqrt(self.rain_speed**2 + 2 * GRAVITY * 1.2 * self.height))
 
-    def supply(self, case: "Case") -> int:
+    def supply(self, case: "LiftCase") -> int:
         """Grains kept ready."""
         return self.grain_count or int(np.ceil(DENSEST_FILL * self.volume / case.grains.shape.volume))
 
-    def prepare(self, cases: Sequence["Case"], device: Any) -> list[WorldSetup]:
+    def prepare(self, cases: "Sequence[LiftCase]", device: Any) -> list[WorldSetup]:
         """Worlds of cases that share this kind of scene; tubes, shapes and counts may differ."""
         setups: list[WorldSetup | None] = [None] * len(cases)
         groups: dict[Any, list[int]] = {}
@@ -114,8 +113,15 @@ class LiftedCylinder:
                 setups[i] = _world(cases[i], rain)
         return [setup for setup in setups if setup is not None]
 
+    def controller(self, case: "LiftCase", setup: WorldSetup, chunk: int) -> "LiftController":
+        """Controller of one case."""
+        return LiftController(case, setup, chunk)
 
-def _world(case: "Case", rain: Rain) -> WorldSetup:
+
+LiftCase = Case[LiftedCylinder]
+
+
+def _world(case: LiftCase, rain: Rain) -> WorldSetup:
     scene, grain = case.scene, case.grain_material
     count = len(rain.sizes)
     reach = case.grains.shape.bounding_radius * rain.sizes.max()
@@ -154,36 +160,14 @@ def _world(case: "Case", rain: Rain) -> WorldSetup:
     )
 
 
-def default_skin(case: "Case") -> float:
+def default_skin(case: LiftCase) -> float:
     """Skin that keeps both the lists short and the rebuilds rare [m]; longer steps want a larger one."""
     radius = float(case.grains.shape.radii.mean()) * case.grains.size_mean
     path = case.scene.fall_speed * case.time_step
     return float(np.clip(24.0 * path, 0.5 * radius, radius))
 
 
-@dataclass(frozen=True)
-class Decision:
-    """What a scene wants done with its world.
-
-    Attributes
-    ----------
-    remove : (k,) int array, optional
-        Grain slots to take out.
-    move : (wall, velocity), optional
-        Wall to set in motion [m/s].
-    done : bool
-        The world has ended.
-    failure : str
-        Why it ended without a result; empty otherwise.
-    """
-
-    remove: np.ndarray | None = None
-    move: tuple[int, tuple[float, float, float]] | None = None
-    done: bool = False
-    failure: str = ""
-
-
-class Controller:
+class LiftController:
     """Phases of one lifted cylinder: fill, settle, lift.
 
     It looks at its world every `period` steps, which follows from the world's time step alone.
@@ -195,7 +179,7 @@ class Controller:
     FILL_MARGIN, SETTLE_LIMIT, LIFT_MARGIN = 2.0, 3.0, 6.0
     """Time [s] allowed beyond the rain, for the settling, and beyond the tube's own height."""
 
-    def __init__(self, case: "Case", setup: WorldSetup, chunk: int) -> None:
+    def __init__(self, case: LiftCase, setup: WorldSetup, chunk: int) -> None:
         self.case, self.scene, self.setup = case, case.scene, setup
         self.period = chunk * 2 ** max(int(np.ceil(np.log2(self.LOOK / (chunk * setup.time_step)))), 0)
         self.phase = "fill"
@@ -213,16 +197,16 @@ class Controller:
         part = min((time - self._phase_start) / length, 1.0)
         return (before + part * length) / (rain + lift + 0.6)
 
-    def look(self, view: "WorldView") -> Decision:
+    def look(self, view: WorldView) -> Decision:
         """Decide what happens next from the present state."""
         return {"fill": self._fill, "settle": self._settle, "lift": self._lift}[self.phase](view)
 
-    def _enter(self, phase: str, view: "WorldView") -> None:
+    def _enter(self, phase: str, view: WorldView) -> None:
         steps = view.step - sum(done["steps"] for done in self.phases)
         self.phases.append({"name": self.phase, "time": view.time - self._phase_start, "steps": steps})
         self.phase, self._phase_start, self._slow_since = phase, view.time, None
 
-    def _rests(self, view: "WorldView") -> bool:
+    def _rests(self, view: WorldView) -> bool:
         """Whether the grains have been slow for `rest_time`."""
         speed = np.linalg.norm(view.velocities[view.alive], axis=1)
         slow = not speed.size or (
@@ -235,7 +219,7 @@ class Controller:
             self._slow_since = view.time
         return view.time - self._slow_since >= self.scene.rest_time
 
-    def _fill(self, view: "WorldView") -> Decision:
+    def _fill(self, view: WorldView) -> Decision:
         free = view.alive & view.released
         above = view.positions[:, 2] > self.scene.height
         slow = np.linalg.norm(view.velocities, axis=1) < 0.5 * self.scene.rain_speed
@@ -253,7 +237,7 @@ class Controller:
             return Decision()
         return Decision(remove=np.flatnonzero(view.alive & (above | ~view.released)))
 
-    def _settle(self, view: "WorldView") -> Decision:
+    def _settle(self, view: WorldView) -> Decision:
         if view.time - self._phase_start > self.SETTLE_LIMIT:
             return Decision(
                 done=True, failure=f"the filled tube did not come to rest within {self.SETTLE_LIMIT:g} s"
@@ -267,7 +251,7 @@ class Controller:
         self._enter("lift", view)
         return Decision(remove=np.flatnonzero(above), move=(TUBE, (0.0, 0.0, self.scene.lift_speed)))
 
-    def _measure_fill(self, view: "WorldView", kept: np.ndarray) -> None:
+    def _measure_fill(self, view: WorldView, kept: np.ndarray) -> None:
         positions = view.positions[kept]
         volume = float(
             (self.setup.masses[: len(kept)] / self.setup.grains.densities)[
@@ -279,7 +263,7 @@ class Controller:
         self.observables["fill_height"] = level
         self.observables["solid_fraction"] = volume / (np.pi / 4 * self.scene.diameter**2 * level)
 
-    def _lift(self, view: "WorldView") -> Decision:
+    def _lift(self, view: WorldView) -> Decision:
         elapsed = view.time - self._phase_start
         rise = self.scene.lift_speed * elapsed
         positions = view.positions[view.alive]
@@ -300,7 +284,7 @@ class Controller:
             )
         return Decision()
 
-    def _finish(self, view: "WorldView", elapsed: float) -> None:
+    def _finish(self, view: WorldView, elapsed: float) -> None:
         rested = elapsed if self._slow_since is None else self._slow_since - self._phase_start
         self.observables["time_to_rest"] = float(rested)
         self.observables["simulated_time"] = view.time

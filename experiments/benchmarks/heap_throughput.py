@@ -108,7 +108,7 @@ def table(name: str, counts: list[int], device: str) -> pd.DataFrame:
     study = load_study(scale=name)
     rows = []
     for count in counts:
-        batch = Batch([study.case({}, seed) for seed in range(count)], device, range(count), count)
+        batch = Batch([study.case({}, seed) for seed in range(count)], device)
         for phase, stretch in run_phases(batch).items():
             rows.append(
                 {
@@ -132,7 +132,7 @@ def main(
     name = resolve_device(device)
     counts = worlds or [1]
     print(table(scale, counts, name).round(2).to_string(index=False))
-    batch = Batch([load_study(scale=scale).case({}, 0)] * counts[0], name, range(counts[0]), counts[0])
+    batch = Batch([load_study(scale=scale).case({}, 0)] * counts[0], name)
     while batch.controllers[0].phase == "fill":
         batch.advance()
     print("\none step, and one rebuild of the full tube, by kernel [ms]")

@@ -18,9 +18,9 @@ import typer
 from scipy.stats import spearmanr
 
 from doe import Design
-from experiments.execute import measure_heap, run_cases
-from experiments.heap import heap_picture
-from experiments.store import Store
+from experiments.cases import measure_heap, run_cases
+from experiments.cases import heap_picture
+from experiments.cases import Store
 from experiments.studies.buckwheat import paper
 from experiments.study import Study, load_study
 from imaging import save_picture

@@ -1,0 +1,87 @@
+"""What a simulation gives back."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a simulation is.
+
+    Attributes
+    ----------
+    done, total : int
+        Cases.
+    fraction : float
+        Of all work, 0 to 1.
+    phase_counts : dict
+        Cases that have not ended, by phase.
+    seconds : float
+        Wall time so far [s].
+    """
+
+    done: int
+    total: int
+    fraction: float
+    phase_counts: dict[str, int]
+    seconds: float
+
+
+@dataclass(frozen=True, eq=False)
+class CaseResult:
+    """End of one case.
+
+    Attributes
+    ----------
+    status : str
+        "finished", "diverged", "overflow", or "failed".
+    reason : str
+        What happened, and what helps; empty when finished.
+    positions, orientations : (n, 3) and (n, 4) arrays
+        Poses of the grains left [m], quaternions x y z w.
+    sizes : (n,) array
+    clump : (S, 4) array
+        Local centre and radius of each sphere of the shape [m].
+    observables : dict of float
+        In SI units; see the scene. `late_rebuilds` is 1 when a grain may have outrun its neighbour list.
+    phases : list of dict
+        Name, time [s] and steps of each phase.
+    provenance : dict
+        Versions, device and precision.
+    """
+
+    status: str
+    reason: str
+    positions: np.ndarray
+    orientations: np.ndarray
+    sizes: np.ndarray
+    clump: np.ndarray
+    observables: dict[str, float] = field(default_factory=dict)
+    phases: list[dict[str, Any]] = field(default_factory=list)
+    provenance: dict[str, Any] = field(default_factory=dict)
+
+    @cached_property
+    def sphere_centers(self) -> np.ndarray:
+        """Sphere centres in place [m], (n * S, 3)."""
+        vector, scalar = self.orientations[:, None, :3], self.orientations[:, None, 3:]
+        local = self.clump[None, :, :3] * self.sizes[:, None, None]
+        turned = 2.0 * np.cross(vector, local)
+        return (self.positions[:, None] + local + scalar * turned + np.cross(vector, turned)).reshape(-1, 3)
+
+    @property
+    def sphere_radii(self) -> np.ndarray:
+        """Sphere radii [m], (n * S,)."""
+        return (self.clump[None, :, 3] * self.sizes[:, None]).ravel()
+
+    @property
+    def sphere_grain(self) -> np.ndarray:
+        """Grain of each sphere, (n * S,)."""
+        return np.repeat(np.arange(len(self.sizes)), len(self.clump))
+
+
+OnResult = Callable[[int, CaseResult], None]
+OnProgress = Callable[[Progress], None]

@@ -1,0 +1,99 @@
+"""Many cases at once: on a GPU all worlds in one batch, on a CPU a world a process, spread over the cores."""
+
+import os
+import time
+from collections import Counter
+from collections.abc import Sequence
+
+from dem_warp.batch import Batch
+from dem_warp.case import Case
+from dem_warp.device import resolve_device
+from dem_warp.processes import REPORT_EVERY, Report, run_in_processes
+from dem_warp.result import CaseResult, OnProgress, OnResult, Progress
+
+
+def simulate(
+    cases: Sequence[Case],
+    device: str | None = None,
+    workers: int | None = None,
+    on_result: OnResult | None = None,
+    on_progress: OnProgress | None = None,
+) -> list[CaseResult]:
+    """Simulate cases at once.
+
+    Parameters
+    ----------
+    cases : sequence of Case
+    device : str, optional
+        "cpu", "cuda" or "cuda:N"; by default the GPU if there is one.
+    workers : int, optional
+        Processes on a CPU; by default one a core. Warp's CPU kernels run on one thread.
+    on_result : callable, optional
+        Called with the index and the result of each case as it ends.
+    on_progress : callable, optional
+        Called with a `Progress` now and then.
+
+    Returns
+    -------
+    list of CaseResult
+        In the order of the cases. A case that goes wrong has its status; it neither raises nor changes
+        another case.
+
+    Raises
+    ------
+    ValueError
+        If the device is not there.
+    """
+    name = resolve_device(device)
+    results: dict[int, CaseResult] = {}
+    started = time.perf_counter()
+
+    def keep(index: int, result: CaseResult) -> None:
+        results[index] = result
+        if on_result:
+            on_result(index, result)
+
+    def report(fractions: Sequence[float], phases: Sequence[str]) -> None:
+        if on_progress:
+            running = Counter(phase for i, phase in enumerate(phases) if i not in results)
+            seconds = time.perf_counter() - started
+            share = sum(fractions) / len(fractions)
+            on_progress(Progress(len(results), len(cases), share, dict(running), seconds))
+
+    count = min(workers or os.cpu_count() or 1, len(cases)) if name == "cpu" else 1
+    if count > 1:
+        run_in_processes(cases, count, keep, report)
+    else:
+        _run_batches(cases, name, keep, report)
+    return [results[i] for i in range(len(cases))]
+
+
+def _run_batches(cases: Sequence[Case], device: str, keep: OnResult, report: Report) -> None:
+    """Run batch after batch in this process."""
+    fractions, phases = [0.0] * len(cases), ["waiting"] * len(cases)
+    reported = time.perf_counter()
+    for members in batches(cases, one_each=device == "cpu"):
+        batch = Batch([cases[i] for i in members], device)
+        while batch.running:
+            for w, result in batch.advance():
+                keep(members[w], result)
+            if not batch.running or time.perf_counter() - reported > REPORT_EVERY:
+                reported = time.perf_counter()
+                for w, i in enumerate(members):
+                    fractions[i], phases[i] = batch.fraction(w), batch.controllers[w].phase
+                report(fractions, phases)
+
+
+def batches(cases: Sequence[Case], one_each: bool) -> list[list[int]]:
+    """Indices of the cases that run in one launch.
+
+    These share all that kernels are compiled for, so that a case runs the same code in any company. On a CPU
+    each runs alone, which keeps its world in the cache.
+    """
+    if one_each:
+        return [[i] for i in range(len(cases))]
+    groups: dict[tuple[type, str, int], list[int]] = {}
+    for i, case in enumerate(cases):
+        build = (type(case.scene), case.numerics.precision, case.grains.shape.sphere_count)
+        groups.setdefault(build, []).append(i)
+    return list(groups.values())
