@@ -13,7 +13,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from experiments.console import FAILED_RUN, CaseProgress, clear_errors, fail, messages
+from experiments.commands.console import FAILED_RUN, CaseProgress, clear_errors, fail, messages
 
 if TYPE_CHECKING:
     from experiments.calibrate.results import StageResult
@@ -54,8 +54,8 @@ def calibrate(
 ) -> None:
     """Run a whole calibration: noise floor, screening, climb, surface, optimum, verification, report."""
     with clear_errors():
-        from experiments.choices import chosen_device, chosen_study, default_folder
-        from experiments.run import run_campaign
+        from experiments.commands.choices import chosen_device, chosen_study, default_folder
+        from experiments.commands.run import run_campaign
 
         device = chosen_device(device)
         chosen = chosen_study(study, scale, device)
@@ -88,9 +88,8 @@ def heap(
 ) -> None:
     """Simulate one heap: heap.vtp (ParaView), snapshot.png with the fitted flanks, angle.json."""
     with clear_errors():
-        from experiments.choices import chosen_device, chosen_study, default_folder
-        from experiments.folder import require_unused
-        from experiments.heap import simulate_heap, write_heap
+        from experiments.cases import require_unused, simulate_heap, write_heap
+        from experiments.commands.choices import chosen_device, chosen_study, default_folder
 
         device = chosen_device(device)
         chosen = chosen_study(study, scale, device)
@@ -120,7 +119,7 @@ def angle(
 ) -> None:
     """Measure repose angles on photographs."""
     with clear_errors():
-        from experiments.photographs import measure_pictures
+        from experiments.commands.photographs import measure_pictures
 
         rows = measure_pictures(pictures, fit, overlay)
     if as_json:
@@ -154,7 +153,7 @@ def clump(
 ) -> None:
     """Make a grain of spheres from a mesh or measured dimensions: volume, mass, inertia, spheres."""
     with clear_errors():
-        from experiments.shapes import make_clump, write_clump
+        from experiments.commands.shapes import make_clump, write_clump
 
         reach = _quantity(protrusion, "length", "--protrusion")
         mass_density = _quantity(density, "density", "--density") if density else None
@@ -171,7 +170,7 @@ def clump(
 def new(name: Annotated[str, typer.Argument(help="Name of the grain, and of the file.")]) -> None:
     """Write a commented study file to start from."""
     with clear_errors():
-        from experiments.template import write_template
+        from experiments.study import write_template
 
         path = write_template(name)
     typer.echo(f"Wrote {path}. Fill it in, then: dem-warp calibrate {path}")
@@ -196,7 +195,7 @@ def _assignments(texts: list[str]) -> dict[str, str]:
 def _quantity(text: str, dimension: str, option: str) -> float:
     """Read an option's quantity in SI."""
     from experiments.errors import InputError
-    from experiments.units import Quantity
+    from experiments.study.units import Quantity
 
     try:
         return Quantity.parse(text).to_base(dimension)

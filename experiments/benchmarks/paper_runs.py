@@ -18,9 +18,7 @@ import typer
 from scipy.stats import spearmanr
 
 from doe import Design
-from experiments.cases import measure_heap, run_cases
-from experiments.cases import heap_picture
-from experiments.cases import Store
+from experiments.cases import Store, heap_picture, measure_heap, run_cases
 from experiments.studies.buckwheat import paper
 from experiments.study import Study, load_study
 from imaging import save_picture

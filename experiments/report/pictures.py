@@ -13,7 +13,7 @@ import pandas as pd
 
 from dem_warp import CaseResult
 from experiments.calibrate.results import Campaign
-from experiments.execute import measure_heap
+from experiments.cases import measure_heap
 from experiments.report.numbers import significant
 from experiments.study import Study
 from imaging import overlay, snapshot

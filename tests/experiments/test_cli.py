@@ -13,9 +13,9 @@ import pytest
 import pyvista
 from typer.testing import CliRunner
 
-from experiments import run
 from experiments.cli import app
-from experiments.console import CaseProgress, describe_progress, duration
+from experiments.commands import run
+from experiments.commands.console import CaseProgress, describe_progress, duration
 from imaging import save_picture
 
 WriteStudy = Callable[..., Path]
@@ -32,7 +32,7 @@ def dem_warp(*arguments: object) -> tuple[int, str, str]:
 
 def last_line_of(program: str) -> str:
     """Run a program in a fresh interpreter; return the last line that it prints."""
-    command, home = [sys.executable, "-c", program], Path(run.__file__).parents[1]
+    command, home = [sys.executable, "-c", program], Path(run.__file__).parents[2]
     done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=home)
     return done.stdout.splitlines()[-1]
 
@@ -66,7 +66,8 @@ def test_help_imports_nothing_heavy() -> None:
 
 
 def test_a_calibration_does_not_need_pyvista() -> None:
-    assert last_line_of("import sys; import experiments.run; print('pyvista' in sys.modules)") == "False"
+    program = "import sys; import experiments.commands.run; print('pyvista' in sys.modules)"
+    assert last_line_of(program) == "False"
 
 
 @pytest.mark.parametrize(

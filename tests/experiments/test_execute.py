@@ -13,9 +13,7 @@ import pandas as pd
 import pytest
 
 from dem_warp import Case, CaseResult
-from experiments import execute
-from experiments.execute import run_cases
-from experiments.store import Store
+from experiments.cases import Store, execute, run_cases
 from experiments.study import Study
 
 Cone = Callable[..., CaseResult]

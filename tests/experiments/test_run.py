@@ -14,9 +14,10 @@ import pandas as pd
 import pytest
 
 from dem_warp import Case, CaseResult
-from experiments import execute, run
 from experiments.calibrate import Campaign, Outcome
-from experiments.run import run_campaign
+from experiments.cases import execute
+from experiments.commands import run
+from experiments.commands.run import run_campaign
 from experiments.study import Study, load_study
 
 SLOPE = 30.0

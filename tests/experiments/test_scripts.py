@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from dem_warp import Case, CaseResult
-from experiments import execute
+from experiments.cases import execute
 from experiments.studies.buckwheat import climb, screening, surface, verification
 
 TARGET = 30.148

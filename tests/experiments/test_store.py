@@ -10,11 +10,10 @@ import numpy as np
 import pytest
 
 from dem_warp import CaseResult
-from experiments import store as store_module
+from experiments.cases import Store, open_folder
+from experiments.cases import store as store_module
 from experiments.errors import StoreError
 from experiments.files import replacing
-from experiments.folder import open_folder
-from experiments.store import Store
 from experiments.study import Study, load_study
 
 Cone = Callable[..., CaseResult]

@@ -11,9 +11,8 @@ import pytest
 
 from experiments.calibrate.settings import MeasuredTarget, TwinTarget
 from experiments.errors import StudyError
-from experiments.study import BUCKWHEAT, load_study, study_scales
-from experiments.template import write_template
-from experiments.units import UNITS, Quantity
+from experiments.study import BUCKWHEAT, load_study, study_scales, write_template
+from experiments.study.units import UNITS, Quantity
 
 WriteStudy = Callable[..., Path]
 

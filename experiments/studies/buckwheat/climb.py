@@ -12,8 +12,7 @@ import pandas as pd
 import typer
 
 from doe import Design, climb_table
-from experiments.execute import run_cases
-from experiments.store import Store
+from experiments.cases import Store, run_cases
 from experiments.study import load_study
 
 START = {"E": 0.30, "F": 0.15}

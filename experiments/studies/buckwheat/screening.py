@@ -10,8 +10,7 @@ from pathlib import Path
 import typer
 
 from doe import plackett_burman, screen
-from experiments.execute import run_cases
-from experiments.store import Store
+from experiments.cases import Store, run_cases
 from experiments.study import load_study
 
 RUNS = 12  # eight factors and three dummy columns, which are the error

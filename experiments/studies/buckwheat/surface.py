@@ -10,8 +10,7 @@ from pathlib import Path
 import typer
 
 from doe import Factor, Sample, TargetError, central_composite, fit_surface
-from experiments.execute import run_cases
-from experiments.store import Store
+from experiments.cases import Store, run_cases
 from experiments.study import load_study
 
 CENTER = {"E": 0.48, "F": 0.45}

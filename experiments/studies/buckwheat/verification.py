@@ -11,8 +11,7 @@ import pandas as pd
 import typer
 
 from doe import Sample, compare_means
-from experiments.execute import run_cases
-from experiments.store import Store
+from experiments.cases import Store, run_cases
 from experiments.study import load_study
 
 POINT = {"E": 0.482, "F": 0.446}

@@ -20,7 +20,7 @@ from dem_warp.case import Case
 from doe.factors import Factor
 from experiments.calibrate.settings import CampaignSettings, MeasuredTarget, TwinTarget
 from experiments.errors import StudyError
-from experiments.factor_section import (
+from experiments.study.factor_section import (
     FactorSection,
     FactorTable,
     check_one_home,
@@ -28,12 +28,12 @@ from experiments.factor_section import (
     natural_settings,
     with_factor_values,
 )
-from experiments.places import Places, value_at
-from experiments.schema import Angle, Dimension, Section, nearest_name, validated
-from experiments.sections import Physics
+from experiments.study.places import Places, value_at
+from experiments.study.schema import Angle, Dimension, Section, nearest_name, validated
+from experiments.study.sections import Physics
 from imaging import FITS
 
-BUCKWHEAT = Path(__file__).parent / "studies" / "buckwheat" / "study.toml"
+BUCKWHEAT = Path(__file__).parents[1] / "studies" / "buckwheat" / "study.toml"
 """The study that is meant when none is named: the paper's buckwheat."""
 
 _FACTOR_VALUE_TABLES = (

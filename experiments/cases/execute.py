@@ -12,8 +12,8 @@ from typing import Any
 import pandas as pd
 
 from dem_warp import Case, CaseResult, Progress, simulate
+from experiments.cases.store import Store
 from experiments.errors import StudyError
-from experiments.store import Store
 from experiments.study import Study
 from imaging import HeapAngle, PictureError, heap_angle
 

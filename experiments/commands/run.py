@@ -14,9 +14,8 @@ from dem_warp import Progress
 from experiments.calibrate import Campaign, calibrate
 from experiments.calibrate.campaign import StageHook
 from experiments.calibrate.checks import check_study
+from experiments.cases import open_folder, run_cases
 from experiments.errors import StudyError
-from experiments.execute import run_cases
-from experiments.folder import open_folder
 from experiments.report import heap_pictures, write_report
 from experiments.study import Study
 

@@ -15,7 +15,7 @@ from dem_warp.case import Case, GrainPopulation, Numerics
 from dem_warp.clumps import ClumpShape
 from dem_warp.materials import Interaction, Material
 from dem_warp.scenes.lifted_cylinder import LiftedCylinder
-from experiments.schema import Density, Length, Number, Pressure, Rate, Section, Speed, Time
+from experiments.study.schema import Density, Length, Number, Pressure, Rate, Section, Speed, Time
 
 
 class MaterialSection(Section):

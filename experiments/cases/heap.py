@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from dem_warp import CaseResult, Progress, simulate
-from experiments.execute import measure_heap
+from experiments.cases.execute import measure_heap
 from experiments.files import replacing, write_text
 from experiments.study import Study
 from imaging import HeapAngle, PictureError, overlay, save_picture, snapshot

@@ -10,10 +10,10 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from doe.factors import Factor
 from experiments.errors import StudyError
-from experiments.places import KeyPath, Places, value_at
-from experiments.schema import Dimension, RawQuantity, Section, bounds, field_at, nearest_name
-from experiments.sections import Physics
-from experiments.units import Quantity, unit_size
+from experiments.study.places import KeyPath, Places, value_at
+from experiments.study.schema import Dimension, RawQuantity, Section, bounds, field_at, nearest_name
+from experiments.study.sections import Physics
+from experiments.study.units import Quantity, unit_size
 
 
 class FactorSection(Section):

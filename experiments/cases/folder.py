@@ -8,11 +8,11 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from experiments.cases.store import Store
 from experiments.errors import StoreError
 from experiments.files import write_text
-from experiments.places import KeyPath, dotted
-from experiments.store import Store
 from experiments.study import Study
+from experiments.study.places import KeyPath, dotted
 
 MANIFEST = "study.json"
 """File that says which study the folder belongs to."""

@@ -7,7 +7,7 @@ from pathlib import Path
 from experiments.errors import InputError
 from experiments.files import write_text
 
-TEMPLATE = Path(__file__).parent / "studies" / "template.toml"
+TEMPLATE = Path(__file__).parents[1] / "studies" / "template.toml"
 
 
 def write_template(name: str, folder: Path | None = None) -> Path:
