@@ -1,4 +1,4 @@
-"""Results as plain data: JSON-able values for results.json and tables for CSV files."""
+"""Results as plain data: JSON-able values for results.json, tables with their index for CSV files."""
 
 from __future__ import annotations
 
@@ -7,16 +7,13 @@ from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from enum import Enum
 from functools import singledispatch
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from pydantic import BaseModel
 
 from doe import Comparison, Design, NoiseFloor, Region, Sample, ScreenResult, Surface
-
-if TYPE_CHECKING:
-    from experiments.calibrate.results import Campaign, ScreeningResult, SurfaceResult
 
 _COMPARISON = (
     "difference",
@@ -148,58 +145,3 @@ def _properties(value: Any, *names: str) -> dict[str, Any]:
 def indexed(table: pd.DataFrame) -> pd.DataFrame:
     """Copy a table with its index as the first column where the index has a name."""
     return table.reset_index() if table.index.name is not None else table
-
-
-def campaign_tables(campaign: Campaign) -> dict[str, pd.DataFrame]:
-    """Collect the tables of every stage that was reached, by file name (without ending)."""
-    tables = {"cases": campaign.cases, "factors": pd.DataFrame([jsonable(f) for f in campaign.factors])}
-    if campaign.screening is not None:
-        tables |= _screening_tables(campaign.screening)
-    if campaign.selection is not None:
-        tables["selection"] = campaign.selection.table
-    if campaign.climb is not None:
-        tables["climb"] = campaign.climb.path
-    if campaign.surface is not None:
-        tables |= _surface_tables(campaign.surface)
-    if campaign.optimum is not None:
-        tables["contour"] = campaign.optimum.contour
-        tables["compatible_ranges"] = campaign.optimum.region.ranges
-    if campaign.verification is not None:
-        tables["verification"] = campaign.verification.cases
-    tables["decisions"] = _decision_table(campaign)
-    return {name: indexed(table) for name, table in tables.items()}
-
-
-def _screening_tables(screening: ScreeningResult) -> dict[str, pd.DataFrame]:
-    design = screening.design.coded.copy()
-    for replicate in range(screening.response.shape[1]):
-        design[f"angle_{replicate + 1}"] = screening.response[:, replicate]
-    return {
-        "screening_design": design,
-        "screening_effects": screening.screen.table,
-        "screening_anova": screening.screen.anova,
-    }
-
-
-def _surface_tables(surface: SurfaceResult) -> dict[str, pd.DataFrame]:
-    coded = surface.design.coded.add_suffix("_coded")
-    design = pd.concat([surface.design.natural, coded], axis=1).assign(angle=surface.response)
-    return {
-        "surface_design": design,
-        "surface_anova_full": surface.full.anova,
-        "surface_anova_reduced": surface.reduced.anova,
-        "surface_outside_ranges": surface.outside,
-    }
-
-
-def _decision_table(campaign: Campaign) -> pd.DataFrame:
-    rows = [
-        {
-            "stage": decision.stage,
-            "rule": decision.rule,
-            "numbers": "; ".join(f"{name} = {value}" for name, value in jsonable(decision.numbers).items()),
-            "outcome": decision.outcome,
-        }
-        for decision in campaign.decisions
-    ]
-    return pd.DataFrame(rows, columns=["stage", "rule", "numbers", "outcome"])

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from experiments.calibrate.export import campaign_tables, jsonable
+from experiments.calibrate.export import indexed, jsonable
 
 if TYPE_CHECKING:
     from doe import Comparison, Design, Factor, NoiseFloor, Region, Sample, ScreenResult, Surface
@@ -56,8 +56,16 @@ class Decision:
     """What was decided, as a sentence."""
 
 
+class _Tabled:
+    """A stage's result with tables worth a file of their own."""
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """Tables by file name (without ending), beside the cases."""
+        return {}
+
+
 @dataclass(frozen=True)
-class TargetResult:
+class TargetResult(_Tabled):
     """The repose angle to be matched."""
 
     sample: Sample
@@ -70,7 +78,7 @@ class TargetResult:
 
 
 @dataclass(frozen=True)
-class NoiseFloorResult:
+class NoiseFloorResult(_Tabled):
     """Replicates with every factor at its middle."""
 
     cases: pd.DataFrame
@@ -80,7 +88,7 @@ class NoiseFloorResult:
 
 
 @dataclass(frozen=True)
-class ScreeningResult:
+class ScreeningResult(_Tabled):
     """The Plackett-Burman design, its response and analysis."""
 
     cases: pd.DataFrame
@@ -91,9 +99,18 @@ class ScreeningResult:
     screen: ScreenResult
     decisions: tuple[Decision, ...]
 
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """The coded design with an angle for each replicate, the effects, the analysis of variance."""
+        angles = {f"angle_{i}": column for i, column in enumerate(self.response.T, start=1)}
+        return {
+            "screening_design": self.design.coded.assign(**angles),
+            "screening_effects": self.screen.table,
+            "screening_anova": self.screen.anova,
+        }
+
 
 @dataclass(frozen=True)
-class SelectionResult:
+class SelectionResult(_Tabled):
     """The factors that the later stages vary."""
 
     kept: tuple[str, ...]
@@ -105,9 +122,13 @@ class SelectionResult:
     """Smallest effect [deg] that the noise floor lets this design see (at the power of the settings)."""
     decisions: tuple[Decision, ...]
 
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """Why each factor was kept or not."""
+        return {"selection": self.table}
+
 
 @dataclass(frozen=True)
-class ClimbResult:
+class ClimbResult(_Tabled):
     """The path of steepest ascent and where it meets the target."""
 
     cases: pd.DataFrame
@@ -127,6 +148,10 @@ class ClimbResult:
     """Step with the smallest error."""
     decisions: tuple[Decision, ...]
 
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """The path."""
+        return {"climb": self.path}
+
     @property
     def best(self) -> dict[str, float]:
         """Kept factors at the step with the smallest error, natural unit."""
@@ -134,7 +159,7 @@ class ClimbResult:
 
 
 @dataclass(frozen=True)
-class SurfaceResult:
+class SurfaceResult(_Tabled):
     """The composite design and the fitted surfaces (coded in the design's own half-ranges)."""
 
     cases: pd.DataFrame
@@ -150,6 +175,16 @@ class SurfaceResult:
     outside: pd.DataFrame
     """Runs outside the stated factor ranges: run, factor, value, low, high."""
     decisions: tuple[Decision, ...]
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """The design in both units with its angles, both analyses of variance, runs outside the ranges."""
+        coded = self.design.coded.add_suffix("_coded")
+        return {
+            "surface_design": pd.concat([self.design.natural, coded], axis=1).assign(angle=self.response),
+            "surface_anova_full": self.full.anova,
+            "surface_anova_reduced": self.reduced.anova,
+            "surface_outside_ranges": self.outside,
+        }
 
 
 @dataclass(frozen=True)
@@ -169,7 +204,7 @@ class TruthCheck:
 
 
 @dataclass(frozen=True)
-class OptimumResult:
+class OptimumResult(_Tabled):
     """The chosen point of the target contour and everything that is as good."""
 
     point: dict[str, float]
@@ -190,9 +225,13 @@ class OptimumResult:
     """Twin study: where the hidden truth lies; None for a physical target."""
     decisions: tuple[Decision, ...]
 
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """The target contour, and the range of each factor over the compatible region."""
+        return {"contour": self.contour, "compatible_ranges": self.region.ranges}
+
 
 @dataclass(frozen=True)
-class VerificationResult:
+class VerificationResult(_Tabled):
     """Fresh cases at the chosen point against the target."""
 
     cases: pd.DataFrame
@@ -203,6 +242,10 @@ class VerificationResult:
     """Equivalence margin [deg]."""
     verified: bool
     decisions: tuple[Decision, ...]
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """The fresh cases."""
+        return {"verification": self.cases}
 
 
 StageResult = (
@@ -259,5 +302,23 @@ class Campaign:
         return {field.name: jsonable(getattr(self, field.name)) for field in fields(self)}
 
     def tables(self) -> dict[str, pd.DataFrame]:
-        """Named tables for CSV files; an index that means something is a column."""
-        return campaign_tables(self)
+        """Tables of every stage that was reached, for CSV files: a named index is a column."""
+        tables = {"cases": self.cases, "factors": pd.DataFrame([jsonable(f) for f in self.factors])}
+        for result in self.stages.values():
+            tables |= result.tables()
+        tables["decisions"] = self._decision_table()
+        return {name: indexed(table) for name, table in tables.items()}
+
+    def _decision_table(self) -> pd.DataFrame:
+        rows = [
+            {
+                "stage": decision.stage,
+                "rule": decision.rule,
+                "numbers": "; ".join(
+                    f"{name} = {value}" for name, value in jsonable(decision.numbers).items()
+                ),
+                "outcome": decision.outcome,
+            }
+            for decision in self.decisions
+        ]
+        return pd.DataFrame(rows, columns=["stage", "rule", "numbers", "outcome"])
