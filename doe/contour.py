@@ -1,19 +1,13 @@
 """The contour of a surface at a target: roots, a traced curve, or a cloud of crossings."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import contourpy
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from doe.factors import natural_points
+from doe.fitted import FittedSurface
 from doe.quadratic import QuadraticForm
-
-if TYPE_CHECKING:
-    from doe.surface import Surface
 
 CURVE_RESOLUTION = 201
 """Grid lines along each factor that a curve of two factors is traced through."""
@@ -23,7 +17,7 @@ LINE_BUDGET = 4_000
 
 
 def contour(
-    surface: Surface, target: float, extent: float = 1.0, resolution: int | None = None
+    surface: FittedSurface, target: float, extent: float = 1.0, resolution: int | None = None
 ) -> pd.DataFrame:
     """Return points where the fitted mean is the target, inside the coded box -extent..+extent.
 
@@ -33,7 +27,7 @@ def contour(
 
     Parameters
     ----------
-    surface : Surface
+    surface : FittedSurface
     target : float
     extent : float
         Coded half width of the box.
@@ -48,7 +42,9 @@ def contour(
     return natural_points(surface.design.factors, contour_points(surface, target, extent, resolution))
 
 
-def contour_points(surface: Surface, target: float, extent: float, resolution: int | None) -> pd.DataFrame:
+def contour_points(
+    surface: FittedSurface, target: float, extent: float, resolution: int | None
+) -> pd.DataFrame:
     """Return the points of ``contour`` in coded units."""
     names = surface.design.names
     form = surface.quadratic_form

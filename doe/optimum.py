@@ -1,10 +1,8 @@
 """Single points of a surface: the one nearest to the center on the target contour, and the stationary one."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -14,11 +12,9 @@ from scipy import optimize
 from doe.contour import contour_points
 from doe.errors import DesignError, TargetError
 from doe.factors import natural_points
+from doe.fitted import FittedSurface
 from doe.quadratic import QuadraticForm
 from doe.region import box_cells
-
-if TYPE_CHECKING:
-    from doe.surface import Surface
 
 NEAREST_STARTS = 8
 """Points of the contour from which the nearest one is refined."""
@@ -47,13 +43,13 @@ class StationaryPoint:
 
 
 def nearest(
-    surface: Surface, target: float, to: Mapping[str, float] | None = None, extent: float = 1.0
+    surface: FittedSurface, target: float, to: Mapping[str, float] | None = None, extent: float = 1.0
 ) -> pd.Series:
     """Return the point of the target contour with the smallest coded distance to a point.
 
     Parameters
     ----------
-    surface : Surface
+    surface : FittedSurface
     target : float
     to : mapping of natural values by factor, optional
         Default: the design's center.
@@ -90,7 +86,7 @@ def nearest(
     return pd.Series({f.name: float(f.to_natural(x)) for f, x in zip(factors, best, strict=True)})
 
 
-def stationary_point(surface: Surface) -> StationaryPoint:
+def stationary_point(surface: FittedSurface) -> StationaryPoint:
     """Return the point where the gradient vanishes (canonical analysis, Box and Wilson 1951).
 
     Raises

@@ -1,10 +1,7 @@
 """Regions of a surface: the settings that a measured target does not contradict."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -14,9 +11,7 @@ from scipy import stats
 from doe.compare import Sample
 from doe.errors import DesignError
 from doe.factors import Factor, natural_points
-
-if TYPE_CHECKING:
-    from doe.surface import Surface
+from doe.fitted import FittedSurface
 
 CELL_BUDGET = 160_000
 """Cells that a region is sampled on, over all factors."""
@@ -75,7 +70,7 @@ class Region:
 
 
 def compatible_region(
-    surface: Surface,
+    surface: FittedSurface,
     target: float | Sample,
     target_se: float = 0.0,
     target_df: float = np.inf,
@@ -91,7 +86,7 @@ def compatible_region(
 
     Parameters
     ----------
-    surface : Surface
+    surface : FittedSurface
     target : float or Sample
         A Sample brings its standard error and degrees of freedom.
     target_se, target_df : float
@@ -118,7 +113,11 @@ def compatible_region(
 
 
 def band(
-    surface: Surface, target: float, half_width: float, extent: float = 1.0, resolution: int | None = None
+    surface: FittedSurface,
+    target: float,
+    half_width: float,
+    extent: float = 1.0,
+    resolution: int | None = None,
 ) -> Region:
     """Return the settings whose fitted mean lies within target +- half_width, the fit taken as exact."""
     points, count = box_cells(len(surface.design.factors), extent, resolution)
@@ -139,7 +138,7 @@ def box_cells(
 
 
 def _region(
-    surface: Surface, points: NDArray[np.float64], mask: NDArray[np.bool_], count: int, extent: float
+    surface: FittedSurface, points: NDArray[np.float64], mask: NDArray[np.bool_], count: int, extent: float
 ) -> Region:
     table = pd.DataFrame(points, columns=surface.design.names)
     return Region(surface.design.factors, table, mask, count, extent)

@@ -1,0 +1,28 @@
+"""What contours, optima and regions need to know of a fitted surface."""
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from doe.design import Design
+from doe.quadratic import QuadraticForm
+
+
+class FittedSurface(Protocol):
+    """A polynomial of second degree that was fitted to a design, such as ``doe.Surface``."""
+
+    @property
+    def design(self) -> Design:
+        """The design, with its factors and their coding."""
+
+    @property
+    def quadratic_form(self) -> QuadraticForm:
+        """The polynomial in coded units."""
+
+    @property
+    def residual_df(self) -> float:
+        """Degrees of freedom of the residual."""
+
+    def evaluate(self, coded: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return mean and its standard error at coded points, shape (points, factors)."""
