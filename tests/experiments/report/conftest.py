@@ -1,0 +1,162 @@
+"""Campaigns on analytic heaps, and a page taken apart, for the tests of the report."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from html.parser import HTMLParser
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from experiments.calibrate import Campaign, CampaignSettings, calibrate
+from experiments.report import render_page
+from experiments.study import Study, load_study
+
+Angle = Callable[[Mapping[str, float]], float]
+Runner = Callable[[pd.DataFrame], pd.DataFrame]
+
+NOISE = 0.35
+"""Standard deviation of one analytic heap [deg]."""
+
+VOID = {"meta", "link", "img", "br"}
+"""Elements that have no end tag."""
+
+
+def friction(row: Mapping[str, float]) -> float:
+    """Both static frictions raise the angle, nothing else does."""
+    e, f = (row["E"] - 0.48) / 0.06, (row["F"] - 0.45) / 0.10
+    return 30.2 + 3.0 * e + 2.0 * f + 0.7 * e * f - 0.35 * f * f
+
+
+def analytic_heaps(
+    angle: Callable[[Mapping[str, float]], float] = friction,
+    fails: Callable[[Mapping[str, float]], bool] = lambda row: False,
+) -> Callable[[pd.DataFrame], pd.DataFrame]:
+    """Make a runner: the angle is a function of the settings plus noise from the case's seed."""
+
+    def run(table: pd.DataFrame) -> pd.DataFrame:
+        rows = table.to_dict("records")
+        failed = np.array([fails(row) for row in rows])
+        angles = [angle(row) + NOISE * np.random.default_rng(row["seed"]).standard_normal() for row in rows]
+        return table.assign(
+            status=np.where(failed, "diverged", "finished"),
+            reason=np.where(failed, "a grain left <the domain> & fell", ""),
+            angle=np.where(failed, np.nan, angles),
+            angle_se=0.2,
+            grain_count=400.0,
+            fill_height=0.028,
+            case_key=[f"key-{row['seed']}" for row in rows],
+        )
+
+    return run
+
+
+class Page(HTMLParser):
+    """A page taken apart: ids, links, tables by id, charts by name, and whether its tags match."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.ids: list[str] = []
+        self.links: list[str] = []
+        self.tables: dict[str, list[list[tuple[str, float | None]]]] = {}
+        self.heads: dict[str, list[str]] = {}
+        self.charts: dict[str, dict] = {}
+        self.text = ""
+        self.mismatches: list[str] = []
+        self._open: list[str] = []
+        self._script: dict[str, str | None] | None = None
+        self._table = ""
+        self._cell: list[str] | None = None
+        self.feed(text)
+        self.close()
+
+    def handle_starttag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
+        named = dict(attributes)
+        if tag not in VOID:
+            self._open.append(tag)
+        self.ids += [named["id"]] if named.get("id") else []
+        self.links += [str(named[key]) for key in ("href", "src") if key in named]
+        if tag == "script":
+            self._script = named
+        elif tag == "table":
+            self._table = str(named.get("id", ""))
+            self.tables[self._table], self.heads[self._table] = [], []
+        elif tag == "tr":
+            self.tables[self._table].append([])
+        elif tag in ("td", "th"):
+            self._cell = []
+            value = named.get("data-value")
+            self._value = float(value) if value is not None else None
+
+    def handle_endtag(self, tag: str) -> None:
+        if not self._open or self._open.pop() != tag:
+            self.mismatches.append(tag)
+        if tag == "script":
+            self._script = None
+        elif tag in ("td", "th") and self._cell is not None:
+            text = "".join(self._cell)
+            if tag == "td":
+                self.tables[self._table][-1].append((text, self._value))
+            else:
+                self.heads[self._table].append(text)
+            self._cell = None
+
+    def handle_data(self, data: str) -> None:
+        if self._script is not None:
+            if self._script.get("type") == "application/json":
+                self.charts[str(self._script["data-plot"])] = json.loads(data)
+            return
+        if self._cell is not None:
+            self._cell.append(data)
+        if "style" not in self._open:
+            self.text += data
+
+    def rows(self, name: str) -> list[list[tuple[str, float | None]]]:
+        """Rows of a table's body."""
+        return [row for row in self.tables[f"table-{name}"] if row]
+
+    def values(self, name: str) -> np.ndarray:
+        """Numbers of a table, row by row; a row's text cells are left out, missing numbers are NaN."""
+        numeric = [
+            [value for text, value in row if value is not None or text == "–"] for row in self.rows(name)
+        ]
+        return np.array(numeric, dtype=np.float64)
+
+
+def study_with(study: Study, paper_study: bool | None = None, **campaign: Mapping) -> Study:
+    """Copy a study with other decisions of its campaign."""
+    settings = CampaignSettings.model_validate(study.campaign.model_dump() | campaign)
+    update = {"campaign": settings}
+    return study.model_copy(update=update if paper_study is None else update | {"paper": paper_study})
+
+
+@pytest.fixture(scope="session")
+def changed() -> Callable[..., Study]:
+    return study_with
+
+
+@pytest.fixture(scope="session")
+def heaps() -> Callable[..., Runner]:
+    return analytic_heaps
+
+
+@pytest.fixture(scope="session")
+def read_page() -> type[Page]:
+    return Page
+
+
+@pytest.fixture(scope="session")
+def study() -> Study:
+    return study_with(load_study(), selection={"keep": ("E", "F")})
+
+
+@pytest.fixture(scope="session")
+def campaign(study: Study) -> Campaign:
+    return calibrate(study, analytic_heaps())
+
+
+@pytest.fixture(scope="session")
+def page(campaign: Campaign, study: Study) -> Page:
+    return Page(render_page(campaign, study, provenance={"device": "cpu", "seconds": 12.5}))

@@ -1,0 +1,119 @@
+"""The page: well formed, self-contained, with the results' own numbers."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+
+import numpy as np
+
+from experiments.calibrate import Campaign, Outcome
+from experiments.report import HeapPicture, render_page
+from experiments.report.numbers import prose
+from experiments.studies.buckwheat import paper
+from experiments.study import Study
+
+
+def test_the_page_is_well_formed_and_its_contents_lead_somewhere(page) -> None:
+    assert page.mismatches == []
+    assert [name for name, count in Counter(page.ids).items() if count > 1] == []
+    inner = {link.removeprefix("#") for link in page.links if link.startswith("#")}
+    assert {"summary", "screening", "surface", "verification", "provenance"} <= inner
+    assert inner <= set(page.ids)
+
+
+def test_the_page_needs_no_network(campaign: Campaign, study: Study, page, read_page: type) -> None:
+    picture = HeapPicture("Heap", "A heap.", np.zeros((8, 12, 3), np.uint8))
+    text = render_page(campaign, study, [picture])
+    assert all(link.startswith(("#", "data:")) for link in read_page(text).links)
+    plotly = text[text.index("<script>") : text.index("</script>", text.index("<script>"))]
+    assert "plotly.js v" in plotly
+    assert "://" not in text.replace(plotly, "")
+    assert text.count("plotly.js v") == plotly.count("plotly.js v")
+    assert "@import" not in text.replace(plotly, "")
+
+
+def test_every_number_of_the_tables_is_the_results_own(campaign: Campaign, page) -> None:
+    screen, surface = campaign.screening.screen, campaign.surface
+    effects = screen.table.sort_values("rank")
+    published = paper.screening().table.loc[effects.index, ["F", "p"]]
+    columns = ["rank", "effect", "sum_sq", "percent", "F", "t", "p"]
+    expected = {
+        "effects": np.column_stack([effects[columns], published]),
+        "screening-anova": screen.anova.to_numpy(),
+        "screening-design": np.column_stack(
+            [campaign.screening.design.coded.reset_index(), campaign.screening.response]
+        ),
+        "climb": campaign.climb.path.reset_index().to_numpy(),
+        "anova-full": np.column_stack([surface.full.anova, paper.surface().anova[["F", "p"]]]),
+        "surface-design": np.column_stack(
+            [surface.design.natural.reset_index(), surface.design.points, surface.response]
+        ),
+        "ranges": np.column_stack([list(campaign.optimum.point.values()), campaign.optimum.region.ranges]),
+    }
+    for name, values in expected.items():
+        # Written by repr and read back: the same bits.
+        np.testing.assert_array_equal(page.values(name), values.astype(np.float64), err_msg=name)
+    coded = surface.reduced.coded_coefficients
+    np.testing.assert_array_equal(
+        page.values("coefficients")[:, 1], coded[surface.reduced.coefficients.index]
+    )
+
+
+def test_every_shown_number_is_its_value_rounded(page) -> None:
+    checked = 0
+    for rows in page.tables.values():
+        for text, value in (cell for row in rows for cell in row if cell[1] is not None):
+            checked += 1
+            if text.startswith("<"):
+                assert value < float(text.removeprefix("< "))
+                continue
+            shown = text.replace("−", "-").replace("\u202f", "")
+            decimals = len(shown.partition(".")[2])
+            # Half a unit of the last digit shown, and the last bits of the comparison itself.
+            assert abs(float(shown) - value) <= 0.5000001 * 10.0**-decimals, (text, value)
+    assert checked > 300
+
+
+def test_every_chart_has_a_place_finite_numbers_and_axes_with_titles(page) -> None:
+    assert {"noise-chart", "pareto-chart", "half-normal-chart", "climb-chart", "verification-chart"} <= set(
+        page.charts
+    )
+    assert {"surface-relief", "contour-E-F", "residual-normal", "residual-actual"} <= set(page.charts)
+    for name, chart in page.charts.items():
+        assert name in page.ids
+        assert chart["data"]
+        axes = chart["layout"]["scene"] if "scene" in chart["layout"] else chart["layout"]
+        assert axes["xaxis"]["title"]["text"]
+        # Pareto chart and verification name their rows instead.
+        assert axes["yaxis"]["title"].get("text") or name in ("pareto-chart", "verification-chart")
+
+
+def test_marked_rows_are_the_significant_ones(campaign: Campaign, study: Study) -> None:
+    text = render_page(campaign, study)
+    table = text[text.index('<table id="table-anova-full">') :]
+    table = table[: table.index("</table>")]
+    assert table.count('<tr class="strong">') == int((campaign.surface.full.anova["p"] < 0.05).sum())
+
+
+def test_the_summary_says_what_was_found(campaign: Campaign, page) -> None:
+    assert campaign.outcome is Outcome.CALIBRATED
+    assert "Calibrated." in page.text
+    assert "One repose angle does not pin down E and F" in page.text
+    assert "35 mm wide, 110 mm high" in page.text
+    for decision in campaign.decisions:
+        assert prose(decision.rule) in page.text
+        assert prose(decision.outcome) in page.text
+
+
+def test_only_the_papers_study_shows_the_papers_numbers(
+    campaign: Campaign, study: Study, page, read_page: type, changed: Callable[..., Study]
+) -> None:
+    other = read_page(render_page(campaign, changed(study, paper_study=False)))
+    for shown, expected in ((page, True), (other, False)):
+        assert ("paper" in shown.ids) is expected
+        assert ("table-paper-climb" in shown.tables) is expected
+        assert any(head.startswith("paper, ") for heads in shown.heads.values() for head in heads) is expected
+        assert ("The paper kept E and F" in shown.text) is expected
+    assert len(page.rows("misprints")) == len(paper.misprints())
+    assert [row[0][0] for row in page.rows("tests")] == ["this campaign", "the paper"]
