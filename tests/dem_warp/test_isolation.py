@@ -1,4 +1,4 @@
-"""A world's bits depend on its setup alone; what goes wrong in one world is flagged there and changes no other."""
+"""A world's bits depend on its setup alone; what goes wrong in one world is flagged there only."""
 
 from dataclasses import replace
 

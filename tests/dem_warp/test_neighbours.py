@@ -97,7 +97,7 @@ def test_the_lists_are_those_of_brute_force():
         rng = np.random.default_rng(seed)
         # A random cloud, dense enough that clumps overlap; no pair lies within rounding of the skin.
         bodies = grains(
-            rng.uniform(-0.009, 0.009, (50, 3)) + [0.0, 0.0, 0.009],
+            rng.uniform([-0.009, -0.009, 0.0], [0.009, 0.009, 0.018], (50, 3)),
             orientations=rng.normal(size=(50, 4)),
             sizes=rng.uniform(0.8, 1.2, 50),
         )

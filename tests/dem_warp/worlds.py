@@ -13,10 +13,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
+from dem_warp.case import Case, GrainPopulation, Numerics
 from dem_warp.clumps import ClumpShape
 from dem_warp.device import resolve_device
 from dem_warp.materials import Interaction, Material
 from dem_warp.model import ContactCoefficients, Grains, WorldSetup
+from dem_warp.scenes.lifted_cylinder import LiftedCylinder
 from dem_warp.solver import Solver
 from dem_warp.walls import Plane, Wall
 
@@ -49,6 +51,7 @@ BOOT = ClumpShape.from_spheres(
 )
 """Three unequal spheres in an L: three different moments of inertia."""
 
+SMALL_TUBE = LiftedCylinder(diameter=0.016, height=0.016, wall_material=STEEL, rain_rate=1500.0)
 BOX = ((-0.12, -0.12, -0.12), (0.12, 0.12, 0.12))
 _NOWHERE = Plane(point=(0.0, 0.0, -1.0))
 
@@ -205,3 +208,15 @@ def assert_same_bits(a: dict[str, np.ndarray], b: dict[str, np.ndarray]) -> None
     assert a.keys() == b.keys()
     for name, array in a.items():
         np.testing.assert_array_equal(array, b[name], err_msg=name)
+
+
+def small_case(seed: int = 1, scene: LiftedCylinder | None = None, **numerics: Any) -> Case:
+    """A lifted cylinder of some seventy nine-sphere grains: about a second on a core."""
+    return Case(
+        scene=scene or SMALL_TUBE,
+        grains=GrainPopulation(PYRAMID, GRAIN),
+        grain_grain=Interaction(0.3, 0.4, 0.05),
+        grain_wall=Interaction(0.5, 0.4, 0.05),
+        seed=seed,
+        numerics=Numerics(**({"modulus_scale": 100.0} | numerics)),
+    )

@@ -1,0 +1,104 @@
+"""Cases: what they refuse, and what of them determines a result."""
+
+import json
+import math
+from dataclasses import fields, is_dataclass, replace
+
+import pytest
+from worlds import BOOT, GRAIN, PYRAMID, SMALL_TUBE, STEEL, small_case
+
+from dem_warp import Case, GrainPopulation, Interaction, LiftedCylinder, Material, Numerics, rayleigh_time
+
+
+@pytest.mark.parametrize(
+    ("build", "message"),
+    [
+        (lambda: LiftedCylinder(-0.03, 0.1, STEEL), r"LiftedCylinder.diameter: must be positive.* got -0.03"),
+        (lambda: LiftedCylinder(0.03, math.nan, STEEL), r"LiftedCylinder.height: .* got nan"),
+        (lambda: replace(SMALL_TUBE, lift_speed=0.0), r"LiftedCylinder.lift_speed: .* got 0.0"),
+        (lambda: replace(SMALL_TUBE, rain_rate=math.inf), r"LiftedCylinder.rain_rate: .* got inf"),
+        (
+            lambda: replace(SMALL_TUBE, grain_count=0),
+            r"LiftedCylinder.grain_count: must be at least 1, got 0",
+        ),
+        (lambda: replace(SMALL_TUBE, duration=-1.0), r"LiftedCylinder.duration: must be positive.* got -1.0"),
+        (lambda: GrainPopulation(PYRAMID, GRAIN, size_mean=0.0), r"size_mean: must be positive, got 0.0"),
+        (lambda: GrainPopulation(PYRAMID, GRAIN, size_sd=0.4), r"size_sd: .* below size_mean / 3, got 0.4"),
+        (lambda: GrainPopulation(PYRAMID, GRAIN, size_sd=-0.1), r"size_sd: must be at least 0 .* got -0.1"),
+        (lambda: Numerics(time_step_fraction=1.5), r"time_step_fraction: .* at most 1, got 1.5"),
+        (lambda: Numerics(skin=0.0), r"Numerics.skin: must be positive \[m\], got 0.0"),
+        (lambda: Numerics(precision="half"), r"precision: must be one of \['double', 'mixed'\], got 'half'"),
+        (lambda: Numerics(modulus_scale=0.5), r"modulus_scale: must be at least 1, got 0.5"),
+        (lambda: replace(small_case(), seed=-1), r"Case.seed: must be an integer from 0 .* got -1"),
+    ],
+)
+def test_a_bad_value_is_refused_with_rule_and_value(build, message):
+    with pytest.raises(ValueError, match=message):
+        build()
+
+
+def test_the_time_step_is_a_fraction_of_the_smallest_rayleigh_time():
+    population = GrainPopulation(PYRAMID, GRAIN, size_mean=1.1, size_sd=0.1)
+    case = replace(small_case(), grains=population, numerics=Numerics(0.2, modulus_scale=4.0))
+    soft = replace(GRAIN, shear_modulus=GRAIN.shear_modulus / 4.0)
+    assert case.time_step == pytest.approx(0.2 * rayleigh_time(0.6e-3 * 0.8, soft), rel=1e-12)
+
+
+def leaves(value, place=()):
+    """Every plain value in nested frozen dataclasses, with the names that lead to it."""
+    for field in fields(value):
+        inner = getattr(value, field.name)
+        if is_dataclass(inner) and not hasattr(inner, "to_dict"):
+            yield from leaves(inner, (*place, field.name))
+        else:
+            yield (*place, field.name), inner
+
+
+def changed(value, place, new):
+    """The same nested dataclasses with another value at a place."""
+    name, *rest = place
+    inner = changed(getattr(value, name), rest, new) if rest else new
+    return replace(value, **{name: inner})
+
+
+OTHER = {
+    "shape": BOOT,
+    "grain_count": 40,
+    "duration": 2.0,
+    "skin": 1e-3,
+    "precision": "double",
+    "clamp_attraction": True,
+    "seed": 2,
+    "modulus_scale": 200.0,
+}
+"""Another valid value, where it is not 0.9 of the present one."""
+
+
+def test_every_parameter_but_the_skin_is_part_of_a_case_s_identity():
+    case = small_case()
+    known = json.dumps(case.to_dict(), sort_keys=True)
+    assert json.dumps(small_case().to_dict(), sort_keys=True) == known
+    places = dict(leaves(case))
+    assert len(places) > 25
+    for place, value in places.items():
+        new = OTHER[place[-1]] if place[-1] in OTHER else 0.9 * value
+        other = json.dumps(changed(case, place, new).to_dict(), sort_keys=True)
+        assert (other == known) == (place == ("numerics", "skin")), place
+
+
+def test_a_case_s_identity_tells_clumps_of_one_radius_apart():
+    slim, wide = (replace(small_case(), grains=GrainPopulation(shape, GRAIN)) for shape in (PYRAMID, BOOT))
+    assert slim.to_dict()["grains"] != wide.to_dict()["grains"]
+    assert slim.to_dict()["grains"]["shape"] == PYRAMID.to_dict()
+
+
+def test_the_modulus_scale_softens_the_grains_alone():
+    case = Case(
+        SMALL_TUBE,
+        GrainPopulation(PYRAMID, Material(700.0, 30e6, 0.3)),
+        Interaction(0.5, 0.5, 0.1),
+        Interaction(0.5, 0.5, 0.1),
+        numerics=Numerics(modulus_scale=10.0),
+    )
+    assert case.grain_material == Material(700.0, 3e6, 0.3)
+    assert case.scene.wall_material == STEEL

@@ -1,0 +1,177 @@
+"""The lifted cylinder from rain to heap, alone, in batches and over processes."""
+
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from worlds import GRAIN, PYRAMID, SMALL_TUBE, small_case, spheres_of
+
+from dem_warp import CaseResult, GrainPopulation, simulate
+from dem_warp.batch import Batch
+from dem_warp.device import resolve_device
+from dem_warp.scenes.lifted_cylinder import bed_level
+
+ARRAYS = ("positions", "orientations", "sizes", "sphere_centers", "sphere_radii", "sphere_grain")
+SPEED_ONLY = {"rebuilds"}
+"""Observables that tell of the work, not of the heap."""
+
+
+def same_bits(a: CaseResult, b: CaseResult) -> None:
+    """Two results are equal in all that the case determines."""
+    assert (a.status, a.reason, a.phases) == (b.status, b.reason, b.phases)
+    for name in ARRAYS:
+        np.testing.assert_array_equal(getattr(a, name), getattr(b, name), err_msg=name)
+    kept = [
+        {name: value for name, value in result.observables.items() if name not in SPEED_ONLY}
+        for result in (a, b)
+    ]
+    assert kept[0] == kept[1]
+
+
+def run_batch(cases) -> dict[int, CaseResult]:
+    """Results of cases that run in one launch on the CPU."""
+    batch, results = Batch(cases, resolve_device("cpu")), {}
+    while batch.running:
+        results.update(batch.advance())
+    return results
+
+
+@pytest.fixture(scope="module")
+def heap() -> CaseResult:
+    """A finished heap, by itself in this process."""
+    return simulate([small_case()], device="cpu", workers=1)[0]
+
+
+def test_a_tube_is_filled_lifted_and_leaves_a_heap_at_rest(heap):
+    assert (heap.status, heap.reason) == ("finished", "")
+    assert [phase["name"] for phase in heap.phases] == ["fill", "settle", "lift"]
+    seen = heap.observables
+    assert seen["grain_count"] == len(heap.positions) + seen["grains_lost"]
+    assert seen["grains_lost"] == 0
+    # Poured, long-ish grains: looser than random close packing of spheres, 0.64, and looser still at the
+    # walls.
+    assert 0.3 < seen["solid_fraction"] < 0.65
+    # Full: the bed ends within half a grain of the rim.
+    assert seen["fill_height"] == pytest.approx(SMALL_TUBE.height, abs=0.5 * PYRAMID.bounding_radius)
+    times = [phase["time"] for phase in heap.phases]
+    assert seen["simulated_time"] == pytest.approx(sum(times), rel=1e-12)
+    assert 0.0 < seen["time_to_rest"] <= times[2] - SMALL_TUBE.rest_time
+    # All of it lies on the plate: spheres sink in by less than a tenth of the smallest.
+    assert (heap.sphere_centers[:, 2] > 0.9 * heap.sphere_radii).all()
+    # The tube is clear of it, and let it spread beyond its wall.
+    top = (heap.sphere_centers[:, 2] + heap.sphere_radii).max()
+    assert SMALL_TUBE.lift_speed * times[2] > top
+    assert top < seen["fill_height"]
+    assert np.hypot(*heap.sphere_centers.T[:2]).max() > SMALL_TUBE.diameter / 2
+
+
+def test_the_mass_that_fills_the_tube_is_that_of_the_grains(heap):
+    volume = PYRAMID.volume * (heap.sizes**3).sum()
+    space = np.pi / 4.0 * SMALL_TUBE.diameter**2 * heap.observables["fill_height"]
+    assert heap.observables["solid_fraction"] == pytest.approx(volume / space, rel=1e-12)
+
+
+def test_a_result_places_the_spheres_of_its_grains(heap):
+    poses = {"positions": heap.positions, "orientations": heap.orientations}
+    centers, radii = spheres_of(PYRAMID, poses, heap.sizes)
+    # Two ways to turn a vector differ by rounding.
+    np.testing.assert_allclose(heap.sphere_centers, centers, atol=1e-15)
+    np.testing.assert_array_equal(heap.sphere_radii, radii)
+    assert Counter(heap.sphere_grain.tolist()) == dict.fromkeys(range(len(heap.sizes)), 9)
+
+
+def test_the_heap_is_really_at_rest(heap):
+    # The same case 0.1 s on. Measured: 2e-11 m, less than half a count of the fixed-point positions.
+    rested = heap.observables["simulated_time"]
+    scene = replace(SMALL_TUBE, duration=rested + 0.1)
+    later = simulate([small_case(scene=scene)], device="cpu", workers=1)[0]
+    assert later.observables["simulated_time"] >= rested + 0.1
+    np.testing.assert_allclose(later.positions, heap.positions, rtol=0.0, atol=1e-9)
+
+
+def test_a_fixed_count_is_poured_and_kept():
+    result = simulate([small_case(scene=replace(SMALL_TUBE, grain_count=25))], device="cpu", workers=1)[0]
+    assert result.status == "finished"
+    assert result.observables["grain_count"] == 25 == len(result.positions)
+    assert result.observables["fill_height"] < 0.75 * SMALL_TUBE.height
+
+
+def test_a_case_of_fixed_duration_ends_then():
+    scene = replace(SMALL_TUBE, grain_count=8, duration=0.5)
+    result = simulate([small_case(scene=scene)], device="cpu", workers=1)[0]
+    assert result.status == "finished"
+    # It looks every 4 ms or up to twice that.
+    assert 0.5 <= result.observables["simulated_time"] < 0.51
+
+
+def test_processes_and_callbacks_change_nothing(heap):
+    cases, seen, fractions = [small_case(), small_case(seed=2)], [], []
+    results = simulate(
+        cases,
+        device="cpu",
+        workers=2,
+        on_result=lambda index, result: seen.append((index, result)),
+        on_progress=lambda progress: fractions.append((progress.done, progress.fraction)),
+    )
+    same_bits(results[0], heap)
+    assert sorted(index for index, _ in seen) == [0, 1]
+    assert all(results[index] is result for index, result in seen)
+    assert fractions[-1] == (2, 1.0)
+    assert not np.array_equal(results[1].sizes[:5], results[0].sizes[:5])
+
+
+def test_a_case_in_a_batch_gives_the_same_bits(heap):
+    others = [
+        small_case(seed=3, scene=replace(SMALL_TUBE, grain_count=20)),
+        small_case(seed=4, modulus_scale=30.0, scene=replace(SMALL_TUBE, grain_count=10)),
+    ]
+    results = run_batch([others[0], small_case(), others[1]])
+    same_bits(results[1], heap)
+    assert {result.status for result in results.values()} == {"finished"}
+
+
+def test_the_skin_of_a_case_does_not_change_its_bits(heap):
+    wide = simulate([small_case(skin=1.6e-3)], device="cpu", workers=1)[0]
+    same_bits(wide, heap)
+    assert wide.observables["rebuilds"] != heap.observables["rebuilds"]
+
+
+def test_a_diverging_case_is_a_row_with_its_reason(heap):
+    # At four times the usual step the explicit damping of almost plastic impacts overshoots, more each time.
+    wild = replace(
+        small_case(time_step_fraction=1.0),
+        grain_grain=replace(small_case().grain_grain, restitution=1e-6),
+        grain_wall=replace(small_case().grain_wall, restitution=1e-6),
+    )
+    results = run_batch([wild, small_case()])
+    assert results[0].status == "diverged"
+    assert "lower time_step_fraction" in results[0].reason
+    same_bits(results[1], heap)
+
+
+def test_no_cases_give_no_results():
+    assert simulate([], device="cpu") == []
+
+
+def test_an_unknown_device_is_refused():
+    with pytest.raises(ValueError, match=r"device: must be one of \[.*'cpu'.*\], got 'gpu'"):
+        simulate([small_case()], device="gpu")
+
+
+def test_the_level_of_a_bed_is_the_mean_height_of_its_surface():
+    # Two grains of half height 1 in a tube of radius 2, over different cells, and one below the first.
+    places = np.array([[-1.0, -1.0, 3.0], [1.0, 1.0, 5.0], [-1.0, -1.0, 1.0]])
+    assert bed_level(places, 2.0, 1.0) == 4.0 + 0.5
+    assert bed_level(np.empty((0, 3)), 2.0, 1.0) == 0.0
+
+
+def test_sizes_stay_within_their_limits_and_follow_their_distribution():
+    population = GrainPopulation(PYRAMID, GRAIN, size_mean=1.2, size_sd=0.1)
+    sizes = population.draw_sizes(4000, np.random.default_rng(7))
+    assert (np.abs(sizes - 1.2) <= 0.3).all()
+    # Standard errors of 4,000 draws, four of them: 0.1 / sqrt(4000), and 0.1 / sqrt(8000). The truncation
+    # takes 1.3 %.
+    assert sizes.mean() == pytest.approx(1.2, abs=4 * 0.1 / np.sqrt(4000))
+    assert sizes.std() == pytest.approx(0.0987, abs=4 * 0.1 / np.sqrt(8000))
+    np.testing.assert_array_equal(sizes, population.draw_sizes(4000, np.random.default_rng(7)))
