@@ -14,7 +14,7 @@ import pandas as pd
 from dem_warp import CaseResult
 from experiments.calibrate.results import Campaign
 from experiments.cases import measure_heap
-from experiments.report.numbers import significant
+from experiments.report.numbers import trimmed
 from experiments.study import Study
 from imaging import overlay, snapshot
 
@@ -82,7 +82,7 @@ def _picture(case: Mapping[str, Any], study: Study, result: CaseResult, kept: tu
         backend="raster",  # a second each also without a GPU, and the same picture on every machine
         grains=result.sphere_grain,
     )
-    values = "".join(f", {name} = {significant(case[name], 3)}" for name in kept)
+    values = "".join(f", {name} = {trimmed(case[name], 3)}" for name in kept)
     return HeapPicture(
         title=f"{STAGE_NAMES[case['stage']]}, run {case['run']}, heap {case['replicate']}",
         caption=f"{angle.mean:.2f}° ± {angle.se:.2f}° over {len(angle.views)} views{values}; "
