@@ -63,7 +63,7 @@ def pareto_chart(screen: ScreenResult, alpha: float) -> Chart:
         # Entries of the legend, as labels at near lines would run into one another.
         add_line(figure, [value, value], ends, f"{name}: {value:.2f}", INK, dash)
     figure.update_yaxes(
-        categoryorder="array", categoryarray=list(points.index), ticks="", ticklabelstandoff=6
+        categoryorder="array", categoryarray=list(points.index), dtick=1, ticks="", ticklabelstandoff=6
     )
     figure.update_layout(bargap=0.35)
     return Chart(
