@@ -57,14 +57,14 @@ def pareto_chart(screen: ScreenResult, alpha: float) -> Chart:
             hovertemplate="%{y}: effect %{customdata[0]:.2f}°, |t| = %{x:.2f}<extra></extra>",
         )
     ends = [points.index[0], points.index[-1]]
-    for (name, value), dash in zip(
-        _critical_values(screen, alpha).items(), ("dot", "dash", "solid"), strict=False
-    ):
+    levels = _critical_values(screen, alpha)
+    for (name, value), dash in zip(levels.items(), ("dot", "dash", "solid"), strict=False):
         # Entries of the legend, as labels at near lines would run into one another.
         add_line(figure, [value, value], ends, f"{name}: {value:.2f}", INK, dash)
     figure.update_yaxes(
         categoryorder="array", categoryarray=list(points.index), dtick=1, ticks="", ticklabelstandoff=6
     )
+    figure.update_xaxes(range=[0.0, 1.06 * max(points["abs_t"].max(), *levels.values())])
     figure.update_layout(bargap=0.35)
     return Chart(
         "pareto-chart", "Pareto chart: effects in standard errors, with the critical values.", figure
