@@ -1,15 +1,15 @@
 """Neighbour lists: complete, in order, and without influence on the motion."""
 
-import itertools
-
 import numpy as np
 import pytest
 from worlds import (
-    GRAVITY,
+    PILE_STEP,
+    PILE_TUBE,
     PYRAMID,
     assert_same_bits,
     grains,
     pair,
+    pile,
     run_for,
     solve,
     spheres_of,
@@ -19,39 +19,12 @@ from worlds import (
 
 from dem_warp.solver import Solver
 from dem_warp.types import SPHERE_BITS, SPHERE_MASK, WorldFlag
-from dem_warp.walls import Cylinder, Plane
+from dem_warp.walls import Plane
 
-TIME_STEP = 5e-6
 FALL = 0.12
 """The time in which a pile falls and most of it settles [s]."""
 
 SPHERES = PYRAMID.sphere_count
-TUBE = Cylinder((0.0, 0.0, 0.0), 0.012, 0.1)
-
-
-def pile(count: int = 36, skin: float = 1e-3, seed: int = 1):
-    """Grains in layers of a tube, a little above one another, that fall and settle."""
-    rng = np.random.default_rng(seed)
-    layers = [
-        (x, y, 0.004 + 0.0065 * layer)
-        for layer in range(-(-count // 4))
-        for x, y in itertools.product((-0.0045, 0.0045), repeat=2)
-    ]
-    bodies = grains(
-        layers[:count],
-        velocities=np.column_stack([rng.normal(size=(count, 2)) * 0.02, np.full(count, -0.4)]),
-        orientations=rng.normal(size=(count, 4)),
-        sizes=rng.uniform(0.9, 1.1, count),
-    )
-    return world(
-        bodies,
-        pair(restitution=0.3, friction=0.5, rolling=0.05),
-        TIME_STEP,
-        walls=(Plane(), TUBE),
-        shapes=(PYRAMID,),
-        gravity=(0.0, 0.0, -GRAVITY),
-        skin=skin,
-    )
 
 
 def listed(solver: Solver) -> list[tuple[int, int]]:
@@ -74,7 +47,7 @@ def near(solver: Solver, skin: float) -> set[tuple[int, int]]:
     owner = np.arange(len(radii)) // SPHERES
     gap = np.linalg.norm(centers[:, None] - centers[None], axis=2) - radii[:, None] - radii[None]
     pairs = set(zip(*np.nonzero((gap < skin) & (owner[:, None] != owner[None])), strict=True))
-    to_tube = np.abs(np.hypot(centers[:, 0], centers[:, 1]) - TUBE.radius)
+    to_tube = np.abs(np.hypot(centers[:, 0], centers[:, 1]) - PILE_TUBE.radius)
     for number, distance in enumerate((centers[:, 2], to_tube)):
         pairs |= {(i, len(radii) + number) for i in np.flatnonzero(distance - radii < skin)}
     return {(int(i), int(j)) for i, j in pairs}
@@ -88,7 +61,7 @@ def settled():
     assert solver.flags.numpy()[0] == 0
     speeds = np.linalg.norm(state(solver)["velocities"], axis=1)
     assert np.median(speeds) < 0.01
-    assert 3 < solver.rebuilds.numpy()[0] < FALL / TIME_STEP / solver.cycle
+    assert 3 < solver.rebuilds.numpy()[0] < FALL / PILE_STEP / solver.cycle
     return state(solver)
 
 
@@ -102,7 +75,13 @@ def test_the_lists_are_those_of_brute_force():
             sizes=rng.uniform(0.8, 1.2, 50),
         )
         setup = world(
-            bodies, pair(), TIME_STEP, walls=(Plane(), TUBE), shapes=(PYRAMID,), skin=8e-4, speed_limit=50.0
+            bodies,
+            pair(),
+            PILE_STEP,
+            walls=(Plane(), PILE_TUBE),
+            shapes=(PYRAMID,),
+            skin=8e-4,
+            speed_limit=50.0,
         )
         solver = solve(setup, precision=precision)
         found = listed(solver)
@@ -164,7 +143,7 @@ def test_a_list_that_is_too_short_is_flagged():
 def test_a_grain_that_outruns_its_skin_is_flagged():
     # At 15 m/s a grain passes its skin of 0.1 mm within 2 steps: no cycle is short enough.
     bodies = grains([0.0, 0.0, 0.05], velocities=[15.0, 0.0, 0.0])
-    setup = world(bodies, pair(), TIME_STEP, shapes=(PYRAMID,), skin=1e-4)
+    setup = world(bodies, pair(), PILE_STEP, shapes=(PYRAMID,), skin=1e-4)
     solver = solve(setup, precision="mixed")
     solver.advance(1)
     assert solver.flags.numpy()[0] == WorldFlag.LATE_REBUILD

@@ -20,7 +20,7 @@ from dem_warp.materials import Interaction, Material
 from dem_warp.model import ContactCoefficients, Grains, WorldSetup
 from dem_warp.scenes.lifted_cylinder import LiftedCylinder
 from dem_warp.solver import Solver
-from dem_warp.walls import Plane, Wall
+from dem_warp.walls import Cylinder, Plane, Wall
 
 GRAVITY = 9.81
 RADIUS = 5e-3
@@ -151,6 +151,44 @@ class Impact:
         return cls(overlap, force, HERTZ_DURATION * overlap / speed)
 
 
+PILE_STEP = 5e-6
+PILE_TUBE = Cylinder((0.0, 0.0, 0.0), 0.012, 0.1)
+
+
+def pile(seed: int = 1, count: int = 36, skin: float = 1e-3) -> WorldSetup:
+    """Nine-sphere grains in layers of a tube, a little above one another, that fall and settle."""
+    rng = np.random.default_rng(seed)
+    corners = 0.0045 * np.array([[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]])
+    number = np.arange(count)
+    bodies = grains(
+        np.column_stack([corners[number % 4], 0.004 + 0.0065 * (number // 4)]),
+        velocities=np.column_stack([rng.normal(size=(count, 2)) * 0.02, np.full(count, -0.4)]),
+        orientations=rng.normal(size=(count, 4)),
+        sizes=rng.uniform(0.9, 1.1, count),
+    )
+    return world(
+        bodies,
+        pair(restitution=0.3, friction=0.5, rolling=0.05),
+        PILE_STEP,
+        walls=(Plane(), PILE_TUBE),
+        shapes=(PYRAMID,),
+        gravity=(0.0, 0.0, -GRAVITY),
+        skin=skin,
+    )
+
+
+def oblique_impact(place: ArrayLike = (0.0, 0.0, 0.0)) -> WorldSetup:
+    """Two spinning balls that meet off-centre, with friction, at a place [m]; an impact lasts 100 steps."""
+    contact = pair(restitution=0.5, friction=0.3, rolling=0.05)
+    bodies = grains(
+        np.add(place, [[0.0, 0.0, 0.0], [0.001, 0.002, 2.0 * RADIUS - 2.4e-4]]),
+        velocities=[[0.0, 0.0, 0.05], [0.02, 0.0, -0.05]],
+        spins=[[1.0, -2.0, 3.0], [0.0, 4.0, 0.0]],
+    )
+    expected = Impact.of(contact, RADIUS / 2.0, ball_mass() / 2.0, 0.1)
+    return world(bodies, contact, expected.duration / 100.0)
+
+
 @dataclass(frozen=True)
 class Record:
     """Motion of all grains, step by step: arrays (steps + 1, grains, 3) in SI units."""
@@ -177,9 +215,11 @@ def record(solver: Solver, steps: int) -> Record:
     return history
 
 
-def solve(*setups: WorldSetup, precision: str = "double", **options: Any) -> Solver:
-    """Solver of worlds on the CPU."""
-    return Solver(setups, resolve_device("cpu"), precision, **options)
+def solve(
+    *setups: WorldSetup, precision: str = "double", device: str = "cpu", capacity: int | None = None
+) -> Solver:
+    """Solver of worlds on a device."""
+    return Solver(setups, resolve_device(device), precision, capacity)
 
 
 def run_for(solver: Solver, time: float) -> None:
