@@ -22,6 +22,9 @@ DENSEST_FILL = 0.58
 HEAPED = 4
 """Slow grains above the rim that show the tube to be full."""
 
+CLOGGED = 1.5
+"""A tube that still holds grains when it has risen by this many times its height has lifted them with it."""
+
 CALM = 10.0
 """A heap rests when its root mean square speed is below `rest_speed` and no grain passes CALM times that."""
 
@@ -275,7 +278,7 @@ class LiftController:
         if over:
             self._finish(view, elapsed)
             return Decision(done=True)
-        if rise > 1.5 * self.scene.height + top and top > rise:
+        if rise > CLOGGED * self.scene.height and top > rise:
             inside = np.count_nonzero(positions[:, 2] > rise)
             return Decision(done=True, failure=f"the tube is clogged: {inside} grains rose with it")
         if elapsed > self.scene.height / self.scene.lift_speed + self.LIFT_MARGIN:

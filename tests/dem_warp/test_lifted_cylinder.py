@@ -11,6 +11,8 @@ from dem_warp import CaseResult, GrainPopulation, simulate
 from dem_warp.batch import Batch
 from dem_warp.device import resolve_device
 from dem_warp.scenes.lifted_cylinder import bed_level
+from dem_warp.scenes.scene import Decision
+from dem_warp.solver import WorldView
 
 ARRAYS = ("positions", "orientations", "sizes", "sphere_centers", "sphere_radii", "sphere_grain")
 SPEED_ONLY = {"rebuilds"}
@@ -175,3 +177,25 @@ def test_sizes_stay_within_their_limits_and_follow_their_distribution():
     assert sizes.mean() == pytest.approx(1.2, abs=4 * 0.1 / np.sqrt(4000))
     assert sizes.std() == pytest.approx(0.0987, abs=4 * 0.1 / np.sqrt(8000))
     np.testing.assert_array_equal(sizes, population.draw_sizes(4000, np.random.default_rng(7)))
+
+
+def test_grains_that_rise_with_the_tube_are_called_clogged():
+    """A controller shown a bed that never leaves its tube gives up, well before its time limit."""
+    case = small_case()
+    case = replace(case, scene=replace(case.scene, grain_count=20))
+    setup = case.scene.prepare([case], resolve_device("cpu"))[0]
+    controller = case.scene.controller(case, setup, 256)
+    rest = np.zeros((20, 3))
+    bed = np.column_stack([rest[:, :2], np.linspace(0.1, 0.9, 20) * case.scene.height])
+    everyone = np.ones(20, dtype=bool)
+    lifted_at, time, decision = None, 0.0, Decision()
+    while not decision.done:
+        rise = 0.0 if lifted_at is None else case.scene.lift_speed * (time - lifted_at)
+        step = round(time / setup.time_step)
+        decision = controller.look(
+            WorldView(step, time, everyone, everyone, bed + np.array([0.0, 0.0, rise]), rest, setup.masses)
+        )
+        lifted_at = time if decision.move else lifted_at
+        time += controller.period * setup.time_step
+    assert decision.failure == "the tube is clogged: 20 grains rose with it"
+    assert 1.5 < rise / case.scene.height < 1.6
