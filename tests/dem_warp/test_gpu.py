@@ -10,7 +10,7 @@ from dem_warp.device import resolve_device
 from dem_warp.model import WorldSetup
 from dem_warp.solver import Solver
 
-resolve_device("cpu")  # starts Warp, quietly, before it is asked for devices
+resolve_device(None)  # starts Warp, quietly, before it is asked for devices
 pytestmark = [
     pytest.mark.gpu,
     pytest.mark.skipif(not wp.is_cuda_available(), reason="needs a CUDA device"),
