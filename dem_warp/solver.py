@@ -7,9 +7,11 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from dem_warp.kernels.cells import cell_kernels
+from dem_warp.kernels.lanes import BLOCK, WARP
 from dem_warp.kernels.neighbours import neighbour_kernels
 from dem_warp.kernels.step import step_kernels
-from dem_warp.kernels.summation import BLOCK, MIN_LANES, WARP
+from dem_warp.kernels.summation import MIN_LANES
 from dem_warp.model import WorldSetup
 from dem_warp.state import (
     Layout,
@@ -91,6 +93,7 @@ class Solver:
         self.layout = Layout.of(worlds)
         build = Build(self.precision, self.layout.sphere_count, self.layout.wall_count, self.device.is_cuda)
         self._step_kernels = step_kernels(build)
+        self._cell_kernels = cell_kernels(build)
         self._list_kernels = neighbour_kernels(build)
         found, row = _neighbour_capacities(worlds)
         with wp.ScopedDevice(self.device):
@@ -115,7 +118,7 @@ class Solver:
 
     def _build_cells(self, found_capacity: int) -> Any:
         layout = self.layout
-        cells = self._list_kernels.Cells()
+        cells = device_structs(self.precision).Cells()
         spheres = layout.grain_count * layout.sphere_count
         bits = max(int(np.ceil(np.log2(2 * spheres))), 6)
         across = bits // 3
@@ -163,15 +166,15 @@ class Solver:
         self._launch(self._step_kernels.step, threads, inputs)
 
     def _rebuild(self) -> None:
-        k, spheres = self._list_kernels, self.layout.sphere_total
-        grains = self.grains[0]
-        self._launch(k.bin_spheres, spheres, [self.model, grains, self.alive, self.stale, self.cells])
-        self._launch(k.open_buckets, spheres, [self.model, self.stale, self.cells])
-        self._launch(k.fill_buckets, spheres, [self.model, grains, self.stale, self.cells])
-        self._launch(k.search, spheres, [self.model, grains, self.stale, self.cells])
-        self._launch(k.write_lists, spheres, [self.model, self.stale, self.cells, self.hood, self.flags])
+        spheres, grains = self.layout.sphere_total, self.grains[0]
+        cells, lists = self._cell_kernels, self._list_kernels
+        self._launch(cells.bin_spheres, spheres, [self.model, grains, self.alive, self.stale, self.cells])
+        self._launch(cells.open_buckets, spheres, [self.model, self.stale, self.cells])
+        self._launch(cells.fill_buckets, spheres, [self.model, grains, self.stale, self.cells])
+        self._launch(cells.search, spheres, [self.model, grains, self.stale, self.cells])
+        self._launch(lists.write_lists, spheres, [self.model, self.stale, self.cells, self.hood, self.flags])
         finish = [grains, self.cells, self.hood, self.stale, self.any_stale, self.rebuilds]
-        self._launch(k.finish, self.layout.world_count, finish)
+        self._launch(lists.finish, self.layout.world_count, finish)
 
     def _cycle(self) -> None:
         for step in range(self.cycle):

@@ -77,7 +77,7 @@ PRECISIONS = {precision.name: precision for precision in (MIXED, DOUBLE)}
 
 @functools.cache
 def device_structs(precision: Precision) -> SimpleNamespace:
-    """Structs of one precision: `ContactParams`, `World`, `Wall`, `Model`, `Grains`, `Neighbours`."""
+    """Structs in a precision: `Cells`, `ContactParams`, `World`, `Wall`, `Model`, `Grains`, `Neighbours`."""
     real, vec3, vec4, sphere = precision.real, precision.vec3, precision.vec4, precision.sphere
 
     @wp.struct
@@ -144,7 +144,22 @@ def device_structs(precision: Precision) -> SimpleNamespace:
         rebuilt: wp.array(dtype=int)  # step of the last rebuild, (worlds,)
         travel: wp.array(dtype=real)  # path of a grain's farthest point since the rebuild [m], (grains,)
 
+    @wp.struct
+    class Cells:
+        bits: wp.vec3i  # a bucket table of 2**bits in each direction
+        bucket_size: wp.array(dtype=int)  # all zero between rebuilds, (worlds * buckets,)
+        bucket_start: wp.array(dtype=int)  # (worlds * buckets,)
+        cursor: wp.array(dtype=int)  # (worlds,)
+        bucket: wp.array(dtype=int)  # of a sphere, (spheres,)
+        rank: wp.array(dtype=int)  # of a sphere in its bucket, (spheres,)
+        order: wp.array(dtype=int)  # spheres by bucket, (spheres,)
+        ordered: wp.array(dtype=sphere)  # their positions, (spheres,)
+        found: wp.array(dtype=int)  # partners of a sphere, sorted, (spheres * found_capacity,)
+        found_count: wp.array(dtype=int)  # (spheres,)
+        found_capacity: int
+
     return SimpleNamespace(
+        Cells=Cells,
         ContactParams=ContactParams,
         World=World,
         Wall=Wall,

@@ -6,8 +6,9 @@ from types import SimpleNamespace
 import warp as wp
 
 from dem_warp.kernels.integration import integration_functions
+from dem_warp.kernels.lanes import WARP
 from dem_warp.kernels.packing import packing
-from dem_warp.kernels.summation import WARP, cooperative_sum, serial_sum
+from dem_warp.kernels.summation import cooperative_sum, serial_sum
 from dem_warp.types import Build, WorldFlag, device_structs
 
 DIVERGED = wp.constant(int(WorldFlag.DIVERGED))

@@ -13,10 +13,19 @@ from types import SimpleNamespace
 import warp as wp
 
 from dem_warp.kernels.contacts import contact_functions
+from dem_warp.kernels.lanes import (
+    WARP,
+    any_lane,
+    bit_count,
+    from_lane,
+    load_quad,
+    lowest_bit,
+    running_sum,
+    shared,
+    sync_warp,
+)
 from dem_warp.types import Build, device_structs
 
-WARP = 32
-BLOCK = 128
 MIN_LANES = 4
 STRETCH = 16
 """Entries that a lane searches before the queue is emptied; a multiple of QUAD."""
@@ -28,96 +37,9 @@ COMPONENTS = 7  # force, torque, rolling torque
 QUEUE = WARP * STRETCH  # every lane's stretch, all touching
 SUMS = COMPONENTS * WARP // MIN_LANES
 
-SHARED = """
-#if defined(__CUDA_ARCH__)
-    __shared__ {kind} memory[{size}];
-    {kind}& cell = memory[(threadIdx.x >> 5) * {part} + index];
-    if (write) cell = value;
-    return cell;
-#else
-    return value;
-#endif
-"""
 
-
-def _shared(kind: str, per_warp: int) -> str:
-    return SHARED.format(kind=kind, size=per_warp * BLOCK // WARP, part=per_warp)
-
-
-@wp.func_native(_shared("int", QUEUE))
+@wp.func_native(shared("int", QUEUE))
 def queue(index: int, value: int, write: bool) -> int: ...
-
-
-@wp.func_native("""
-#if defined(__CUDA_ARCH__)
-    return __any_sync(0xffffffffu, value);
-#else
-    return value;
-#endif
-""")
-def any_lane(value: bool) -> bool: ...
-
-
-@wp.func_native("""
-#if defined(__CUDA_ARCH__)
-    return __popc((unsigned)bits);
-#else
-    return __builtin_popcount((unsigned)bits);
-#endif
-""")
-def bit_count(bits: int) -> int: ...
-
-
-@wp.func_native("""
-#if defined(__CUDA_ARCH__)
-    return __ffs(bits) - 1;
-#else
-    return __builtin_ffs(bits) - 1;
-#endif
-""")
-def lowest_bit(bits: int) -> int: ...
-
-
-@wp.func_native("""
-#if defined(__CUDA_ARCH__)
-    __syncwarp();
-#endif
-""")
-def sync_warp(): ...
-
-
-@wp.func_native("""
-#if defined(__CUDA_ARCH__)
-    int lane = threadIdx.x & 31;
-    for (int o = 1; o < 32; o <<= 1) {
-        int before = __shfl_up_sync(0xffffffffu, value, o);
-        if (lane >= o) value += before;
-    }
-#endif
-    return value;
-""")
-def running_sum(value: int) -> int: ...
-
-
-@wp.func_native("""
-#if defined(__CUDA_ARCH__)
-    return __shfl_sync(0xffffffffu, value, lane);
-#else
-    return value;
-#endif
-""")
-def from_lane(value: int, lane: int) -> int: ...
-
-
-@wp.func_native("""
-#if defined(__CUDA_ARCH__)
-    int4 t = reinterpret_cast<const int4*>(a.data + i)[0];
-    return wp::vec_t<4, wp::int32>(t.x, t.y, t.z, t.w);
-#else
-    return wp::vec_t<4, wp::int32>(a.data[i], a.data[i + 1], a.data[i + 2], a.data[i + 3]);
-#endif
-""")
-def load_quad(a: wp.array(dtype=int), i: int) -> wp.vec4i: ...
 
 
 @functools.cache
@@ -153,10 +75,10 @@ def _totals(build: Build) -> SimpleNamespace:
     real, vec3 = build.precision.real, build.precision.vec3
     kind = "float" if build.precision.is_fixed_point else "double"
 
-    @wp.func_native(_shared(kind, COMPONENTS * (WARP + 1)))
+    @wp.func_native(shared(kind, COMPONENTS * (WARP + 1)))
     def result(index: int, value: real, write: bool) -> real: ...
 
-    @wp.func_native(_shared(kind, SUMS))
+    @wp.func_native(shared(kind, SUMS))
     def total(index: int, value: real, write: bool) -> real: ...
 
     @wp.func

@@ -1,0 +1,143 @@
+"""Which spheres are near each other: a hash grid of cells, each occupied one a run of spheres in memory.
+
+The grid wraps around in each direction; two cells of one bucket are told apart by the distance of their
+spheres. Only worlds whose `stale` flag is set are searched. Places in memory are given out in a race, and the
+partners of a sphere are found in any order; `neighbours` sorts them.
+"""
+
+import functools
+from types import SimpleNamespace
+
+import warp as wp
+
+from dem_warp.kernels.packing import packing
+from dem_warp.kernels.walls import wall_functions
+from dem_warp.types import Build, device_structs
+
+ABSENT = -1
+CELLS_AROUND = 27
+OWN_CELL = CELLS_AROUND // 2
+
+
+@functools.cache
+def cell_kernels(build: Build) -> SimpleNamespace:
+    """`bin_spheres`, `open_buckets`, `fill_buckets` and `search`, in their order of launch."""
+    precision = build.precision
+    real = precision.real
+    types = device_structs(precision)
+    Model, World, Grains, Cells = types.Model, types.World, types.Grains, types.Cells
+    pack = packing(precision)
+    walls = wall_functions(precision)
+    spheres_each = wp.constant(build.sphere_count)
+    walls_each = wp.constant(build.wall_count)
+    module = wp.get_module(f"dem_warp_cells_{build.name}")
+    wp.set_module_options({"enable_backward": False}, module)
+
+    @wp.func
+    def cell_of(a: precision.sphere, world: World) -> wp.vec3i:
+        rate = world.cell_rate
+        return wp.vec3i(
+            int(wp.floor(real(a[0]) * rate)),
+            int(wp.floor(real(a[1]) * rate)),
+            int(wp.floor(real(a[2]) * rate)),
+        )
+
+    @wp.func
+    def bucket_of(x: int, y: int, z: int, bits: wp.vec3i, w: int) -> int:
+        mx = x & ((1 << bits[0]) - 1)
+        my = y & ((1 << bits[1]) - 1)
+        mz = z & ((1 << bits[2]) - 1)
+        return (((((w << bits[2]) + mz) << bits[1]) + my) << bits[0]) + mx
+
+    @wp.func
+    def exists(model: Model, alive: wp.array(dtype=int), g: int, s: int) -> bool:
+        return alive[g] > 0 and s < model.shape_sphere_count[model.shape[g]]
+
+    @wp.kernel(module=module)
+    def bin_spheres(
+        model: Model, grains: Grains, alive: wp.array(dtype=int), stale: wp.array(dtype=int), cells: Cells
+    ):
+        i = wp.tid()
+        g = i // spheres_each
+        w = g // model.grain_count
+        if stale[w] == 0:
+            return
+        if not exists(model, alive, g, i - g * spheres_each):
+            cells.rank[i] = ABSENT
+            return
+        c = cell_of(pack.load_sphere(grains.spheres, i), model.world[w])
+        b = bucket_of(c[0], c[1], c[2], cells.bits, w)
+        cells.bucket[i] = b
+        cells.found_count[i] = 0
+        cells.rank[i] = wp.atomic_add(cells.bucket_size, b, 1)
+
+    @wp.kernel(module=module)
+    def open_buckets(model: Model, stale: wp.array(dtype=int), cells: Cells):
+        """Gives each occupied bucket its place; which place is a race, and nothing depends on it."""
+        i = wp.tid()
+        w = i // (spheres_each * model.grain_count)
+        if stale[w] != 0 and cells.rank[i] == 0:
+            b = cells.bucket[i]
+            cells.bucket_start[b] = wp.atomic_add(cells.cursor, w, cells.bucket_size[b])
+
+    @wp.kernel(module=module)
+    def fill_buckets(model: Model, grains: Grains, stale: wp.array(dtype=int), cells: Cells):
+        i = wp.tid()
+        w = i // (spheres_each * model.grain_count)
+        if stale[w] != 0 and cells.rank[i] >= 0:
+            first = w * spheres_each * model.grain_count
+            slot = first + cells.bucket_start[cells.bucket[i]] + cells.rank[i]
+            cells.order[slot] = i
+            pack.store_sphere(cells.ordered, slot, pack.load_sphere(grains.spheres, i))
+
+    @wp.func
+    def append(cells: Cells, i: int, partner: int):
+        """Adds a partner to those of sphere `i`, in any order; past the capacity only the count goes on."""
+        n = wp.atomic_add(cells.found_count, i, 1)
+        if n < cells.found_capacity:
+            cells.found[i * cells.found_capacity + n] = partner
+
+    @wp.kernel(module=module)
+    def search(model: Model, grains: Grains, stale: wp.array(dtype=int), cells: Cells):
+        """Partners of each sphere: pairs in its own bucket, and with the half of the buckets ahead of it.
+
+        Threads follow the buckets, so that neighbouring threads read the same memory.
+        """
+        slot = wp.tid()
+        w = slot // (spheres_each * model.grain_count)
+        first = w * spheres_each * model.grain_count
+        if stale[w] == 0 or slot - first >= cells.cursor[w]:
+            return
+        i = cells.order[slot]
+        g = i // spheres_each
+        world = model.world[w]
+        a = pack.load_sphere(cells.ordered, slot)
+        reach = pack.last(a) + world.skin
+        c = cell_of(a, world)
+        for n in range(OWN_CELL, CELLS_AROUND):
+            b = bucket_of(c[0] + n % 3 - 1, c[1] + (n // 3) % 3 - 1, c[2] + n // 9 - 1, cells.bits, w)
+            begin = first + cells.bucket_start[b]
+            end = begin + cells.bucket_size[b]
+            if n == OWN_CELL:
+                begin = slot + 1
+            for k in range(begin, end):
+                q = pack.load_sphere(cells.ordered, k)
+                d = pack.difference(a, q, world)
+                touching = reach + pack.last(q)
+                if wp.dot(d, d) < touching * touching:
+                    j = cells.order[k]
+                    if j // spheres_each != g:
+                        append(cells, i, j - first)
+                        append(cells, j, i - first)
+        for k in range(walls_each):
+            wall = model.wall[w * walls_each + k]
+            if walls.overlaps(wall, pack.place(a, world), reach, grains.step[w], world.time_step):
+                append(cells, i, model.grain_count * spheres_each + k)
+
+    return SimpleNamespace(
+        bin_spheres=bin_spheres,
+        open_buckets=open_buckets,
+        fill_buckets=fill_buckets,
+        search=search,
+        module=module,
+    )
