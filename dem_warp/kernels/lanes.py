@@ -21,7 +21,7 @@ SHARED = """
 
 
 def shared(kind: str, per_warp: int) -> str:
-    """Code of a function (index, value, write) on `per_warp` cells of shared memory that a warp has to itself."""
+    """Code of a function (index, value, write) on the `per_warp` cells of shared memory of a warp."""
     return SHARED.format(kind=kind, size=per_warp * BLOCK // WARP, part=per_warp)
 
 
