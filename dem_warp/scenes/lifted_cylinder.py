@@ -22,8 +22,11 @@ DENSEST_FILL = 0.58
 HEAPED = 4
 """Slow grains above the rim that show the tube to be full."""
 
-CLOGGED = 1.5
-"""A tube that still holds grains when it has risen by this many times its height has lifted them with it."""
+GONE = 1.5
+"""Grains that have risen with the tube by this many times its height leave with it."""
+
+CLOGGED = 0.02
+"""Part of the grains from which on a tube that takes them along is clogged: no heap."""
 
 CALM = 10.0
 """A heap rests when its root mean square speed is below `rest_speed` and no grain passes CALM times that."""
@@ -278,9 +281,12 @@ class LiftController:
         if over:
             self._finish(view, elapsed)
             return Decision(done=True)
-        if rise > CLOGGED * self.scene.height and top > rise:
-            inside = np.count_nonzero(positions[:, 2] > rise)
-            return Decision(done=True, failure=f"the tube is clogged: {inside} grains rose with it")
+        riding = view.alive & (view.positions[:, 2] > rise)
+        if rise > GONE * self.scene.height and riding.any():
+            count = np.count_nonzero(riding)
+            if count > CLOGGED * self.observables["grain_count"]:
+                return Decision(done=True, failure=f"the tube is clogged: {count} grains rose with it")
+            return Decision(remove=np.flatnonzero(riding))
         if elapsed > self.scene.height / self.scene.lift_speed + self.LIFT_MARGIN:
             return Decision(
                 done=True, failure=f"the heap did not come to rest within {elapsed:.1f} s of the lift"

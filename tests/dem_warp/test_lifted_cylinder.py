@@ -179,23 +179,51 @@ def test_sizes_stay_within_their_limits_and_follow_their_distribution():
     np.testing.assert_array_equal(sizes, population.draw_sizes(4000, np.random.default_rng(7)))
 
 
-def test_grains_that_rise_with_the_tube_are_called_clogged():
-    """A controller shown a bed that never leaves its tube gives up, well before its time limit."""
+def end_of_lift(riding: int) -> tuple[Decision, Decision, float]:
+    """What a controller decides for a bed of 100 that stays where it is, but for some that ride on the tube.
+
+    Returns the first decision after the lift began that asks for anything, the last one, and how far the tube
+    had then risen, in its heights.
+    """
     case = small_case()
-    case = replace(case, scene=replace(case.scene, grain_count=20))
+    case = replace(case, scene=replace(case.scene, grain_count=100))
     setup = case.scene.prepare([case], resolve_device("cpu"))[0]
     controller = case.scene.controller(case, setup, 256)
-    rest = np.zeros((20, 3))
-    bed = np.column_stack([rest[:, :2], np.linspace(0.1, 0.9, 20) * case.scene.height])
-    everyone = np.ones(20, dtype=bool)
-    lifted_at, time, decision = None, 0.0, Decision()
+    alive, rest = np.ones(100, dtype=bool), np.zeros((100, 3))
+    bed = np.column_stack([rest[:, :2], np.linspace(0.05, 0.1, 100) * case.scene.height])
+    lifted_at, time, rise, first, decision = None, 0.0, 0.0, None, Decision()
     while not decision.done:
         rise = 0.0 if lifted_at is None else case.scene.lift_speed * (time - lifted_at)
+        positions = bed.copy()
+        positions[:riding, 2] += rise
         step = round(time / setup.time_step)
-        decision = controller.look(
-            WorldView(step, time, everyone, everyone, bed + np.array([0.0, 0.0, rise]), rest, setup.masses)
-        )
+        decision = controller.look(WorldView(step, time, alive, alive, positions, rest, setup.masses))
+        if decision.remove is not None:
+            alive[decision.remove] = False
+        if lifted_at is not None and first is None and (decision.done or decision.remove is not None):
+            first = decision
         lifted_at = time if decision.move else lifted_at
         time += controller.period * setup.time_step
-    assert decision.failure == "the tube is clogged: 20 grains rose with it"
-    assert 1.5 < rise / case.scene.height < 1.6
+    return first, decision, rise / case.scene.height
+
+
+def test_a_bed_that_rises_with_the_tube_has_clogged_it():
+    first, last, risen = end_of_lift(riding=50)
+    assert first is last
+    assert last.failure == "the tube is clogged: 50 grains rose with it"
+    assert 1.5 < risen < 1.6
+
+
+def test_a_grain_that_hangs_on_the_rim_leaves_with_the_tube():
+    first, last, risen = end_of_lift(riding=1)
+    assert first.remove.tolist() == [0]
+    assert last.done
+    assert last.failure == ""
+    assert risen < 3.0
+
+
+def test_a_bed_that_stays_is_a_heap_once_the_tube_is_above_it():
+    first, last, risen = end_of_lift(riding=0)
+    assert first is last
+    assert last.failure == ""
+    assert risen < 1.5
