@@ -28,7 +28,7 @@ from experiments.calibrate.selection import require_kept, select_factors
 from experiments.calibrate.settings import CampaignStudy, MeasuredTarget
 from experiments.calibrate.surface import explore_surface, require_slope
 from experiments.calibrate.target import measured_target, plan_target, twin_target
-from experiments.calibrate.values import listed
+from experiments.calibrate.values import listed, p_text
 from experiments.calibrate.verification import verify
 
 Found = TypeVar("Found", bound=StageResult)
@@ -139,7 +139,7 @@ def _verdict(optimum: OptimumResult, verification: VerificationResult, target: S
     comparison = verification.comparison
     found = (
         f"At {listed(optimum.point)} fresh heaps gave {comparison.a.mean:.2f} deg against the target's "
-        f"{target.mean:.2f} deg (difference {comparison.difference:+.2f}, p = {comparison.p:.3f})"
+        f"{target.mean:.2f} deg (difference {comparison.difference:+.2f}, {p_text(comparison.p)})"
     )
     if comparison.different:
         return Outcome.NOT_VERIFIED, f"{found}: the chosen point does not give the target."

@@ -10,6 +10,7 @@ from doe import Design, DesignError, Factor, ScreenResult, plackett_burman, scre
 from experiments.calibrate.cases import failure_summary, measured, plan_cases, response_table, too_many_failed
 from experiments.calibrate.results import Decision, ScreeningResult
 from experiments.calibrate.settings import ScreeningSettings, SeedSettings
+from experiments.calibrate.values import p_text
 
 STAGE = "screening"
 
@@ -77,5 +78,5 @@ def _decision(design: Design, cases: pd.DataFrame, result: ScreenResult) -> Deci
             "critical |t| at 0.05, Bonferroni": result.critical_t(0.05, bonferroni=True),
         },
         f"{strongest} moves the angle most: {ranked['effect'].iloc[0]:+.2f} deg from low to high "
-        f"(p = {ranked['p'].iloc[0]:.4f}). {failure_summary(cases)}".strip(),
+        f"({p_text(ranked['p'].iloc[0])}). {failure_summary(cases)}".strip(),
     )

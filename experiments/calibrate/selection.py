@@ -17,6 +17,7 @@ from experiments.calibrate.results import (
     SelectionResult,
 )
 from experiments.calibrate.settings import SelectionSettings
+from experiments.calibrate.values import p_text
 
 STAGE = "selection"
 
@@ -56,7 +57,7 @@ def require_kept(settings: SelectionSettings, selection: SelectionResult) -> Non
     raise StageEnd(
         Outcome.NO_SIGNIFICANT_FACTOR,
         f"No factor has p below {settings.alpha:g}; the strongest, {selection.table.index[0]}, has an effect "
-        f"of {strongest['effect']:+.2f} deg (p = {strongest['p']:.3f}). With this noise the design sees "
+        f"of {strongest['effect']:+.2f} deg ({p_text(strongest['p'])}). With this noise the design sees "
         f"effects from about {selection.visible_effect:.2f} deg on: widen the ranges, add screening "
         "replicates or dummies, or name the factors to keep in selection.keep.",
     )

@@ -21,7 +21,14 @@ from experiments.calibrate.cases import (
 )
 from experiments.calibrate.results import ClimbResult, Decision, Outcome, SurfaceResult
 from experiments.calibrate.settings import CampaignStudy, SurfaceSettings
-from experiments.calibrate.values import UNLIMITED, fixed_values, kept_factors, listed, numbered_values
+from experiments.calibrate.values import (
+    UNLIMITED,
+    fixed_values,
+    kept_factors,
+    listed,
+    numbered_values,
+    p_text,
+)
 
 STAGE = "surface"
 
@@ -216,9 +223,9 @@ def _full_decision(full: Surface, settings: SurfaceSettings) -> Decision:
     if math.isnan(p_lack):
         fit = "Lack of fit cannot be tested."
     elif p_lack < settings.lack_of_fit_alpha:
-        fit = f"Lack of fit is significant (p = {p_lack:.3f}): a quadratic is too simple; shrink the design."
+        fit = f"Lack of fit is significant ({p_text(p_lack)}): a quadratic is too simple; shrink the design."
     else:
-        fit = f"No lack of fit is found (p = {p_lack:.3f})."
+        fit = f"No lack of fit is found ({p_text(p_lack)})."
     return Decision(
         STAGE,
         f"A full quadratic; lack of fit is tested against the replicates at {settings.lack_of_fit_alpha:g}.",
@@ -228,7 +235,7 @@ def _full_decision(full: Surface, settings: SurfaceSettings) -> Decision:
             "R2": full.r2,
             "adjusted R2": full.r2_adjusted,
         },
-        f"The model has p = {p_model:.4f}. {fit}",
+        f"The model has {p_text(p_model)}. {fit}",
     )
 
 

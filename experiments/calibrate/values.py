@@ -21,6 +21,11 @@ def fixed_values(values: Mapping[str, float] | None, kept: Iterable[str]) -> dic
     return {name: float(values[name]) for name in kept}
 
 
+def p_text(p: float) -> str:
+    """Return a p value in words: ``p = 0.042``, or ``p < 0.001``."""
+    return "p < 0.001" if p < 0.001 else f"p = {p:.3f}"
+
+
 def listed(values: Mapping[str, float]) -> str:
     """Write values as ``E = 0.48, F = 0.45``."""
     return ", ".join(f"{name} = {value:.4g}" for name, value in values.items())

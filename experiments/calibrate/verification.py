@@ -8,6 +8,7 @@ from doe import Comparison, Sample, compare_means
 from experiments.calibrate.cases import Runner, angles_of, failure_summary, plan_cases, simulate
 from experiments.calibrate.results import Decision, OptimumResult, VerificationResult
 from experiments.calibrate.settings import CampaignStudy, VerificationSettings
+from experiments.calibrate.values import p_text
 
 STAGE = "verification"
 
@@ -49,7 +50,7 @@ def _difference(comparison: Comparison, target: Sample, cases: pd.DataFrame) -> 
             "df": comparison.df,
             "p": comparison.p,
         },
-        f"{found} (p = {comparison.p:.3f}): {comparison.difference:+.2f} deg, {1.0 - comparison.alpha:.0%} "
+        f"{found} ({p_text(comparison.p)}): {comparison.difference:+.2f} deg, {1.0 - comparison.alpha:.0%} "
         f"interval {low:+.2f} to {high:+.2f} deg. {failure_summary(cases)}".strip(),
     )
 
@@ -65,6 +66,6 @@ def _equivalence(comparison: Comparison, settings: VerificationSettings) -> Deci
             "p of equivalence": comparison.equivalence_p,
             "smallest margin shown [deg]": comparison.smallest_margin,
         },
-        f"Equivalence {shown} (p = {comparison.equivalence_p:.3f}); these heaps show it from a margin of "
+        f"Equivalence {shown} ({p_text(comparison.equivalence_p)}); these heaps show it from a margin of "
         f"{comparison.smallest_margin:.2f} deg on.",
     )
