@@ -21,8 +21,10 @@ def fixed_values(values: Mapping[str, float] | None, kept: Iterable[str]) -> dic
     return {name: float(values[name]) for name in kept}
 
 
-def p_text(p: float) -> str:
-    """Return a p value in words: ``p = 0.042``, or ``p < 0.001``."""
+def p_text(p: float | None) -> str:
+    """Return a p value in words: ``p = 0.042``, or ``p < 0.001``; where there was no test, say so."""
+    if p is None:
+        return "not tested"
     return "p < 0.001" if p < 0.001 else f"p = {p:.3f}"
 
 
