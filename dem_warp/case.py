@@ -6,7 +6,9 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 
 from dem_warp.clumps import ClumpShape
+from dem_warp.laws.mechanism import Mechanism
 from dem_warp.materials import Interaction, Material, rayleigh_time
+from dem_warp.model import ContactCoefficients
 from dem_warp.scenes.scene import Scene
 from dem_warp.types import PRECISIONS
 
@@ -109,6 +111,9 @@ class Case(Generic[SceneT]):
     seed : int
         Of sizes, orientations and places of the grains.
     numerics : Numerics
+    mechanisms : tuple of Mechanism
+        Physical effects beside those of the base contact law. One at its null changes no result, but may
+        change the last bits: its code is compiled in.
     """
 
     scene: SceneT
@@ -117,6 +122,7 @@ class Case(Generic[SceneT]):
     grain_wall: Interaction
     seed: int = 0
     numerics: Numerics = field(default_factory=Numerics)
+    mechanisms: tuple[Mechanism, ...] = ()
 
     def __post_init__(self) -> None:
         _require(0 <= self.seed < 2**63, "Case.seed", "must be an integer from 0 to 2^63 - 1", self.seed)
@@ -136,6 +142,18 @@ class Case(Generic[SceneT]):
             self.grains.smallest_sphere, self.grain_material
         )
 
+    def contacts(self, wall_material: Material) -> tuple[ContactCoefficients, ContactCoefficients]:
+        """Contacts of grains with grains, and with walls of a material."""
+        grain, clamp = self.grain_material, self.numerics.clamp_attraction
+        pairs = (("grains", grain, self.grain_grain), ("walls", wall_material, self.grain_wall))
+        first, second = (
+            ContactCoefficients.of_pair(
+                grain, partner, interaction, clamp, tuple(m for m in self.mechanisms if m.acts_between(kind))
+            )
+            for kind, partner, interaction in pairs
+        )
+        return first, second
+
     def to_dict(self) -> dict[str, Any]:
         """Everything that determines the result, as plain JSON values; the device and the skin do not."""
         content = _plain(self)
@@ -144,6 +162,10 @@ class Case(Generic[SceneT]):
 
 
 def _plain(value: Any) -> Any:
+    if isinstance(value, tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, Mechanism):
+        return {"name": value.name, "between": value.between} | value.parameters
     if hasattr(value, "to_dict") and not isinstance(value, Case):
         return value.to_dict()
     if is_dataclass(value) and not isinstance(value, type):

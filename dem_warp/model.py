@@ -1,11 +1,14 @@
 """What one world is made of, described on the host, and the stacking of many worlds into arrays."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
 from dem_warp.clumps import ClumpShape
+from dem_warp.laws.contact_law import Mechanisms
+from dem_warp.laws.library import MECHANISMS
+from dem_warp.laws.mechanism import Mechanism
 from dem_warp.materials import Interaction, Material, damping_coefficient, effective_moduli
 from dem_warp.types import MAX_PARTNERS, MAX_SPHERES_PER_GRAIN
 from dem_warp.walls import Wall
@@ -27,6 +30,8 @@ class ContactCoefficients:
     static_friction, rolling_friction : float
     clamp_attraction : bool
         Whether the damping is kept from attracting at the end of an impact.
+    mechanisms : tuple of Mechanism
+        What the contact has beside the base law.
     """
 
     modulus: float
@@ -35,10 +40,21 @@ class ContactCoefficients:
     static_friction: float
     rolling_friction: float
     clamp_attraction: bool = False
+    mechanisms: tuple[Mechanism, ...] = ()
+
+    def __post_init__(self) -> None:
+        names = [mechanism.name for mechanism in self.mechanisms]
+        if len(set(names)) < len(names):
+            raise ValueError(f"ContactCoefficients.mechanisms: must be different, got {names}")
 
     @classmethod
     def of_pair(
-        cls, a: Material, b: Material, interaction: Interaction, clamp_attraction: bool = False
+        cls,
+        a: Material,
+        b: Material,
+        interaction: Interaction,
+        clamp_attraction: bool = False,
+        mechanisms: tuple[Mechanism, ...] = (),
     ) -> "ContactCoefficients":
         """Coefficients of two materials in contact."""
         modulus, shear_modulus = effective_moduli(a, b)
@@ -49,7 +65,17 @@ class ContactCoefficients:
             interaction.static_friction,
             interaction.rolling_friction,
             clamp_attraction,
+            mechanisms,
         )
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Fields of `ContactParams`; a mechanism that is not there is at its null."""
+        base = {f.name: float(getattr(self, f.name)) for f in fields(self) if f.name != "mechanisms"}
+        absent = (kind() for kind in MECHANISMS.values())
+        null = {name: value for mechanism in absent for name, value in mechanism.parameters.items()}
+        own = {name: value for m in self.mechanisms for name, value in m.parameters.items()}
+        return base | null | own
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,6 +189,21 @@ class WorldSetup:
         """Largest sphere radius of the world [m]."""
         largest = np.array([shape.radii.max() for shape in self.shapes])
         return float((largest[self.grains.shapes] * self.grains.sizes).max())
+
+    @property
+    def mechanisms(self) -> Mechanisms:
+        """Kinds of mechanism that some contact of the world has, in the order of the library."""
+        present = {type(mechanism) for contact in self.contacts for mechanism in contact.mechanisms}
+        return tuple(kind for kind in MECHANISMS.values() if kind in present)
+
+    @property
+    def reach(self) -> float:
+        """Largest distance of two surfaces that act on each other [m]."""
+        radius = self.largest_sphere
+        return max(
+            (m.reach(radius, contact.modulus) for contact in self.contacts for m in contact.mechanisms),
+            default=0.0,
+        )
 
     @property
     def masses(self) -> np.ndarray:

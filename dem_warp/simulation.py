@@ -4,6 +4,7 @@ import os
 import time
 from collections import Counter
 from collections.abc import Sequence
+from typing import Any
 
 from dem_warp.batch import Batch
 from dem_warp.case import Case
@@ -92,8 +93,9 @@ def batches(cases: Sequence[Case], one_each: bool) -> list[list[int]]:
     """
     if one_each:
         return [[i] for i in range(len(cases))]
-    groups: dict[tuple[type, str, int], list[int]] = {}
+    groups: dict[Any, list[int]] = {}
     for i, case in enumerate(cases):
-        build = (type(case.scene), case.numerics.precision, case.grains.shape.sphere_count)
+        mechanisms = frozenset(mechanism.name for mechanism in case.mechanisms)
+        build = (type(case.scene), case.numerics.precision, case.grains.shape.sphere_count, mechanisms)
         groups.setdefault(build, []).append(i)
     return list(groups.values())

@@ -12,6 +12,7 @@ from dem_warp.kernels.lanes import BLOCK, WARP
 from dem_warp.kernels.neighbours import neighbour_kernels
 from dem_warp.kernels.step import step_kernels
 from dem_warp.kernels.summation import MIN_LANES
+from dem_warp.laws.contact_law import memory_size
 from dem_warp.model import WorldSetup
 from dem_warp.state import (
     Layout,
@@ -73,7 +74,7 @@ class Solver:
     Parameters
     ----------
     worlds : sequence of WorldSetup
-        With the same number of walls and contacts.
+        With the same walls, contacts and mechanisms in number and kind.
     device : str or warp Device
     precision : "mixed" or "double"
     capacity : int, optional
@@ -91,10 +92,13 @@ class Solver:
         self.device = wp.get_device(device)
         self.precision = PRECISIONS[precision]
         self.layout = Layout.of(worlds)
-        build = Build(self.precision, self.layout.sphere_count, self.layout.wall_count, self.device.is_cuda)
-        self._step_kernels = step_kernels(build)
-        self._cell_kernels = cell_kernels(build)
-        self._list_kernels = neighbour_kernels(build)
+        layout = self.layout
+        self.build = Build(
+            self.precision, layout.sphere_count, layout.wall_count, self.device.is_cuda, layout.mechanisms
+        )
+        self._step_kernels = step_kernels(self.build)
+        self._cell_kernels = cell_kernels(self.build.without_mechanisms)
+        self._list_kernels = neighbour_kernels(self.build)
         found, row = _neighbour_capacities(worlds)
         with wp.ScopedDevice(self.device):
             self._build_state(capacity or row, found)
@@ -108,7 +112,7 @@ class Solver:
         self.model = build_model(self.worlds, layout, self.precision, device)
         first = build_grains(self.worlds, layout, self.precision, device)
         self.grains = (first, copy_grains(first, self.precision))
-        self.hood = build_neighbours(layout, capacity, self.precision, device)
+        self.hood = build_neighbours(layout, capacity, memory_size(layout.mechanisms), self.precision, device)
         self.alive = _padded_ones(self.worlds, layout, device)
         self.flags, self.stale, self.idle, self.rebuilds, self.running = (
             wp.zeros(layout.world_count, dtype=int) for _ in range(5)
@@ -296,7 +300,7 @@ def _neighbour_capacities(worlds: Sequence[WorldSetup]) -> tuple[int, int]:
     found, row = 16, 32
     for world in worlds:
         for shape in world.shapes:
-            reach = 2 * shape.radii.mean() + world.skin
+            reach = 2 * shape.radii.mean() + world.skin + world.reach
             per_volume = 0.7 * shape.sphere_count / shape.volume
             around = per_volume * (4 / 3 * np.pi * reach**3)
             found = max(found, int(1.5 * around) + 16)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from dem_warp.laws.contact_law import Mechanisms
 from dem_warp.model import WorldSetup, shape_table
 from dem_warp.types import Precision, device_structs
 
@@ -20,23 +21,28 @@ class Layout:
     sphere_count: int
     wall_count: int
     pair_count: int
+    mechanisms: Mechanisms
 
     @classmethod
     def of(cls, worlds: Sequence[WorldSetup]) -> "Layout":
         """Layout that holds all worlds; worlds with fewer grains are padded."""
-        walls = {len(world.walls) for world in worlds}
-        pairs = {len(world.contacts) for world in worlds}
-        if len(walls) > 1 or len(pairs) > 1:
-            raise ValueError(
-                "worlds of one batch must have the same number of walls and contacts, "
-                f"got {sorted(walls)} and {sorted(pairs)}"
-            )
+        alike: dict[str, set[Any]] = {
+            "number of walls": {len(world.walls) for world in worlds},
+            "number of contacts": {len(world.contacts) for world in worlds},
+            "mechanisms": {world.mechanisms for world in worlds},
+        }
+        for name, found in alike.items():
+            if len(found) > 1:
+                raise ValueError(
+                    f"worlds of one batch must have the same {name}, got {sorted(found, key=str)}"
+                )
         return cls(
             len(worlds),
             max(world.grains.count for world in worlds),
             max(shape.sphere_count for world in worlds for shape in world.shapes),
-            walls.pop(),
-            pairs.pop(),
+            len(worlds[0].walls),
+            len(worlds[0].contacts),
+            worlds[0].mechanisms,
         )
 
     @property
@@ -104,6 +110,7 @@ def build_model(worlds: Sequence[WorldSetup], layout: Layout, precision: Precisi
             "gravity": world.gravity,
             "unit": world.length_unit if precision.is_fixed_point else 1.0,
             "skin": world.skin,
+            "reach": world.reach,
             "cell_rate": _cell_rate(world, precision),
             "speed_limit": world.speed_limit,
             "origin": world.origin,
@@ -111,11 +118,7 @@ def build_model(worlds: Sequence[WorldSetup], layout: Layout, precision: Precisi
         }
         for world in worlds
     ]
-    contact_rows = [
-        {name: float(getattr(contact, name)) for name in contact.__dataclass_fields__}
-        for world in worlds
-        for contact in world.contacts
-    ]
+    contact_rows = [contact.parameters for world in worlds for contact in world.contacts]
     model = types.Model()
     model.world = struct_array(types.World, world_rows, device)
     model.contact = struct_array(types.ContactParams, contact_rows, device)
@@ -134,7 +137,7 @@ def build_model(worlds: Sequence[WorldSetup], layout: Layout, precision: Precisi
 def _cell_rate(world: WorldSetup, precision: Precision) -> float:
     """Cells per count of a sphere position; a cell holds a contact's reach, and a little for rounding."""
     unit = world.length_unit if precision.is_fixed_point else 1.0
-    return unit / (1.01 * (2 * world.largest_sphere + world.skin))
+    return unit / (1.01 * (2 * world.largest_sphere + world.skin + world.reach))
 
 
 def _ints(
@@ -180,8 +183,10 @@ def copy_grains(grains: Any, precision: Precision) -> Any:
     return other
 
 
-def build_neighbours(layout: Layout, capacity: int, precision: Precision, device: Any) -> Any:
-    """Empty `Neighbours` of a batch."""
+def build_neighbours(
+    layout: Layout, capacity: int, remembered: int, precision: Precision, device: Any
+) -> Any:
+    """Empty `Neighbours` of a batch, of which the mechanisms remember some values a contact."""
     hood = device_structs(precision).Neighbours()
     slots = 2 * layout.grain_total * capacity
     hood.capacity = capacity
@@ -190,6 +195,7 @@ def build_neighbours(layout: Layout, capacity: int, precision: Precision, device
     hood.entry = wp.zeros(slots, dtype=int, device=device)
     # all zero is a displacement of zero, remembered at step 0: no history
     hood.history = wp.zeros(slots, dtype=precision.vec4, device=device)
+    hood.memory = wp.zeros(slots * remembered, dtype=precision.real, device=device)
     hood.rebuilt = wp.zeros(layout.world_count, dtype=int, device=device)
     hood.travel = wp.zeros(layout.grain_total, dtype=precision.real, device=device)
     return hood

@@ -5,12 +5,16 @@ the float64 build used for verification.
 """
 
 import functools
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from enum import IntFlag
 from types import SimpleNamespace
 from typing import Any
 
 import warp as wp
+
+from dem_warp.laws.contact_law import Mechanisms
+from dem_warp.laws.library import PARAMETERS
 
 SPHERE_BITS = 23
 """Bits of a neighbour entry that hold the partner (a sphere or a wall); above is the own sphere's number."""
@@ -64,23 +68,41 @@ class Build:
     sphere_count: int
     wall_count: int
     cooperative: bool
+    mechanisms: Mechanisms = ()
 
     @property
     def name(self) -> str:
         """Name of the compiled module."""
         way = "warp" if self.cooperative else "serial"
-        return f"{self.precision.name}_{way}_{self.sphere_count}_{self.wall_count}"
+        sizes = (self.sphere_count, self.wall_count)
+        return "_".join(map(str, (self.precision.name, way, *sizes, *(m.name for m in self.mechanisms))))
+
+    @property
+    def without_mechanisms(self) -> "Build":
+        """What kernels are compiled for that have nothing to do with forces."""
+        return replace(self, mechanisms=())
 
 
 PRECISIONS = {precision.name: precision for precision in (MIXED, DOUBLE)}
 
 
+def _with_fields(kinds: dict[str, Any]) -> Callable[[type], type]:
+    """Class decorator that adds fields, by name and kind."""
+
+    def add(cls: type) -> type:
+        cls.__annotations__ |= kinds
+        return cls
+
+    return add
+
+
 @functools.cache
 def device_structs(precision: Precision) -> SimpleNamespace:
-    """Structs in a precision: `Cells`, `ContactParams`, `World`, `Wall`, `Model`, `Grains`, `Neighbours`."""
+    """Structs in a precision, among them `Contact`, `ContactParams`, `Model`, `Grains` and `Neighbours`."""
     real, vec3, vec4, sphere = precision.real, precision.vec3, precision.vec4, precision.sphere
 
     @wp.struct
+    @_with_fields(dict.fromkeys(PARAMETERS, real))
     class ContactParams:
         modulus: real  # effective Young's modulus E* [Pa]
         shear_modulus: real  # effective shear modulus G* [Pa]
@@ -90,11 +112,24 @@ def device_structs(precision: Precision) -> SimpleNamespace:
         clamp_attraction: real  # 1: the damping force may not attract; 0: it may
 
     @wp.struct
+    class Contact:
+        normal: vec3  # unit vector from the partner to the grain
+        overlap: real  # d [m]; negative where the surfaces stand apart
+        radius: real  # effective radius R* [m]
+        mass: real  # effective mass m* [kg]
+        velocity: vec3  # of the grain's surface relative to the partner's [m/s]
+        spin: vec3  # of the grain relative to the partner [rad/s]
+        lever: vec3  # from the grain's centre to the contact [m]
+        time_step: real  # [s]
+        is_new: bool  # nothing is remembered from the step before
+
+    @wp.struct
     class World:
         time_step: real  # [s]
         gravity: vec3  # [m/s2]
         unit: real  # length of one count of a sphere position [m]
         skin: real  # [m]
+        reach: real  # largest distance of two surfaces that act on each other [m]
         cell_rate: real  # cells per count of a sphere position
         speed_limit: real  # above it the world has diverged [m/s]
         origin: wp.vec3d  # where sphere positions count from [m]
@@ -141,6 +176,7 @@ def device_structs(precision: Precision) -> SimpleNamespace:
         count: wp.array(dtype=int)  # (2 * grains,)
         entry: wp.array(dtype=int)  # own sphere's number and partner, (2 * grains * capacity,)
         history: wp.array(dtype=vec4)  # tangential displacement [m] and the step of it, one an entry
+        memory: wp.array(dtype=real)  # what the mechanisms remember of a contact, in SI units
         rebuilt: wp.array(dtype=int)  # step of the last rebuild, (worlds,)
         travel: wp.array(dtype=real)  # path of a grain's farthest point since the rebuild [m], (grains,)
 
@@ -160,6 +196,7 @@ def device_structs(precision: Precision) -> SimpleNamespace:
 
     return SimpleNamespace(
         Cells=Cells,
+        Contact=Contact,
         ContactParams=ContactParams,
         World=World,
         Wall=Wall,

@@ -26,12 +26,12 @@ LATE_LIBRARIES = {"dem_warp": {"trimesh"}, "doe": set(), "imaging": {"pyvista"}}
 
 # Device code: a law sees numbers only, a kernel sees laws and the structures that it works on.
 LAYERS = {
-    "dem_warp.laws": {"dem_warp.laws", "typing", "warp"},
+    "dem_warp.laws": {"dem_warp.laws", "dataclasses", "functools", "math", "typing", "warp"},
     "dem_warp.kernels": {
         "dem_warp.kernels", "dem_warp.laws", "dem_warp.types", "dem_warp.walls",
         "functools", "types", "typing", "warp",
     },
-    "dem_warp.types": {"dataclasses", "enum", "functools", "types", "typing", "warp"},
+    "dem_warp.types": {"collections.abc", "dem_warp.laws", "dataclasses", "enum", "functools", "types", "typing", "warp"},
 }  # fmt: skip
 
 DISTRIBUTIONS = {"cv2": "opencv-python-headless", "warp": "warp-lang"}

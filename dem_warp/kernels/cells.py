@@ -112,7 +112,7 @@ def cell_kernels(build: Build) -> SimpleNamespace:
         g = i // spheres_each
         world = model.world[w]
         a = pack.load_sphere(cells.ordered, slot)
-        reach = pack.last(a) + world.skin
+        reach = pack.last(a) + world.skin + world.reach
         c = cell_of(a, world)
         for n in range(OWN_CELL, CELLS_AROUND):
             b = bucket_of(c[0] + n % 3 - 1, c[1] + (n // 3) % 3 - 1, c[2] + n // 9 - 1, cells.bits, w)

@@ -14,6 +14,7 @@ from types import SimpleNamespace
 import warp as wp
 
 from dem_warp.kernels.packing import packing
+from dem_warp.laws.contact_law import memory_size
 from dem_warp.types import SPHERE_BITS, Build, WorldFlag, device_structs
 
 NEIGHBOUR_OVERFLOW = wp.constant(int(WorldFlag.NEIGHBOUR_OVERFLOW))
@@ -29,6 +30,7 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
     pack = packing(precision)
     spheres_each = wp.constant(build.sphere_count)
     walls_each = wp.constant(build.wall_count)
+    memory_each = wp.constant(memory_size(build.mechanisms))
     module = wp.get_module(f"dem_warp_neighbours_{build.name}")
     wp.set_module_options({"enable_backward": False}, module)
 
@@ -134,6 +136,9 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
             history = vec4(real(0.0), real(0.0), real(0.0), real(-1.0))
             if old < old_count and hood.entry[old_first + old] == entry:
                 history = pack.load_vec4(hood.history, old_first + old)
+                for m in range(memory_each):
+                    remembered = hood.memory[(old_first + old) * memory_each + m]
+                    hood.memory[slot * memory_each + m] = remembered
             hood.entry[slot] = entry
             pack.store_vec4(hood.history, slot, history)
         if s == model.shape_sphere_count[model.shape[g]] - 1:

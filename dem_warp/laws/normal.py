@@ -15,10 +15,17 @@ def hertz_stiffness(modulus: Any, radius: Any, overlap: Any):
 
 
 @wp.func
-def damped_hertz(
-    stiffness: Any, overlap: Any, damping_rate: Any, normal_velocity: Any, clamp_attraction: Any
-):
-    """Normal force (4/3) E* sqrt(R*) d^(3/2) - c v_n [N], with c = 2 sqrt(5/6) |beta| sqrt(S_n m*).
+def hertz_force(stiffness: Any, overlap: Any):
+    """Elastic force (4/3) E* sqrt(R*) d^(3/2) [N], from the tangent stiffness at the same overlap.
+
+    Source: K. L. Johnson, Contact Mechanics (1985), section 4.2.
+    """
+    return type(overlap)(2.0) / type(overlap)(3.0) * stiffness * overlap
+
+
+@wp.func
+def damped(elastic: Any, damping_rate: Any, normal_velocity: Any, clamp_attraction: Any):
+    """Normal force F - c v_n [N] of an elastic force, with c = 2 sqrt(5/6) |beta| sqrt(S_n m*).
 
     `normal_velocity` is the separation speed. Near the end of an impact the damping exceeds the spring and
     attracts; left alone, the chosen restitution comes back. With `clamp_attraction` the force never attracts,
@@ -26,7 +33,7 @@ def damped_hertz(
 
     Source: Tsuji, Tanaka and Ishida, Powder Technology 71 (1992) 239-250; EDEM 2.7 Theory Reference Guide.
     """
-    force = type(overlap)(2.0) / type(overlap)(3.0) * stiffness * overlap - damping_rate * normal_velocity
-    if clamp_attraction > type(overlap)(0.0):
-        force = wp.max(force, type(overlap)(0.0))
+    force = elastic - damping_rate * normal_velocity
+    if clamp_attraction > type(elastic)(0.0):
+        force = wp.max(force, type(elastic)(0.0))
     return force

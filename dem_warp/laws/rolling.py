@@ -6,12 +6,12 @@ import warp as wp
 
 
 @wp.func
-def rolling_torque(rolling_friction: Any, normal_force: Any, lever: Any):
-    """Largest torque mu_r F_n R_i [N m] that a contact sets against a spin; an attracting contact sets none.
+def rolling_torque(rolling_friction: Any, support: Any, lever: Any):
+    """Largest torque mu_r F_n R_i [N m] that a contact sets against a spin, F_n being what it supports.
 
     Source: Zhou et al., Physica A 269 (1999) 536-553; model A of Ai et al., Powder Technology 206 (2011) 269.
     """
-    return rolling_friction * wp.max(normal_force, type(normal_force)(0.0)) * wp.length(lever)
+    return rolling_friction * support * wp.length(lever)
 
 
 @wp.func

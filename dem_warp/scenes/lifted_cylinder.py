@@ -8,7 +8,7 @@ import numpy as np
 
 from dem_warp.case import Case
 from dem_warp.materials import Material
-from dem_warp.model import ContactCoefficients, Grains, WorldSetup
+from dem_warp.model import Grains, WorldSetup
 from dem_warp.scenes.rain import Rain, place_rain
 from dem_warp.scenes.scene import Decision
 from dem_warp.solver import WorldView
@@ -145,15 +145,11 @@ def _world(case: LiftCase, rain: Rain) -> WorldSetup:
         release_steps=np.ceil((positions[:, 2] - release) / (scene.rain_speed * case.time_step)).astype(int),
     )
     half_width = 4.0 * scene.diameter + 2.0 * scene.height
-    clamp = case.numerics.clamp_attraction
     tube = Cylinder((0.0, 0.0, 0.0), scene.diameter / 2, scene.height)
     return WorldSetup(
         grains=grains,
         shapes=(case.grains.shape,),
-        contacts=(
-            ContactCoefficients.of_pair(grain, grain, case.grain_grain, clamp),
-            ContactCoefficients.of_pair(grain, scene.wall_material, case.grain_wall, clamp),
-        ),
+        contacts=case.contacts(scene.wall_material),
         walls=((Plane(), 1), (tube, 1)),
         time_step=case.time_step,
         skin=case.numerics.skin or default_skin(case),

@@ -143,7 +143,7 @@ def test_a_removed_grain_touches_nothing_more():
 
 def test_worlds_of_a_batch_need_the_same_number_of_walls():
     fewer = replace(heap(1), walls=heap(1).walls[:1])
-    with pytest.raises(ValueError, match="same number of walls and contacts"):
+    with pytest.raises(ValueError, match="must have the same number of walls"):
         solve(heap(1), fewer)
 
 

@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 from dem_warp.case import Case, GrainPopulation, Numerics
 from dem_warp.clumps import ClumpShape
 from dem_warp.device import resolve_device
+from dem_warp.laws.mechanism import Mechanism
 from dem_warp.materials import Interaction, Material
 from dem_warp.model import ContactCoefficients, Grains, WorldSetup
 from dem_warp.scenes.lifted_cylinder import LiftedCylinder
@@ -87,9 +88,11 @@ def pair(
     rolling: float = 0.0,
     clamp: bool = False,
     partner: Material = GRAIN,
+    mechanisms: tuple[Mechanism, ...] = (),
 ) -> ContactCoefficients:
     """Contact of the grains' material with a partner's."""
-    return ContactCoefficients.of_pair(GRAIN, partner, Interaction(restitution, friction, rolling), clamp)
+    interaction = Interaction(restitution, friction, rolling)
+    return ContactCoefficients.of_pair(GRAIN, partner, interaction, clamp, mechanisms)
 
 
 def world(

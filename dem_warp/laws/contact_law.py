@@ -1,0 +1,201 @@
+"""The contact law: Hertz-Mindlin without slip, with the mechanisms of a build put in at their places."""
+
+import functools
+from typing import Any
+
+import warp as wp
+
+from dem_warp.laws.mechanism import Mechanism
+from dem_warp.laws.normal import damped, hertz_force, hertz_stiffness
+from dem_warp.laws.rolling import rolling_torque
+from dem_warp.laws.tangential import advance_displacement, coulomb_spring, mindlin_stiffness
+
+Mechanisms = tuple[type[Mechanism], ...]
+
+
+def memory_size(mechanisms: Mechanisms) -> int:
+    """Values that a contact remembers for its mechanisms."""
+    return sum(mechanism.memory_size for mechanism in mechanisms)
+
+
+def acts_apart(mechanisms: Mechanisms) -> bool:
+    """Whether some mechanism acts on surfaces that do not touch."""
+    return any(mechanism.acts_apart for mechanism in mechanisms)
+
+
+@functools.cache
+def contact_law(mechanisms: Mechanisms) -> Any:
+    """Device function of the law with some mechanisms.
+
+    It takes `params` (ContactParams), `contact` (Contact), the tangential displacement so far [m], and an
+    array and the index in it at which the mechanisms' memory of this contact begins. It gives the force on
+    the grain [N], the new tangential displacement [m], the torque [N m] beside that of the force, and the
+    largest torque [N m] that rolling resistance may set against the grain's spin.
+
+    Both dampings use the same constant 2 sqrt(5/6) |beta|, each with its own stiffness, as in EDEM.
+
+    Raises
+    ------
+    ValueError
+        If several mechanisms stand in place of the rolling resistance.
+    """
+    rolling_laws = [mechanism.name for mechanism in mechanisms if mechanism.replaces_rolling]
+    if len(rolling_laws) > 1:
+        raise ValueError(f"mechanisms: at most one law of rolling resistance, got {rolling_laws}")
+    spring, friction = _spring(mechanisms), _friction(mechanisms)
+    attraction, torque = _attraction(mechanisms), _torque(mechanisms)
+
+    @wp.func(name=_name("law", mechanisms))
+    def law(params: Any, contact: Any, displacement: Any, memory: Any, first: int):
+        overlap = contact.overlap + type(contact.overlap)(0.0)
+        zero = type(overlap)(0.0)
+        if wp.static(acts_apart(mechanisms)):
+            overlap = wp.max(overlap, zero)
+            if overlap <= zero:
+                displacement = displacement * zero
+        stiffness = hertz_stiffness(params.modulus, contact.radius, overlap)
+        elastic = spring(params, contact, hertz_force(stiffness, overlap), memory, first)
+        normal_velocity = wp.dot(contact.velocity, contact.normal)
+        normal_force = damped(
+            elastic,
+            params.damping * wp.sqrt(stiffness * contact.mass),
+            normal_velocity,
+            params.clamp_attraction,
+        )
+        support = wp.max(normal_force, zero)
+        tangential_velocity = contact.velocity - contact.normal * normal_velocity
+        displacement = advance_displacement(
+            displacement, contact.normal, tangential_velocity, contact.time_step
+        )
+        tangential_stiffness = mindlin_stiffness(params.shear_modulus, contact.radius, overlap)
+        coefficient = friction(
+            params,
+            contact,
+            params.static_friction,
+            wp.length(displacement) * tangential_stiffness,
+            support,
+            memory,
+            first,
+        )
+        tangential_force, displacement = coulomb_spring(
+            displacement,
+            tangential_stiffness,
+            params.damping * wp.sqrt(tangential_stiffness * contact.mass),
+            tangential_velocity,
+            coefficient * support,
+        )
+        limit = zero
+        if not wp.static(bool(rolling_laws)):
+            limit = rolling_torque(params.rolling_friction, support, contact.lever)
+        force = contact.normal * (normal_force - attraction(params, contact, memory, first))
+        return (
+            force + tangential_force,
+            displacement,
+            torque(params, contact, support, memory, first),
+            limit,
+        )
+
+    return law
+
+
+def _places(mechanisms: Mechanisms, hook: str) -> list[tuple[Any, int, str]]:
+    """Each device function at a place of the law, where its memory begins, and a name up to it."""
+    found = []
+    for i, mechanism in enumerate(mechanisms):
+        function = getattr(mechanism, hook)
+        if function is not None:
+            found.append((function, memory_size(mechanisms[:i]), _name(hook, mechanisms[: i + 1])))
+    return found
+
+
+def _name(hook: str, mechanisms: Mechanisms) -> str:
+    return "_".join([hook, *(mechanism.name for mechanism in mechanisms)])
+
+
+@wp.func
+def _no_attraction(params: Any, contact: Any, memory: Any, first: int):
+    return contact.overlap * type(contact.overlap)(0.0)
+
+
+@wp.func
+def _no_torque(params: Any, contact: Any, support: Any, memory: Any, first: int):
+    return contact.normal * (support * type(support)(0.0))
+
+
+@wp.func
+def _same_elastic(params: Any, contact: Any, elastic: Any, memory: Any, first: int):
+    return elastic
+
+
+@wp.func
+def _same_coefficient(
+    params: Any, contact: Any, coefficient: Any, spring: Any, support: Any, memory: Any, first: int
+):
+    return coefficient
+
+
+def _attraction(mechanisms: Mechanisms) -> Any:
+    total = _no_attraction
+    for own, offset, name in _places(mechanisms, "attraction"):
+        total = _plus_attraction(total, own, offset, name)
+    return total
+
+
+def _plus_attraction(before: Any, own: Any, offset: int, name: str) -> Any:
+    @wp.func(name=name)
+    def attraction(params: Any, contact: Any, memory: Any, first: int):
+        at = first + wp.static(offset)
+        return before(params, contact, memory, first) + own(params, contact, memory, at)
+
+    return attraction
+
+
+def _torque(mechanisms: Mechanisms) -> Any:
+    total = _no_torque
+    for own, offset, name in _places(mechanisms, "torque"):
+        total = _plus_torque(total, own, offset, name)
+    return total
+
+
+def _plus_torque(before: Any, own: Any, offset: int, name: str) -> Any:
+    @wp.func(name=name)
+    def torque(params: Any, contact: Any, support: Any, memory: Any, first: int):
+        at = first + wp.static(offset)
+        return before(params, contact, support, memory, first) + own(params, contact, support, memory, at)
+
+    return torque
+
+
+def _spring(mechanisms: Mechanisms) -> Any:
+    chain = _same_elastic
+    for own, offset, name in _places(mechanisms, "spring"):
+        chain = _then_spring(chain, own, offset, name)
+    return chain
+
+
+def _then_spring(before: Any, own: Any, offset: int, name: str) -> Any:
+    @wp.func(name=name)
+    def spring(params: Any, contact: Any, elastic: Any, memory: Any, first: int):
+        at = first + wp.static(offset)
+        return own(params, contact, before(params, contact, elastic, memory, first), memory, at)
+
+    return spring
+
+
+def _friction(mechanisms: Mechanisms) -> Any:
+    chain = _same_coefficient
+    for own, offset, name in _places(mechanisms, "friction"):
+        chain = _then_friction(chain, own, offset, name)
+    return chain
+
+
+def _then_friction(before: Any, own: Any, offset: int, name: str) -> Any:
+    @wp.func(name=name)
+    def friction(
+        params: Any, contact: Any, coefficient: Any, spring: Any, support: Any, memory: Any, first: int
+    ):
+        at = first + wp.static(offset)
+        changed = before(params, contact, coefficient, spring, support, memory, first)
+        return own(params, contact, changed, spring, support, memory, at)
+
+    return friction

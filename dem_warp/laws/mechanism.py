@@ -1,0 +1,83 @@
+"""What a mechanism is: a physical effect that contacts have beside, or in place of, a part of the base law.
+
+A mechanism is a frozen dataclass of its parameters, each a field of `ContactParams` under the same name, and
+of device functions (`@wp.func`), each at one of the places where the law can be changed; `None` leaves one as
+it is. A mechanism of strength 0, the default, is at its null: it leaves the base law as it is.
+"""
+
+import math
+from dataclasses import dataclass, fields
+from typing import Any, ClassVar
+
+BETWEEN = ("all", "grains", "walls")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mechanism:
+    """A physical effect of contacts.
+
+    Attributes
+    ----------
+    between : "all", "grains" or "walls"
+        The contacts that have it: every one, those of grains with grains, or those of grains with walls.
+
+    Notes
+    -----
+    The device functions of a subclass take `params` (ContactParams of the pair) and `contact` (Contact)
+    first, and last `memory` and `at`: an array and the index in it of the first of the `memory_size` values
+    that the mechanism remembers of this contact from step to step; nothing as yet when `contact.is_new`.
+
+    spring(params, contact, elastic, memory, at)
+        Elastic normal force [N] in place of Hertz's, `elastic`.
+    attraction(params, contact, memory, at)
+        Force [N] that pulls the two bodies together. Friction does not feel it.
+    friction(params, contact, coefficient, spring, support, memory, at)
+        Coefficient of friction in place of `coefficient`, knowing the force of the tangential spring [N], not
+        yet limited, and the normal force [N] by which the surfaces push each other off.
+    torque(params, contact, support, memory, at)
+        Torque [N m] on the grain beside that of the contact force.
+    """
+
+    between: str = "all"
+
+    name: ClassVar[str]
+    strength: ClassVar[str]
+    """The parameter that says how strong it is: 0 is its null, whatever the others are."""
+    memory_size: ClassVar[int] = 0
+    replaces_rolling: ClassVar[bool] = False
+    """Whether `torque` stands in place of the base law's rolling resistance."""
+    acts_apart: ClassVar[bool] = False
+    """Whether it acts on surfaces that no longer touch; then `reach` says how far."""
+
+    spring: ClassVar[Any] = None
+    attraction: ClassVar[Any] = None
+    friction: ClassVar[Any] = None
+    torque: ClassVar[Any] = None
+
+    def __post_init__(self) -> None:
+        if self.between not in BETWEEN:
+            raise ValueError(f"{type(self).__name__}.between: must be one of {BETWEEN}, got {self.between!r}")
+        for name, value in self.parameters.items():
+            if not (math.isfinite(value) and value >= 0.0):
+                raise ValueError(f"{type(self).__name__}.{name}: must be finite and 0 or more, got {value!r}")
+
+    @classmethod
+    def parameter_names(cls) -> tuple[str, ...]:
+        """Names of the parameters, which are fields of `ContactParams` too."""
+        return tuple(f.name for f in fields(cls) if f.name != "between")
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Value of each parameter."""
+        return {name: float(getattr(self, name)) for name in self.parameter_names()}
+
+    def acts_between(self, kind: str) -> bool:
+        """Whether contacts of a kind, "grains" or "walls", have it."""
+        return self.between in ("all", kind)
+
+    def reach(self, largest_radius: float, modulus: float) -> float:
+        """Largest distance [m] between two surfaces at which it acts, for spheres up to a radius [m].
+
+        `modulus` is the pair's effective Young's modulus E* [Pa].
+        """
+        return 0.0
