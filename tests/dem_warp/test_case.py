@@ -70,6 +70,7 @@ OTHER = {
     "clamp_attraction": True,
     "seed": 2,
     "modulus_scale": 200.0,
+    "mechanisms": (LinearCohesion(cohesion_energy_density=1e4),),
 }
 """Another valid value, where it is not 0.9 of the present one."""
 
