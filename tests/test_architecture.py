@@ -31,7 +31,9 @@ LAYERS = {
         "dem_warp.kernels", "dem_warp.laws", "dem_warp.types", "dem_warp.walls",
         "functools", "types", "typing", "warp",
     },
-    "dem_warp.types": {"collections.abc", "dem_warp.laws", "dataclasses", "enum", "functools", "types", "typing", "warp"},
+    "dem_warp.types": {
+        "collections.abc", "dem_warp.laws", "dataclasses", "enum", "functools", "types", "typing", "warp",
+    },
 }  # fmt: skip
 
 DISTRIBUTIONS = {"cv2": "opencv-python-headless", "warp": "warp-lang"}
