@@ -8,6 +8,7 @@ import pytest
 from worlds import BOOT, GRAIN, PYRAMID, SMALL_TUBE, STEEL, small_case
 
 from dem_warp import Case, GrainPopulation, Interaction, LiftedCylinder, Material, Numerics, rayleigh_time
+from dem_warp.laws.linear_cohesion import LinearCohesion
 
 
 @pytest.mark.parametrize(
