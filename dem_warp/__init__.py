@@ -1,8 +1,9 @@
 """Discrete element simulation of clumped grains on NVIDIA Warp: many worlds at once, on a GPU or a CPU."""
 
-from dem_warp.case import Case, GrainPopulation, Numerics
+from dem_warp.case import Case, Numerics
 from dem_warp.clumps import ClumpShape
 from dem_warp.materials import Interaction, Material, effective_moduli, rayleigh_time
+from dem_warp.population import GrainPopulation, ShapeMixture
 from dem_warp.result import CaseResult, Progress
 from dem_warp.scenes.lifted_cylinder import LiftedCylinder
 from dem_warp.simulation import simulate
@@ -17,6 +18,7 @@ __all__ = [
     "Material",
     "Numerics",
     "Progress",
+    "ShapeMixture",
     "effective_moduli",
     "rayleigh_time",
     "simulate",

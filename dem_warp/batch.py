@@ -7,6 +7,7 @@ import numpy as np
 import warp as wp
 
 from dem_warp.case import Case
+from dem_warp.clumps import stack_spheres
 from dem_warp.result import CaseResult
 from dem_warp.scenes.scene import Decision
 from dem_warp.solver import CHUNK, Solver
@@ -26,7 +27,7 @@ ADVICE = {
 
 
 class Batch:
-    """Cases of one kind of scene, precision and number of spheres a grain, as worlds of one launch."""
+    """Cases of one kind of scene, precision and largest number of spheres, as worlds of one launch."""
 
     def __init__(self, cases: Sequence[Case], device: str) -> None:
         self.cases = list(cases)
@@ -76,7 +77,7 @@ class Batch:
             self.solver.move_wall(w, *decision.move)
 
     def _result(self, w: int, status: str, reason: str) -> CaseResult:
-        poses, controller, shape = self.solver.poses(w), self.controllers[w], self.cases[w].grains.shape
+        poses, controller, setup = self.solver.poses(w), self.controllers[w], self.setups[w]
         late = WorldFlag.LATE_REBUILD in WorldFlag(int(self.solver.flags.numpy()[w]))
         counts = {"rebuilds": float(self.solver.rebuilds.numpy()[w]), "late_rebuilds": float(late)}
         return CaseResult(
@@ -84,8 +85,9 @@ class Batch:
             reason=reason,
             positions=poses["positions"],
             orientations=poses["orientations"],
-            sizes=self.setups[w].grains.sizes[poses["slots"]],
-            clump=np.column_stack([shape.centers, shape.radii]),
+            sizes=setup.grains.sizes[poses["slots"]],
+            shapes=setup.grains.shapes[poses["slots"]],
+            clumps=stack_spheres(setup.shapes),
             observables=controller.observables | counts,
             phases=controller.phases,
             provenance=self._provenance(),

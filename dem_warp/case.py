@@ -3,58 +3,14 @@
 from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any, Generic, TypeVar
 
-import numpy as np
-
-from dem_warp.clumps import ClumpShape
 from dem_warp.laws.mechanism import Mechanism
 from dem_warp.materials import Interaction, Material, rayleigh_time
 from dem_warp.model import ContactCoefficients
+from dem_warp.population import GrainPopulation
 from dem_warp.scenes.scene import Scene
 from dem_warp.types import PRECISIONS
 
 SceneT = TypeVar("SceneT", bound=Scene)
-
-SIZE_LIMIT = 3.0
-"""Sizes are drawn within this many standard deviations of their mean."""
-
-
-@dataclass(frozen=True)
-class GrainPopulation:
-    """Grains of one shape and material whose sizes vary.
-
-    Attributes
-    ----------
-    shape : ClumpShape
-    material : Material
-    size_mean, size_sd : float
-        Of the normal distribution of the factor that scales the shape, truncated at +-3 standard deviations.
-    """
-
-    shape: ClumpShape
-    material: Material
-    size_mean: float = 1.0
-    size_sd: float = 0.05
-
-    def __post_init__(self) -> None:
-        _require(self.size_mean > 0, "GrainPopulation.size_mean", "must be positive", self.size_mean)
-        _require(
-            0 <= SIZE_LIMIT * self.size_sd < self.size_mean,
-            "GrainPopulation.size_sd",
-            f"must be at least 0 and below size_mean / {SIZE_LIMIT:g}",
-            self.size_sd,
-        )
-
-    @property
-    def smallest_sphere(self) -> float:
-        """Smallest sphere radius that the population may hold [m]."""
-        return float(self.shape.radii.min()) * (self.size_mean - SIZE_LIMIT * self.size_sd)
-
-    def draw_sizes(self, count: int, rng: np.random.Generator) -> np.ndarray:
-        """Sizes of `count` grains, (count,)."""
-        sizes = rng.normal(size=count)
-        while (wide := np.abs(sizes) > SIZE_LIMIT).any():
-            sizes[wide] = rng.normal(size=int(wide.sum()))
-        return self.size_mean + self.size_sd * sizes
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,6 @@
 """Grain shapes: rigid sets of spheres with the mass properties of their union."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import permutations
 from pathlib import Path
@@ -154,6 +155,21 @@ class ClumpShape:
         for (x, y, z), r in zip(self.centers / _MILLIMETER, self.radii / _MILLIMETER, strict=True):
             lines.append(f"{x:.9f} {y:.9f} {z:.9f} {r:.9f}")
         Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def stack_spheres(shapes: Sequence[ClumpShape]) -> Array:
+    """Spheres of several shapes in one array.
+
+    Returns
+    -------
+    Array
+        Local centre and radius of each sphere [m], shape (shapes, S, 4), S the largest number of spheres of
+        a shape; the others are filled up with zeros.
+    """
+    spheres = np.zeros((len(shapes), max(shape.sphere_count for shape in shapes), 4))
+    for row, shape in zip(spheres, shapes, strict=True):
+        row[: shape.sphere_count] = np.column_stack([shape.centers, shape.radii])
+    return spheres
 
 
 def _checked_spheres(centers: ArrayLike, radii: ArrayLike) -> tuple[Array, Array]:

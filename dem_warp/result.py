@@ -44,8 +44,11 @@ class CaseResult:
     positions, orientations : (n, 3) and (n, 4) arrays
         Poses of the grains left [m], quaternions x y z w.
     sizes : (n,) array
-    clump : (S, 4) array
-        Local centre and radius of each sphere of the shape [m].
+    shapes : (n,) int array
+        Index of each grain's shape into `clumps`.
+    clumps : (shapes, S, 4) array
+        Local centre and radius of each sphere of each shape [m]; a shape of fewer than S spheres is filled up
+        with radii of 0, which are no spheres.
     observables : dict of float
         In SI units; see the scene. `late_rebuilds` is 1 when a grain may have outrun its neighbour list.
     phases : list of dict
@@ -59,28 +62,35 @@ class CaseResult:
     positions: np.ndarray
     orientations: np.ndarray
     sizes: np.ndarray
-    clump: np.ndarray
+    shapes: np.ndarray
+    clumps: np.ndarray
     observables: dict[str, float] = field(default_factory=dict)
     phases: list[dict[str, Any]] = field(default_factory=list)
     provenance: dict[str, Any] = field(default_factory=dict)
 
     @cached_property
     def sphere_centers(self) -> np.ndarray:
-        """Sphere centres in place [m], (n * S, 3)."""
+        """Sphere centres in place [m], (spheres, 3), grain by grain."""
         vector, scalar = self.orientations[:, None, :3], self.orientations[:, None, 3:]
-        local = self.clump[None, :, :3] * self.sizes[:, None, None]
+        local = self.clumps[self.shapes, :, :3] * self.sizes[:, None, None]
         turned = 2.0 * np.cross(vector, local)
-        return (self.positions[:, None] + local + scalar * turned + np.cross(vector, turned)).reshape(-1, 3)
+        placed = self.positions[:, None] + local + scalar * turned + np.cross(vector, turned)
+        return placed[self._exist]
 
     @property
     def sphere_radii(self) -> np.ndarray:
-        """Sphere radii [m], (n * S,)."""
-        return (self.clump[None, :, 3] * self.sizes[:, None]).ravel()
+        """Sphere radii [m], (spheres,)."""
+        return (self.clumps[self.shapes, :, 3] * self.sizes[:, None])[self._exist]
 
     @property
     def sphere_grain(self) -> np.ndarray:
-        """Grain of each sphere, (n * S,)."""
-        return np.repeat(np.arange(len(self.sizes)), len(self.clump))
+        """Grain of each sphere, (spheres,)."""
+        return np.nonzero(self._exist)[0]
+
+    @property
+    def _exist(self) -> np.ndarray:
+        """Whether a grain has the sphere of a number, (n, S)."""
+        return self.clumps[self.shapes, :, 3] > 0.0
 
 
 OnResult = Callable[[int, CaseResult], None]

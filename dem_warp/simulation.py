@@ -96,6 +96,6 @@ def batches(cases: Sequence[Case], one_each: bool) -> list[list[int]]:
     groups: dict[Any, list[int]] = {}
     for i, case in enumerate(cases):
         mechanisms = frozenset(mechanism.name for mechanism in case.mechanisms)
-        build = (type(case.scene), case.numerics.precision, case.grains.shape.sphere_count, mechanisms)
+        build = (type(case.scene), case.numerics.precision, case.grains.sphere_count, mechanisms)
         groups.setdefault(build, []).append(i)
     return list(groups.values())

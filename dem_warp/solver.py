@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -299,9 +300,9 @@ def _neighbour_capacities(worlds: Sequence[WorldSetup]) -> tuple[int, int]:
     """Partners of a sphere and entries of a grain that no packing of the worlds' grains should pass."""
     found, row = 16, 32
     for world in worlds:
-        for shape in world.shapes:
-            reach = 2 * shape.radii.mean() + world.skin + world.reach
-            per_volume = 0.7 * shape.sphere_count / shape.volume
+        for shape, others in product(world.shapes, repeat=2):
+            reach = shape.radii.mean() + others.radii.mean() + world.skin + world.reach
+            per_volume = 0.7 * others.sphere_count / others.volume
             around = per_volume * (4 / 3 * np.pi * reach**3)
             found = max(found, int(1.5 * around) + 16)
             row = max(row, int(shape.sphere_count * around * 0.7) + 32)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from dem_warp.clumps import stack_spheres
 from dem_warp.laws.contact_law import Mechanisms
 from dem_warp.model import WorldSetup, shape_table
 from dem_warp.types import Precision, device_structs
@@ -99,9 +100,7 @@ def build_model(worlds: Sequence[WorldSetup], layout: Layout, precision: Precisi
     types = device_structs(precision)
     shapes = shape_table(worlds)
     real = np.float32 if precision.real is wp.float32 else np.float64
-    spheres = np.zeros((len(shapes), layout.sphere_count, 4))
-    for i, shape in enumerate(shapes):
-        spheres[i, : shape.sphere_count] = np.column_stack([shape.centers, shape.radii])
+    spheres = stack_spheres(shapes)
     shape_index = [np.array([shapes.index(s) for s in world.shapes])[world.grains.shapes] for world in worlds]
     inertia = [np.column_stack([world.inertias, world.bounding_radii]) for world in worlds]
     world_rows = [

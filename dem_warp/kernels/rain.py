@@ -15,13 +15,15 @@ MAX_DELAYS = 4000
 @wp.kernel(enable_backward=False)
 def place_grains(
     # model
-    grain_count: int,
+    first: wp.array(dtype=int),
     sphere_count: int,
-    shape: wp.array(dtype=wp.vec4),
-    reach: float,
+    shape_spheres: wp.array(dtype=wp.vec4),
+    shape_sphere_count: wp.array(dtype=int),
+    reach: wp.array(dtype=float),
     radius: wp.array(dtype=float),
     spacing: wp.array(dtype=float),
     seed: wp.array(dtype=int),
+    shape: wp.array(dtype=int),
     orientation: wp.array(dtype=wp.quat),
     size: wp.array(dtype=float),
     # state out
@@ -29,12 +31,13 @@ def place_grains(
     spheres: wp.array(dtype=wp.vec4),
     delays: wp.array(dtype=int),
 ):
-    """One thread a world: places its grains in order of arrival."""
+    """One thread a world: places its grains, which begin at `first`, in order of arrival."""
     w = wp.tid()
     state = wp.rand_init(seed[w])
     late = int(0)
-    for n in range(grain_count):
-        g = w * grain_count + n
+    for g in range(first[w], first[w + 1]):
+        n = g - first[w]
+        shape_g = shape[g]
         placed = bool(False)
         while not placed and late < MAX_DELAYS:
             z = spacing[w] * float(n + late)
@@ -44,26 +47,25 @@ def place_grains(
                     across = radius[w] * wp.sqrt(wp.randf(state))
                     center = wp.vec3(across * wp.cos(angle), across * wp.sin(angle), z)
                     free = bool(True)
-                    for s in range(sphere_count):
-                        local = shape[s] * size[g]
+                    for s in range(shape_sphere_count[shape_g]):
+                        local = shape_spheres[shape_g * sphere_count + s] * size[g]
                         offset = wp.quat_rotate(orientation[g], wp.vec3(local[0], local[1], local[2]))
                         p = center + offset
                         spheres[g * sphere_count + s] = wp.vec4(p[0], p[1], p[2], local[3])
                         if wp.sqrt(p[0] * p[0] + p[1] * p[1]) + CLEARANCE * local[3] > radius[w]:
                             free = False
-                    other = n - 1
-                    while free and other >= 0 and z - position[w * grain_count + other][2] < 2.0 * reach:
-                        h = w * grain_count + other
+                    h = g - 1
+                    while free and h >= first[w] and z - position[h][2] < 2.0 * reach[w]:
                         apart = wp.length(center - position[h])
-                        if apart < CLEARANCE * reach * 2.0:
-                            for a in range(sphere_count):
-                                for b in range(sphere_count):
+                        if apart < CLEARANCE * reach[w] * 2.0:
+                            for a in range(shape_sphere_count[shape_g]):
+                                for b in range(shape_sphere_count[shape[h]]):
                                     sa = spheres[g * sphere_count + a]
                                     sb = spheres[h * sphere_count + b]
                                     d = wp.vec3(sa[0] - sb[0], sa[1] - sb[1], sa[2] - sb[2])
                                     if wp.length(d) < CLEARANCE * (sa[3] + sb[3]):
                                         free = False
-                        other -= 1
+                        h -= 1
                     if free:
                         position[g] = center
                         placed = True

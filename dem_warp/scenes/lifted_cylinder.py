@@ -95,29 +95,20 @@ class LiftedCylinder:
 
     def supply(self, case: "LiftCase") -> int:
         """Grains kept ready."""
-        return self.grain_count or int(np.ceil(DENSEST_FILL * self.volume / case.grains.shape.volume))
+        mean_volume = case.grains.mean(lambda shape: shape.volume)
+        return self.grain_count or int(np.ceil(DENSEST_FILL * self.volume / mean_volume))
 
     def prepare(self, cases: "Sequence[LiftCase]", device: Any) -> list[WorldSetup]:
-        """Worlds of cases that share this kind of scene; tubes, shapes and counts may differ."""
-        setups: list[WorldSetup | None] = [None] * len(cases)
-        groups: dict[Any, list[int]] = {}
-        for i, case in enumerate(cases):
-            groups.setdefault((case.grains.shape, case.scene.supply(case)), []).append(i)
-        for (shape, count), members in groups.items():
-            group = [cases[i] for i in members]
-            sizes = [c.grains.draw_sizes(count, np.random.default_rng([c.seed, 0])) for c in group]
-            scenes = [c.scene for c in group]
-            rains = place_rain(
-                shape,
-                sizes,
-                [c.seed for c in group],
-                [s.diameter / 2 for s in scenes],
-                [s.rain_speed / s.rain_rate for s in scenes],
-                device,
-            )
-            for i, rain in zip(members, rains, strict=True):
-                setups[i] = _world(cases[i], rain)
-        return [setup for setup in setups if setup is not None]
+        """Worlds of cases that share this kind of scene; tubes, grains and counts may differ."""
+        scenes = [case.scene for case in cases]
+        rains = place_rain(
+            [case.grains.draw(case.scene.supply(case), case.seed) for case in cases],
+            [case.seed for case in cases],
+            [scene.diameter / 2 for scene in scenes],
+            [scene.rain_speed / scene.rain_rate for scene in scenes],
+            device,
+        )
+        return [_world(case, rain) for case, rain in zip(cases, rains, strict=True)]
 
     def controller(self, case: "LiftCase", setup: WorldSetup, chunk: int) -> "LiftController":
         """Controller of one case."""
@@ -129,8 +120,8 @@ LiftCase = Case[LiftedCylinder]
 
 def _world(case: LiftCase, rain: Rain) -> WorldSetup:
     scene, grain = case.scene, case.grain_material
-    count = len(rain.sizes)
-    reach = case.grains.shape.bounding_radius * rain.sizes.max()
+    count = rain.grains.count
+    reach = rain.grains.bounding_radii.max()
     release = scene.height + reach
     positions = rain.positions + np.array([0.0, 0.0, release + reach])
     velocities = np.tile([0.0, 0.0, -scene.rain_speed], (count, 1))
@@ -139,16 +130,16 @@ def _world(case: LiftCase, rain: Rain) -> WorldSetup:
         orientations=rain.orientations,
         velocities=velocities,
         spins=np.zeros((count, 3)),
-        sizes=rain.sizes,
+        sizes=rain.grains.sizes,
         densities=np.full(count, grain.density),
-        shapes=np.zeros(count, dtype=int),
+        shapes=rain.grains.shapes,
         release_steps=np.ceil((positions[:, 2] - release) / (scene.rain_speed * case.time_step)).astype(int),
     )
     half_width = 4.0 * scene.diameter + 2.0 * scene.height
     tube = Cylinder((0.0, 0.0, 0.0), scene.diameter / 2, scene.height)
     return WorldSetup(
         grains=grains,
-        shapes=(case.grains.shape,),
+        shapes=rain.grains.clumps,
         contacts=case.contacts(scene.wall_material),
         walls=((Plane(), 1), (tube, 1)),
         time_step=case.time_step,
@@ -164,7 +155,7 @@ def _world(case: LiftCase, rain: Rain) -> WorldSetup:
 
 def default_skin(case: LiftCase) -> float:
     """Skin that keeps both the lists short and the rebuilds rare [m]; longer steps want a larger one."""
-    radius = float(case.grains.shape.radii.mean()) * case.grains.size_mean
+    radius = case.grains.mean(lambda shape: float(shape.radii.mean())) * case.grains.size_mean
     path = case.scene.fall_speed * case.time_step
     return float(np.clip(24.0 * path, 0.5 * radius, radius))
 
@@ -260,7 +251,8 @@ class LiftController:
                 kept[: self.setup.grains.count]
             ].sum()
         )
-        level = bed_level(positions, self.scene.diameter / 2, self.case.grains.shape.bounding_radius)
+        reach = self.case.grains.mean(lambda shape: shape.bounding_radius)
+        level = bed_level(positions, self.scene.diameter / 2, reach)
         self.observables["grain_count"] = float(np.count_nonzero(kept))
         self.observables["fill_height"] = level
         self.observables["solid_fraction"] = volume / (np.pi / 4 * self.scene.diameter**2 * level)

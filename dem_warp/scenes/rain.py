@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from dem_warp.clumps import ClumpShape
+from dem_warp.clumps import stack_spheres
 from dem_warp.kernels.rain import MAX_DELAYS, place_grains
+from dem_warp.population import DrawnGrains
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,33 +24,32 @@ class Rain:
 
     Attributes
     ----------
+    grains : DrawnGrains
+        In order of arrival.
     positions : (n, 3) array
         [m], the lowest grain near z = 0.
     orientations : (n, 4) array
         Quaternions x y z w.
-    sizes : (n,) array
     """
 
+    grains: DrawnGrains
     positions: np.ndarray
     orientations: np.ndarray
-    sizes: np.ndarray
 
 
 def place_rain(
-    shape: ClumpShape,
-    sizes: Sequence[np.ndarray],
+    grains: Sequence[DrawnGrains],
     seeds: Sequence[int],
     radii: Sequence[float],
     spacings: Sequence[float],
     device: Any,
 ) -> list[Rain]:
-    """Rains of several worlds, which share a shape and a number of grains.
+    """Rains of several worlds, none depending on another.
 
     Parameters
     ----------
-    shape : ClumpShape
-    sizes : sequence of (n,) arrays
-        Sizes of the grains in order of arrival.
+    grains : sequence of DrawnGrains
+        Of each world, in order of arrival.
     seeds : sequence of int
     radii : sequence of float
         Inner radius of each tube [m].
@@ -61,36 +61,42 @@ def place_rain(
     ValueError
         If a tube is too narrow, or its rain too dense, for the grains.
     """
-    worlds, count = len(sizes), len(sizes[0])
-    orientations = [_random_orientations(count, seed) for seed in seeds]
-    local = np.column_stack([shape.centers, shape.radii]).astype(np.float32)
+    orientations = [
+        _random_orientations(drawn.count, seed) for drawn, seed in zip(grains, seeds, strict=True)
+    ]
+    reaches = [float(drawn.bounding_radii.max()) for drawn in grains]
+    first = np.cumsum([0, *(drawn.count for drawn in grains)])
+    table = list(dict.fromkeys(clump for drawn in grains for clump in drawn.clumps))
+    shapes = [np.array([table.index(clump) for clump in drawn.clumps])[drawn.shapes] for drawn in grains]
+    spheres = stack_spheres(table)
     with wp.ScopedDevice(device):
-        position = wp.zeros(worlds * count, dtype=wp.vec3)
-        delays = wp.zeros(worlds, dtype=int)
+        position = wp.zeros(int(first[-1]), dtype=wp.vec3)
+        delays = wp.zeros(len(grains), dtype=int)
         inputs = [
-            count,
-            shape.sphere_count,
-            wp.array(local, dtype=wp.vec4),
-            float(shape.bounding_radius * max(row.max() for row in sizes)),
-            wp.array(np.asarray(radii, dtype=np.float32), dtype=float),
-            wp.array(np.asarray(spacings, dtype=np.float32), dtype=float),
-            wp.array(np.asarray([seed & 0x7FFFFFFF for seed in seeds], dtype=np.int32), dtype=int),
-            wp.array(np.concatenate(orientations).astype(np.float32), dtype=wp.quat),
-            wp.array(np.concatenate(sizes).astype(np.float32), dtype=float),
+            wp.array(first, dtype=int),
+            spheres.shape[1],
+            wp.array(spheres.reshape(-1, 4), dtype=wp.vec4),
+            wp.array([clump.sphere_count for clump in table], dtype=int),
+            wp.array(reaches, dtype=float),
+            wp.array(list(radii), dtype=float),
+            wp.array(list(spacings), dtype=float),
+            wp.array([seed & 0x7FFFFFFF for seed in seeds], dtype=int),
+            wp.array(np.concatenate(shapes), dtype=int),
+            wp.array(np.concatenate(orientations), dtype=wp.quat),
+            wp.array(np.concatenate([drawn.sizes for drawn in grains]), dtype=float),
             position,
-            wp.zeros(worlds * count * shape.sphere_count, dtype=wp.vec4),
+            wp.zeros(int(first[-1]) * spheres.shape[1], dtype=wp.vec4),
             delays,
         ]
-        wp.launch(place_grains, worlds, inputs=inputs, block_dim=32)
-        placed = position.numpy().astype(float).reshape(worlds, count, 3)
-        late = delays.numpy()
-    crowded = np.flatnonzero(late >= MAX_DELAYS)
+        wp.launch(place_grains, len(grains), inputs=inputs, block_dim=32)
+        placed = np.split(position.numpy().astype(float), first[1:-1])
+        crowded = np.flatnonzero(delays.numpy() >= MAX_DELAYS)
     if crowded.size:
         raise ValueError(
-            f"the rain finds no free place: grains of {2e3 * shape.bounding_radius:.2f} mm in a tube of "
-            f"{2e3 * radii[int(crowded[0])]:.2f} mm; lower rain_rate, raise rain_speed or widen the tube"
+            f"the rain finds no free place: grains of {2e3 * reaches[crowded[0]]:.2f} mm in a tube of "
+            f"{2e3 * radii[crowded[0]]:.2f} mm; lower rain_rate, raise rain_speed or widen the tube"
         )
-    return [Rain(placed[w], orientations[w], np.asarray(sizes[w])) for w in range(worlds)]
+    return [Rain(*world) for world in zip(grains, placed, orientations, strict=True)]
 
 
 def _random_orientations(count: int, seed: int) -> np.ndarray:

@@ -75,10 +75,9 @@ def require_unused(folder: Path, advice: str = "") -> None:
 
 
 def describe(study: Study) -> dict[str, Any]:
-    """Everything that a study says, its clump included, as JSON-able data."""
-    clump = study.grain.clump
-    digest = hashlib.sha256(clump.read_bytes()).hexdigest() if clump else None
-    return {"study": study.document, "scale": study.scale, "clump_sha256": digest}
+    """Everything that a study says, its clumps included, as JSON-able data."""
+    digests = [hashlib.sha256(clump.read_bytes()).hexdigest() for clump in study.grain.clump_files]
+    return {"study": study.document, "scale": study.scale, "clump_sha256": digests}
 
 
 def differences(old: object, new: object, path: KeyPath = ()) -> Iterator[str]:

@@ -130,13 +130,14 @@ def write_heap(heap: Heap, folder: Path) -> None:
 
 
 def write_spheres(path: Path, result: CaseResult) -> None:
-    """Write a heap's spheres as points [m] with their ``radius`` [m] and ``grain``, for ParaView."""
+    """Write a heap's spheres as points [m] with ``radius`` [m], ``grain`` and ``shape``, for ParaView."""
     # PyVista is slow to import and absent on some machines that only calibrate.
     import pyvista
 
     points = pyvista.PolyData(result.sphere_centers)
     points["radius"] = result.sphere_radii
     points["grain"] = result.sphere_grain
+    points["shape"] = result.shapes[result.sphere_grain]
     points.save(path)
 
 

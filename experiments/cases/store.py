@@ -18,7 +18,7 @@ from dem_warp import Case, CaseResult
 from experiments.errors import StoreError
 from experiments.files import replacing
 
-FORMAT = 1
+FORMAT = 2
 """Version of the case files; an older one is not read."""
 
 _RECORD = "record"

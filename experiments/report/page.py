@@ -9,6 +9,7 @@ import jinja2
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
+from dem_warp import GrainPopulation
 from experiments.calibrate.results import STAGES, Campaign, Outcome
 from experiments.report import numbers
 from experiments.report.pictures import HeapPicture
@@ -80,17 +81,23 @@ def study_facts(study: Study) -> dict[str, str]:
     """Say what was simulated and measured, in the terms in which scales differ."""
     tube, numerics, measurement = study.scene.lifted_cylinder, study.numerics, study.measurement
     grains = f"{tube.grain_count} grains" if tube.grain_count else "as many grains as fill it"
-    spheres = study.grain.shape().sphere_count
+    spheres = _sphere_counts(study.grain.population())
     softened = "real" if numerics.modulus_scale == 1.0 else f"divided by {numerics.modulus_scale:g}"
     return {
         "Scale": study.scale or "the study as written",
         "Tube": f"{1e3 * tube.diameter:g} mm wide, {1e3 * tube.height:g} mm high",
         "Lift": f"{tube.lift_speed:g} m/s",
-        "Grains": f"{grains}, {spheres} sphere{'s' if spheres > 1 else ''} each",
+        "Grains": f"{grains}, {spheres} each",
         "Shear modulus": softened,
         "Time step": f"{100.0 * numerics.time_step_fraction:g} % of the Rayleigh time",
         "Angle": f"“{measurement.fit}” fit, mean of {measurement.azimuths} views of a heap, both flanks",
     }
+
+
+def _sphere_counts(grains: GrainPopulation) -> str:
+    """Say of how many spheres the grains are: ``9 spheres``, or ``1 or 9 spheres`` of several shapes."""
+    counts = sorted({shape.sphere_count for shape in grains.mixture.shapes})
+    return f"{' or '.join(map(str, counts))} sphere{'' if counts == [1] else 's'}"
 
 
 def flat(settings: Mapping[str, Any], prefix: str = "") -> dict[str, str]:

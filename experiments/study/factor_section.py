@@ -11,7 +11,15 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 from doe.factors import Factor
 from experiments.errors import StudyError
 from experiments.study.places import KeyPath, Places, value_at
-from experiments.study.schema import Dimension, RawQuantity, Section, bounds, field_at, nearest_name
+from experiments.study.schema import (
+    Dimension,
+    RawQuantity,
+    Section,
+    bounds,
+    dimension_of,
+    field_at,
+    nearest_name,
+)
 from experiments.study.sections import Physics
 from experiments.study.units import Quantity, unit_size
 
@@ -192,4 +200,4 @@ def check_one_home(document: Mapping[str, Any], sections: Iterable[FactorSection
 
 def _dimension_of(parameter: str) -> Dimension | None:
     field = field_at(Physics, tuple(parameter.split(".")))
-    return next((mark for mark in field.metadata if isinstance(mark, Dimension)), None) if field else None
+    return dimension_of(field) if field else None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, TypeVar, get_args
+from typing import Annotated, Any, TypeVar, get_args, get_origin
 
 from annotated_types import Ge, Gt, Le, Lt
 from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, PlainValidator, ValidationError
@@ -56,13 +56,21 @@ def field_at(model: type[BaseModel], path: KeyPath) -> FieldInfo | None:
     """Find the field that a key path leads to; None when there is none."""
     field = None
     section: type[BaseModel] | None = model
+    named = False  # whether the next key is the name of one section among several
     for key in path:
-        if isinstance(key, int):
+        if isinstance(key, int) or named:
+            named = False
             continue
         if section is None or (field := _fields(section).get(key)) is None:
             return None
-        section = _section_of(field)
+        section, named = _section_of(field), get_origin(field.annotation) is dict
     return field
+
+
+def dimension_of(field: FieldInfo) -> Dimension | None:
+    """Find the dimension of a quantity's field, be it optional or not; None for any other field."""
+    inner = [mark for kind in get_args(field.annotation) for mark in getattr(kind, "__metadata__", ())]
+    return next((mark for mark in (*field.metadata, *inner) if isinstance(mark, Dimension)), None)
 
 
 def bounds(field: FieldInfo) -> tuple[float, float]:

@@ -7,13 +7,14 @@ from __future__ import annotations
 
 from functools import lru_cache
 from pathlib import Path
-from typing import Literal
+from typing import Literal, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from dem_warp.case import Case, GrainPopulation, Numerics
+from dem_warp.case import Case, Numerics
 from dem_warp.clumps import ClumpShape
 from dem_warp.materials import Interaction, Material
+from dem_warp.population import FRACTION_TOLERANCE, GrainPopulation, ShapeMixture
 from dem_warp.scenes.lifted_cylinder import LiftedCylinder
 from experiments.study.schema import Density, Length, Number, Pressure, Rate, Section, Speed, Time
 
@@ -35,17 +36,13 @@ class MaterialSection(Section):
         )
 
 
-class GrainSection(MaterialSection):
-    """``[grain]``: shape, size and material of the grains."""
+class ShapeSection(Section):
+    """Where a shape comes from: a file of spheres, or the radius of one."""
 
     clump: Path | None = None
     """File with the clump's spheres (x y z r in mm), relative to the study file."""
     sphere: Length | None = Field(default=None, gt=0.0)
     """Radius of spherical grains, instead of a clump."""
-    size_mean: Number = Field(default=1.0, gt=0.0)
-    """Mean size, as a multiple of the shape."""
-    size_sd: Number = Field(default=0.05, ge=0.0)
-    """Standard deviation of the size."""
 
     @field_validator("clump")
     @classmethod
@@ -57,20 +54,68 @@ class GrainSection(MaterialSection):
             raise ValueError(f"must name an existing clump file (looked for {path})")
         return path
 
-    @model_validator(mode="after")
-    def _one_shape(self) -> GrainSection:
+    def one_shape(self) -> ClumpShape:
+        """Build the shape."""
         if self.clump is not None and self.sphere is not None:
             raise ValueError("takes a clump (a file) or a sphere (a radius), not both")
-        self.shape()
-        return self
-
-    def shape(self) -> ClumpShape:
-        """Build the grain's shape."""
         if self.sphere is not None:
             return _sphere(self.sphere)
         if self.clump is not None:
             return _read_clump(self.clump, self.clump.stat().st_mtime_ns)
         raise ValueError("needs a clump (a file) or a sphere (a radius)")
+
+
+class PartSection(ShapeSection):
+    """``[grain.shapes.NAME]``: one of several shapes."""
+
+    fraction: Number | None = Field(default=None, ge=0.0, le=1.0)
+    """Part of the number of grains that has this shape; left out, which one of them may: the rest."""
+
+    @model_validator(mode="after")
+    def _has_a_shape(self) -> Self:
+        self.one_shape()
+        return self
+
+
+class GrainSection(MaterialSection, ShapeSection):
+    """``[grain]``: shape or shapes, size and material of the grains."""
+
+    shapes: dict[str, PartSection] = Field(default_factory=dict)
+    """Several shapes by name, instead of a clump or a sphere."""
+    size_mean: Number = Field(default=1.0, gt=0.0)
+    """Mean size, as a multiple of the shape."""
+    size_sd: Number = Field(default=0.05, ge=0.0)
+    """Standard deviation of the size."""
+
+    @model_validator(mode="after")
+    def _has_its_shapes(self) -> Self:
+        self.shape()
+        return self
+
+    def shape(self) -> ClumpShape | ShapeMixture:
+        """Build the grain's shape, or the mixture of its shapes."""
+        if not self.shapes:
+            return self.one_shape()
+        if self.clump is not None or self.sphere is not None:
+            raise ValueError("takes one shape (clump or sphere) or several ([grain.shapes.NAME]), not both")
+        return ShapeMixture(tuple(part.one_shape() for part in self.shapes.values()), self._fractions())
+
+    def _fractions(self) -> tuple[float, ...]:
+        parts = [part.fraction for part in self.shapes.values()]
+        given = sum(fraction for fraction in parts if fraction is not None)
+        rest = 1.0 - given
+        if parts.count(None) > 1:
+            raise ValueError("every shape but one needs its fraction")
+        if rest < -FRACTION_TOLERANCE or (None not in parts and rest > FRACTION_TOLERANCE):
+            raise ValueError(
+                f"fractions of the shapes must add up to 1 (one left out takes the rest), not to {given:g}"
+            )
+        return tuple(max(rest, 0.0) if fraction is None else fraction for fraction in parts)
+
+    @property
+    def clump_files(self) -> tuple[Path, ...]:
+        """Every file of spheres, in order."""
+        return tuple(section.clump for section in (self, *self.shapes.values()) if section.clump is not None)
 
     def population(self) -> GrainPopulation:
         """Build the engine's population."""
@@ -80,12 +125,12 @@ class GrainSection(MaterialSection):
 
 
 # The integrals over a shape take milliseconds, and every case of a campaign needs them.
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=32)
 def _read_clump(path: Path, modified: int) -> ClumpShape:
     return ClumpShape.read(path)
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=32)
 def _sphere(radius: float) -> ClumpShape:
     return ClumpShape.sphere(radius)
 

@@ -5,6 +5,7 @@ import pytest
 from worlds import PYRAMID, small_case, spheres_of
 
 from dem_warp.device import resolve_device
+from dem_warp.population import DrawnGrains
 from dem_warp.scenes.rain import Rain, place_rain
 
 RADIUS = 0.012
@@ -17,8 +18,11 @@ ROUNDING = 1e-8
 def rain(seeds=(1,), spacing: float = SPACING, radius: float = RADIUS) -> list[Rain]:
     """Rains of grains whose sizes follow from their seeds."""
     n = len(seeds)
-    sizes = [np.random.default_rng(seed).uniform(0.85, 1.15, COUNT) for seed in seeds]
-    return place_rain(PYRAMID, sizes, seeds, [radius] * n, [spacing] * n, resolve_device("cpu"))
+    one = np.zeros(COUNT, dtype=int)
+    bodies = [
+        DrawnGrains((PYRAMID,), one, np.random.default_rng(seed).uniform(0.85, 1.15, COUNT)) for seed in seeds
+    ]
+    return place_rain(bodies, seeds, [radius] * n, [spacing] * n, resolve_device("cpu"))
 
 
 def clearance(centers: np.ndarray, radii: np.ndarray, owner: np.ndarray) -> float:
@@ -30,7 +34,7 @@ def clearance(centers: np.ndarray, radii: np.ndarray, owner: np.ndarray) -> floa
 def test_grains_start_apart_and_inside_the_tube():
     fall = rain()[0]
     poses = {"positions": fall.positions, "orientations": fall.orientations}
-    centers, radii = spheres_of(PYRAMID, poses, fall.sizes)
+    centers, radii = spheres_of(PYRAMID, poses, fall.grains.sizes)
     owner = np.arange(len(radii)) // PYRAMID.sphere_count
     # Kept apart by 2 % of the sum of two radii, of which the smallest is 0.6 mm times 0.85.
     assert clearance(centers, radii, owner) > 0.02 * 2 * 0.85 * 0.6e-3 - ROUNDING

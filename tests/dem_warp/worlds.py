@@ -13,12 +13,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from dem_warp.case import Case, GrainPopulation, Numerics
+from dem_warp.case import Case, Numerics
 from dem_warp.clumps import ClumpShape
 from dem_warp.device import resolve_device
 from dem_warp.laws.mechanism import Mechanism
 from dem_warp.materials import Interaction, Material
 from dem_warp.model import ContactCoefficients, Grains, WorldSetup
+from dem_warp.population import GrainPopulation
 from dem_warp.scenes.lifted_cylinder import LiftedCylinder
 from dem_warp.solver import Solver
 from dem_warp.walls import Cylinder, Plane, Wall

@@ -132,9 +132,8 @@ def test_a_plate_without_grains_has_no_angle_and_says_why(
     small_study: Study, engine: Engine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     heap = engine.cone()
-    empty = replace(
-        heap, positions=heap.positions[:0], orientations=heap.orientations[:0], sizes=heap.sizes[:0]
-    )
+    none = {name: getattr(heap, name)[:0] for name in ("positions", "orientations", "sizes", "shapes")}
+    empty = replace(heap, **none)
     monkeypatch.setattr(engine, "cone", lambda *_: empty)
     [row] = run_cases(small_study, table_of([0.3]), Store(tmp_path)).to_dict("records")
     assert (row["status"], np.isnan(row["angle"])) == ("finished", True)

@@ -60,7 +60,8 @@ def heap_of(angle: float) -> CaseResult:
         positions=centers,
         orientations=np.tile([0.0, 0.0, 0.0, 1.0], (count, 1)),
         sizes=np.ones(count),
-        clump=np.array([[0.0, 0.0, 0.0, radius]]),
+        shapes=np.zeros(count, dtype=int),
+        clumps=np.array([[[0.0, 0.0, 0.0, radius]]]),
     )
 
 
