@@ -120,6 +120,7 @@ def device_structs(precision: Precision) -> SimpleNamespace:
         velocity: vec3  # of the grain's surface relative to the partner's [m/s]
         spin: vec3  # of the grain relative to the partner [rad/s]
         lever: vec3  # from the grain's centre to the contact [m]
+        mobility: real  # 1 / (m lever^2) of the grain and of a grain that is its partner, added [1/(kg m2)]
         time_step: real  # [s]
         is_new: bool  # nothing is remembered from the step before
 

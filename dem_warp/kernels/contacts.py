@@ -77,6 +77,7 @@ def contact_functions(build: Build) -> SimpleNamespace:
         contact.velocity = -surface_velocity(grains, j, lever)
         contact.spin = -spin_of(grains, j)
         mb = pack.load_vec4(grains.velocity, j)[3]
+        contact.mobility = real(1.0) / (mb * wp.dot(lever, lever))
         contact.mass = contact.mass * mb / (contact.mass + mb)
         return contact
 
@@ -91,8 +92,9 @@ def contact_functions(build: Build) -> SimpleNamespace:
         a = pack.load_sphere(grains.spheres, g * spheres_each + (entry >> SPHERE_BITS))
         radius = pack.last(a)
         pair = w * model.pair_count
+        mass = pack.load_vec4(grains.velocity, g)[3]
         c = Contact()
-        c.mass = pack.load_vec4(grains.velocity, g)[3]
+        c.mass = mass
         c.time_step = world.time_step
         if partner < wall_base:
             b = pack.load_sphere(grains.spheres, w * wall_base + partner)
@@ -108,6 +110,7 @@ def contact_functions(build: Build) -> SimpleNamespace:
             c.velocity = -walls.wall_velocity(wall, step)
             pair += wall.pair
         c.lever = lever_of(grains, world, g, a, c.normal * (real(0.5) * c.overlap - radius))
+        c.mobility += real(1.0) / (mass * wp.dot(c.lever, c.lever))
         c.velocity += surface_velocity(grains, g, c.lever)
         c.spin += spin_of(grains, g)
         history = pack.load_vec4(hood.history, slot)

@@ -39,11 +39,9 @@ def contact_law(mechanisms: Mechanisms) -> Any:
     ValueError
         If several mechanisms stand in place of the rolling resistance.
     """
-    rolling_laws = [mechanism.name for mechanism in mechanisms if mechanism.replaces_rolling]
-    if len(rolling_laws) > 1:
-        raise ValueError(f"mechanisms: at most one law of rolling resistance, got {rolling_laws}")
     spring, friction = _spring(mechanisms), _friction(mechanisms)
     attraction, torque = _attraction(mechanisms), _torque(mechanisms)
+    rolling = _rolling(mechanisms)
 
     @wp.func(name=_name("law", mechanisms))
     def law(params: Any, contact: Any, displacement: Any, memory: Any, first: int):
@@ -84,9 +82,7 @@ def contact_law(mechanisms: Mechanisms) -> Any:
             tangential_velocity,
             coefficient * support,
         )
-        limit = zero
-        if not wp.static(bool(rolling_laws)):
-            limit = rolling_torque(params.rolling_friction, support, contact.lever)
+        limit = rolling(params, rolling_torque(params.rolling_friction, support, contact.lever))
         force = contact.normal * (normal_force - attraction(params, contact, memory, first))
         return (
             force + tangential_force,
@@ -128,6 +124,11 @@ def _same_elastic(params: Any, contact: Any, elastic: Any, memory: Any, first: i
 
 
 @wp.func
+def _same_limit(params: Any, limit: Any):
+    return limit
+
+
+@wp.func
 def _same_coefficient(
     params: Any, contact: Any, coefficient: Any, spring: Any, support: Any, memory: Any, first: int
 ):
@@ -164,6 +165,15 @@ def _plus_torque(before: Any, own: Any, offset: int, name: str) -> Any:
         return before(params, contact, support, memory, first) + own(params, contact, support, memory, at)
 
     return torque
+
+
+def _rolling(mechanisms: Mechanisms) -> Any:
+    laws = [mechanism for mechanism in mechanisms if mechanism.rolling is not None]
+    if len(laws) > 1:
+        raise ValueError(
+            f"mechanisms: at most one law of rolling resistance, got {[law.name for law in laws]}"
+        )
+    return laws[0].rolling if laws else _same_limit
 
 
 def _spring(mechanisms: Mechanisms) -> Any:

@@ -36,6 +36,9 @@ class Mechanism:
         yet limited, and the normal force [N] by which the surfaces push each other off.
     torque(params, contact, support, memory, at)
         Torque [N m] on the grain beside that of the contact force.
+    rolling(params, limit)
+        Largest torque [N m] of the base law's rolling resistance in place of `limit`: none where `torque`
+        stands in its place. One mechanism of a build at the most has it.
     """
 
     between: str = "all"
@@ -44,8 +47,6 @@ class Mechanism:
     strength: ClassVar[str]
     """The parameter that says how strong it is: 0 is its null, whatever the others are."""
     memory_size: ClassVar[int] = 0
-    replaces_rolling: ClassVar[bool] = False
-    """Whether `torque` stands in place of the base law's rolling resistance."""
     acts_apart: ClassVar[bool] = False
     """Whether it acts on surfaces that no longer touch; then `reach` says how far."""
 
@@ -53,6 +54,7 @@ class Mechanism:
     attraction: ClassVar[Any] = None
     friction: ClassVar[Any] = None
     torque: ClassVar[Any] = None
+    rolling: ClassVar[Any] = None
 
     def __post_init__(self) -> None:
         if self.between not in BETWEEN:
@@ -60,6 +62,10 @@ class Mechanism:
         for name, value in self.parameters.items():
             if not (math.isfinite(value) and value >= 0.0):
                 raise ValueError(f"{type(self).__name__}.{name}: must be finite and 0 or more, got {value!r}")
+
+    def _require_below_one(self, name: str) -> None:
+        if not getattr(self, name) < 1.0:
+            raise ValueError(f"{type(self).__name__}.{name}: must be below 1, got {getattr(self, name)!r}")
 
     @classmethod
     def parameter_names(cls) -> tuple[str, ...]:

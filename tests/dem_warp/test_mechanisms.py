@@ -80,6 +80,6 @@ def test_one_batch_holds_one_set_of_mechanisms():
 
 
 def test_one_law_of_rolling_resistance_at_a_time():
-    kinds = tuple(type(name, (LinearCohesion,), {"name": name, "replaces_rolling": True}) for name in "ab")
+    kinds = tuple(type(name, (LinearCohesion,), {"name": name, "rolling": lambda *_: 0.0}) for name in "ab")
     with pytest.raises(ValueError, match=r"at most one law of rolling resistance"):
         contact_law(kinds)
