@@ -45,12 +45,11 @@ def contact_law(mechanisms: Mechanisms) -> Any:
 
     @wp.func(name=_name("law", mechanisms))
     def law(params: Any, contact: Any, displacement: Any, memory: Any, first: int):
-        overlap = contact.overlap + type(contact.overlap)(0.0)
-        zero = type(overlap)(0.0)
+        attracting = attraction(params, contact, memory, first)
         if wp.static(acts_apart(mechanisms)):
-            overlap = wp.max(overlap, zero)
-            if overlap <= zero:
-                displacement = displacement * zero
+            contact, displacement = without_gap(contact, displacement)
+        overlap = contact.overlap
+        zero = type(overlap)(0.0)
         stiffness = hertz_stiffness(params.modulus, contact.radius, overlap)
         elastic = spring(params, contact, hertz_force(stiffness, overlap), memory, first)
         normal_velocity = wp.dot(contact.velocity, contact.normal)
@@ -83,7 +82,7 @@ def contact_law(mechanisms: Mechanisms) -> Any:
             coefficient * support,
         )
         limit = rolling(params, rolling_torque(params.rolling_friction, support, contact.lever))
-        force = contact.normal * (normal_force - attraction(params, contact, memory, first))
+        force = contact.normal * (normal_force - attracting)
         return (
             force + tangential_force,
             displacement,
@@ -92,6 +91,17 @@ def contact_law(mechanisms: Mechanisms) -> Any:
         )
 
     return law
+
+
+@wp.func
+def without_gap(contact: Any, displacement: Any):
+    """What all but an attraction sees of a contact: while the surfaces stand apart, one that is about to begin."""
+    zero = type(contact.overlap)(0.0)
+    if contact.overlap <= zero:
+        contact.overlap = zero
+        contact.is_new = True
+        displacement = displacement * zero
+    return contact, displacement
 
 
 def _places(mechanisms: Mechanisms, hook: str) -> list[tuple[Any, int, str]]:

@@ -26,6 +26,8 @@ class Mechanism:
     The device functions of a subclass take `params` (ContactParams of the pair) and `contact` (Contact)
     first, and last `memory` and `at`: an array and the index in it of the first of the `memory_size` values
     that the mechanism remembers of this contact from step to step; nothing as yet when `contact.is_new`.
+    Surfaces that stand apart, where some mechanism acts on such, have a negative `contact.overlap` for
+    `attraction` alone; for the others the overlap is then 0 and the contact new.
 
     spring(params, contact, elastic, memory, at)
         Elastic normal force [N] in place of Hertz's, `elastic`.
