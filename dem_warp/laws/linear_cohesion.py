@@ -10,11 +10,16 @@ from dem_warp.laws.mechanism import Mechanism
 
 
 @wp.func
+def contact_area(contact: Any):
+    """Area 2 pi R* d [m2] of the circle in which two spheres cut each other, to first order in d / R*."""
+    overlap = wp.max(contact.overlap, type(contact.overlap)(0.0))
+    return type(overlap)(2.0) * type(overlap)(math.pi) * contact.radius * overlap
+
+
+@wp.func
 def area_attraction(params: Any, contact: Any, memory: Any, at: int):
-    """Attraction k A [N] on the circle A = 2 pi R* d in which the two spheres cut each other."""
-    zero = type(contact.overlap)(0.0)
-    area = type(contact.overlap)(2.0 * math.pi) * contact.radius * wp.max(contact.overlap, zero)
-    return params.cohesion_energy_density * area
+    """Attraction k A [N] with A = 2 pi R* d."""
+    return params.cohesion_energy_density * contact_area(contact)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,10 +33,16 @@ class LinearCohesion(Mechanism):
 
     Notes
     -----
-    The area is that of the circle of intersection, to first order in d / R*; twice the area of the Hertz
-    contact. The attraction vanishes with the overlap: there is none beyond contact.
+    The area is that in which the two undeformed surfaces cut each other, twice that of the Hertz contact
+    (pi R* d). It is taken to first order in the overlap: the exact circle is smaller by the part d / (8 R*)
+    for two like spheres and by d / (2 R*) for a sphere on a plane.
 
-    Source: LIGGGHTS documentation, "cohesion sjkr"; JKR in its linear form.
+    The attraction is none at d = 0, nor beyond contact, and it is conservative: by itself it takes nothing
+    from an impact. A contact that carries nothing rests at d0 = R* (3 pi k / (2 E*))^2; the largest force
+    that it holds is (2/3) pi^3 k^3 R*^2 / E*^2, at (4/9) d0. So it weakens with the square of the modulus: k
+    is to be chosen with the modulus that is simulated.
+
+    Source: LIGGGHTS documentation, "gran cohesion sjkr"; its "sjkr2" takes twice this area.
     """
 
     cohesion_energy_density: float = 0.0
