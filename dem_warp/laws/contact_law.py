@@ -95,7 +95,7 @@ def contact_law(mechanisms: Mechanisms) -> Any:
 
 @wp.func
 def without_gap(contact: Any, displacement: Any):
-    """What all but an attraction sees of a contact: while the surfaces stand apart, one that is about to begin."""
+    """A contact for all but attractions: while the surfaces stand apart, it is about to begin."""
     zero = type(contact.overlap)(0.0)
     if contact.overlap <= zero:
         contact.overlap = zero
