@@ -1,17 +1,22 @@
 """Worlds that run in one launch, each under the controller of its scene."""
 
+import logging
+import time
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
-import warp as wp
 
 from dem_warp.case import Case
+from dem_warp.checkpoint import Checkpoints
 from dem_warp.clumps import stack_spheres
+from dem_warp.provenance import engine_fingerprint, provenance
 from dem_warp.result import CaseResult
 from dem_warp.scenes.scene import Decision
+from dem_warp.snapshot import STEP, put_snapshot, take_snapshot
 from dem_warp.solver import CHUNK, Solver
 from dem_warp.types import WorldFlag
+
+_log = logging.getLogger(__name__)
 
 ADVICE = {
     WorldFlag.DIVERGED: (
@@ -27,9 +32,17 @@ ADVICE = {
 
 
 class Batch:
-    """Cases of one kind of scene, precision and largest number of spheres, as worlds of one launch."""
+    """Cases of one kind of scene, precision and largest number of spheres, as worlds of one launch.
 
-    def __init__(self, cases: Sequence[Case], device: str) -> None:
+    Parameters
+    ----------
+    cases : sequence of Case
+    device : str
+    checkpoints : Checkpoints, optional
+        Where the cases are saved now and then, and go on from where an earlier run left them.
+    """
+
+    def __init__(self, cases: Sequence[Case], device: str, checkpoints: Checkpoints | None = None) -> None:
         self.cases = list(cases)
         self.setups = cases[0].scene.prepare(cases, device)
         self.solver = Solver(self.setups, device, cases[0].numerics.precision)
@@ -37,21 +50,59 @@ class Batch:
             case.scene.controller(case, setup, CHUNK) for case, setup in zip(cases, self.setups, strict=True)
         ]
         self.running = list(range(len(cases)))
-        self.chunk = 0
+        self.steps = [0] * len(cases)
+        self.provenance = provenance(self.solver.device, self.solver.precision.name)
+        self._checkpoints, self._saved = checkpoints, time.monotonic()
+        self._maker = self.provenance | {"engine": engine_fingerprint()}
+        self._resume()
 
     def advance(self) -> list[tuple[int, CaseResult]]:
         """Step until the next controller is due, let it decide, and return the worlds that ended."""
-        apart = min(self.controllers[w].period for w in self.running) // CHUNK
-        ahead = apart - self.chunk % apart
-        self.solver.advance(ahead)
-        self.chunk += ahead
-        return self._look([w for w in self.running if self.chunk * CHUNK % self.controllers[w].period == 0])
+        ahead = min(
+            self.controllers[w].period - self.steps[w] % self.controllers[w].period for w in self.running
+        )
+        self.solver.advance(ahead // CHUNK)
+        for w in self.running:
+            self.steps[w] += ahead
+        ended = self._look([w for w in self.running if self.steps[w] % self.controllers[w].period == 0])
+        self._save_when_due()
+        return ended
 
     def fraction(self, world: int) -> float:
         """Roughly how much of a world is done, 0 to 1."""
         if world not in self.running:
             return 1.0
-        return self.controllers[world].fraction(self.chunk * CHUNK * self.setups[world].time_step)
+        return self.controllers[world].fraction(self.steps[world] * self.setups[world].time_step)
+
+    def phase(self, world: int) -> str:
+        """Phase that a world is in."""
+        return self.controllers[world].course.phase
+
+    # ---- checkpoints ---------------------------------------------------------------------------------------
+
+    def _resume(self) -> None:
+        """Bring every case that has a checkpoint to where an earlier run left it."""
+        if self._checkpoints is None:
+            return
+        for w, (case, controller) in enumerate(zip(self.cases, self.controllers, strict=True)):
+            try:
+                if kept := self._checkpoints.load(case, self._maker):
+                    course, snapshot = type(controller.course)(**kept[0]), kept[1]
+                    put_snapshot(self.solver, w, snapshot)
+                    controller.course, self.steps[w] = course, int(snapshot[STEP].item())
+            except (TypeError, ValueError) as error:
+                path = self._checkpoints.path(case)
+                _log.warning("%s: a checkpoint that cannot be used, its case starts afresh: %s", path, error)
+
+    def _save_when_due(self) -> None:
+        if self._checkpoints is None or time.monotonic() - self._saved < self._checkpoints.every:
+            return
+        for w in self.running:
+            snapshot = take_snapshot(self.solver, w)
+            self._checkpoints.save(self.cases[w], self._maker, self.controllers[w].course, snapshot)
+        self._saved = time.monotonic()
+
+    # ---- what the controllers decide -----------------------------------------------------------------------
 
     def _look(self, due: Sequence[int]) -> list[tuple[int, CaseResult]]:
         """Let the controllers of the worlds that are due decide; results of those that ended."""
@@ -77,7 +128,7 @@ class Batch:
             self.solver.move_wall(w, *decision.move)
 
     def _result(self, w: int, status: str, reason: str) -> CaseResult:
-        poses, controller, setup = self.solver.poses(w), self.controllers[w], self.setups[w]
+        poses, course, setup = self.solver.poses(w), self.controllers[w].course, self.setups[w]
         late = WorldFlag.LATE_REBUILD in WorldFlag(int(self.solver.flags.numpy()[w]))
         counts = {"rebuilds": float(self.solver.rebuilds.numpy()[w]), "late_rebuilds": float(late)}
         return CaseResult(
@@ -88,19 +139,10 @@ class Batch:
             sizes=setup.grains.sizes[poses["slots"]],
             shapes=setup.grains.shapes[poses["slots"]],
             clumps=stack_spheres(setup.shapes),
-            observables=controller.observables | counts,
-            phases=controller.phases,
-            provenance=self._provenance(),
+            observables=course.observables | counts,
+            phases=course.phases,
+            provenance=self.provenance,
         )
-
-    def _provenance(self) -> dict[str, Any]:
-        device = self.solver.device
-        return {
-            "warp": wp.__version__,
-            "numpy": np.__version__,
-            "device": device.name if device.is_cuda else "CPU",
-            "precision": self.solver.precision.name,
-        }
 
 
 def _verdict(flags: WorldFlag, at: float) -> tuple[str, str] | None:

@@ -7,6 +7,7 @@ from typing import Any
 
 from dem_warp.batch import Batch
 from dem_warp.case import Case
+from dem_warp.checkpoint import Checkpoints
 from dem_warp.device import resolve_device
 from dem_warp.result import CaseResult, OnResult
 
@@ -26,15 +27,15 @@ def _start_worker(fractions: Any, phases: Any) -> None:
     _shared.update(fractions=fractions, phases=phases)
 
 
-def _run_case(index: int, case: Case) -> CaseResult:
+def _run_case(index: int, case: Case, checkpoints: Checkpoints | None) -> CaseResult:
     """Run one case in a worker, leaving its progress in the shared memory."""
-    batch = Batch([case], resolve_device("cpu"))
+    batch = Batch([case], resolve_device("cpu"), checkpoints)
     while True:
         ended = batch.advance()
         if ended:
             return ended[0][1]
         _shared["fractions"][index] = batch.fraction(0)
-        name = batch.controllers[0].phase.encode()[:PHASE_LENGTH].ljust(PHASE_LENGTH)
+        name = batch.phase(0).encode()[:PHASE_LENGTH].ljust(PHASE_LENGTH)
         _shared["phases"][index * PHASE_LENGTH : (index + 1) * PHASE_LENGTH] = name
 
 
@@ -43,6 +44,7 @@ def run_in_processes(
     workers: int,
     on_result: OnResult,
     report: Report,
+    checkpoints: Checkpoints | None = None,
 ) -> None:
     """Run cases, `workers` at a time.
 
@@ -54,13 +56,15 @@ def run_in_processes(
         Called with index and result of each case as it ends.
     report : callable
         Called now and then with the fraction done and the phase of every case.
+    checkpoints : Checkpoints, optional
+        Where the processes save their cases and take them up.
     """
     context = multiprocessing.get_context("spawn")
     fractions = context.Array("d", len(cases))
     phases = context.Array("c", b"waiting".ljust(PHASE_LENGTH) * len(cases))
     with ProcessPoolExecutor(workers, context, _start_worker, (fractions, phases)) as pool:
         futures: dict[Future[CaseResult], int] = {
-            pool.submit(_run_case, i, case): i for i, case in enumerate(cases)
+            pool.submit(_run_case, i, case, checkpoints): i for i, case in enumerate(cases)
         }
         pending = set(futures)
         try:

@@ -4,10 +4,12 @@ import os
 import time
 from collections import Counter
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from dem_warp.batch import Batch
 from dem_warp.case import Case
+from dem_warp.checkpoint import CHECKPOINT_EVERY, Checkpoints
 from dem_warp.device import resolve_device
 from dem_warp.processes import REPORT_EVERY, Report, run_in_processes
 from dem_warp.result import CaseResult, OnProgress, OnResult, Progress
@@ -19,6 +21,8 @@ def simulate(
     workers: int | None = None,
     on_result: OnResult | None = None,
     on_progress: OnProgress | None = None,
+    checkpoint: str | Path | None = None,
+    checkpoint_every: float = CHECKPOINT_EVERY,
 ) -> list[CaseResult]:
     """Simulate cases at once.
 
@@ -33,6 +37,11 @@ def simulate(
         Called with the index and the result of each case as it ends.
     on_progress : callable, optional
         Called with a `Progress` now and then.
+    checkpoint : str or Path, optional
+        Folder for checkpoints of the running cases. Cases that a killed run left there go on from where they
+        were, to the same bits; the file of a case is removed when it has ended.
+    checkpoint_every : float
+        Wall time between two checkpoints [s].
 
     Returns
     -------
@@ -43,9 +52,10 @@ def simulate(
     Raises
     ------
     ValueError
-        If the device is not there.
+        If the device is not there, or `checkpoint_every` is negative.
     """
     name = resolve_device(device)
+    checkpoints = None if checkpoint is None else Checkpoints(checkpoint, checkpoint_every)
     results: dict[int, CaseResult] = {}
     started = time.perf_counter()
 
@@ -53,6 +63,8 @@ def simulate(
         results[index] = result
         if on_result:
             on_result(index, result)
+        if checkpoints:
+            checkpoints.drop(cases[index])
 
     def report(fractions: Sequence[float], phases: Sequence[str]) -> None:
         if on_progress:
@@ -63,25 +75,27 @@ def simulate(
 
     count = min(workers or os.cpu_count() or 1, len(cases)) if name == "cpu" else 1
     if count > 1:
-        run_in_processes(cases, count, keep, report)
+        run_in_processes(cases, count, keep, report, checkpoints)
     else:
-        _run_batches(cases, name, keep, report)
+        _run_batches(cases, name, keep, report, checkpoints)
     return [results[i] for i in range(len(cases))]
 
 
-def _run_batches(cases: Sequence[Case], device: str, keep: OnResult, report: Report) -> None:
+def _run_batches(
+    cases: Sequence[Case], device: str, keep: OnResult, report: Report, checkpoints: Checkpoints | None
+) -> None:
     """Run batch after batch in this process."""
     fractions, phases = [0.0] * len(cases), ["waiting"] * len(cases)
     reported = time.perf_counter()
     for members in batches(cases, one_each=device == "cpu"):
-        batch = Batch([cases[i] for i in members], device)
+        batch = Batch([cases[i] for i in members], device, checkpoints)
         while batch.running:
             for w, result in batch.advance():
                 keep(members[w], result)
             if not batch.running or time.perf_counter() - reported > REPORT_EVERY:
                 reported = time.perf_counter()
                 for w, i in enumerate(members):
-                    fractions[i], phases[i] = batch.fraction(w), batch.controllers[w].phase
+                    fractions[i], phases[i] = batch.fraction(w), batch.phase(w)
                 report(fractions, phases)
 
 

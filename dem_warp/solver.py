@@ -21,8 +21,6 @@ from dem_warp.state import (
     build_model,
     build_neighbours,
     copy_grains,
-    struct_array,
-    wall_rows,
 )
 from dem_warp.types import PRECISIONS, Build, device_structs
 
@@ -105,7 +103,6 @@ class Solver:
             self._build_state(capacity or row, found)
         self._running = list(range(len(worlds)))
         self._graphs: dict[tuple[int, int, int], Any] = {}
-        self._walls = wall_rows(worlds)
         self._place()
 
     def _build_state(self, capacity: int, found_capacity: int) -> None:
@@ -235,12 +232,13 @@ class Solver:
 
     def move_wall(self, world: int, wall: int, velocity: Sequence[float]) -> None:
         """Let a wall move with a constant velocity [m/s] from the present step on."""
-        row = self._walls[world * self.layout.wall_count + wall]
+        walls = self.model.wall.numpy()
+        row = walls[world * self.layout.wall_count + wall]
         step = int(self.grains[0].step.numpy()[world])
-        moved = max(step - row["start_step"], 0) * self.worlds[world].time_step
-        row["point"] = tuple(np.add(row["point"], np.multiply(row["velocity"], moved)))
-        row["velocity"], row["start_step"] = tuple(velocity), step
-        self.model.wall.assign(struct_array(device_structs(self.precision).Wall, self._walls, self.device))
+        moved = max(step - int(row["start_step"]), 0) * self.worlds[world].time_step
+        row["point"] += row["velocity"] * moved
+        row["velocity"], row["start_step"] = velocity, step
+        self.model.wall.assign(walls)
 
     def view(self, worlds: Sequence[int]) -> list[WorldView]:
         """What scenes need of some worlds, copied from the device."""

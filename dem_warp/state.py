@@ -174,11 +174,16 @@ def build_grains(worlds: Sequence[WorldSetup], layout: Layout, precision: Precis
     return grains
 
 
+def arrays_of(struct: Any) -> dict[str, wp.array]:
+    """Arrays of a struct by field."""
+    return {name: value for name, value in vars(struct).items() if isinstance(value, wp.array)}
+
+
 def copy_grains(grains: Any, precision: Precision) -> Any:
     """A second copy of `Grains`, for steps that read one and write the other."""
     other = device_structs(precision).Grains()
-    for name in ("step", "position", "orientation", "velocity", "spin", "center", "spheres"):
-        setattr(other, name, wp.clone(getattr(grains, name)))
+    for name, array in arrays_of(grains).items():
+        setattr(other, name, wp.clone(array))
     return other
 
 

@@ -10,7 +10,7 @@ from dem_warp.case import Case
 from dem_warp.materials import Material
 from dem_warp.model import Grains, WorldSetup
 from dem_warp.scenes.rain import Rain, place_rain
-from dem_warp.scenes.scene import Decision
+from dem_warp.scenes.scene import Course, Decision
 from dem_warp.solver import WorldView
 from dem_warp.walls import Cylinder, Plane
 
@@ -175,29 +175,20 @@ class LiftController:
     def __init__(self, case: LiftCase, setup: WorldSetup, chunk: int) -> None:
         self.case, self.scene, self.setup = case, case.scene, setup
         self.period = chunk * 2 ** max(int(np.ceil(np.log2(self.LOOK / (chunk * setup.time_step)))), 0)
-        self.phase = "fill"
-        self.phases: list[dict[str, Any]] = []
-        self.observables: dict[str, float] = {}
-        self._phase_start = 0.0
-        self._slow_since: float | None = None
+        self.course = Course("fill")
 
     def fraction(self, time: float) -> float:
         """Roughly how much of the case is done at a simulated time [s], 0 to 1."""
         rain = float(self.setup.grains.release_steps.max()) * self.setup.time_step
         lift = 0.5 * self.scene.diameter / self.scene.lift_speed
         expected = {"fill": (0.0, rain + 0.1), "settle": (rain + 0.1, 0.2), "lift": (rain + 0.3, lift + 0.3)}
-        before, length = expected[self.phase]
-        part = min((time - self._phase_start) / length, 1.0)
+        before, length = expected[self.course.phase]
+        part = min((time - self.course.phase_start) / length, 1.0)
         return (before + part * length) / (rain + lift + 0.6)
 
     def look(self, view: WorldView) -> Decision:
         """Decide what happens next from the present state."""
-        return {"fill": self._fill, "settle": self._settle, "lift": self._lift}[self.phase](view)
-
-    def _enter(self, phase: str, view: WorldView) -> None:
-        steps = view.step - sum(done["steps"] for done in self.phases)
-        self.phases.append({"name": self.phase, "time": view.time - self._phase_start, "steps": steps})
-        self.phase, self._phase_start, self._slow_since = phase, view.time, None
+        return {"fill": self._fill, "settle": self._settle, "lift": self._lift}[self.course.phase](view)
 
     def _rests(self, view: WorldView) -> bool:
         """Whether the grains have been slow for `rest_time`."""
@@ -206,11 +197,11 @@ class LiftController:
             np.sqrt(np.mean(speed**2)) < self.scene.rest_speed and speed.max() < CALM * self.scene.rest_speed
         )
         if not slow:
-            self._slow_since = None
+            self.course.slow_since = None
             return False
-        if self._slow_since is None:
-            self._slow_since = view.time
-        return view.time - self._slow_since >= self.scene.rest_time
+        if self.course.slow_since is None:
+            self.course.slow_since = view.time
+        return view.time - self.course.slow_since >= self.scene.rest_time
 
     def _fill(self, view: WorldView) -> Decision:
         free = view.alive & view.released
@@ -225,13 +216,13 @@ class LiftController:
             )
         if not (full or (rained_out and self._rests(view))):
             return Decision()
-        self._enter("settle", view)
+        self.course.enter("settle", view)
         if self.scene.grain_count is not None:
             return Decision()
         return Decision(remove=np.flatnonzero(view.alive & (above | ~view.released)))
 
     def _settle(self, view: WorldView) -> Decision:
-        if view.time - self._phase_start > self.SETTLE_LIMIT:
+        if view.time - self.course.phase_start > self.SETTLE_LIMIT:
             return Decision(
                 done=True, failure=f"the filled tube did not come to rest within {self.SETTLE_LIMIT:g} s"
             )
@@ -241,7 +232,7 @@ class LiftController:
         if self.scene.grain_count is not None:
             above[:] = False
         self._measure_fill(view, view.alive & ~above)
-        self._enter("lift", view)
+        self.course.enter("lift", view)
         return Decision(remove=np.flatnonzero(above), move=(TUBE, (0.0, 0.0, self.scene.lift_speed)))
 
     def _measure_fill(self, view: WorldView, kept: np.ndarray) -> None:
@@ -253,12 +244,12 @@ class LiftController:
         )
         reach = self.case.grains.mean(lambda shape: shape.bounding_radius)
         level = bed_level(positions, self.scene.diameter / 2, reach)
-        self.observables["grain_count"] = float(np.count_nonzero(kept))
-        self.observables["fill_height"] = level
-        self.observables["solid_fraction"] = volume / (np.pi / 4 * self.scene.diameter**2 * level)
+        self.course.observables["grain_count"] = float(np.count_nonzero(kept))
+        self.course.observables["fill_height"] = level
+        self.course.observables["solid_fraction"] = volume / (np.pi / 4 * self.scene.diameter**2 * level)
 
     def _lift(self, view: WorldView) -> Decision:
-        elapsed = view.time - self._phase_start
+        elapsed = view.time - self.course.phase_start
         rise = self.scene.lift_speed * elapsed
         positions = view.positions[view.alive]
         reach = self.setup.bounding_radii.max()
@@ -272,7 +263,7 @@ class LiftController:
         riding = view.alive & (view.positions[:, 2] > rise)
         if rise > GONE * self.scene.height and riding.any():
             count = np.count_nonzero(riding)
-            if count > CLOGGED * self.observables["grain_count"]:
+            if count > CLOGGED * self.course.observables["grain_count"]:
                 return Decision(done=True, failure=f"the tube is clogged: {count} grains rose with it")
             return Decision(remove=np.flatnonzero(riding))
         if elapsed > self.scene.height / self.scene.lift_speed + self.LIFT_MARGIN:
@@ -282,13 +273,15 @@ class LiftController:
         return Decision()
 
     def _finish(self, view: WorldView, elapsed: float) -> None:
-        rested = elapsed if self._slow_since is None else self._slow_since - self._phase_start
-        self.observables["time_to_rest"] = float(rested)
-        self.observables["simulated_time"] = view.time
-        self.observables["grains_lost"] = self.observables["grain_count"] - float(
+        rested = (
+            elapsed if self.course.slow_since is None else self.course.slow_since - self.course.phase_start
+        )
+        self.course.observables["time_to_rest"] = float(rested)
+        self.course.observables["simulated_time"] = view.time
+        self.course.observables["grains_lost"] = self.course.observables["grain_count"] - float(
             np.count_nonzero(view.alive)
         )
-        self._enter("rest", view)
+        self.course.enter("rest", view)
 
 
 def bed_level(positions: np.ndarray, radius: float, reach: float) -> float:

@@ -1,7 +1,7 @@
 """What every scene offers: worlds to start from, and a controller that leads each through its phases."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
@@ -32,15 +32,45 @@ class Decision:
     failure: str = ""
 
 
+@dataclass
+class Course:
+    """How far a world has come: all that its controller remembers from one look to the next.
+
+    A checkpoint keeps it as JSON, so its fields, and those that a scene adds in a subclass, are plain values.
+
+    Attributes
+    ----------
+    phase : str
+    phase_start : float
+        When the phase began [s].
+    slow_since : float, optional
+        Since when the grains have been slow in this phase [s].
+    phases : list of dict
+        Name, time [s] and steps of each phase that has ended.
+    observables : dict of float
+        In SI units.
+    """
+
+    phase: str
+    phase_start: float = 0.0
+    slow_since: float | None = None
+    phases: list[dict[str, Any]] = field(default_factory=list)
+    observables: dict[str, float] = field(default_factory=dict)
+
+    def enter(self, phase: str, view: WorldView) -> None:
+        """Record the end of the present phase and begin another."""
+        steps = view.step - sum(done["steps"] for done in self.phases)
+        self.phases.append({"name": self.phase, "time": view.time - self.phase_start, "steps": steps})
+        self.phase, self.phase_start, self.slow_since = phase, view.time, None
+
+
 class Controller(Protocol):
     """Leads one world; what it decides depends on that world alone."""
 
     period: int
-    """Steps between two looks; follows from the world alone."""
-    phase: str
-    phases: list[dict[str, Any]]
-    """Name, time [s] and steps of each phase that has ended."""
-    observables: dict[str, float]
+    """Steps between two looks, a power of two of chunks; follows from the world alone."""
+    course: Course
+    """Nothing else in a controller changes, so that with its course it takes up a world half-way."""
 
     def look(self, view: WorldView) -> Decision:
         """Decide what happens next from the present state."""

@@ -42,12 +42,13 @@ def run_phases(batch: Batch) -> dict[str, Stretch]:
     """Run a batch to its end; time is counted for the phase that all running worlds are in."""
     stretches: dict[str, Stretch] = defaultdict(Stretch)
     while batch.running:
-        phases = {batch.controllers[w].phase for w in batch.running}
+        phases = {batch.phase(w) for w in batch.running}
         if phases == {"settle"} and "settled" not in stretches and _is_calm(batch):
             stretches["settled"] = _timed(batch, lambda: batch.solver.advance(SETTLED_CHUNKS), SETTLED_CHUNKS)
-        chunk = batch.chunk
+        world = batch.running[0]
+        before = batch.steps[world]
         stretch = _timed(batch, batch.advance, None)
-        stretch.steps = (batch.chunk - chunk) * CHUNK
+        stretch.steps = batch.steps[world] - before
         stretch.sphere_steps *= stretch.steps
         if len(phases) == 1:
             total = stretches[phases.pop()]
@@ -133,7 +134,7 @@ def main(
     counts = worlds or [1]
     print(table(scale, counts, name).round(2).to_string(index=False))
     batch = Batch([load_study(scale=scale).case({}, 0)] * counts[0], name)
-    while batch.controllers[0].phase == "fill":
+    while batch.phase(0) == "fill":
         batch.advance()
     print("\none step, and one rebuild of the full tube, by kernel [ms]")
     print((1e3 * kernel_times(batch)).round(3).to_string())

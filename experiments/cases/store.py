@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import hashlib
-import importlib.metadata
-import importlib.util
 import json
 import zipfile
 from dataclasses import fields
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from dem_warp import Case, CaseResult
+from dem_warp.provenance import engine_fingerprint
 from experiments.errors import StoreError
 from experiments.files import replacing
 
@@ -98,18 +96,6 @@ class Store:
             return CaseResult(**values)
         except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
             raise StoreError("a stored case must be whole", f"a damaged file: {error}", str(path)) from error
-
-
-@lru_cache(maxsize=1)
-def engine_fingerprint() -> str:
-    """Hash of the engine's sources and of the version of Warp that compiles them."""
-    spec = importlib.util.find_spec("dem_warp")
-    digest = hashlib.sha256(importlib.metadata.version("warp-lang").encode())
-    for root in map(Path, (spec and spec.submodule_search_locations) or ()):
-        for path in sorted(root.rglob("*.py")):
-            digest.update(f"\n{path.relative_to(root).as_posix()}\n".encode())
-            digest.update(path.read_bytes())
-    return digest.hexdigest()
 
 
 def _read_values(path: Path) -> dict[str, Any]:

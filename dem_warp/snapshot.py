@@ -1,0 +1,159 @@
+"""One world's part of a batch's device arrays, copied out and put back.
+
+A snapshot knows nothing of the batch that it was taken from: its world may go on in any batch of its build,
+at any place and beside any others, and comes to the same bits.
+
+The arrays are found by going through the structs, and how one is parted follows from its length: a new field
+of the state needs nothing here.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from dem_warp.solver import Solver
+from dem_warp.state import arrays_of
+from dem_warp.types import SPHERE_MASK
+
+Snapshot = dict[str, np.ndarray]
+"""What a world has in each array of the state, by the array's name."""
+
+STEP, COUNT, ENTRY = "grains.step", "neighbours.count", "neighbours.entry"
+LISTS = 2
+
+
+def take_snapshot(solver: Solver, world: int) -> Snapshot:
+    """Everything that the next steps of a world follow from, beside its setup.
+
+    To be called between two calls of `Solver.advance`: the first copy of the grains is then the present one,
+    and the next step writes the second.
+    """
+    snapshot = {field.name: field.read() for field in _fields(solver, world, _counts(solver, world))}
+    snapshot[ENTRY] = _renumbered(snapshot[ENTRY], *_first_walls(solver, world))
+    walls = _walls(solver, world).numpy()
+    return snapshot | {f"wall.{name}": walls[name].copy() for name in _values(walls)}
+
+
+def put_snapshot(solver: Solver, world: int, snapshot: Snapshot) -> None:
+    """Bring a world to where it was when a snapshot of it was taken.
+
+    Raises
+    ------
+    ValueError
+        When the snapshot is none of such a world, or its neighbour lists are longer than the batch's. The
+        world is then as it was before.
+    """
+    if COUNT not in snapshot:
+        raise ValueError(f"a snapshot must have {COUNT}, got {sorted(snapshot)}")
+    fields = list(_fields(solver, world, snapshot[COUNT].ravel()))
+    on_device = _walls(solver, world)
+    walls = on_device.numpy().copy()
+    names = {field.name for field in fields} | {f"wall.{name}" for name in _values(walls)}
+    if odd := sorted(snapshot.keys() ^ names):
+        raise ValueError(f"a snapshot must have the fields of the state, got a difference in {odd}")
+    in_batch, in_snapshot = _first_walls(solver, world)
+    numbered = snapshot | {ENTRY: _renumbered(snapshot[ENTRY], in_snapshot, in_batch)}
+    filled = [field.filled(numbered[field.name]) for field in fields]
+    for field, whole in zip(fields, filled, strict=True):
+        for part in field.parts:
+            part.assign(whole)
+    for name in _values(walls):
+        walls[name] = snapshot[f"wall.{name}"]
+    on_device.assign(walls)
+
+
+@dataclass(frozen=True, eq=False)
+class _Field:
+    """What one world has in an array; the same in every copy that there is of it."""
+
+    name: str
+    parts: tuple[Any, ...]
+    axes: tuple[int, ...]
+    """What it is counted by; a last axis beside them holds the values of each."""
+    used: Any
+    """Index into the axes of what is in use; the rest is room."""
+
+    def read(self) -> np.ndarray:
+        """Copy what is in use from the device."""
+        return np.array(self._counted(self.parts[0].numpy())[self.used])
+
+    def filled(self, values: np.ndarray) -> np.ndarray:
+        """The whole part with other values where it is in use."""
+        whole = self.parts[0].numpy().copy()
+        old = self._counted(whole)[self.used]
+        if (values.shape, values.dtype) != (old.shape, old.dtype):
+            raise ValueError(
+                f"{self.name}: must be {old.dtype} {old.shape}, got {values.dtype} {values.shape}"
+            )
+        self._counted(whole)[self.used] = values
+        return whole
+
+    def _counted(self, array: np.ndarray) -> np.ndarray:
+        return array.reshape(*self.axes, -1)
+
+
+def _fields(solver: Solver, world: int, counts: np.ndarray) -> Iterator[_Field]:
+    """Every array that has something of a world, whose grains have `counts` neighbours."""
+    layout, capacity = solver.layout, solver.hood.capacity
+    slots, grains, held = layout.grain_count, solver.worlds[world].grains.count, _held(solver, world)
+    if counts.shape != (grains,) or counts.max() > capacity:
+        raise ValueError(f"{COUNT}: must be at most {capacity} for each of {grains} grains, got {counts}")
+    listed = np.zeros((slots, capacity), dtype=bool)
+    listed[:grains] = np.arange(capacity) < counts[:, None]
+    for name, arrays in _state(solver).items():
+        of_lists = name.startswith("neighbours.") and arrays[0].size % (LISTS * layout.grain_total) == 0
+        lists, place = (LISTS, (held, world)) if of_lists else (1, (0, world))
+        parts = tuple(array.reshape((lists, layout.world_count, -1))[place] for array in arrays)
+        each = parts[0].size // slots
+        if of_lists and each >= capacity:
+            yield _Field(name, parts, (slots, capacity), listed)
+        elif each:
+            yield _Field(name, parts, (slots,), slice(grains))
+        else:
+            yield _Field(name, parts, (1,), slice(1))
+
+
+def _state(solver: Solver) -> dict[str, tuple[Any, ...]]:
+    """Every array that steps change, with its copies; those that a build leaves out have no elements."""
+    first, second = (arrays_of(grains) for grains in solver.grains)
+    state: dict[str, tuple[Any, ...]] = {
+        f"grains.{name}": (array, second[name]) for name, array in first.items()
+    }
+    state |= {f"neighbours.{name}": (array,) for name, array in arrays_of(solver.hood).items()}
+    state |= {f"world.{name}": (getattr(solver, name),) for name in ("alive", "flags", "rebuilds")}
+    # which list holds: the snapshot's entries go into the one that holds in the batch
+    del state["neighbours.list"]
+    return {name: arrays for name, arrays in state.items() if arrays[0].size}
+
+
+def _held(solver: Solver, world: int) -> int:
+    return int(solver.hood.list.numpy()[world])
+
+
+def _counts(solver: Solver, world: int) -> np.ndarray:
+    """Neighbours of each of a world's grains."""
+    counts = solver.hood.count.reshape((LISTS, solver.layout.world_count, -1))[_held(solver, world), world]
+    return counts.numpy()[: solver.worlds[world].grains.count]
+
+
+def _walls(solver: Solver, world: int) -> Any:
+    """The world's walls on the device: their motion begins and changes on the way."""
+    return solver.model.wall.reshape((solver.layout.world_count, -1))[world]
+
+
+def _values(walls: np.ndarray) -> list[str]:
+    """Fields of a struct that are values; an unsigned 64-bit one is an address of this process."""
+    return [name for name in walls.dtype.names or () if walls.dtype[name].base != np.uint64]
+
+
+def _first_walls(solver: Solver, world: int) -> tuple[int, int]:
+    """Number of the first wall among the partners: in the batch, and in a snapshot, which has no padding."""
+    each = solver.layout.sphere_count
+    return solver.layout.grain_count * each, solver.worlds[world].grains.count * each
+
+
+def _renumbered(entries: np.ndarray, first: int, new_first: int) -> np.ndarray:
+    """Neighbour entries whose walls are counted from another number."""
+    return np.where(entries & SPHERE_MASK >= first, entries + np.int32(new_first - first), entries)
