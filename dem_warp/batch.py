@@ -4,8 +4,6 @@ import logging
 import time
 from collections.abc import Sequence
 
-import numpy as np
-
 from dem_warp.case import Case
 from dem_warp.checkpoint import Checkpoints
 from dem_warp.clumps import stack_spheres

@@ -1,8 +1,8 @@
 """Checkpoints: cases on disk half-way, so that a run that was killed goes on where it was.
 
 Every running case has a file of its own, named by what the case is. It is written under a temporary name and
-then renamed, so that it is whole or absent, and it says what made it: one of another version of the engine or of
-another device, or a damaged one, is not used, and its case starts afresh.
+then renamed, so that it is whole or absent, and it says what made it: one of another version of the engine or
+of another device, or a damaged one, is not used, and its case starts afresh.
 """
 
 import hashlib

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import math
 import os
+import shutil
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
@@ -44,7 +45,8 @@ def run_cases(
         One row a case: factors by name in natural units (one that is missing is at its middle), ``seed``, and
         any further columns, which are carried over.
     store
-        Where results are kept; each is saved as it finishes.
+        Where results are kept; each is saved as it finishes. Checkpoints of the running cases are kept there
+        too: what an interrupted run had begun goes on where it was.
     device
         ``"cpu"``, ``"cuda"``, ``"cuda:1"``; None: the engine's choice.
     workers
@@ -132,7 +134,10 @@ def _simulate_missing(
     workers: int | None,
     progress: Callable[[Progress], None] | None,
 ) -> dict[str, Future[dict[str, Any]]]:
-    """Simulate what the store lacks, in one call; save each result as it finishes, and measure it."""
+    """Simulate what the store lacks, in one call; save each result as it finishes, and measure it.
+
+    The checkpoints of cases that were interrupted are taken up, and removed when all have ended.
+    """
     missing = [key for key in cases if not store.has(key)]
     for key in missing:
         if damage := store.damage(key):
@@ -152,7 +157,9 @@ def _simulate_missing(
             workers=workers,
             on_result=keep,
             on_progress=progress,
+            checkpoint=store.unfinished,
         )
+        shutil.rmtree(store.unfinished, ignore_errors=True)
     return outcomes
 
 

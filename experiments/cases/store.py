@@ -42,6 +42,11 @@ class Store:
         text = json.dumps(determined_by, sort_keys=True, separators=(",", ":"), allow_nan=False)
         return hashlib.sha256(text.encode()).hexdigest()
 
+    @property
+    def unfinished(self) -> Path:
+        """Folder of the checkpoints of cases that are being simulated."""
+        return self.folder / "unfinished"
+
     def path(self, key: str) -> Path:
         """File of a case."""
         return self.folder / f"{key}.npz"
