@@ -1,7 +1,7 @@
 """The sequence of launches that moves a batch on, captured once as a graph and replayed."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from itertools import product
 from typing import Any
 
@@ -13,6 +13,7 @@ from dem_warp.kernels.lanes import BLOCK, WARP
 from dem_warp.kernels.neighbours import neighbour_kernels
 from dem_warp.kernels.step import step_kernels
 from dem_warp.kernels.summation import MIN_LANES
+from dem_warp.kernels.walls import wall_kernels
 from dem_warp.laws.contact_law import memory_size
 from dem_warp.model import WorldSetup
 from dem_warp.state import (
@@ -22,7 +23,8 @@ from dem_warp.state import (
     build_neighbours,
     copy_grains,
 )
-from dem_warp.types import PRECISIONS, Build, device_structs
+from dem_warp.types import FRAMES, PRECISIONS, Build, device_structs
+from dem_warp.walls import Motion
 
 CHUNK = 256
 """Steps that `advance` takes at the least; a multiple of every length of a cycle."""
@@ -97,6 +99,7 @@ class Solver:
         )
         self._step_kernels = step_kernels(self.build)
         self._cell_kernels = cell_kernels(self.build.without_mechanisms)
+        self._wall_kernels = wall_kernels(self.build.without_mechanisms)
         self._list_kernels = neighbour_kernels(self.build)
         found, row = _neighbour_capacities(worlds)
         with wp.ScopedDevice(self.device):
@@ -139,6 +142,7 @@ class Solver:
         for grains in self.grains:
             self._launch(self._step_kernels.place_spheres, self.layout.grain_total, [self.model, grains])
         self._set_running(self._running)
+        self._place_walls(FRAMES - 1)
         self.stale.fill_(1)
         self._rebuild()
 
@@ -167,6 +171,10 @@ class Solver:
         ]  # fmt: skip
         self._launch(self._step_kernels.step, threads, inputs)
 
+    def _place_walls(self, ahead: int) -> None:
+        frames = len(self.worlds) * self.layout.wall_count * (ahead + 1)
+        self._launch(self._wall_kernels.place_walls, frames, [ahead, self.model, self.grains[0]])
+
     def _rebuild(self) -> None:
         spheres, grains = self.layout.sphere_total, self.grains[0]
         cells, lists = self._cell_kernels, self._list_kernels
@@ -179,11 +187,12 @@ class Solver:
         self._launch(lists.finish, self.layout.world_count, finish)
 
     def _cycle(self) -> None:
+        self._place_walls(self.cycle)
         for step in range(self.cycle):
             self._step(step % 2)
         inputs = [
             self.cycle, self.model, self.grains[0], self.alive, self.idle, self.hood,
-            self.stale, self.any_stale,
+            self.stale, self.any_stale, self.flags,
         ]  # fmt: skip
         self._launch(self._list_kernels.mark_stale, self.layout.grain_total, inputs)
         wp.capture_if(self.any_stale, self._rebuild)
@@ -230,15 +239,26 @@ class Solver:
                 self._step_kernels.remove, rows.size, [self.model, removed, self.alive, *self.grains]
             )
 
-    def move_wall(self, world: int, wall: int, velocity: Sequence[float]) -> None:
-        """Let a wall move with a constant velocity [m/s] from the present step on."""
-        walls = self.model.wall.numpy()
+    def move_wall(self, world: int, wall: int, motion: Motion) -> None:
+        """Let a wall move on from its present place, in any way, from the present step on."""
+        walls = np.array(self.model.wall.numpy())
         row = walls[world * self.layout.wall_count + wall]
-        step = int(self.grains[0].step.numpy()[world])
-        moved = max(step - int(row["start_step"]), 0) * self.worlds[world].time_step
-        row["point"] += row["velocity"] * moved
-        row["velocity"], row["start_step"] = velocity, step
+        row["start_step"] = self.grains[0].step.numpy()[world]
+        row["point"], row["orientation"] = self.wall_pose(world, wall)
+        for field in fields(motion):
+            row[field.name] = getattr(motion, field.name)
         self.model.wall.assign(walls)
+        self._place_walls(0)
+        # the lists know of the old motion only
+        self.stale[world : world + 1].fill_(1)
+        self._rebuild()
+
+    def wall_pose(self, world: int, wall: int) -> tuple[np.ndarray, np.ndarray]:
+        """Where the wall's own point is [m], and how far the wall has turned (quaternion x y z w)."""
+        number = world * self.layout.wall_count + wall
+        step = int(self.grains[0].step.numpy()[world])
+        frame = self.model.frame.numpy()[number * FRAMES + step % FRAMES]
+        return np.array(frame["origin"]), np.array(frame["rotation"])
 
     def view(self, worlds: Sequence[int]) -> list[WorldView]:
         """What scenes need of some worlds, copied from the device."""

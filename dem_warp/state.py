@@ -10,7 +10,7 @@ import warp as wp
 from dem_warp.clumps import stack_spheres
 from dem_warp.laws.contact_law import Mechanisms
 from dem_warp.model import WorldSetup, shape_table
-from dem_warp.types import Precision, device_structs
+from dem_warp.types import FRAMES, Precision, device_structs
 
 
 @dataclass(frozen=True)
@@ -77,18 +77,19 @@ def struct_array(struct: Any, rows: Sequence[dict[str, Any]], device: Any) -> wp
     return wp.array(host, dtype=struct, device=device)
 
 
-def wall_rows(worlds: Sequence[WorldSetup]) -> list[dict[str, Any]]:
+def _wall_rows(worlds: Sequence[WorldSetup]) -> list[dict[str, Any]]:
     """Fields of every wall at rest, world by world."""
     return [
         {
             "kind": wall.kind,
             "pair": pair,
-            "start_step": np.iinfo(np.int32).max,
-            "point": wall.point,
             "axis": wall.axis,
-            "velocity": (0.0, 0.0, 0.0),
             "radius": wall.radius,
+            "upper_radius": wall.upper_radius,
             "length": wall.length,
+            "reach": wall.reach,
+            "point": wall.point,
+            "orientation": (0.0, 0.0, 0.0, 1.0),
         }
         for world in worlds
         for wall, pair in world.walls
@@ -121,7 +122,8 @@ def build_model(worlds: Sequence[WorldSetup], layout: Layout, precision: Precisi
     model = types.Model()
     model.world = struct_array(types.World, world_rows, device)
     model.contact = struct_array(types.ContactParams, contact_rows, device)
-    model.wall = struct_array(types.Wall, wall_rows(worlds), device)
+    model.wall = struct_array(types.Wall, _wall_rows(worlds), device)
+    model.frame = wp.zeros(len(worlds) * layout.wall_count * FRAMES, dtype=types.Frame, device=device)
     model.shape_spheres = wp.array(spheres.reshape(-1, 4).astype(real), dtype=precision.vec4, device=device)
     model.shape_sphere_count = wp.array([s.sphere_count for s in shapes], dtype=int, device=device)
     model.shape = _ints(worlds, layout, shape_index, 0, device)

@@ -23,6 +23,9 @@ SPHERE_MASK = (1 << SPHERE_BITS) - 1
 MAX_PARTNERS = 1 << SPHERE_BITS
 MAX_SPHERES_PER_GRAIN = 1 << (31 - SPHERE_BITS)
 
+FRAMES = 64
+"""Steps for which the places of the walls are kept: a power of two above the longest cycle."""
+
 
 class WorldFlag(IntFlag):
     """What happened to a world while it ran; 0 is a healthy one."""
@@ -138,20 +141,37 @@ def device_structs(precision: Precision) -> SimpleNamespace:
 
     @wp.struct
     class Wall:
-        kind: int  # walls.PLANE or walls.CYLINDER
+        kind: int  # as in the module walls
         pair: int  # which contact parameters hold
+        axis: wp.vec3d  # unit axis or normal before the first motion
+        radius: wp.float64  # of the profile's start [m]
+        upper_radius: wp.float64  # of its end [m]
+        length: wp.float64  # of the profile along the axis [m]
+        reach: wp.float64  # from the wall's point to its farthest [m]
         start_step: int  # the motion starts with this step
-        point: wp.vec3d  # a point of the plane; the centre of the cylinder's lower rim [m]
-        axis: wp.vec3d  # unit normal of the plane; unit axis of the cylinder
+        point: wp.vec3d  # the wall's point when the motion starts [m]
+        orientation: wp.quatd  # how far it had then turned
         velocity: wp.vec3d  # [m/s]
-        radius: wp.float64  # [m]
-        length: wp.float64  # [m]
+        spin: wp.vec3d  # [rad/s]
+        amplitude: wp.vec3d  # of the vibration [m]
+        frequency: wp.float64  # [Hz]
+
+    @wp.struct
+    class Frame:
+        origin: wp.vec3d  # the wall's point [m]
+        rotation: wp.quatd  # how far it has turned
+        axis: wp.vec3d  # unit axis or normal
+        velocity: vec3  # of the wall's point [m/s]
+        spin: vec3  # [rad/s]
 
     @wp.struct
     class Model:
         world: wp.array(dtype=World)  # (worlds,)
         contact: wp.array(dtype=ContactParams)  # (worlds * pairs,)
         wall: wp.array(dtype=Wall)  # (worlds * walls,)
+        frame: wp.array(
+            dtype=Frame
+        )  # where it stands in the steps about the present, (worlds * walls * FRAMES,)
         shape_spheres: wp.array(dtype=vec4)  # local centre and radius, (shapes * spheres,) [m]
         shape_sphere_count: wp.array(dtype=int)  # (shapes,)
         shape: wp.array(dtype=int)  # (grains,)
@@ -198,6 +218,7 @@ def device_structs(precision: Precision) -> SimpleNamespace:
     return SimpleNamespace(
         Cells=Cells,
         Contact=Contact,
+        Frame=Frame,
         ContactParams=ContactParams,
         World=World,
         Wall=Wall,

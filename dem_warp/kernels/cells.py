@@ -130,8 +130,9 @@ def cell_kernels(build: Build) -> SimpleNamespace:
                         append(cells, i, j - first)
                         append(cells, j, i - first)
         for k in range(walls_each):
-            wall = model.wall[w * walls_each + k]
-            if walls.overlaps(wall, pack.place(a, world), reach, grains.step[w], world.time_step):
+            number = w * walls_each + k
+            frame = walls.frame_of(model, number, grains.step[w])
+            if walls.overlaps(model.wall[number], frame, pack.place(a, world), reach):
                 append(cells, i, model.grain_count * spheres_each + k)
 
     return SimpleNamespace(

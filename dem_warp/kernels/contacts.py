@@ -40,8 +40,9 @@ def contact_functions(build: Build) -> SimpleNamespace:
         if wp.static(acts_apart(build.mechanisms)):
             reach += world.reach
         if partner >= wall_base:
-            wall = model.wall[w * walls_each + partner - wall_base]
-            return walls.overlaps(wall, pack.place(a, world), reach, step, world.time_step)
+            number = w * walls_each + partner - wall_base
+            frame = walls.frame_of(model, number, step)
+            return walls.overlaps(model.wall[number], frame, pack.place(a, world), reach)
         b = pack.load_sphere(grains.spheres, w * wall_base + partner)
         d = pack.difference(a, b, world)
         reach += pack.last(b)
@@ -100,14 +101,15 @@ def contact_functions(build: Build) -> SimpleNamespace:
             b = pack.load_sphere(grains.spheres, w * wall_base + partner)
             c = meet_sphere(grains, world, c, w * model.grain_count + partner // spheres_each, a, b)
         else:
-            wall = model.wall[w * walls_each + partner - wall_base]
-            overlap, normal = walls.overlap_and_normal(
-                wall, pack.place(a, world), radius, step, world.time_step
-            )
+            number = w * walls_each + partner - wall_base
+            wall = model.wall[number]
+            frame = walls.frame_of(model, number, step)
+            overlap, normal, velocity = walls.meet(wall, frame, pack.place(a, world), radius)
             c.overlap = overlap
             c.normal = normal
             c.radius = radius
-            c.velocity = -walls.wall_velocity(wall, step)
+            c.velocity = -velocity
+            c.spin = -frame.spin
             pair += wall.pair
         c.lever = lever_of(grains, world, g, a, c.normal * (real(0.5) * c.overlap - radius))
         c.mobility += real(1.0) / (mass * wp.dot(c.lever, c.lever))

@@ -14,10 +14,12 @@ from types import SimpleNamespace
 import warp as wp
 
 from dem_warp.kernels.packing import packing
+from dem_warp.kernels.walls import wall_functions
 from dem_warp.laws.contact_law import memory_size
 from dem_warp.types import SPHERE_BITS, Build, WorldFlag, device_structs
 
 NEIGHBOUR_OVERFLOW = wp.constant(int(WorldFlag.NEIGHBOUR_OVERFLOW))
+LATE_REBUILD = wp.constant(int(WorldFlag.LATE_REBUILD))
 
 
 @functools.cache
@@ -28,6 +30,7 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
     types = device_structs(precision)
     Model, Grains, Neighbours, Cells = types.Model, types.Grains, types.Neighbours, types.Cells
     pack = packing(precision)
+    walls = wall_functions(precision)
     spheres_each = wp.constant(build.sphere_count)
     walls_each = wp.constant(build.wall_count)
     memory_each = wp.constant(memory_size(build.mechanisms))
@@ -47,6 +50,7 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
         # state out
         stale: wp.array(dtype=int),
         any_stale: wp.array(dtype=int),
+        flags: wp.array(dtype=int),
     ):
         """Marks a world in which a grain or a wall may use up its half of the skin within `ahead` steps."""
         g = wp.tid()
@@ -57,11 +61,15 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
         if g % model.grain_count == 0:
             for i in range(walls_each):
                 wall = model.wall[w * walls_each + i]
-                steps = grains.step[w] + ahead - wp.max(wall.start_step, hood.rebuilt[w])
-                path = wp.length(wall.velocity) * wp.float64(steps) * wp.float64(world.time_step)
-                if wp.float64(2.0) * path > wp.float64(world.skin):
+                frame = walls.frame_of(model, w * walls_each + i, grains.step[w])
+                past = wp.float64(grains.step[w] - hood.rebuilt[w]) * wp.float64(world.time_step)
+                coming = wp.float64(ahead) * wp.float64(world.time_step)
+                skin = wp.float64(world.skin)
+                if wp.float64(2.0) * walls.path(wall, frame, world, past + coming) > skin:
                     stale[w] = 1
                     any_stale[0] = 1
+                if wp.float64(2.0) * walls.path(wall, frame, world, past) > skin:
+                    wp.atomic_or(flags, w, LATE_REBUILD)
         if alive[g] <= 0:
             return
         v = pack.load_vec4(grains.velocity, g)

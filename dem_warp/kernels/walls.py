@@ -1,91 +1,147 @@
-"""Distance of a sphere from a wall: overlap, normal and the wall's velocity."""
+"""Where walls stand, step by step, and how a sphere meets one: overlap, normal and the wall's velocity."""
 
 import functools
+import math
 from types import SimpleNamespace
 
 import warp as wp
 
-from dem_warp.types import Precision, device_structs
-from dem_warp.walls import CYLINDER
+from dem_warp.types import FRAMES, Build, Precision, device_structs
+from dem_warp.walls import CYLINDER, PLANE
 
 TINY = 1.0e-12  # m; nearer than this to an axis or a surface no direction is defined
+TURN = wp.constant(wp.float64(2.0 * math.pi))  # rad
 
 
 @functools.cache
 def wall_functions(precision: Precision) -> SimpleNamespace:
-    """`overlaps`, `overlap_and_normal` and `wall_velocity` in one precision.
+    """`frame_of`, `overlaps`, `meet` and `path` in one precision.
 
     Geometry is in float64: an overlap is 1e-3 to 1e-6 of the distances that it is the difference of.
     """
     real, vec3 = precision.real, precision.vec3
-    Wall = device_structs(precision).Wall
-
-    @wp.func
-    def from_wall(wall: Wall, position: wp.vec3d, step: int, time_step: real) -> wp.vec3d:
-        """Position relative to the wall's own point, which moves from `start_step` on."""
-        steps = wp.max(step - wall.start_step, 0)
-        return position - wall.point - wall.velocity * (wp.float64(steps) * wp.float64(time_step))
-
-    @wp.func
-    def from_rim(wall: Wall, r: wp.vec3d, along: wp.float64):
-        """Vector to `r`, beyond the rims of a cylinder, from the nearest point of a rim, and its length.
-
-        On the axis every point of a rim is as near: the vector is what they have in common, along the axis.
-        """
-        across = r - wall.axis * along
-        off_axis = wp.length(across)
-        aside = off_axis - wall.radius
-        beyond = along - wp.clamp(along, wp.float64(0.0), wall.length)
-        outward = across / wp.max(off_axis, wp.float64(TINY))
-        return outward * aside + wall.axis * beyond, wp.sqrt(aside * aside + beyond * beyond)
-
-    @wp.func
-    def overlaps(wall: Wall, position: wp.vec3d, radius: real, step: int, time_step: real) -> bool:
-        """Whether a sphere touches the wall; away from a cylinder's rims without a root."""
-        r = from_wall(wall, position, step, time_step)
-        reach = wp.float64(radius)
-        along = wp.dot(r, wall.axis)
-        if wall.kind == CYLINDER:
-            if along < wp.float64(0.0) or along > wall.length:
-                _d, distance = from_rim(wall, r, along)
-                return distance < reach
-            across2 = wp.dot(r, r) - along * along
-            inner = wall.radius - reach
-            outer = wall.radius + reach
-            return (inner < wp.float64(0.0) or across2 > inner * inner) and across2 < outer * outer
-        return along < reach
+    types = device_structs(precision)
+    Model, World, Wall, Frame = types.Model, types.World, types.Wall, types.Frame
 
     @wp.func
     def rounded(v: wp.vec3d) -> vec3:
         return vec3(real(v[0]), real(v[1]), real(v[2]))
 
     @wp.func
-    def overlap_and_normal(wall: Wall, position: wp.vec3d, radius: real, step: int, time_step: real):
-        """Overlap [m] (positive when touching) and unit normal from the wall to the sphere."""
-        r = from_wall(wall, position, step, time_step)
-        along = wp.dot(r, wall.axis)
+    def frame_of(model: Model, wall: int, step: int) -> Frame:
+        """Where a wall stands in a step, one of those that `place_walls` was last asked for."""
+        return model.frame[wall * FRAMES + step % FRAMES]
+
+    @wp.func
+    def from_profile(wall: Wall, axis: wp.vec3d, r: wp.vec3d):
+        """Vector to `r` from the nearest point of the surface that the wall's profile sweeps, and its length.
+
+        On the axis every point of a ring is as near: the vector is what they have in common, along the axis.
+        """
+        along = wp.dot(r, axis)
+        across = r - axis * along
+        off_axis = wp.length(across)
+        widening = wall.upper_radius - wall.radius
+        part = (off_axis - wall.radius) * widening + along * wall.length
+        part = wp.clamp(
+            part / (widening * widening + wall.length * wall.length), wp.float64(0.0), wp.float64(1.0)
+        )
+        aside = off_axis - (wall.radius + part * widening)
+        beyond = along - part * wall.length
+        outward = across / wp.max(off_axis, wp.float64(TINY))
+        return outward * aside + axis * beyond, wp.sqrt(aside * aside + beyond * beyond)
+
+    @wp.func
+    def overlaps(wall: Wall, frame: Frame, position: wp.vec3d, radius: real) -> bool:
+        """Whether a sphere touches the wall; away from a cylinder's rims without a root."""
+        r = position - frame.origin
+        reach = wp.float64(radius)
+        along = wp.dot(r, frame.axis)
+        if wall.kind == PLANE:
+            return along < reach
+        if wall.kind == CYLINDER and along >= wp.float64(0.0) and along <= wall.length:
+            across2 = wp.dot(r, r) - along * along
+            inner = wall.radius - reach
+            outer = wall.radius + reach
+            return (inner < wp.float64(0.0) or across2 > inner * inner) and across2 < outer * outer
+        _d, distance = from_profile(wall, frame.axis, r)
+        return distance < reach
+
+    @wp.func
+    def overlap_and_normal(wall: Wall, axis: wp.vec3d, r: wp.vec3d, radius: real):
+        along = wp.dot(r, axis)
         distance = along
-        normal = rounded(wall.axis)
-        if wall.kind == CYLINDER:
-            if along < wp.float64(0.0) or along > wall.length:
-                d, length = from_rim(wall, r, along)
-                distance = length
-                normal = rounded(d) / real(wp.max(length, wp.float64(TINY)))
-            else:
-                across = r - wall.axis * along
-                off_axis = wp.max(wp.length(across), wp.float64(TINY))
-                distance = wp.abs(off_axis - wall.radius)
-                outward = rounded(across) / real(off_axis)
-                normal = wp.where(off_axis > wall.radius, outward, -outward)
+        normal = rounded(axis)
+        if wall.kind == CYLINDER and along >= wp.float64(0.0) and along <= wall.length:
+            across = r - axis * along
+            off_axis = wp.max(wp.length(across), wp.float64(TINY))
+            distance = wp.abs(off_axis - wall.radius)
+            outward = rounded(across) / real(off_axis)
+            normal = wp.where(off_axis > wall.radius, outward, -outward)
+        elif wall.kind != PLANE:
+            d, length = from_profile(wall, axis, r)
+            distance = length
+            normal = rounded(d) / real(wp.max(length, wp.float64(TINY)))
         return real(wp.float64(radius) - distance), normal
 
     @wp.func
-    def wall_velocity(wall: Wall, step: int) -> vec3:
-        moving = real(0.0)
-        if step >= wall.start_step:
-            moving = real(1.0)
-        return rounded(wall.velocity) * moving
+    def meet(wall: Wall, frame: Frame, position: wp.vec3d, radius: real):
+        """Overlap [m], unit normal from the wall to the sphere, and the wall's velocity there [m/s]."""
+        r = position - frame.origin
+        overlap, normal = overlap_and_normal(wall, frame.axis, r, radius)
+        arm = rounded(r) + normal * (real(0.5) * overlap - radius)
+        return overlap, normal, frame.velocity + wp.cross(frame.spin, arm)
 
-    return SimpleNamespace(
-        overlaps=overlaps, overlap_and_normal=overlap_and_normal, wall_velocity=wall_velocity
-    )
+    @wp.func
+    def path(wall: Wall, frame: Frame, world: World, time: wp.float64) -> wp.float64:
+        """How far the wall's motion takes any point of it that grains may touch, at the most, in a time [m].
+
+        A spin about its own axis leaves a surface of revolution where it is.
+        """
+        reach = wp.min(wall.reach, wp.length(frame.origin - world.origin) + wp.length(world.half_extent))
+        sway = wall.spin - frame.axis * wp.dot(wall.spin, frame.axis)
+        amplitude = wp.length(wall.amplitude)
+        swing = wp.min(wp.float64(2.0), TURN * wall.frequency * time) * amplitude
+        return (wp.length(wall.velocity) + wp.length(sway) * reach) * time + swing
+
+    return SimpleNamespace(frame_of=frame_of, overlaps=overlaps, meet=meet, path=path)
+
+
+@functools.cache
+def wall_kernels(build: Build) -> SimpleNamespace:
+    """`place_walls`, which works out where the walls stand in the steps to come."""
+    precision = build.precision
+    real, vec3 = precision.real, precision.vec3
+    types = device_structs(precision)
+    Model, Wall, Frame, Grains = types.Model, types.Wall, types.Frame, types.Grains
+    walls_each = wp.constant(build.wall_count)
+    module = wp.get_module(f"dem_warp_walls_{build.name}")
+    wp.set_module_options({"enable_backward": False}, module)
+
+    @wp.func
+    def moved(wall: Wall, time: wp.float64) -> Frame:
+        """Frame of a wall at a time [s] since its motion started."""
+        rate = wp.length(wall.spin)
+        turn = wp.quat_from_axis_angle(wp.normalize(wall.spin), rate * time)
+        circular = TURN * wall.frequency
+        velocity = wall.velocity + wall.amplitude * (circular * wp.cos(circular * time))
+        frame = Frame()
+        frame.origin = wall.point + wall.velocity * time + wall.amplitude * wp.sin(circular * time)
+        frame.rotation = wp.mul(turn, wall.orientation)
+        frame.axis = wp.quat_rotate(frame.rotation, wall.axis)
+        frame.velocity = vec3(real(velocity[0]), real(velocity[1]), real(velocity[2]))
+        frame.spin = vec3(real(wall.spin[0]), real(wall.spin[1]), real(wall.spin[2]))
+        return frame
+
+    @wp.kernel(module=module)
+    def place_walls(ahead: int, model: Model, grains: Grains):
+        """Frames of every wall for the present step and the `ahead` next: a closed form, nothing adds up."""
+        i = wp.tid()
+        index = i // (ahead + 1)
+        w = index // walls_each
+        wall = model.wall[index]
+        step = grains.step[w] + i % (ahead + 1)
+        time = wp.float64(step - wall.start_step) * wp.float64(model.world[w].time_step)
+        model.frame[index * FRAMES + step % FRAMES] = moved(wall, time)
+
+    return SimpleNamespace(place_walls=place_walls, module=module)

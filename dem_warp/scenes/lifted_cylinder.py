@@ -12,7 +12,7 @@ from dem_warp.model import Grains, WorldSetup
 from dem_warp.scenes.rain import Rain, place_rain
 from dem_warp.scenes.scene import Course, Decision
 from dem_warp.solver import WorldView
-from dem_warp.walls import Cylinder, Plane
+from dem_warp.walls import Cylinder, Motion, Plane
 
 PLATE, TUBE = 0, 1
 GRAVITY = 9.81
@@ -233,7 +233,8 @@ class LiftController:
             above[:] = False
         self._measure_fill(view, view.alive & ~above)
         self.course.enter("lift", view)
-        return Decision(remove=np.flatnonzero(above), move=(TUBE, (0.0, 0.0, self.scene.lift_speed)))
+        lift = Motion(velocity=(0.0, 0.0, self.scene.lift_speed))
+        return Decision(remove=np.flatnonzero(above), move=(TUBE, lift))
 
     def _measure_fill(self, view: WorldView, kept: np.ndarray) -> None:
         positions = view.positions[kept]

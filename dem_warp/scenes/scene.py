@@ -8,6 +8,7 @@ import numpy as np
 
 from dem_warp.model import WorldSetup
 from dem_warp.solver import WorldView
+from dem_warp.walls import Motion
 
 
 @dataclass(frozen=True)
@@ -18,8 +19,8 @@ class Decision:
     ----------
     remove : (k,) int array, optional
         Grain slots to take out.
-    move : (wall, velocity), optional
-        Wall to set in motion [m/s].
+    move : (wall, Motion), optional
+        Wall to set in motion, and how.
     done : bool
         The world has ended.
     failure : str
@@ -27,7 +28,7 @@ class Decision:
     """
 
     remove: np.ndarray | None = None
-    move: tuple[int, tuple[float, float, float]] | None = None
+    move: tuple[int, Motion] | None = None
     done: bool = False
     failure: str = ""
 

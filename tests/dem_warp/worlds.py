@@ -214,6 +214,8 @@ def record(solver: Solver, steps: int) -> Record:
 
     keep(0, solver.grains[0])
     for step in range(steps):
+        if step % 2 == 0:
+            solver._place_walls(1)
         solver._step(step % 2)
         keep(step + 1, solver.grains[1 - step % 2])
     return history
