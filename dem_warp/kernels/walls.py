@@ -1,7 +1,6 @@
 """Where walls stand, step by step, and how a sphere meets one: overlap, normal and the wall's velocity."""
 
 import functools
-import math
 from types import SimpleNamespace
 
 import warp as wp
@@ -10,7 +9,7 @@ from dem_warp.types import FRAMES, Build, Precision, device_structs
 from dem_warp.walls import CYLINDER, PLANE
 
 TINY = 1.0e-12  # m; nearer than this to an axis or a surface no direction is defined
-TURN = wp.constant(wp.float64(2.0 * math.pi))  # rad
+TURN = wp.constant(wp.float64(2.0 * wp.pi))  # rad
 
 
 @functools.cache
