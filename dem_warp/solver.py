@@ -255,6 +255,7 @@ class Solver:
 
     def wall_pose(self, world: int, wall: int) -> tuple[np.ndarray, np.ndarray]:
         """Where the wall's own point is [m], and how far the wall has turned (quaternion x y z w)."""
+        self._place_walls(0)
         number = world * self.layout.wall_count + wall
         step = int(self.grains[0].step.numpy()[world])
         frame = self.model.frame.numpy()[number * FRAMES + step % FRAMES]
