@@ -9,6 +9,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from dem_warp.clumps import ClumpShape
+from dem_warp.device import resolve_device
 from dem_warp.kernels.mesh_depth import mesh_depth
 from dem_warp.sphere_union import Array
 
@@ -87,21 +88,22 @@ class _Surface:
     """Signed distance to a closed surface, in units of its longest side from the corner of its box."""
 
     def __init__(self, solid: "Trimesh") -> None:
+        self._device = resolve_device("cpu")
         self.origin = np.array(solid.bounds[0])
         self.extent = float(np.ptp(solid.bounds, axis=0).max())
         self.box = np.ptp(solid.bounds, axis=0) / self.extent
         points = (np.asarray(solid.vertices) - self.origin) / self.extent
         self._mesh = wp.Mesh(
-            points=wp.array(points, dtype=wp.vec3, device="cpu"),
-            indices=wp.array(np.asarray(solid.faces).ravel(), dtype=wp.int32, device="cpu"),
+            points=wp.array(points, dtype=wp.vec3, device=self._device),
+            indices=wp.array(np.asarray(solid.faces).ravel(), dtype=wp.int32, device=self._device),
             support_winding_number=True,
         )
 
     def depth(self, points: Array) -> Array:
         """Distance of points (N, 3) to the surface, positive inside."""
-        depths = wp.empty(len(points), dtype=wp.float32, device="cpu")
-        queries: wp.array = wp.array(points, dtype=wp.vec3, device="cpu")
-        wp.launch(mesh_depth, len(points), inputs=[self._mesh.id, queries], outputs=[depths], device="cpu")
+        depths = wp.empty(len(points), dtype=wp.float32, device=self._device)
+        queries: wp.array = wp.array(points, dtype=wp.vec3, device=self._device)
+        wp.launch(mesh_depth, len(points), [self._mesh.id, queries], [depths], device=self._device)
         return depths.numpy().astype(np.float64)
 
 

@@ -145,6 +145,12 @@ class GrainPopulation:
         mixture = self.mixture
         return float(np.dot(mixture.fractions, [quantity(shape) for shape in mixture.shapes]))
 
+    @property
+    def grain_reach(self) -> float:
+        """Bounding radius of a typical grain [m]: the mean over the volume of solid, at size 1."""
+        volume = self.mean(lambda shape: shape.volume)
+        return self.mean(lambda shape: shape.volume / volume * shape.bounding_radius)
+
     def draw(self, count: int, seed: int) -> DrawnGrains:
         """Draw `count` grains, the same ones from the same seed."""
         return DrawnGrains(

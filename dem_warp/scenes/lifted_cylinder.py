@@ -243,8 +243,7 @@ class LiftController:
                 kept[: self.setup.grains.count]
             ].sum()
         )
-        reach = self.case.grains.mean(lambda shape: shape.bounding_radius)
-        level = bed_level(positions, self.scene.diameter / 2, reach)
+        level = bed_level(positions, self.scene.diameter / 2, self.case.grains.grain_reach)
         self.course.observables["grain_count"] = float(np.count_nonzero(kept))
         self.course.observables["fill_height"] = level
         self.course.observables["solid_fraction"] = volume / (np.pi / 4 * self.scene.diameter**2 * level)

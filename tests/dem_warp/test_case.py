@@ -5,9 +5,18 @@ import math
 from dataclasses import fields, is_dataclass, replace
 
 import pytest
-from worlds import BOOT, GRAIN, PYRAMID, SMALL_TUBE, STEEL, small_case
+from worlds import BALL, BOOT, GRAIN, PYRAMID, SMALL_TUBE, STEEL, small_case
 
-from dem_warp import Case, GrainPopulation, Interaction, LiftedCylinder, Material, Numerics, rayleigh_time
+from dem_warp import (
+    Case,
+    GrainPopulation,
+    Interaction,
+    LiftedCylinder,
+    Material,
+    Numerics,
+    ShapeMixture,
+    rayleigh_time,
+)
 from dem_warp.laws.linear_cohesion import LinearCohesion
 
 
@@ -92,6 +101,16 @@ def test_a_case_s_identity_tells_clumps_of_one_radius_apart():
     slim, wide = (replace(small_case(), grains=GrainPopulation(shape, GRAIN)) for shape in (PYRAMID, BOOT))
     assert slim.to_dict()["grains"] != wide.to_dict()["grains"]
     assert slim.to_dict()["grains"]["shape"] == PYRAMID.to_dict()
+
+
+def test_a_case_s_identity_tells_mixtures_apart():
+    mixtures = [
+        ShapeMixture(shapes, fractions)
+        for shapes in ((PYRAMID, BOOT), (BOOT, PYRAMID), (PYRAMID, BALL))
+        for fractions in ((0.5, 0.5), (0.4, 0.6))
+    ]
+    cases = [replace(small_case(), grains=GrainPopulation(mixture, GRAIN)) for mixture in mixtures]
+    assert len({json.dumps(case.to_dict(), sort_keys=True) for case in cases}) == len(cases)
 
 
 def test_the_modulus_scale_softens_the_grains_alone():

@@ -5,13 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from worlds import GRAIN, PYRAMID, SMALL_TUBE, small_case, spheres_of
+from worlds import BOOT, GRAIN, PYRAMID, SMALL_TUBE, small_case, spheres_of
 
-from dem_warp import CaseResult, GrainPopulation, simulate
+from dem_warp import Case, CaseResult, ClumpShape, GrainPopulation, ShapeMixture, simulate
 from dem_warp.batch import Batch
 from dem_warp.device import resolve_device
 from dem_warp.scenes.lifted_cylinder import bed_level
 from dem_warp.scenes.scene import Decision
+from dem_warp.simulation import batches
 from dem_warp.solver import WorldView
 
 ARRAYS = ("positions", "orientations", "sizes", "sphere_centers", "sphere_radii", "sphere_grain")
@@ -37,6 +38,11 @@ def run_batch(cases) -> dict[int, CaseResult]:
     while batch.running:
         results.update(batch.advance())
     return results
+
+
+def with_shapes(shapes: tuple[ClumpShape, ...], fractions: tuple[float, ...]) -> Case:
+    """The small case with several shapes."""
+    return replace(small_case(), grains=GrainPopulation(ShapeMixture(shapes, fractions), GRAIN))
 
 
 @pytest.fixture(scope="module")
@@ -131,6 +137,46 @@ def test_a_case_in_a_batch_gives_the_same_bits(heap):
     results = run_batch([others[0], small_case(), others[1]])
     same_bits(results[1], heap)
     assert {result.status for result in results.values()} == {"finished"}
+
+
+def test_a_second_shape_of_fraction_0_changes_no_bit(heap):
+    # The other shape has more spheres, whose kernels differ.
+    other = ClumpShape.from_spheres(1e-3 * np.arange(36).reshape(12, 3), np.full(12, 1e-3))
+    case = with_shapes((other, PYRAMID), (0.0, 1.0))
+    same_bits(simulate([case], device="cpu", workers=1)[0], heap)
+
+
+def test_equal_shapes_under_two_names_are_one_and_do_not_segregate(heap):
+    [twins] = simulate([with_shapes((PYRAMID, PYRAMID), (0.5, 0.5))], device="cpu", workers=1)
+    same_bits(twins, heap)
+    first = twins.shapes == 0
+    assert 0 < first.sum() < len(first)
+    # Names do not know where their grains go: heights and distances from the axis of the two kinds have means
+    # within four standard errors of their difference.
+    for value in (twins.positions[:, 2], np.hypot(*twins.positions.T[:2])):
+        error = value.std() * np.sqrt(1.0 / first.sum() + 1.0 / (~first).sum())
+        assert value[first].mean() == pytest.approx(value[~first].mean(), abs=4.0 * error)
+
+
+def test_two_shapes_in_one_world_give_a_heap_alone_and_in_a_batch(heap):
+    case = with_shapes((PYRAMID, BOOT), (0.4, 0.6))
+    case = replace(case, scene=replace(SMALL_TUBE, grain_count=60))
+    assert batches([small_case(), case], one_each=False) == [[0, 1]]
+    [alone] = simulate([case], device="cpu", workers=1)
+    results = run_batch([small_case(), case])
+    same_bits(results[0], heap)
+    same_bits(results[1], alone)
+    assert (alone.status, alone.observables["grains_lost"]) == ("finished", 0)
+    drawn = case.grains.draw(60, case.seed)
+    np.testing.assert_array_equal(alone.shapes, drawn.shapes)
+    counts = np.bincount(drawn.shapes)
+    assert counts.min() > 10
+    assert len(alone.sphere_radii) == 9 * counts[0] + 3 * counts[1]
+    # All of it lies on the plate: spheres sink in by less than a tenth of the smallest.
+    assert (alone.sphere_centers[:, 2] > 0.9 * alone.sphere_radii).all()
+    volumes = np.array([PYRAMID.volume, BOOT.volume])[alone.shapes] * alone.sizes**3
+    space = np.pi / 4.0 * SMALL_TUBE.diameter**2 * alone.observables["fill_height"]
+    assert alone.observables["solid_fraction"] == pytest.approx(volumes.sum() / space, rel=1e-12)
 
 
 def test_the_skin_of_a_case_does_not_change_its_bits(heap):

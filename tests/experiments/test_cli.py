@@ -166,6 +166,24 @@ def test_a_small_real_heap_is_simulated_and_written(write_study: WriteStudy) -> 
     assert json.loads(dem_warp(*command, "--out", "two")[1])["views"] == heap["views"]
 
 
+def test_a_heap_of_two_shapes_is_simulated_and_written(write_study: WriteStudy) -> None:
+    shapes = (
+        '[grain.shapes.large]\nsphere = "2 mm"\n[grain.shapes.small]\nsphere = "1.5 mm"\nfraction = 0.4\n\n'
+    )
+    path = write_study(('sphere = "2 mm"\n', ""), ("[wall]", f"{shapes}[wall]"))
+    code, out, _ = dem_warp("heap", path, "--device", "cpu", "--json", "--out", "one")
+    assert (code, json.loads(out)["status"]) == (0, "finished")
+    spheres = pyvista.read("one/heap.vtp")
+    assert spheres.n_points == 30
+    counts = np.bincount(spheres["shape"])
+    # Binomial: four standard deviations about 12 of 30.
+    assert counts[1] == pytest.approx(12, abs=4.0 * np.sqrt(30 * 0.4 * 0.6))
+    for shape, radius in enumerate((2e-3, 1.5e-3)):
+        # Sizes lie within three standard deviations of 5 %.
+        np.testing.assert_allclose(spheres["radius"][spheres["shape"] == shape], radius, rtol=0.15)
+    assert Path("one/snapshot.png").stat().st_size > 1000
+
+
 def test_photographs_become_angles_and_overlays() -> None:
     save_picture("a.png", triangle(0.5))
     save_picture("b.png", triangle(0.3))

@@ -151,3 +151,14 @@ def test_a_changed_clump_is_noticed(tmp_path: Path, write_study: WriteStudy) -> 
     clump.write_text("0 0 0 1\n1.5 0 0 1\n", encoding="utf-8")
     [change] = open_folder(tmp_path / "out", load_study(path), resume=True)[1]
     assert change.startswith("clump_sha256")
+
+
+def test_a_changed_clump_of_several_is_noticed(tmp_path: Path, write_study: WriteStudy) -> None:
+    for name in ("a", "b"):
+        (tmp_path / f"{name}.txt").write_text("0 0 0 1\n", encoding="utf-8")
+    shapes = '[grain.shapes.a]\nclump = "a.txt"\n[grain.shapes.b]\nclump = "b.txt"\nfraction = 0.4\n'
+    path = write_study(('sphere = "2 mm"\n', ""), ("[wall]", f"{shapes}[wall]"))
+    open_folder(tmp_path / "out", load_study(path))
+    (tmp_path / "b.txt").write_text("0 0 0 1.5\n", encoding="utf-8")
+    [change] = open_folder(tmp_path / "out", load_study(path), resume=True)[1]
+    assert change.startswith("clump_sha256[2]")

@@ -77,6 +77,90 @@ def test_factors_that_are_not_set_are_at_their_middle() -> None:
     assert case.grains.material.shear_modulus == pytest.approx(34.325e6, rel=1e-15)
 
 
+TWO_SHAPES = """
+[grain.shapes.whole]
+sphere = "2 mm"
+[grain.shapes.split]
+clump = "split.txt"
+fraction = 0.25
+"""
+
+
+@pytest.fixture
+def two_shapes(tmp_path: Path, write_study: WriteStudy) -> WriteStudy:
+    """Write the small study with two shapes, some of its text replaced."""
+    (tmp_path / "split.txt").write_text("0 0 0 1\n1 0 0 1\n", encoding="utf-8")
+
+    def write(*replacements: tuple[str, str], add: str = "") -> Path:
+        text = TWO_SHAPES
+        for old, new in replacements:
+            assert text.count(old) == 1, old
+            text = text.replace(old, new)
+        return write_study(('sphere = "2 mm"\n', ""), ("[wall]", f"{text}\n[wall]"), add=add)
+
+    return write
+
+
+def test_several_shapes_are_mixed_in_the_order_of_the_file(two_shapes: WriteStudy) -> None:
+    grains = load_study(two_shapes()).case({}, seed=1).grains
+    whole, split = grains.mixture.shapes
+    assert (whole.sphere_count, whole.radii[0], split.sphere_count) == (1, 2e-3, 2)
+    assert grains.mixture.fractions == (0.75, 0.25)
+    given = load_study(two_shapes(('sphere = "2 mm"', 'sphere = "2 mm"\nfraction = 0.75')))
+    assert given.case({}, seed=1).grains == grains
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key", "rule"),
+    [
+        ("fraction = 0.25", "fraction = 1.25", "grain.shapes.split.fraction", "less than or equal to 1"),
+        ("fraction = 0.25", 'fraction = "1 mm"', "grain.shapes.split.fraction", "without the unit"),
+        ("fraction = 0.25", "part = 0.25", "grain.shapes.split.part", "unknown key"),
+        ("fraction = 0.25", "fractoin = 0.25", "grain.shapes.split.fractoin", "did you mean 'fraction'?"),
+        ('clump = "split.txt"', 'clump = "none.txt"', "grain.shapes.split.clump", "existing clump file"),
+        ('clump = "split.txt"', "", "grain.shapes.split", "needs a clump"),
+        ('clump = "split.txt"', 'clump = "split.txt"\nsphere = "1 mm"', "grain.shapes.split", "not both"),
+        ("fraction = 0.25", "", "grain", "every shape but one needs its fraction"),
+        ('sphere = "2 mm"', 'sphere = "2 mm"\nfraction = 0.7', "grain", "add up to 1 .* not to 0.95"),
+        ('sphere = "2 mm"', 'sphere = "2 mm"\nfraction = 0.8', "grain", "add up to 1 .* not to 1.05"),
+    ],
+)
+def test_a_breach_in_one_of_several_shapes_is_placed_there(
+    two_shapes: WriteStudy, old: str, new: str, key: str, rule: str
+) -> None:
+    path = two_shapes((old, new))
+    with pytest.raises(StudyError, match=rule) as caught:
+        load_study(path)
+    place, _, found = caught.value.place.rpartition(": ")
+    assert found == key
+    line = path.read_text(encoding="utf-8").splitlines()[int(place.rpartition(":")[2]) - 1]
+    assert line.startswith(key.rpartition(".")[2] + " ") or line == f"[{key}]"
+
+
+def test_one_shape_and_several_exclude_each_other(two_shapes: WriteStudy) -> None:
+    with pytest.raises(StudyError, match=r"one shape .* or several .*, not both"):
+        load_study(two_shapes(add='[scale.other]\ngrain.sphere = "1 mm"\n'), "other")
+
+
+def test_a_fraction_can_be_a_factor(two_shapes: WriteStudy) -> None:
+    factor = """
+[[factor]]
+name = "S"
+label = "split grains"
+parameter = "grain.shapes.split.fraction"
+low = 0.0
+high = 0.4
+"""
+    study = load_study(two_shapes(("fraction = 0.25\n", ""), add=factor))
+    assert study.limits["S"] == (0.0, 1.0)
+    assert study.case({}, seed=1).grains.mixture.fractions == (0.8, 0.2)
+    assert study.case({"S": 0.1}, seed=1).grains.mixture.fractions == (0.9, 0.1)
+    # Without split grains a case is one of spheres.
+    assert study.case({"S": 0.0}, seed=1).grains.sphere_count == 1
+    with pytest.raises(StudyError, match="less than or equal to 1"):
+        study.case({"S": 1.1}, seed=1)
+
+
 def test_factor_values_are_in_the_factors_unit() -> None:
     study = load_study()
     assert study.natural_settings({"B": "34000 kPa", "E": 0.4}) == {"B": 34.0, "E": 0.4}
