@@ -179,6 +179,21 @@ def test_two_shapes_in_one_world_give_a_heap_alone_and_in_a_batch(heap):
     assert alone.observables["solid_fraction"] == pytest.approx(volumes.sum() / space, rel=1e-12)
 
 
+def test_grains_of_5_and_of_30_spheres_form_a_heap():
+    # Rings whose spheres overlap the more, the more they are: the longest neighbour lists of a grain's size.
+    rings = []
+    for count in (5, 30):
+        turn = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
+        centers = 2e-3 * np.column_stack([np.cos(turn), np.sin(turn), 0.3 * np.cos(3.0 * turn)])
+        rings.append(ClumpShape.from_spheres(centers, np.full(count, 0.8e-3), resolution=8))
+    case = with_shapes(tuple(rings), (0.5, 0.5))
+    case = replace(case, scene=replace(SMALL_TUBE, grain_count=20))
+    [result] = simulate([case], device="cpu", workers=1)
+    assert (result.status, result.observables["late_rebuilds"]) == ("finished", 0)
+    assert len(result.sphere_radii) == 5 * (result.shapes == 0).sum() + 30 * (result.shapes == 1).sum()
+    assert (result.sphere_centers[:, 2] > 0.9 * result.sphere_radii).all()
+
+
 def test_the_skin_of_a_case_does_not_change_its_bits(heap):
     wide = simulate([small_case(skin=1.6e-3)], device="cpu", workers=1)[0]
     same_bits(wide, heap)

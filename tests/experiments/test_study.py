@@ -161,6 +161,48 @@ high = 0.4
         study.case({"S": 1.1}, seed=1)
 
 
+def test_a_scale_exchanges_clump_sizes_tube_rain_step_and_fit(two_shapes: WriteStudy, tmp_path: Path) -> None:
+    (tmp_path / "other.txt").write_text("0 0 0 1\n1 0 0 1\n0 1 0 1\n", encoding="utf-8")
+    scale = """
+[scale.other]
+grain.shapes.split.clump = "other.txt"
+grain.size_sd = 0.1
+scene.lifted-cylinder.height = "50 mm"
+scene.lifted-cylinder.rain_rate = "1000 1/s"
+numerics.time_step_fraction = 0.1
+measurement.fit = "middle"
+"""
+    study = load_study(two_shapes(add=scale), "other")
+    case = study.case({}, seed=1)
+    assert [shape.sphere_count for shape in case.grains.mixture.shapes] == [1, 3]
+    assert (case.grains.size_sd, case.numerics.time_step_fraction) == (0.1, 0.1)
+    assert (case.scene.height, case.scene.rain_rate, study.measurement.fit) == (0.05, 1000.0, "middle")
+
+
+@pytest.mark.parametrize(
+    ("fixed", "parameter", "low", "high"),
+    [
+        ("size_sd", "grain.size_sd", 0.0, 0.1),
+        ("sphere", "grain.sphere", "1 mm", "2 mm"),
+        ("height", "scene.lifted-cylinder.height", "20 mm", "40 mm"),
+        ("duration", "scene.lifted-cylinder.duration", "1 s", "2 s"),
+        ("modulus_scale", "numerics.modulus_scale", 10.0, 400.0),
+    ],
+)
+def test_sizes_tube_and_softening_can_be_factors(
+    write_study: WriteStudy, fixed: str, parameter: str, low: object, high: object
+) -> None:
+    path = write_study()
+    lines = [line for line in path.read_text(encoding="utf-8").splitlines() if not line.startswith(fixed)]
+    factor = (
+        f'[[factor]]\nname = "X"\nlabel = "x"\nparameter = "{parameter}"\nlow = {low!r}\nhigh = {high!r}\n'
+    )
+    path.write_text("\n".join([*lines, factor]), encoding="utf-8")
+    study = load_study(path)
+    ends = [study.case({"X": getattr(study.factors[1], end)}, seed=1).to_dict() for end in ("low", "high")]
+    assert ends[0] != ends[1]
+
+
 def test_factor_values_are_in_the_factors_unit() -> None:
     study = load_study()
     assert study.natural_settings({"B": "34000 kPa", "E": 0.4}) == {"B": 34.0, "E": 0.4}

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 
 from experiments.calibrate import Campaign, Outcome
 from experiments.report import HeapPicture, render_page
 from experiments.report.numbers import prose
+from experiments.report.page import study_facts
 from experiments.studies.buckwheat import paper
-from experiments.study import Study
+from experiments.study import Study, load_study
 
 
 def test_the_page_is_well_formed_and_its_contents_lead_somewhere(page) -> None:
@@ -117,3 +119,12 @@ def test_only_the_papers_study_shows_the_papers_numbers(
         assert ("The paper kept E and F" in shown.text) is expected
     assert len(page.rows("misprints")) == len(paper.misprints())
     assert [row[0][0] for row in page.rows("tests")] == ["this campaign", "the paper"]
+
+
+def test_the_facts_name_the_spheres_of_every_shape(write_study: Callable[..., Path]) -> None:
+    one = load_study(write_study())
+    assert study_facts(one)["Grains"] == "30 grains, 1 sphere each"
+    (one.file.parent / "two.txt").write_text("0 0 0 1\n1 0 0 1\n", encoding="utf-8")
+    shapes = '[grain.shapes.a]\nclump = "two.txt"\n[grain.shapes.b]\nsphere = "2 mm"\nfraction = 0.5\n\n'
+    both = load_study(write_study(('sphere = "2 mm"\n', ""), ("[wall]", f"{shapes}[wall]")))
+    assert study_facts(both)["Grains"] == "30 grains, 1 or 2 spheres each"
