@@ -9,7 +9,9 @@ from worlds import (
     GRAVITY,
     PYRAMID,
     RADIUS,
+    TIME_STEP,
     ball_mass,
+    ball_on_plane,
     downhill,
     grains,
     pair,
@@ -25,21 +27,7 @@ from dem_warp.materials import rayleigh_time
 from dem_warp.model import ContactCoefficients, WorldSetup
 from dem_warp.walls import Plane
 
-TIME_STEP = 0.25 * rayleigh_time(RADIUS, GRAIN)
 SPEED = 0.1
-
-
-def ball_on_plane(
-    contact: ContactCoefficients,
-    slope: float = 0.0,
-    velocity: tuple[float, float, float] = (0.0, 0.0, 0.0),
-    spin: tuple[float, float, float] = (0.0, 0.0, 0.0),
-) -> WorldSetup:
-    """A ball that stands on a plane under its own weight."""
-    weight = ball_mass() * GRAVITY * math.cos(math.radians(slope))
-    place = [0.0, 0.0, RADIUS - static_overlap(contact, weight)]
-    bodies = grains(place, velocities=velocity, spins=spin)
-    return world(bodies, contact, TIME_STEP, walls=(Plane(),), gravity=downhill(slope))
 
 
 def lever(contact: ContactCoefficients) -> float:

@@ -17,7 +17,7 @@ from dem_warp.case import Case, Numerics
 from dem_warp.clumps import ClumpShape
 from dem_warp.device import resolve_device
 from dem_warp.laws.mechanism import Mechanism
-from dem_warp.materials import Interaction, Material
+from dem_warp.materials import Interaction, Material, rayleigh_time
 from dem_warp.model import ContactCoefficients, Grains, WorldSetup
 from dem_warp.population import GrainPopulation
 from dem_warp.scenes.lifted_cylinder import LiftedCylinder
@@ -31,6 +31,9 @@ RADIUS = 5e-3
 BALL = ClumpShape.sphere(RADIUS)
 GRAIN = Material(density=1000.0, shear_modulus=10e6, poisson_ratio=0.25)
 STEEL = Material(density=7800.0, shear_modulus=70e9, poisson_ratio=0.3)
+TIME_STEP = 0.25 * rayleigh_time(RADIUS, GRAIN)
+"""Of a ball on a plane [s]."""
+
 HERTZ_DURATION = 0.8 * math.sqrt(math.pi) * math.gamma(0.4) / math.gamma(0.9)
 """Duration of an elastic Hertz impact over (largest overlap / impact speed): 2.9432750."""
 
@@ -137,6 +140,19 @@ def ball_mass() -> float:
 def static_overlap(contact: ContactCoefficients, force: float, radius: float = RADIUS) -> float:
     """Overlap [m] at which a Hertz contact carries a force [N]."""
     return float((0.75 * force / (contact.modulus * math.sqrt(radius))) ** (2.0 / 3.0))
+
+
+def ball_on_plane(
+    contact: ContactCoefficients,
+    slope: float = 0.0,
+    velocity: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    spin: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> WorldSetup:
+    """A ball that stands on a plane under its own weight."""
+    weight = ball_mass() * GRAVITY * math.cos(math.radians(slope))
+    place = [0.0, 0.0, RADIUS - static_overlap(contact, weight)]
+    bodies = grains(place, velocities=velocity, spins=spin)
+    return world(bodies, contact, TIME_STEP, walls=(Plane(),), gravity=downhill(slope))
 
 
 @dataclass(frozen=True)
