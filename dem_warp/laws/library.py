@@ -1,9 +1,17 @@
 """Every mechanism, by its name; a new one is its file and a line here."""
 
+from dem_warp.laws.elastic_plastic_rolling import ElasticPlasticRolling
 from dem_warp.laws.linear_cohesion import LinearCohesion
 from dem_warp.laws.mechanism import Mechanism
+from dem_warp.laws.twisting import Twisting
 
-MECHANISMS: dict[str, type[Mechanism]] = {mechanism.name: mechanism for mechanism in (LinearCohesion,)}
+_ALL: tuple[type[Mechanism], ...] = (
+    LinearCohesion,
+    ElasticPlasticRolling,
+    Twisting,
+)
+
+MECHANISMS: dict[str, type[Mechanism]] = {mechanism.name: mechanism for mechanism in _ALL}
 
 PARAMETERS: tuple[str, ...] = tuple(
     name for mechanism in MECHANISMS.values() for name in mechanism.parameter_names()
