@@ -1,14 +1,19 @@
 """Every mechanism, by its name; a new one is its file and a line here."""
 
 from dem_warp.laws.elastic_plastic_rolling import ElasticPlasticRolling
+from dem_warp.laws.kinetic_friction import KineticFriction
 from dem_warp.laws.linear_cohesion import LinearCohesion
 from dem_warp.laws.mechanism import Mechanism
+from dem_warp.laws.rate_weakening import RateWeakening
 from dem_warp.laws.twisting import Twisting
 
 _ALL: tuple[type[Mechanism], ...] = (
     LinearCohesion,
     ElasticPlasticRolling,
     Twisting,
+    # before kinetic friction, which compares the spring with the coefficient that holds at the present speed
+    RateWeakening,
+    KineticFriction,
 )
 
 MECHANISMS: dict[str, type[Mechanism]] = {mechanism.name: mechanism for mechanism in _ALL}

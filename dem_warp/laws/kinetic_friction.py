@@ -1,0 +1,57 @@
+"""Static and kinetic friction: a contact that slips is held by less than one that sticks."""
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import warp as wp
+
+from dem_warp.laws.mechanism import Mechanism
+
+
+@wp.func
+def stick_or_slip(
+    params: Any, contact: Any, coefficient: Any, spring: Any, support: Any, memory: Any, at: int
+):
+    """Coefficient of a contact that sticks, or that slips; remembers which (1: it slips)."""
+    zero = type(coefficient)(0.0)
+    one = type(coefficient)(1.0)
+    kinetic = coefficient * (one - params.friction_drop)
+    held_by = coefficient
+    if memory[at] == one and not contact.is_new:
+        held_by = kinetic
+    if spring > held_by * support:
+        memory[at] = one
+        return kinetic
+    memory[at] = zero
+    return coefficient
+
+
+@dataclass(frozen=True, kw_only=True)
+class KineticFriction(Mechanism):
+    """Kinetic friction mu_k below the static mu_s, which is the pair's coefficient of friction.
+
+    Attributes
+    ----------
+    friction_drop : float
+        1 - mu_k / mu_s [1], from 0 to below 1.
+
+    Notes
+    -----
+    A contact starts to slip when its tangential spring passes mu_s F_n. From then on the spring is held to
+    mu_k F_n, until the motion no longer stretches it to that: then the contact sticks, and takes mu_s F_n to
+    slip again.
+
+    Source: Coulomb's two coefficients, with the state of each contact as in S. Luding, Granular Matter 10
+    (2008) 235-246.
+    """
+
+    friction_drop: float = 0.0
+
+    name: ClassVar[str] = "kinetic_friction"
+    strength: ClassVar[str] = "friction_drop"
+    memory_size: ClassVar[int] = 1
+    friction: ClassVar[Any] = stick_or_slip
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._require_below_one("friction_drop")

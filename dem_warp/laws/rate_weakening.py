@@ -1,0 +1,55 @@
+"""Friction that weakens with the speed of sliding."""
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import warp as wp
+
+from dem_warp.laws.mechanism import Mechanism
+
+
+@wp.func
+def weakened(params: Any, contact: Any, coefficient: Any, spring: Any, support: Any, memory: Any, at: int):
+    """Coefficient of friction at the present speed of sliding."""
+    one = type(coefficient)(1.0)
+    if params.weakening > type(coefficient)(0.0):
+        velocity = contact.velocity - contact.normal * wp.dot(contact.velocity, contact.normal)
+        fast = one - wp.exp(-wp.length(velocity) / params.weakening_speed)
+        coefficient = coefficient * (one - params.weakening * fast)
+    return coefficient
+
+
+@dataclass(frozen=True, kw_only=True)
+class RateWeakening(Mechanism):
+    """Friction that falls from the pair's coefficient mu at rest to mu (1 - weakening) at speed.
+
+    Attributes
+    ----------
+    weakening : float
+        Part of the friction that is lost at high speed [1], from 0 to below 1.
+    weakening_speed : float
+        v_0, the speed at which 63 % of that is lost [m/s]; above 0 where something is lost.
+
+    Notes
+    -----
+    mu(v) = mu (1 - weakening (1 - exp(-v / v_0))), where v is the speed of the one surface along the other.
+
+    Source: Oden and Martins, Computer Methods in Applied Mechanics and Engineering 52 (1985) 527-634; the
+    "exponential decay" of finite-element codes, mu_k + (mu_s - mu_k) exp(-v / v_0).
+    """
+
+    weakening: float = 0.0
+    weakening_speed: float = 0.0
+
+    name: ClassVar[str] = "rate_weakening"
+    strength: ClassVar[str] = "weakening"
+    friction: ClassVar[Any] = weakened
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._require_below_one("weakening")
+        if self.weakening > 0.0 and self.weakening_speed == 0.0:
+            raise ValueError(
+                f"{type(self).__name__}.weakening_speed: must be above 0 where weakening is, "
+                f"got {self.weakening_speed!r}"
+            )
