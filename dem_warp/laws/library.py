@@ -1,6 +1,7 @@
 """Every mechanism, by its name; a new one is its file and a line here."""
 
 from dem_warp.laws.elastic_plastic_rolling import ElasticPlasticRolling
+from dem_warp.laws.hysteretic_spring import HystereticSpring
 from dem_warp.laws.kinetic_friction import KineticFriction
 from dem_warp.laws.linear_cohesion import LinearCohesion
 from dem_warp.laws.mechanism import Mechanism
@@ -14,6 +15,7 @@ _ALL: tuple[type[Mechanism], ...] = (
     # before kinetic friction, which compares the spring with the coefficient that holds at the present speed
     RateWeakening,
     KineticFriction,
+    HystereticSpring,
 )
 
 MECHANISMS: dict[str, type[Mechanism]] = {mechanism.name: mechanism for mechanism in _ALL}

@@ -1,0 +1,61 @@
+"""Plastic dents: a normal spring that gives less back than it took, at any speed."""
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import warp as wp
+
+from dem_warp.laws.mechanism import Mechanism
+
+
+@wp.func
+def dented(params: Any, contact: Any, elastic: Any, memory: Any, at: int):
+    """Normal force [N] over a dent; remembers the largest overlap [m]."""
+    zero = type(elastic)(0.0)
+    one = type(elastic)(1.0)
+    deepest = memory[at]
+    if contact.is_new:
+        deepest = zero
+    deepest = wp.max(deepest, contact.overlap)
+    memory[at] = deepest
+    if params.plasticity <= zero or contact.overlap <= zero:
+        return elastic
+    above = wp.max(one - params.plasticity * (deepest / contact.overlap), zero) / (one - params.plasticity)
+    return elastic * above * wp.sqrt(above)
+
+
+@dataclass(frozen=True, kw_only=True)
+class HystereticSpring(Mechanism):
+    """Normal spring that loads along Hertz's curve and unloads along a steeper one.
+
+    Attributes
+    ----------
+    plasticity : float
+        Depth of the dent that is left over the largest overlap, d_p / d_max [1], from 0 to below 1.
+
+    Notes
+    -----
+    With Hertz's F = K d^(3/2) on first loading, below the largest overlap d_max of the contact
+
+        F = K d_max^(3/2) ((d - d_p) / (d_max - d_p))^(3/2),  and 0 below d_p = plasticity d_max,
+
+    down and up again, until d_max is passed. It never attracts. The work given back is 1 - plasticity of that
+    done, so the coefficient of restitution is sqrt(1 - plasticity) at any speed; the base law's damping comes
+    on top, which restitution 1 of the pair leaves out. Unloading starts 1 / (1 - plasticity) times as stiff
+    as Hertz, which the time step must resolve. The dent is forgotten when the contact opens.
+
+    Source: Walton and Braun, Journal of Rheology 30 (1986) 949-980. Theirs is linear, with stiffnesses
+    K_1 loading and K_2 unloading, e = sqrt(K_1 / K_2); here both branches have Hertz's exponent, so that
+    plasticity 0 is the base law.
+    """
+
+    plasticity: float = 0.0
+
+    name: ClassVar[str] = "hysteretic_spring"
+    strength: ClassVar[str] = "plasticity"
+    memory_size: ClassVar[int] = 1
+    spring: ClassVar[Any] = dented
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._require_below_one("plasticity")
