@@ -22,7 +22,7 @@ from worlds import (
 
 from dem_warp.laws.hysteretic_spring import HystereticSpring
 from dem_warp.model import ContactCoefficients
-from dem_warp.walls import Plane
+from dem_warp.walls import Motion, Plane
 
 
 def dented(plasticity: float, restitution: float = 1.0) -> ContactCoefficients:
@@ -65,7 +65,7 @@ def test_a_dent_reloads_along_its_unloading_branch_and_grows_beyond():
     first = record(solver, 400)
     # A jerk of the plane makes it deeper.
     lift = 0.02
-    solver.move_wall(0, 0, (0.0, 0.0, lift))
+    solver.move_wall(0, 0, Motion(velocity=(0.0, 0.0, lift)))
     second = record(solver, 24)
     raised = lift * TIME_STEP * np.arange(24)
     overlap = np.concatenate(
