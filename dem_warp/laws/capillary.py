@@ -1,0 +1,100 @@
+"""Capillary bridges: liquid between surfaces that touched pulls them together until it breaks."""
+
+import math
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import warp as wp
+
+from dem_warp.laws.bond import bonded
+from dem_warp.laws.mechanism import Mechanism
+
+
+@wp.func
+def rupture_distance(volume: Any, angle: Any):
+    """Distance of the surfaces (1 + theta / 2) V^(1/3) [m] at which a bridge breaks."""
+    return (type(angle)(1.0) + type(angle)(0.5) * angle) * wp.cbrt(volume)
+
+
+@wp.func
+def bridge_attraction(params: Any, contact: Any, memory: Any, at: int):
+    """Attraction 2 pi R g cos(theta) / (1 + 1.05 S + 2.5 S^2) [N] of a bridge between spheres of radius R."""
+    tension = params.surface_tension
+    volume = params.bridge_volume
+    angle = params.contact_angle
+    zero = type(tension)(0.0)
+    one = type(tension)(1.0)
+    if tension <= zero:
+        return zero
+    if not bonded(contact, rupture_distance(volume, angle), memory, at):
+        return zero
+    radius = type(tension)(2.0) * contact.radius
+    s = wp.max(-contact.overlap, zero) * wp.sqrt(radius / volume)
+    at_contact = type(tension)(2.0) * type(tension)(math.pi) * radius * tension * wp.cos(angle)
+    return at_contact / (one + type(tension)(1.05) * s + type(tension)(2.5) * s * s)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CapillaryBridge(Mechanism):
+    """Touching spheres share a drop of liquid, which pulls them together until it breaks.
+
+    Attributes
+    ----------
+    surface_tension : float
+        g [N/m]; of water 0.072.
+    bridge_volume : float
+        V of each bridge [m3]; above 0 where there is surface tension.
+    contact_angle : float
+        theta, of the liquid on the surfaces [rad], below pi / 2.
+
+    Raises
+    ------
+    ValueError
+        If a value lies outside its range.
+
+    Notes
+    -----
+    The attraction at the distance D of the surfaces, none of which is counted in an overlap, is ::
+
+        F = 2 pi R g cos(theta) / (1 + 1.05 S + 2.5 S^2),    S = D sqrt(R / V)
+
+    with R = 2 R*: the radius of two like spheres; of unlike ones the mean 2 R1 R2 / (R1 + R2) of Derjaguin;
+    on a wall twice that of the sphere. A bridge forms when the surfaces touch and breaks at
+    D = (1 + theta / 2) V^(1/3).
+
+    The formulas hold for bridges that are small beside the spheres and are not bent by gravity. Every bridge
+    has the same volume, liquid is not handed on, and its viscosity is left out. Each pair of spheres that
+    touched has a bridge of its own, so a grain of several spheres may have several with the same neighbour.
+
+    Sources: C. D. Willett, M. J. Adams, S. A. Johnson and J. P. K. Seville, Langmuir 16 (2000) 9396-9405,
+    equation 12, which counts half the distance; the rupture: G. Lian, C. Thornton and M. J. Adams, J. Colloid
+    Interface Sci. 161 (1993) 138-147.
+    """
+
+    surface_tension: float = 0.0
+    bridge_volume: float = 0.0
+    contact_angle: float = 0.0
+
+    name: ClassVar[str] = "capillary_bridge"
+    strength: ClassVar[str] = "surface_tension"
+    memory_size: ClassVar[int] = 1
+    acts_apart: ClassVar[bool] = True
+    attraction: ClassVar[Any] = bridge_attraction
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.surface_tension > 0.0 and self.bridge_volume <= 0.0:
+            raise ValueError(
+                "CapillaryBridge.bridge_volume: must be above 0 where there is surface tension [m3], "
+                f"got {self.bridge_volume!r}"
+            )
+        if self.contact_angle >= math.pi / 2.0:
+            raise ValueError(
+                f"CapillaryBridge.contact_angle: must be below pi / 2 [rad], got {self.contact_angle!r}"
+            )
+
+    def reach(self, largest_radius: float, modulus: float) -> float:
+        """Distance [m] at which a bridge breaks."""
+        if self.surface_tension == 0.0:
+            return 0.0
+        return (1.0 + 0.5 * self.contact_angle) * self.bridge_volume ** (1.0 / 3.0)
