@@ -51,7 +51,7 @@ class Batch:
         self.steps = [0] * len(cases)
         self.provenance = provenance(self.solver.device, self.solver.precision.name)
         self._checkpoints, self._saved = checkpoints, time.monotonic()
-        self._maker = self.provenance | {"engine": engine_fingerprint()}
+        self.maker = self.provenance | {"engine": engine_fingerprint()}
         self._resume()
 
     def advance(self) -> list[tuple[int, CaseResult]]:
@@ -63,7 +63,8 @@ class Batch:
         for w in self.running:
             self.steps[w] += ahead
         ended = self._look([w for w in self.running if self.steps[w] % self.controllers[w].period == 0])
-        self._save_when_due()
+        if self._checkpoints and time.monotonic() - self._saved >= self._checkpoints.every:
+            self.save()
         return ended
 
     def fraction(self, world: int) -> float:
@@ -84,7 +85,7 @@ class Batch:
             return
         for w, (case, controller) in enumerate(zip(self.cases, self.controllers, strict=True)):
             try:
-                if kept := self._checkpoints.load(case, self._maker):
+                if kept := self._checkpoints.load(case, self.maker):
                     course, snapshot = type(controller.course)(**kept[0]), kept[1]
                     put_snapshot(self.solver, w, snapshot)
                     controller.course, self.steps[w] = course, int(snapshot[STEP].item())
@@ -92,12 +93,13 @@ class Batch:
                 path = self._checkpoints.path(case)
                 _log.warning("%s: a checkpoint that cannot be used, its case starts afresh: %s", path, error)
 
-    def _save_when_due(self) -> None:
-        if self._checkpoints is None or time.monotonic() - self._saved < self._checkpoints.every:
+    def save(self) -> None:
+        """Write a checkpoint of every running case."""
+        if self._checkpoints is None:
             return
         for w in self.running:
             snapshot = take_snapshot(self.solver, w)
-            self._checkpoints.save(self.cases[w], self._maker, self.controllers[w].course, snapshot)
+            self._checkpoints.save(self.cases[w], self.maker, self.controllers[w].course, snapshot)
         self._saved = time.monotonic()
 
     # ---- what the controllers decide -----------------------------------------------------------------------

@@ -30,10 +30,12 @@ def take_snapshot(solver: Solver, world: int) -> Snapshot:
     To be called between two calls of `Solver.advance`: the first copy of the grains is then the present one,
     and the next step writes the second.
     """
-    snapshot = {field.name: field.read() for field in _fields(solver, world, _counts(solver, world))}
+    counts = _counts(solver, world)
+    snapshot = {field.name: field.read() for field in _fields(solver, world, counts)}
+    snapshot[COUNT] = counts[:, None]
     snapshot[ENTRY] = _renumbered(snapshot[ENTRY], *_first_walls(solver, world))
     walls = _walls(solver, world).numpy()
-    return snapshot | {f"wall.{name}": walls[name].copy() for name in _values(walls)}
+    return snapshot | {f"wall.{name}": walls[name].copy() for name in walls.dtype.names or ()}
 
 
 def put_snapshot(solver: Solver, world: int, snapshot: Snapshot) -> None:
@@ -50,17 +52,18 @@ def put_snapshot(solver: Solver, world: int, snapshot: Snapshot) -> None:
     fields = list(_fields(solver, world, snapshot[COUNT].ravel()))
     on_device = _walls(solver, world)
     walls = on_device.numpy().copy()
-    names = {field.name for field in fields} | {f"wall.{name}" for name in _values(walls)}
+    names = {field.name for field in fields} | {f"wall.{name}" for name in walls.dtype.names or ()}
     if odd := sorted(snapshot.keys() ^ names):
         raise ValueError(f"a snapshot must have the fields of the state, got a difference in {odd}")
     in_batch, in_snapshot = _first_walls(solver, world)
     numbered = snapshot | {ENTRY: _renumbered(snapshot[ENTRY], in_snapshot, in_batch)}
     filled = [field.filled(numbered[field.name]) for field in fields]
+    for name in walls.dtype.names or ():
+        _require_like(f"wall.{name}", snapshot[f"wall.{name}"], walls[name])
+        walls[name] = snapshot[f"wall.{name}"]
     for field, whole in zip(fields, filled, strict=True):
         for part in field.parts:
             part.assign(whole)
-    for name in _values(walls):
-        walls[name] = snapshot[f"wall.{name}"]
     on_device.assign(walls)
 
 
@@ -82,16 +85,17 @@ class _Field:
     def filled(self, values: np.ndarray) -> np.ndarray:
         """The whole part with other values where it is in use."""
         whole = self.parts[0].numpy().copy()
-        old = self._counted(whole)[self.used]
-        if (values.shape, values.dtype) != (old.shape, old.dtype):
-            raise ValueError(
-                f"{self.name}: must be {old.dtype} {old.shape}, got {values.dtype} {values.shape}"
-            )
+        _require_like(self.name, values, self._counted(whole)[self.used])
         self._counted(whole)[self.used] = values
         return whole
 
     def _counted(self, array: np.ndarray) -> np.ndarray:
         return array.reshape(*self.axes, -1)
+
+
+def _require_like(name: str, values: np.ndarray, old: np.ndarray) -> None:
+    if (values.shape, values.dtype) != (old.shape, old.dtype):
+        raise ValueError(f"{name}: must be {old.dtype} {old.shape}, got {values.dtype} {values.shape}")
 
 
 def _fields(solver: Solver, world: int, counts: np.ndarray) -> Iterator[_Field]:
@@ -133,19 +137,16 @@ def _held(solver: Solver, world: int) -> int:
 
 
 def _counts(solver: Solver, world: int) -> np.ndarray:
-    """Neighbours of each of a world's grains."""
-    counts = solver.hood.count.reshape((LISTS, solver.layout.world_count, -1))[_held(solver, world), world]
-    return counts.numpy()[: solver.worlds[world].grains.count]
+    """Neighbours of each of a world's grains; those of a grain that was taken out are never looked at."""
+    shape, grains = (solver.layout.world_count, -1), solver.worlds[world].grains.count
+    counts = solver.hood.count.reshape((LISTS, *shape))[_held(solver, world), world].numpy()[:grains]
+    alive = solver.alive.reshape(shape)[world].numpy()[:grains] > 0
+    return np.where(alive, counts, 0)
 
 
 def _walls(solver: Solver, world: int) -> Any:
     """The world's walls on the device: their motion begins and changes on the way."""
     return solver.model.wall.reshape((solver.layout.world_count, -1))[world]
-
-
-def _values(walls: np.ndarray) -> list[str]:
-    """Fields of a struct that are values; an unsigned 64-bit one is an address of this process."""
-    return [name for name in walls.dtype.names or () if walls.dtype[name].base != np.uint64]
 
 
 def _first_walls(solver: Solver, world: int) -> tuple[int, int]:

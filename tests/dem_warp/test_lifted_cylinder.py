@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from worlds import BOOT, GRAIN, PYRAMID, SMALL_TUBE, small_case, spheres_of
+from worlds import BOOT, GRAIN, PYRAMID, SMALL_TUBE, assert_same_result, small_case, spheres_of
 
 from dem_warp import Case, CaseResult, ClumpShape, GrainPopulation, ShapeMixture, simulate
 from dem_warp.batch import Batch
@@ -14,22 +14,6 @@ from dem_warp.scenes.lifted_cylinder import bed_level
 from dem_warp.scenes.scene import Decision
 from dem_warp.simulation import batches
 from dem_warp.solver import WorldView
-
-ARRAYS = ("positions", "orientations", "sizes", "sphere_centers", "sphere_radii", "sphere_grain")
-SPEED_ONLY = {"rebuilds"}
-"""Observables that tell of the work, not of the heap."""
-
-
-def same_bits(a: CaseResult, b: CaseResult) -> None:
-    """Two results are equal in all that the case determines."""
-    assert (a.status, a.reason, a.phases) == (b.status, b.reason, b.phases)
-    for name in ARRAYS:
-        np.testing.assert_array_equal(getattr(a, name), getattr(b, name), err_msg=name)
-    kept = [
-        {name: value for name, value in result.observables.items() if name not in SPEED_ONLY}
-        for result in (a, b)
-    ]
-    assert kept[0] == kept[1]
 
 
 def run_batch(cases) -> dict[int, CaseResult]:
@@ -122,7 +106,7 @@ def test_processes_and_callbacks_change_nothing(heap):
         on_result=lambda index, result: seen.append((index, result)),
         on_progress=lambda progress: fractions.append((progress.done, progress.fraction)),
     )
-    same_bits(results[0], heap)
+    assert_same_result(results[0], heap)
     assert sorted(index for index, _ in seen) == [0, 1]
     assert all(results[index] is result for index, result in seen)
     assert fractions[-1] == (2, 1.0)
@@ -135,7 +119,7 @@ def test_a_case_in_a_batch_gives_the_same_bits(heap):
         small_case(seed=4, modulus_scale=30.0, scene=replace(SMALL_TUBE, grain_count=10)),
     ]
     results = run_batch([others[0], small_case(), others[1]])
-    same_bits(results[1], heap)
+    assert_same_result(results[1], heap)
     assert {result.status for result in results.values()} == {"finished"}
 
 
@@ -143,12 +127,12 @@ def test_a_second_shape_of_fraction_0_changes_no_bit(heap):
     # The other shape has more spheres, whose kernels differ.
     other = ClumpShape.from_spheres(1e-3 * np.arange(36).reshape(12, 3), np.full(12, 1e-3))
     case = with_shapes((other, PYRAMID), (0.0, 1.0))
-    same_bits(simulate([case], device="cpu", workers=1)[0], heap)
+    assert_same_result(simulate([case], device="cpu", workers=1)[0], heap)
 
 
 def test_equal_shapes_under_two_names_are_one_and_do_not_segregate(heap):
     [twins] = simulate([with_shapes((PYRAMID, PYRAMID), (0.5, 0.5))], device="cpu", workers=1)
-    same_bits(twins, heap)
+    assert_same_result(twins, heap)
     first = twins.shapes == 0
     assert 0 < first.sum() < len(first)
     # Names do not know where their grains go: heights and distances from the axis of the two kinds have means
@@ -164,8 +148,8 @@ def test_two_shapes_in_one_world_give_a_heap_alone_and_in_a_batch(heap):
     assert batches([small_case(), case], one_each=False) == [[0, 1]]
     [alone] = simulate([case], device="cpu", workers=1)
     results = run_batch([small_case(), case])
-    same_bits(results[0], heap)
-    same_bits(results[1], alone)
+    assert_same_result(results[0], heap)
+    assert_same_result(results[1], alone)
     assert (alone.status, alone.observables["grains_lost"]) == ("finished", 0)
     drawn = case.grains.draw(60, case.seed)
     np.testing.assert_array_equal(alone.shapes, drawn.shapes)
@@ -196,7 +180,7 @@ def test_grains_of_5_and_of_30_spheres_form_a_heap():
 
 def test_the_skin_of_a_case_does_not_change_its_bits(heap):
     wide = simulate([small_case(skin=1.6e-3)], device="cpu", workers=1)[0]
-    same_bits(wide, heap)
+    assert_same_result(wide, heap)
     assert wide.observables["rebuilds"] != heap.observables["rebuilds"]
 
 
@@ -210,7 +194,7 @@ def test_a_diverging_case_is_a_row_with_its_reason(heap):
     results = run_batch([wild, small_case()])
     assert results[0].status == "diverged"
     assert "lower time_step_fraction" in results[0].reason
-    same_bits(results[1], heap)
+    assert_same_result(results[1], heap)
 
 
 def test_no_cases_give_no_results():

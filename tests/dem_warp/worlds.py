@@ -20,6 +20,7 @@ from dem_warp.laws.mechanism import Mechanism
 from dem_warp.materials import Interaction, Material, rayleigh_time
 from dem_warp.model import ContactCoefficients, Grains, WorldSetup
 from dem_warp.population import GrainPopulation
+from dem_warp.result import CaseResult
 from dem_warp.scenes.lifted_cylinder import LiftedCylinder
 from dem_warp.solver import Solver
 from dem_warp.walls import Cylinder, Plane, Wall
@@ -270,6 +271,23 @@ def assert_same_bits(a: dict[str, np.ndarray], b: dict[str, np.ndarray]) -> None
     assert a.keys() == b.keys()
     for name, array in a.items():
         np.testing.assert_array_equal(array, b[name], err_msg=name)
+
+
+RESULT_ARRAYS = ("positions", "orientations", "sizes", "sphere_centers", "sphere_radii", "sphere_grain")
+SPEED_ONLY = {"rebuilds"}
+"""Observables that tell of the work, not of the heap."""
+
+
+def assert_same_result(a: CaseResult, b: CaseResult) -> None:
+    """Two results are equal in all that the case determines."""
+    assert (a.status, a.reason, a.phases) == (b.status, b.reason, b.phases)
+    for name in RESULT_ARRAYS:
+        np.testing.assert_array_equal(getattr(a, name), getattr(b, name), err_msg=name)
+    kept = [
+        {name: value for name, value in result.observables.items() if name not in SPEED_ONLY}
+        for result in (a, b)
+    ]
+    assert kept[0] == kept[1]
 
 
 def small_case(seed: int = 1, scene: LiftedCylinder | None = None, **numerics: Any) -> Case:

@@ -1,0 +1,325 @@
+"""Cases that are interrupted, killed or moved to another batch end in the same bits as others."""
+
+import logging
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from worlds import SMALL_TUBE, assert_same_bits, assert_same_result, pile, small_case, solve, state
+
+import dem_warp.batch
+import dem_warp.checkpoint
+import dem_warp.simulation
+from dem_warp import Case, CaseResult, simulate
+from dem_warp.batch import Batch
+from dem_warp.checkpoint import Checkpoints
+from dem_warp.device import resolve_device
+from dem_warp.scenes.scene import Course
+from dem_warp.snapshot import put_snapshot, take_snapshot
+
+NEVER, ALWAYS = 1e9, 0.0
+"""Times between two checkpoints [s]: no checkpoint at all, and one after every look of a controller."""
+
+DIVERGING = replace(
+    small_case(time_step_fraction=1.0, scene=replace(SMALL_TUBE, grain_count=20)),
+    grain_grain=replace(small_case().grain_grain, restitution=1e-6),
+    grain_wall=replace(small_case().grain_wall, restitution=1e-6),
+)
+"""At four times the usual step the explicit damping of almost plastic impacts overshoots."""
+
+ENDLESS = small_case(scene=replace(SMALL_TUBE, duration=3600.0))
+"""A case that nobody sees the end of."""
+
+
+def start(*cases: Case, folder: Path | None = None, every: float = NEVER) -> Batch:
+    """A batch on the CPU that takes up the checkpoints of a folder."""
+    kept = Checkpoints(folder, every) if folder else None
+    return Batch(cases, resolve_device("cpu"), kept)
+
+
+def finish(batch: Batch) -> dict[int, CaseResult]:
+    """Results of the cases that have yet to end."""
+    results = {}
+    while batch.running:
+        results.update(batch.advance())
+    return results
+
+
+def handful(seed: int) -> Case:
+    """A few grains, from three to six of them, with a friction and a time step of their own."""
+    scene = replace(SMALL_TUBE, grain_count=3 + seed % 4)
+    case = small_case(seed, scene, modulus_scale=100.0 + 10.0 * (seed % 5))
+    return replace(case, grain_grain=replace(case.grain_grain, static_friction=0.1 + 0.02 * seed))
+
+
+class Ended(NamedTuple):
+    """The end of one case."""
+
+    result: CaseResult
+    state: dict[str, np.ndarray]
+
+
+@pytest.fixture(scope="module")
+def alone() -> Ended:
+    """The small case by itself and never interrupted."""
+    batch = start(small_case())
+    return Ended(finish(batch)[0], state(batch.solver))
+
+
+@pytest.fixture(scope="module")
+def left(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """A folder for each phase in which the small case was left, with its checkpoint."""
+    folder = tmp_path_factory.mktemp("running")
+    batch, folders = start(small_case(), folder=folder), {}
+    while "lift" not in folders:
+        batch.advance()
+        phase = batch.phase(0)
+        if phase not in folders:
+            batch.save()
+            folders[phase] = tmp_path_factory.mktemp(phase)
+            shutil.copytree(folder, folders[phase], dirs_exist_ok=True)
+    return folders
+
+
+def the_file(folder: Path) -> Path:
+    """The only file of a folder."""
+    [path] = folder.iterdir()
+    return path
+
+
+def marked(folder: Path, *cases: Case) -> None:
+    """Leave a mark in checkpoints: it comes out in the results of those that are taken up."""
+    for case in cases:
+        batch = start(case)
+        kept = Checkpoints(folder)
+        course, snapshot = kept.load(case, batch.maker)
+        course["observables"]["taken_up"] = 1.0
+        kept.save(case, batch.maker, Course(**course), snapshot)
+
+
+def without_mark(result: CaseResult) -> CaseResult:
+    """A result of a case that was taken up, the mark removed."""
+    observables = dict(result.observables)
+    assert observables.pop("taken_up") == 1.0
+    return replace(result, observables=observables)
+
+
+@pytest.mark.parametrize("phase", ["fill", "settle", "lift"])
+def test_a_case_that_was_left_in_any_phase_ends_in_the_same_bits(alone, left, phase):
+    batch = start(small_case(), folder=left[phase])
+    assert batch.steps[0] > 0
+    assert batch.phase(0) == phase
+    assert_same_result(finish(batch)[0], alone.result)
+    assert_same_bits(state(batch.solver), alone.state)
+
+
+def test_places_in_a_batch_of_31_and_a_resumption_change_nothing(tmp_path):
+    """One case three times among 28, one of which diverges; then what is left of them, turned round."""
+    case, places = small_case(scene=replace(SMALL_TUBE, grain_count=16)), (0, 17, 30)
+    alone = start(case)
+    [result] = finish(alone).values()
+    cases = [case if w in places else handful(w) for w in range(31)]
+    cases[1] = DIVERGING
+    batch, results = start(*cases, folder=tmp_path), {}
+    while batch.phase(17) != "lift":
+        results.update(batch.advance())
+    batch.save()
+    assert results[1].status == "diverged"
+    rest = batch.running[::-1]
+    results.update(finish(batch))
+    resumed = start(*(cases[w] for w in rest), folder=tmp_path)
+    assert min(resumed.steps) > 0
+    for at, end in finish(resumed).items():
+        assert_same_result(end, results[rest[at]])
+        assert_same_bits(state(resumed.solver, at), state(batch.solver, rest[at]))
+    for place in places:
+        assert_same_result(results[place], result)
+        assert_same_bits(state(batch.solver, place), state(alone.solver))
+
+
+def test_a_killed_process_is_taken_up_to_the_same_bits(tmp_path):
+    code = """
+import sys
+from pathlib import Path
+from test_checkpoint import ALWAYS, ENDLESS, start
+batch = start(ENDLESS, folder=Path(sys.argv[1]), every=ALWAYS)
+while True:
+    batch.advance()
+    if batch.phase(0) == "lift":
+        print("lifting", flush=True)
+"""
+    command = [sys.executable, "-c", code, str(tmp_path)]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(map(os.path.abspath, sys.path))}
+    with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE) as process:
+        assert process.stdout.readline() == b"lifting\n"
+        process.send_signal(signal.SIGKILL)
+        assert process.wait() == -signal.SIGKILL
+    resumed, whole = start(ENDLESS, folder=tmp_path), start(ENDLESS)
+    killed_at = resumed.steps[0]
+    assert resumed.phase(0) == "lift"
+    for batch in (resumed, whole):
+        while batch.steps[0] < killed_at + 8 * batch.controllers[0].period:
+            batch.advance()
+    assert resumed.controllers[0].course == whole.controllers[0].course
+    assert_same_bits(take_snapshot(resumed.solver, 0), take_snapshot(whole.solver, 0))
+
+
+def test_an_interrupted_simulation_goes_on(alone, tmp_path, monkeypatch):
+    monkeypatch.setattr(dem_warp.simulation, "REPORT_EVERY", 0.0)
+    settings = {"device": "cpu", "workers": 1, "checkpoint": tmp_path, "checkpoint_every": ALWAYS}
+
+    def interrupt(progress):
+        if "lift" in progress.phase_counts:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        simulate([small_case()], on_progress=interrupt, **settings)
+    marked(tmp_path, small_case())
+    [result] = simulate([small_case()], **settings)
+    assert_same_result(without_mark(result), alone.result)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_processes_take_up_their_cases(alone, left, tmp_path):
+    shutil.copytree(left["lift"], tmp_path, dirs_exist_ok=True)
+    marked(tmp_path, small_case())
+    ended = []
+    results = simulate(
+        [handful(5), small_case()],
+        device="cpu",
+        workers=2,
+        on_result=lambda index, _: ended.append((index, len(list(tmp_path.iterdir())))),
+        checkpoint=tmp_path,
+    )
+    assert "taken_up" not in results[0].observables
+    assert_same_result(without_mark(results[1]), alone.result)
+    # A checkpoint stays until its result has been handed over.
+    assert dict(ended)[1] == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_result_that_could_not_be_kept_leaves_its_checkpoint(left, tmp_path):
+    shutil.copytree(left["lift"], tmp_path, dirs_exist_ok=True)
+
+    def full(index, result):
+        raise OSError("no space left on device")
+
+    with pytest.raises(OSError, match="no space"):
+        simulate([small_case()], device="cpu", workers=1, on_result=full, checkpoint=tmp_path)
+    assert start(small_case(), folder=tmp_path).steps[0] > 0
+
+
+def cut(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+
+
+def flip_a_bit(path: Path) -> None:
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+
+
+def empty(path: Path) -> None:
+    path.write_bytes(b"")
+
+
+def put_a_text(path: Path) -> None:
+    path.write_text("not a checkpoint", encoding="utf-8")
+
+
+def put_other_arrays(path: Path) -> None:
+    np.savez(path, positions=np.zeros((3, 3)))
+
+
+@pytest.mark.parametrize("damage", [cut, flip_a_bit, empty, put_a_text, put_other_arrays])
+def test_a_damaged_checkpoint_is_named_and_only_its_case_starts_afresh(left, tmp_path, caplog, damage):
+    shutil.copytree(left["settle"], tmp_path, dirs_exist_ok=True)
+    damage(the_file(tmp_path))
+    other = start(handful(5), folder=tmp_path, every=ALWAYS)
+    other.advance()
+    with caplog.at_level(logging.WARNING):
+        batch = start(handful(5), small_case(), folder=tmp_path)
+    assert batch.steps == [other.steps[0], 0]
+    assert str(Checkpoints(tmp_path).path(small_case())) in caplog.text
+    assert "starts afresh: must be a whole file" in caplog.text
+    assert_same_bits(take_snapshot(batch.solver, 1), take_snapshot(start(small_case()).solver, 0))
+
+
+@pytest.mark.parametrize(
+    ("module", "name", "value", "reason"),
+    [
+        (dem_warp.batch, "engine_fingerprint", lambda: "newer", "engine '.*' instead of 'newer'"),
+        (dem_warp.batch, "provenance", lambda *_: {"device": "another"}, "device 'CPU' instead of 'another'"),
+        (dem_warp.checkpoint, "FORMAT", 99, "format 1 instead of 99"),
+    ],
+)
+def test_a_checkpoint_of_another_maker_is_not_used(left, caplog, monkeypatch, module, name, value, reason):
+    monkeypatch.setattr(module, name, value)
+    with caplog.at_level(logging.WARNING):
+        assert start(small_case(), folder=left["fill"]).steps == [0]
+    assert caplog.messages[0].startswith(str(the_file(left["fill"])))
+    assert re.search(reason, caplog.text)
+
+
+def test_a_checkpoint_is_that_of_its_case_alone(left):
+    wide = replace(small_case(), numerics=replace(small_case().numerics, skin=1.6e-3))
+    for other in (small_case(seed=2), small_case(time_step_fraction=0.2), wide):
+        assert start(other, folder=left["fill"]).steps == [0]
+
+
+def test_a_run_goes_on_where_no_checkpoint_can_be_written(tmp_path, caplog):
+    (tmp_path / "file").write_text("in the way", encoding="utf-8")
+    batch = start(handful(1), folder=tmp_path / "file", every=ALWAYS)
+    with caplog.at_level(logging.WARNING):
+        batch.advance()
+    assert batch.steps[0] > 0
+    assert "no checkpoint could be written" in caplog.text
+
+
+def test_an_interval_is_not_negative(tmp_path):
+    with pytest.raises(ValueError, match=r"Checkpoints.every: must be 0 or more \[s\], got -1"):
+        simulate([small_case()], device="cpu", checkpoint=tmp_path, checkpoint_every=-1.0)
+
+
+def test_a_world_goes_on_in_another_batch_with_its_walls_in_motion():
+    """Its plate rises, sinks after a while, and has been taken into a batch of more grains in between."""
+    whole, first = (solve(pile(), precision="mixed") for _ in range(2))
+    second = solve(pile(2, count=40), pile(), precision="mixed")
+    for solver in (whole, first):
+        solver.move_wall(0, 0, (0.0, 0.0, 0.01))
+        solver.advance(10)
+    put_snapshot(second, 1, take_snapshot(first, 0))
+    bystander = take_snapshot(second, 0)
+    assert_same_bits(take_snapshot(second, 1), take_snapshot(first, 0))
+    for solver, w in ((whole, 0), (second, 1)):
+        solver.move_wall(w, 0, (0.0, 0.0, -0.01))
+        solver.advance(10)
+    assert_same_bits(take_snapshot(second, 1), take_snapshot(whole, 0))
+    fresh = solve(pile(2, count=40), precision="mixed")
+    assert_same_bits(bystander, take_snapshot(fresh, 0))
+    fresh.advance(10)
+    assert_same_bits(state(second, 0), state(fresh, 0))
+
+
+def test_a_snapshot_of_another_world_is_refused_and_changes_nothing():
+    solver = solve(pile(), pile(3), precision="mixed")
+    untouched, snapshot = take_snapshot(solver, 0), take_snapshot(solver, 1)
+    for bad, message in (
+        (take_snapshot(solve(pile(count=20), precision="mixed"), 0), "at most .* for each of 36 grains"),
+        (take_snapshot(solve(pile(), precision="double"), 0), "must be float32"),
+        ({name: array for name, array in snapshot.items() if name != "grains.spin"}, "grains.spin"),
+        (snapshot | {"grains.smell": snapshot["grains.spin"]}, "grains.smell"),
+        (snapshot | {"wall.point": snapshot["wall.point"][:1]}, "wall.point"),
+        ({}, "neighbours.count"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            put_snapshot(solver, 0, bad)
+        assert_same_bits(take_snapshot(solver, 0), untouched)
