@@ -32,10 +32,8 @@ def take_snapshot(solver: Solver, world: int) -> Snapshot:
     """
     counts = _counts(solver, world)
     snapshot = {field.name: field.read() for field in _fields(solver, world, counts)}
-    snapshot[COUNT] = counts[:, None]
-    snapshot[ENTRY] = _renumbered(snapshot[ENTRY], *_first_walls(solver, world))
-    walls = _walls(solver, world).numpy()
-    return snapshot | {f"wall.{name}": walls[name].copy() for name in walls.dtype.names or ()}
+    entries = _renumbered(snapshot[ENTRY], *_first_walls(solver, world))
+    return snapshot | {COUNT: counts[:, None], ENTRY: entries}
 
 
 def put_snapshot(solver: Solver, world: int, snapshot: Snapshot) -> None:
@@ -50,21 +48,14 @@ def put_snapshot(solver: Solver, world: int, snapshot: Snapshot) -> None:
     if COUNT not in snapshot:
         raise ValueError(f"a snapshot must have {COUNT}, got {sorted(snapshot)}")
     fields = list(_fields(solver, world, snapshot[COUNT].ravel()))
-    on_device = _walls(solver, world)
-    walls = on_device.numpy().copy()
-    names = {field.name for field in fields} | {f"wall.{name}" for name in walls.dtype.names or ()}
-    if odd := sorted(snapshot.keys() ^ names):
+    if odd := sorted(snapshot.keys() ^ {field.name for field in fields}):
         raise ValueError(f"a snapshot must have the fields of the state, got a difference in {odd}")
     in_batch, in_snapshot = _first_walls(solver, world)
     numbered = snapshot | {ENTRY: _renumbered(snapshot[ENTRY], in_snapshot, in_batch)}
     filled = [field.filled(numbered[field.name]) for field in fields]
-    for name in walls.dtype.names or ():
-        _require_like(f"wall.{name}", snapshot[f"wall.{name}"], walls[name])
-        walls[name] = snapshot[f"wall.{name}"]
     for field, whole in zip(fields, filled, strict=True):
         for part in field.parts:
             part.assign(whole)
-    on_device.assign(walls)
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,17 +76,16 @@ class _Field:
     def filled(self, values: np.ndarray) -> np.ndarray:
         """The whole part with other values where it is in use."""
         whole = self.parts[0].numpy().copy()
-        _require_like(self.name, values, self._counted(whole)[self.used])
+        old = self._counted(whole)[self.used]
+        if (values.shape, values.dtype) != (old.shape, old.dtype):
+            raise ValueError(
+                f"{self.name}: must be {old.dtype} {old.shape}, got {values.dtype} {values.shape}"
+            )
         self._counted(whole)[self.used] = values
         return whole
 
     def _counted(self, array: np.ndarray) -> np.ndarray:
         return array.reshape(*self.axes, -1)
-
-
-def _require_like(name: str, values: np.ndarray, old: np.ndarray) -> None:
-    if (values.shape, values.dtype) != (old.shape, old.dtype):
-        raise ValueError(f"{name}: must be {old.dtype} {old.shape}, got {values.dtype} {values.shape}")
 
 
 def _fields(solver: Solver, world: int, counts: np.ndarray) -> Iterator[_Field]:
@@ -106,6 +96,8 @@ def _fields(solver: Solver, world: int, counts: np.ndarray) -> Iterator[_Field]:
         raise ValueError(f"{COUNT}: must be at most {capacity} for each of {grains} grains, got {counts}")
     listed = np.zeros((slots, capacity), dtype=bool)
     listed[:grains] = np.arange(capacity) < counts[:, None]
+    walls = solver.model.wall.reshape((layout.world_count, -1))[world]
+    yield _Field("world.walls", (walls,), (layout.wall_count,), slice(None))
     for name, arrays in _state(solver).items():
         of_lists = name.startswith("neighbours.") and arrays[0].size % (LISTS * layout.grain_total) == 0
         lists, place = (LISTS, (held, world)) if of_lists else (1, (0, world))
@@ -142,11 +134,6 @@ def _counts(solver: Solver, world: int) -> np.ndarray:
     counts = solver.hood.count.reshape((LISTS, *shape))[_held(solver, world), world].numpy()[:grains]
     alive = solver.alive.reshape(shape)[world].numpy()[:grains] > 0
     return np.where(alive, counts, 0)
-
-
-def _walls(solver: Solver, world: int) -> Any:
-    """The world's walls on the device: their motion begins and changes on the way."""
-    return solver.model.wall.reshape((solver.layout.world_count, -1))[world]
 
 
 def _first_walls(solver: Solver, world: int) -> tuple[int, int]:

@@ -24,6 +24,7 @@ from dem_warp.checkpoint import Checkpoints
 from dem_warp.device import resolve_device
 from dem_warp.scenes.scene import Course
 from dem_warp.snapshot import put_snapshot, take_snapshot
+from dem_warp.walls import Motion
 
 NEVER, ALWAYS = 1e9, 0.0
 """Times between two checkpoints [s]: no checkpoint at all, and one after every look of a controller."""
@@ -294,13 +295,13 @@ def test_a_world_goes_on_in_another_batch_with_its_walls_in_motion():
     whole, first = (solve(pile(), precision="mixed") for _ in range(2))
     second = solve(pile(2, count=40), pile(), precision="mixed")
     for solver in (whole, first):
-        solver.move_wall(0, 0, (0.0, 0.0, 0.01))
+        solver.move_wall(0, 0, Motion((0.0, 0.0, 0.01), spin=(0.1, 0.0, 0.0)))
         solver.advance(10)
     put_snapshot(second, 1, take_snapshot(first, 0))
     bystander = take_snapshot(second, 0)
     assert_same_bits(take_snapshot(second, 1), take_snapshot(first, 0))
     for solver, w in ((whole, 0), (second, 1)):
-        solver.move_wall(w, 0, (0.0, 0.0, -0.01))
+        solver.move_wall(w, 0, Motion((0.0, 0.0, -0.01)))
         solver.advance(10)
     assert_same_bits(take_snapshot(second, 1), take_snapshot(whole, 0))
     fresh = solve(pile(2, count=40), precision="mixed")
@@ -317,7 +318,7 @@ def test_a_snapshot_of_another_world_is_refused_and_changes_nothing():
         (take_snapshot(solve(pile(), precision="double"), 0), "must be float32"),
         ({name: array for name, array in snapshot.items() if name != "grains.spin"}, "grains.spin"),
         (snapshot | {"grains.smell": snapshot["grains.spin"]}, "grains.smell"),
-        (snapshot | {"wall.point": snapshot["wall.point"][:1]}, "wall.point"),
+        (snapshot | {"world.walls": snapshot["world.walls"][:1]}, "world.walls"),
         ({}, "neighbours.count"),
     ):
         with pytest.raises(ValueError, match=message):
