@@ -39,8 +39,8 @@ class LinearCohesion(Mechanism):
 
     The attraction is none at d = 0, nor beyond contact, and it is conservative: by itself it takes nothing
     from an impact. A contact that carries nothing rests at d0 = R* (3 pi k / (2 E*))^2; the largest force
-    that it holds is (2/3) pi^3 k^3 R*^2 / E*^2, at (4/9) d0. So it weakens with the square of the modulus: k
-    is to be chosen with the modulus that is simulated.
+    that it holds is (2/3) pi^3 k^3 R*^2 / E*^2, at (4/9) d0. So k is to be chosen for the modulus that is
+    simulated, and a small part of it: d0 is 22 (k / E*)^2 of R*.
 
     Source: LIGGGHTS documentation, "gran cohesion sjkr"; its "sjkr2" takes twice this area.
     """
