@@ -101,16 +101,17 @@ class Solver:
         self._cell_kernels = cell_kernels(self.build.without_mechanisms)
         self._wall_kernels = wall_kernels(self.build.without_mechanisms)
         self._list_kernels = neighbour_kernels(self.build)
-        found, row = _neighbour_capacities(worlds)
+        room = [_neighbour_room(world) for world in worlds]
         with wp.ScopedDevice(self.device):
-            self._build_state(capacity or row, found)
+            self._build_state([(found, capacity or listed) for found, listed in room])
         self._running = list(range(len(worlds)))
         self._graphs: dict[tuple[int, int, int], Any] = {}
         self._place()
 
-    def _build_state(self, capacity: int, found_capacity: int) -> None:
+    def _build_state(self, room: Sequence[tuple[int, int]]) -> None:
         layout, device = self.layout, self.device
-        self.model = build_model(self.worlds, layout, self.precision, device)
+        found_capacity, capacity = (max(sizes) for sizes in zip(*room, strict=True))
+        self.model = build_model(self.worlds, room, layout, self.precision, device)
         first = build_grains(self.worlds, layout, self.precision, device)
         self.grains = (first, copy_grains(first, self.precision))
         self.hood = build_neighbours(layout, capacity, memory_size(layout.mechanisms), self.precision, device)
@@ -315,14 +316,13 @@ def expected_speed(world: WorldSetup) -> float:
     return world.speed_limit / 20
 
 
-def _neighbour_capacities(worlds: Sequence[WorldSetup]) -> tuple[int, int]:
-    """Partners of a sphere and entries of a grain that no packing of the worlds' grains should pass."""
-    found, row = 16, 32
-    for world in worlds:
-        for shape, others in product(world.shapes, repeat=2):
-            reach = shape.radii.mean() + others.radii.mean() + world.skin + world.reach
-            per_volume = 0.7 * others.sphere_count / others.volume
-            around = per_volume * (4 / 3 * np.pi * reach**3)
-            found = max(found, int(1.5 * around) + 16)
-            row = max(row, int(shape.sphere_count * around * 0.7) + 32)
-    return found, -(-row // 8) * 8
+def _neighbour_room(world: WorldSetup) -> tuple[int, int]:
+    """Partners of a sphere and entries of a grain that no packing of the world's grains should pass."""
+    found, listed = 16, 32
+    for shape, others in product(world.shapes, repeat=2):
+        reach = shape.radii.mean() + others.radii.mean() + world.skin + world.reach
+        per_volume = 0.7 * others.sphere_count / others.volume
+        around = per_volume * (4 / 3 * np.pi * reach**3)
+        found = max(found, int(1.5 * around) + 16)
+        listed = max(listed, int(shape.sphere_count * around * 0.7) + 32)
+    return found, -(-listed // 8) * 8

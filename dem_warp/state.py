@@ -96,8 +96,17 @@ def _wall_rows(worlds: Sequence[WorldSetup]) -> list[dict[str, Any]]:
     ]
 
 
-def build_model(worlds: Sequence[WorldSetup], layout: Layout, precision: Precision, device: Any) -> Any:
-    """`Model` of a batch on a device."""
+def build_model(
+    worlds: Sequence[WorldSetup],
+    room: Sequence[tuple[int, int]],
+    layout: Layout,
+    precision: Precision,
+    device: Any,
+) -> Any:
+    """`Model` of a batch on a device.
+
+    `room` has, for each world, how many partners a sphere may have and how many entries a grain's list.
+    """
     types = device_structs(precision)
     shapes = shape_table(worlds)
     real = np.float32 if precision.real is wp.float32 else np.float64
@@ -115,8 +124,10 @@ def build_model(worlds: Sequence[WorldSetup], layout: Layout, precision: Precisi
             "speed_limit": world.speed_limit,
             "origin": world.origin,
             "half_extent": world.half_extent,
+            "most_found": found,
+            "most_listed": listed,
         }
-        for world in worlds
+        for world, (found, listed) in zip(worlds, room, strict=True)
     ]
     contact_rows = [contact.parameters for world in worlds for contact in world.contacts]
     model = types.Model()

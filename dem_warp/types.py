@@ -138,6 +138,8 @@ def device_structs(precision: Precision) -> SimpleNamespace:
         speed_limit: real  # above it the world has diverged [m/s]
         origin: wp.vec3d  # where sphere positions count from [m]
         half_extent: wp.vec3d  # a grain further from the origin has left the domain [m]
+        most_found: int  # partners that a sphere may have; of its own, so that no other world changes it
+        most_listed: int  # entries that a grain's list may have
 
     @wp.struct
     class Wall:

@@ -122,13 +122,14 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
             return
         # empty for the next time; every sphere of the bucket writes the same
         cells.bucket_size[cells.bucket[i]] = 0
+        world = model.world[w]
         before = int(0)
         for k in range(s):
-            before += wp.min(cells.found_count[g * spheres_each + k], cells.found_capacity)
-        own = wp.min(cells.found_count[i], cells.found_capacity)
-        if cells.found_count[i] > cells.found_capacity or before + own > hood.capacity:
+            before += wp.min(cells.found_count[g * spheres_each + k], world.most_found)
+        own = wp.min(cells.found_count[i], world.most_found)
+        if cells.found_count[i] > world.most_found or before + own > world.most_listed:
             wp.atomic_or(flags, w, NEIGHBOUR_OVERFLOW)
-            own = wp.clamp(own, 0, wp.max(hood.capacity - before, 0))
+            own = wp.clamp(own, 0, wp.max(world.most_listed - before, 0))
         sort_found(cells, i, own)
         grain_total = model.shape.shape[0]
         old_row = hood.list[w] * grain_total + g
@@ -150,7 +151,7 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
             hood.entry[slot] = entry
             pack.store_vec4(hood.history, slot, history)
         if s == model.shape_sphere_count[model.shape[g]] - 1:
-            hood.count[new_row] = wp.min(before + own, hood.capacity)
+            hood.count[new_row] = wp.min(before + own, world.most_listed)
             hood.travel[g] = real(0.0)
 
     @wp.kernel(module=module)

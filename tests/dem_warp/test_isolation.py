@@ -95,6 +95,16 @@ def test_an_overflowing_world_is_flagged_and_changes_nothing(alone):
     assert_same_bits(state(solver, 1), alone)
 
 
+def test_a_world_overflows_in_any_company_or_in_none():
+    # Forty balls in one place, more than any packing has; a world of a wide skin has longer lists.
+    places = np.random.default_rng(0).normal(size=(40, 3)) * 1e-3
+    crowd, roomy = replace(heap(0), grains=grains(places)), replace(heap(1), skin=2.0 * RADIUS)
+    alone, together = solve(crowd, precision="mixed"), solve(roomy, crowd, precision="mixed")
+    assert together.hood.capacity > alone.hood.capacity
+    assert WorldFlag.NEIGHBOUR_OVERFLOW in WorldFlag(int(alone.flags.numpy()[0]))
+    assert together.flags.numpy().tolist() == [0, *alone.flags.numpy()]
+
+
 def test_stopping_a_world_freezes_it_and_changes_no_other(alone):
     solver = solve(heap(2), heap(1), precision="mixed")
     solver.advance(4)
