@@ -34,8 +34,9 @@ class RateWeakening(Mechanism):
     -----
     mu(v) = mu (1 - weakening (1 - exp(-v / v_0))), where v is the speed of the one surface along the other.
 
-    Source: Oden and Martins, Computer Methods in Applied Mechanics and Engineering 52 (1985) 527-634; the
-    "exponential decay" of finite-element codes, mu_k + (mu_s - mu_k) exp(-v / v_0).
+    Source: the "static-kinetic exponential decay" of the Abaqus Analysis User's Guide, mu_k + (mu_s - mu_k)
+    exp(-v / v_0); the form also in Constantinou, Mokha and Reinhorn, Journal of Structural Engineering 116
+    (1990) 455-474, for a friction that grows with speed.
     """
 
     weakening: float = 0.0
