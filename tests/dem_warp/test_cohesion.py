@@ -12,10 +12,10 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 from worlds import (
     BALL,
-    GRAIN,
     GRAVITY,
     RADIUS,
     STEEL,
+    TIME_STEP,
     Impact,
     Record,
     assert_same_bits,
@@ -37,11 +37,9 @@ from dem_warp.laws.jkr import JKR
 from dem_warp.laws.linear_cohesion import LinearCohesion
 from dem_warp.laws.mechanism import Mechanism
 from dem_warp.laws.wall_adhesion import WallAdhesion
-from dem_warp.materials import rayleigh_time
 from dem_warp.model import ContactCoefficients, WorldSetup
 from dem_warp.walls import Plane
 
-TIME_STEP = 0.25 * rayleigh_time(RADIUS, GRAIN)
 MODULUS = pair().modulus
 CEILING = Plane(normal=(0.0, 0.0, -1.0))
 FLOOR = Plane(point=(0.0, 0.0, -0.05))
@@ -59,9 +57,9 @@ def only(*mechanisms: Mechanism) -> tuple[Mechanism, ...]:
     return (*mechanisms, *(kind() for kind in kinds if kind not in named))
 
 
-def sticking(*mechanisms: Mechanism, restitution: float = 1.0, friction: float = 0.0) -> ContactCoefficients:
-    """A contact with mechanisms."""
-    return pair(restitution, friction, mechanisms=only(*mechanisms))
+def sticking(*mechanisms: Mechanism, restitution: float = 1.0) -> ContactCoefficients:
+    """A contact with mechanisms and without friction."""
+    return pair(restitution, mechanisms=only(*mechanisms))
 
 
 def hertz(radius: float, overlap: np.ndarray) -> np.ndarray:
@@ -102,8 +100,9 @@ def drive(
     return touching - height, density * BALL.volume * np.diff(seen.velocities[:, 0, 2]) / dt
 
 
-# A kick of 1e-7 of the speed is read from velocities rounded to 1e-16 of it; measured: 2e-9 at the most.
-SEEN = {"rtol": 1e-8}
+# Forces of up to 0.2 N, read from the kicks to 0.5 kg in steps of 1e-6 s or more: its speed of 0.01 m/s is
+# rounded to 1e-18. Measured: 7e-14 N.
+SEEN = {"rtol": 0.0, "atol": 1e-12}
 
 
 @pytest.mark.parametrize("partner", PARTNERS)
@@ -113,7 +112,7 @@ def test_linear_cohesion_pulls_with_a_constant_pressure_on_the_contact_area(part
     area = 2.0 * math.pi * radius * np.maximum(overlap, 0.0)
     expected = hertz(radius, overlap) - COHESION.cohesion_energy_density * area
     assert expected.min() < 0.0 < expected.max()
-    np.testing.assert_allclose(force, expected, **SEEN, atol=1e-11)
+    np.testing.assert_allclose(force, expected, **SEEN)
 
 
 def jkr_force(work: float, radius: float, overlap: float) -> float:
@@ -139,10 +138,10 @@ def test_jkr_surfaces_part_along_the_curve_of_their_contact_radius(partner):
     overlap, force = drive(sticking(STICKY), 3.0 * unit, -0.6 * unit, partner)
     parted = overlap < -0.75 * 4.0 ** (-1.0 / 3.0) * unit
     expected = [jkr_force(work, radius, d) for d in overlap[~parted]]
-    np.testing.assert_allclose(force[~parted], expected, **SEEN, atol=1e-11)
+    np.testing.assert_allclose(force[~parted], expected, **SEEN)
     assert parted.sum() > 10
     assert (force[parted] == 0.0).all()
-    # The largest pull lies within half a step of 0.009 units of a maximum: 1e-5 of it.
+    # The largest pull is seen half a step of 0.009 units away at the most: measured, 5e-5 of it.
     assert force.min() == pytest.approx(-1.5 * math.pi * work * radius, rel=1e-4)
 
 
@@ -154,9 +153,7 @@ def test_jkr_surfaces_feel_nothing_before_they_touch(partner):
     before = overlap <= 0.0
     assert before.sum() > 100
     assert (force[before] == 0.0).all()
-    np.testing.assert_allclose(
-        force[~before], [jkr_force(work, radius, d) for d in overlap[~before]], **SEEN, atol=1e-11
-    )
+    np.testing.assert_allclose(force[~before], [jkr_force(work, radius, d) for d in overlap[~before]], **SEEN)
 
 
 def willett(bridge: CapillaryBridge, radius: float, gap: np.ndarray) -> np.ndarray:
@@ -181,9 +178,11 @@ def test_a_bridge_pulls_by_willett_until_it_breaks(partner):
     np.testing.assert_allclose(force[~broken], expected[~broken], **SEEN)
     assert broken.sum() > 10
     assert (force[broken] == 0.0).all()
-    # Summed step by step: to half a step of 400, at either end, of a force three times the mean at the first.
+    # Summed step by step: to a step of the largest pull.
+    step = (first - last) / len(overlap)
     work = quad(lambda gap: willett(WATER, radius, gap), 0.0, rupture(WATER))[0]
-    assert -force[overlap < 0.0].sum() * (first - last) / 400 == pytest.approx(work, rel=0.015)
+    most = willett(WATER, radius, np.array(0.0))
+    assert -force[overlap < 0.0].sum() * step == pytest.approx(work, abs=float(most) * step)
 
 
 @pytest.mark.parametrize("partner", PARTNERS)
@@ -204,7 +203,7 @@ def test_attractions_add_up_and_each_ends_at_its_own_distance():
     bridge = np.where(overlap > -rupture(WATER), willett(WATER, 2.0 * radius, np.maximum(-overlap, 0.0)), 0.0)
     area = 2.0 * math.pi * radius * np.maximum(overlap, 0.0)
     expected = np.array(pull) - bridge - COHESION.cohesion_energy_density * area
-    np.testing.assert_allclose(both, expected, **SEEN, atol=1e-11)
+    np.testing.assert_allclose(both, expected, **SEEN)
 
 
 # ---- rest and rupture under a load ---------------------------------------------------------------------
@@ -278,7 +277,7 @@ def test_a_ceiling_that_adheres_holds_a_grain_that_does_not_stick_to_another():
 
 
 def collide(
-    contact: ContactCoefficients, speeds: np.ndarray, steps: int = 1000, precision: str = "double"
+    contact: ContactCoefficients, speeds: np.ndarray, steps: int, precision: str = "double"
 ) -> Record:
     """Impacts of two balls, a world for each speed [m/s], for three durations of the slowest by Hertz."""
     mass = ball_mass() / 2.0
@@ -297,15 +296,16 @@ def collide(
     return record(solver, 3 * steps)
 
 
-def separation(seen: Record) -> np.ndarray:
-    """Speeds at which the pairs of balls part in the end [m/s]."""
-    return seen.velocities[-1, 1::2, 2] - seen.velocities[-1, ::2, 2]
+def between(vectors: np.ndarray) -> np.ndarray:
+    """Upward component of the upper ball of each pair less that of the lower, (steps + 1, pairs)."""
+    return vectors[:, 1::2, 2] - vectors[:, ::2, 2]
 
 
 def test_linear_cohesion_takes_nothing_from_an_impact():
     speeds = np.array([0.01, 0.03, 0.1])
-    # The overlaps of the first and the last step differ: of second order, by 1e-6 at 1000 steps.
-    np.testing.assert_allclose(separation(collide(sticking(COHESION), speeds)), speeds, rtol=1e-5)
+    # The force starts in the midst of a step, and ends so: measured, 2e-6 at 1000 steps.
+    after = between(collide(sticking(COHESION), speeds, 1000).velocities)[-1]
+    np.testing.assert_allclose(after, speeds, rtol=1e-5)
 
 
 def test_jkr_takes_from_an_impact_what_it_costs_to_part():
@@ -315,13 +315,17 @@ def test_jkr_takes_from_an_impact_what_it_costs_to_part():
     cost *= (STICKY.work_of_adhesion**5 * radius**4 / MODULUS**2) ** (1.0 / 3.0)
     slowest = math.sqrt(2.0 * cost / mass)
     speeds = slowest * np.array([0.5, 0.95, 1.05, 1.2, 2.0])
-    after = separation(collide(sticking(STICKY), speeds))
-    lost = 0.5 * mass * (speeds[2:] ** 2 - after[2:] ** 2)
-    # The jump of the force at first touch is seen up to a step late.
-    np.testing.assert_allclose(lost, cost, rtol=0.01)
-    assert (after[2:] > 0.0).all()
-    # Slower ones stay together and oscillate.
-    assert (np.abs(after[:2]) <= speeds[:2]).all()
+    seen = collide(sticking(STICKY), speeds, 2000)
+    lost = 0.5 * mass * (speeds**2 - between(seen.velocities)[-1] ** 2)
+    # The force is there at once, up to a step after the touch. Measured: 0.16 % (at 1000 steps 0.8 %).
+    np.testing.assert_allclose(lost[2:], cost, rtol=0.003)
+    gaps = between(seen.positions) - 2.0 * RADIUS
+    parting = 0.75 * 4.0 ** (-1.0 / 3.0) * jkr_unit(STICKY.work_of_adhesion, radius)
+    assert (gaps[-1, 2:] > parting).all()
+    assert (gaps[:, :2].max(axis=0) < parting).all()
+    # Both balls feel the same, in every step: rounding of 6000 of them.
+    momenta = seen.velocities[:, ::2, 2] + seen.velocities[:, 1::2, 2]
+    np.testing.assert_allclose(momenta, np.broadcast_to(speeds, momenta.shape), rtol=1e-12)
 
 
 # ---- precision, lists, checks --------------------------------------------------------------------------
