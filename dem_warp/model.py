@@ -178,10 +178,10 @@ class WorldSetup:
         spheres = max(shape.sphere_count for shape in self.shapes)
         if spheres > MAX_SPHERES_PER_GRAIN:
             raise ValueError(f"ClumpShape: at most {MAX_SPHERES_PER_GRAIN} spheres a grain, got {spheres}")
-        partners = spheres * self.grains.count + len(self.walls)
+        partners = spheres * self.grains.count + len(self.walls) + self.triangle_count
         if partners > MAX_PARTNERS:
             raise ValueError(
-                f"WorldSetup.grains: at most {MAX_PARTNERS} spheres and walls a world, got {partners}"
+                f"WorldSetup.grains: at most {MAX_PARTNERS} spheres, walls and triangles, got {partners}"
             )
 
     @property
@@ -189,6 +189,11 @@ class WorldSetup:
         """Largest sphere radius of the world [m]."""
         largest = np.array([shape.radii.max() for shape in self.shapes])
         return float((largest[self.grains.shapes] * self.grains.sizes).max())
+
+    @property
+    def triangle_count(self) -> int:
+        """Triangles of all its meshes."""
+        return sum(wall.triangle_count for wall, _ in self.walls)
 
     @property
     def mechanisms(self) -> Mechanisms:

@@ -23,6 +23,7 @@ from dem_warp.state import (
     build_neighbours,
     copy_grains,
 )
+from dem_warp.triangles import meshes_of, most_within, place_triangles
 from dem_warp.types import FRAMES, PRECISIONS, Build, device_structs
 from dem_warp.walls import Motion
 
@@ -95,8 +96,9 @@ class Solver:
         self.layout = Layout.of(worlds)
         layout = self.layout
         self.build = Build(
-            self.precision, layout.sphere_count, layout.wall_count, self.device.is_cuda, layout.mechanisms
-        )
+            self.precision, layout.sphere_count, layout.wall_count, self.device.is_cuda,
+            layout.mechanisms, layout.has_mesh,
+        )  # fmt: skip
         self._step_kernels = step_kernels(self.build)
         self._cell_kernels = cell_kernels(self.build.without_mechanisms)
         self._wall_kernels = wall_kernels(self.build.without_mechanisms)
@@ -112,6 +114,7 @@ class Solver:
         layout, device = self.layout, self.device
         found_capacity, capacity = (max(sizes) for sizes in zip(*room, strict=True))
         self.model = build_model(self.worlds, room, layout, self.precision, device)
+        self._trees = place_triangles(self.model, self.worlds, self.precision, device)
         first = build_grains(self.worlds, layout, self.precision, device)
         self.grains = (first, copy_grains(first, self.precision))
         self.hood = build_neighbours(layout, capacity, memory_size(layout.mechanisms), self.precision, device)
@@ -325,4 +328,12 @@ def _neighbour_room(world: WorldSetup) -> tuple[int, int]:
         around = per_volume * (4 / 3 * np.pi * reach**3)
         found = max(found, int(1.5 * around) + 16)
         listed = max(listed, int(shape.sphere_count * around * 0.7) + 32)
-    return found, -(-listed // 8) * 8
+    triangles = _triangles_near(world)
+    listed += triangles * max(shape.sphere_count for shape in world.shapes)
+    return found + triangles, -(-listed // 8) * 8
+
+
+def _triangles_near(world: WorldSetup) -> int:
+    """Triangles that a sphere lists at the most, and some more."""
+    reach = world.largest_sphere + world.skin + world.reach
+    return sum(int(1.5 * most_within(mesh, reach)) + 8 for mesh in meshes_of([world]))

@@ -23,6 +23,7 @@ class Layout:
     wall_count: int
     pair_count: int
     mechanisms: Mechanisms
+    has_mesh: bool
 
     @classmethod
     def of(cls, worlds: Sequence[WorldSetup]) -> "Layout":
@@ -31,6 +32,7 @@ class Layout:
             "number of walls": {len(world.walls) for world in worlds},
             "number of contacts": {len(world.contacts) for world in worlds},
             "mechanisms": {world.mechanisms for world in worlds},
+            "use of meshes": {world.triangle_count > 0 for world in worlds},
         }
         for name, found in alike.items():
             if len(found) > 1:
@@ -44,6 +46,7 @@ class Layout:
             len(worlds[0].walls),
             len(worlds[0].contacts),
             worlds[0].mechanisms,
+            worlds[0].triangle_count > 0,
         )
 
     @property

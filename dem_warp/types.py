@@ -72,13 +72,15 @@ class Build:
     wall_count: int
     cooperative: bool
     mechanisms: Mechanisms = ()
+    has_mesh: bool = False
 
     @property
     def name(self) -> str:
         """Name of the compiled module."""
         way = "warp" if self.cooperative else "serial"
         sizes = (self.sphere_count, self.wall_count)
-        return "_".join(map(str, (self.precision.name, way, *sizes, *(m.name for m in self.mechanisms))))
+        extras = (*(m.name for m in self.mechanisms), *("mesh",) * self.has_mesh)
+        return "_".join(map(str, (self.precision.name, way, *sizes, *extras)))
 
     @property
     def without_mechanisms(self) -> "Build":
@@ -167,6 +169,24 @@ def device_structs(precision: Precision) -> SimpleNamespace:
         spin: vec3  # [rad/s]
 
     @wp.struct
+    class Triangle:
+        a: (
+            wp.vec3d
+        )  # corners, from the wall's point and before any motion, in the order of the mesh's vertices [m]
+        b: wp.vec3d
+        c: wp.vec3d
+        normal: wp.vec3d  # unit vector, to either side
+        first: int  # index of its neighbours
+        count: int  # of them
+
+    @wp.struct
+    class Facets:
+        bvh: wp.uint64  # of the wall's mesh
+        first: int  # index of its triangles
+        number: int  # of the first triangle, counted on from the world's walls
+        count: int  # of triangles; 0 for a wall that is no mesh
+
+    @wp.struct
     class Model:
         world: wp.array(dtype=World)  # (worlds,)
         contact: wp.array(dtype=ContactParams)  # (worlds * pairs,)
@@ -174,6 +194,11 @@ def device_structs(precision: Precision) -> SimpleNamespace:
         frame: wp.array(
             dtype=Frame
         )  # where it stands in the steps about the present, (worlds * walls * FRAMES,)
+        facets: wp.array(dtype=Facets)  # (worlds * walls,)
+        triangle: wp.array(dtype=Triangle)  # of every different mesh
+        beside: wp.array(
+            dtype=int
+        )  # its neighbours: number in the mesh, and bits of the corners that they share
         shape_spheres: wp.array(dtype=vec4)  # local centre and radius, (shapes * spheres,) [m]
         shape_sphere_count: wp.array(dtype=int)  # (shapes,)
         shape: wp.array(dtype=int)  # (grains,)
@@ -220,8 +245,10 @@ def device_structs(precision: Precision) -> SimpleNamespace:
     return SimpleNamespace(
         Cells=Cells,
         Contact=Contact,
+        Facets=Facets,
         Frame=Frame,
         ContactParams=ContactParams,
+        Triangle=Triangle,
         World=World,
         Wall=Wall,
         Model=Model,

@@ -1,6 +1,6 @@
 """Boundary surfaces and how they move: their description on the host.
 
-A disc, a cylinder and a cone are all swept by a straight profile that goes around the axis: from `radius`, at
+A disc, a cylinder and a cone are swept by a straight profile that goes around the axis: from `radius`, at
 the point, to `upper_radius`, at `length` along the axis.
 """
 
@@ -14,6 +14,10 @@ Vector = tuple[float, float, float]
 PLANE = 0
 CYLINDER = 1
 CONE = 2
+MESH = 3
+
+THINNEST = 1.0e-9
+"""Twice a triangle's area over its longest side squared, below which it has no plane."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +68,7 @@ class Plane:
     normal: Vector = (0.0, 0.0, 1.0)
 
     kind = PLANE
+    triangle_count = 0
     radius = upper_radius = length = 0.0
     reach = math.inf
 
@@ -95,6 +100,7 @@ class Disc:
     inner_radius: float = 0.0
 
     kind = CONE
+    triangle_count = 0
     length = 0.0
 
     def __post_init__(self) -> None:
@@ -142,6 +148,7 @@ class Cylinder:
     direction: Vector = (0.0, 0.0, 1.0)
 
     kind = CYLINDER
+    triangle_count = 0
 
     def __post_init__(self) -> None:
         _check_vectors(self, "point", "direction")
@@ -189,6 +196,7 @@ class Cone:
     direction: Vector = (0.0, 0.0, 1.0)
 
     kind = CONE
+    triangle_count = 0
 
     def __post_init__(self) -> None:
         _check_vectors(self, "point", "direction")
@@ -210,7 +218,80 @@ class Cone:
         return max(self.radius, math.hypot(self.upper_radius, self.length))
 
 
-Wall = Plane | Disc | Cylinder | Cone
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Thin surface of triangles, touched from both sides, at its edges and at its corners.
+
+    Triangles are joined where they share vertices of equal coordinates. A contact is counted once wherever
+    the surface comes nearest to a sphere, so in a concave corner there are several.
+
+    Attributes
+    ----------
+    vertices : (n, 3) array
+        [m], read-only.
+    faces : (m, 3) int array
+        Three vertices of each triangle, either way around, read-only.
+    point : 3 floats
+        What the mesh turns about [m].
+    """
+
+    vertices: np.ndarray
+    faces: np.ndarray
+    point: Vector = (0.0, 0.0, 0.0)
+
+    kind = MESH
+    axis = (0.0, 0.0, 1.0)
+    radius = upper_radius = length = 0.0
+
+    def __post_init__(self) -> None:
+        vertices, faces = np.array(self.vertices, dtype=float), np.array(self.faces)
+        if vertices.ndim != 2 or vertices.shape[1] != 3 or not np.isfinite(vertices).all():
+            raise ValueError(f"Mesh.vertices: must be finite, shape (n, 3) [m], got shape {vertices.shape}")
+        if faces.ndim != 2 or faces.shape[1] != 3 or not len(faces) or faces.dtype.kind not in "iu":
+            raise ValueError(
+                f"Mesh.faces: must be integers, shape (m, 3), got {faces.dtype} of shape {faces.shape}"
+            )
+        if bad := np.flatnonzero(((faces < 0) | (faces >= len(vertices))).any(axis=1)).tolist():
+            raise ValueError(
+                f"Mesh.faces: must be from 0 to {len(vertices) - 1}, got others in triangles {bad[:5]}"
+            )
+        a, b, c = np.moveaxis(vertices[faces], 1, 0)
+        area, side = (
+            np.linalg.norm(np.cross(b - a, c - a), axis=1),
+            np.linalg.norm([b - a, c - a, c - b], axis=2),
+        )
+        if bad := np.flatnonzero(area <= THINNEST * side.max(axis=0) ** 2).tolist():
+            raise ValueError(f"Mesh.faces: must span an area, triangles {bad[:5]} do not")
+        for name, array in (("vertices", vertices), ("faces", faces)):
+            array.flags.writeable = False
+            object.__setattr__(self, name, array)
+
+    @classmethod
+    def tube(cls, radius: float, height: float, segments: int) -> "Mesh":
+        """Upright open tube about the origin, its cross-section that of a round one of this radius [m]."""
+        if segments < 3:
+            raise ValueError(f"Mesh.tube: must have 3 segments or more, got {segments!r}")
+        turn = 2.0 * np.pi / segments
+        corner = radius * np.sqrt(turn / np.sin(turn))
+        lower = np.arange(segments)
+        ring = corner * np.column_stack([np.cos(turn * lower), np.sin(turn * lower)])
+        vertices = np.vstack([np.insert(ring, 2, z, axis=1) for z in (0.0, height)])
+        after = (lower + 1) % segments
+        faces = [[lower, after, lower + segments], [after, after + segments, lower + segments]]
+        return cls(vertices, np.concatenate(faces, axis=1).T)
+
+    @property
+    def triangle_count(self) -> int:
+        """Number of triangles."""
+        return len(self.faces)
+
+    @property
+    def reach(self) -> float:
+        """Distance of its farthest point from `point` [m]."""
+        return float(np.linalg.norm(self.vertices - np.array(self.point), axis=1).max())
+
+
+Wall = Plane | Disc | Cylinder | Cone | Mesh
 
 
 def _check_vectors(wall: object, place: str, direction: str) -> None:

@@ -11,6 +11,7 @@ from types import SimpleNamespace
 import warp as wp
 
 from dem_warp.kernels.packing import packing
+from dem_warp.kernels.triangles import triangle_functions
 from dem_warp.kernels.walls import wall_functions
 from dem_warp.types import Build, device_structs
 
@@ -27,7 +28,8 @@ def cell_kernels(build: Build) -> SimpleNamespace:
     types = device_structs(precision)
     Model, World, Grains, Cells = types.Model, types.World, types.Grains, types.Cells
     pack = packing(precision)
-    walls = wall_functions(precision)
+    walls = wall_functions(build)
+    triangles = triangle_functions(precision)
     spheres_each = wp.constant(build.sphere_count)
     walls_each = wp.constant(build.wall_count)
     module = wp.get_module(f"dem_warp_cells_{build.name}")
@@ -97,6 +99,28 @@ def cell_kernels(build: Build) -> SimpleNamespace:
         if n < cells.found_capacity:
             cells.found[i * cells.found_capacity + n] = partner
 
+    @wp.func
+    def append_triangles(
+        model: Model, cells: Cells, i: int, w: int, k: int, position: wp.vec3d, reach: real, step: int
+    ):
+        """Adds the triangles of wall `k` that are near to sphere `i`."""
+        wall = w * walls_each + k
+        facets = model.facets[wall]
+        if facets.count == 0:
+            return
+        q = walls.to_mesh(walls.frame_of(model, wall, step), position)
+        near = wp.float64(reach)
+        # the tree's boxes are in float32, rounded by some 1e-7 of the mesh's size
+        center = wp.vec3(float(q[0]), float(q[1]), float(q[2]))
+        half = float(reach) + 1.0e-6 * float(model.wall[wall].reach)
+        corner = wp.vec3(half, half, half)
+        query = wp.mesh_query_aabb(facets.bvh, center - corner, center + corner)
+        t = int(0)
+        while wp.mesh_query_aabb_next(query, t):
+            d = triangles.from_triangle(model.triangle[facets.first + t], q)
+            if wp.dot(d, d) < near * near:
+                append(cells, i, model.grain_count * spheres_each + facets.number + t)
+
     @wp.kernel(module=module)
     def search(model: Model, grains: Grains, stale: wp.array(dtype=int), cells: Cells):
         """Partners of each sphere: pairs in its own bucket, and with the half of the buckets ahead of it.
@@ -130,10 +154,11 @@ def cell_kernels(build: Build) -> SimpleNamespace:
                         append(cells, i, j - first)
                         append(cells, j, i - first)
         for k in range(walls_each):
-            number = w * walls_each + k
-            frame = walls.frame_of(model, number, grains.step[w])
-            if walls.overlaps(model.wall[number], frame, pack.place(a, world), reach):
+            if walls.touches(model, w, k, pack.place(a, world), reach, grains.step[w]):
                 append(cells, i, model.grain_count * spheres_each + k)
+        if wp.static(build.has_mesh):
+            for k in range(walls_each):
+                append_triangles(model, cells, i, w, k, pack.place(a, world), reach, grains.step[w])
 
     return SimpleNamespace(
         bin_spheres=bin_spheres,

@@ -26,7 +26,7 @@ def contact_functions(build: Build) -> SimpleNamespace:
     pack = packing(precision)
     law = contact_law(build.mechanisms)
     memory_each = wp.constant(memory_size(build.mechanisms))
-    walls = wall_functions(precision)
+    walls = wall_functions(build.without_mechanisms)
     spheres_each = wp.constant(build.sphere_count)
     walls_each = wp.constant(build.wall_count)
 
@@ -40,9 +40,7 @@ def contact_functions(build: Build) -> SimpleNamespace:
         if wp.static(acts_apart(build.mechanisms)):
             reach += world.reach
         if partner >= wall_base:
-            number = w * walls_each + partner - wall_base
-            frame = walls.frame_of(model, number, step)
-            return walls.overlaps(model.wall[number], frame, pack.place(a, world), reach)
+            return walls.touches(model, w, partner - wall_base, pack.place(a, world), reach, step)
         b = pack.load_sphere(grains.spheres, w * wall_base + partner)
         d = pack.difference(a, b, world)
         reach += pack.last(b)
@@ -83,6 +81,35 @@ def contact_functions(build: Build) -> SimpleNamespace:
         return contact
 
     @wp.func
+    def joined(model: Model, w: int, entry: int, other: int) -> bool:
+        """Whether the partners of two entries are triangles that share a corner, the first being one."""
+        wall_base = model.grain_count * spheres_each
+        return walls.joined(model, w, (entry & SPHERE_MASK) - wall_base, (other & SPHERE_MASK) - wall_base)
+
+    @wp.func
+    def take_over(
+        model: Model, world: World, grains: Grains, hood: Neighbours, w: int, g: int, slot: int, step: int
+    ):
+        """Lets a contact that has passed from one triangle of a mesh to the next go on with its history.
+
+        The sphere touched the other one in the step before and has left it now. Nobody writes to an entry
+        that does not touch, so it may be read.
+        """
+        entry = hood.entry[slot]
+        row = hood.list[w] * model.shape.shape[0] + g
+        first = row * hood.capacity
+        for k in range(first, first + hood.count[row]):
+            other = hood.entry[k]
+            if other >> SPHERE_BITS == entry >> SPHERE_BITS and joined(model, w, entry, other):
+                if not touches(model, world, grains, w, g, other, step):
+                    history = pack.load_vec4(hood.history, k)
+                    if pack.stamped_step(history) == step:
+                        pack.store_vec4(hood.history, slot, history)
+                        for m in range(memory_each):
+                            hood.memory[slot * memory_each + m] = hood.memory[k * memory_each + m]
+                        return
+
+    @wp.func
     def contact(
         model: Model, world: World, grains: Grains, hood: Neighbours, w: int, g: int, slot: int, step: int
     ):
@@ -101,20 +128,17 @@ def contact_functions(build: Build) -> SimpleNamespace:
             b = pack.load_sphere(grains.spheres, w * wall_base + partner)
             c = meet_sphere(grains, world, c, w * model.grain_count + partner // spheres_each, a, b)
         else:
-            number = w * walls_each + partner - wall_base
-            wall = model.wall[number]
-            frame = walls.frame_of(model, number, step)
-            overlap, normal, velocity = walls.meet(wall, frame, pack.place(a, world), radius)
-            c.overlap = overlap
-            c.normal = normal
-            c.radius = radius
-            c.velocity = -velocity
-            c.spin = -frame.spin
-            pair += wall.pair
+            wall = walls.wall_of(model, w, partner - wall_base)
+            c = walls.meet(model, c, wall, partner - wall_base, pack.place(a, world), radius, step)
+            pair += model.wall[wall].pair
         c.lever = lever_of(grains, world, g, a, c.normal * (real(0.5) * c.overlap - radius))
         c.mobility += real(1.0) / (mass * wp.dot(c.lever, c.lever))
         c.velocity += surface_velocity(grains, g, c.lever)
         c.spin += spin_of(grains, g)
+        if wp.static(build.has_mesh):
+            is_triangle = partner >= wall_base + walls_each
+            if is_triangle and pack.stamped_step(pack.load_vec4(hood.history, slot)) != step:
+                take_over(model, world, grains, hood, w, g, slot, step)
         history = pack.load_vec4(hood.history, slot)
         displacement = vec3(history[0], history[1], history[2])
         c.is_new = pack.stamped_step(history) != step

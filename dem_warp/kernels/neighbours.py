@@ -30,7 +30,7 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
     types = device_structs(precision)
     Model, Grains, Neighbours, Cells = types.Model, types.Grains, types.Neighbours, types.Cells
     pack = packing(precision)
-    walls = wall_functions(precision)
+    walls = wall_functions(build.without_mechanisms)
     spheres_each = wp.constant(build.sphere_count)
     walls_each = wp.constant(build.wall_count)
     memory_each = wp.constant(memory_size(build.mechanisms))

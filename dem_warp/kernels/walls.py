@@ -5,22 +5,28 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from dem_warp.types import FRAMES, Build, Precision, device_structs
-from dem_warp.walls import CYLINDER, PLANE
+from dem_warp.kernels.triangles import triangle_functions
+from dem_warp.types import FRAMES, Build, device_structs
+from dem_warp.walls import CYLINDER, MESH, PLANE
 
 TINY = 1.0e-12  # m; nearer than this to an axis or a surface no direction is defined
 TURN = wp.constant(wp.float64(2.0 * wp.pi))  # rad
 
 
 @functools.cache
-def wall_functions(precision: Precision) -> SimpleNamespace:
-    """`frame_of`, `overlaps`, `meet` and `path` in one precision.
+def wall_functions(build: Build) -> SimpleNamespace:
+    """`wall_of`, `frame_of`, `touches`, `meet` and `path` of one build.
 
+    Among the partners of a sphere, walls have numbers from 0 and the triangles of their meshes those after.
     Geometry is in float64: an overlap is 1e-3 to 1e-6 of the distances that it is the difference of.
     """
-    real, vec3 = precision.real, precision.vec3
-    types = device_structs(precision)
+    real, vec3 = build.precision.real, build.precision.vec3
+    types = device_structs(build.precision)
     Model, World, Wall, Frame = types.Model, types.World, types.Wall, types.Frame
+    Contact = types.Contact
+    triangles = triangle_functions(build.precision)
+    walls_each = wp.constant(build.wall_count)
+    has_mesh = build.has_mesh
 
     @wp.func
     def rounded(v: wp.vec3d) -> vec3:
@@ -67,6 +73,53 @@ def wall_functions(precision: Precision) -> SimpleNamespace:
         return distance < reach
 
     @wp.func
+    def wall_of(model: Model, w: int, number: int) -> int:
+        """The wall that a partner is or, if it is a triangle, belongs to."""
+        wall = w * walls_each + number
+        if wp.static(has_mesh):
+            if number >= walls_each:
+                for k in range(walls_each):
+                    facets = model.facets[w * walls_each + k]
+                    if number >= facets.number and number < facets.number + facets.count:
+                        wall = w * walls_each + k
+        return wall
+
+    @wp.func
+    def joined(model: Model, w: int, number: int, other: int) -> bool:
+        """Whether a triangle shares a corner with another partner."""
+        facets = model.facets[wall_of(model, w, number)]
+        return triangles.joined(model, facets.first + number - facets.number, other - facets.number)
+
+    @wp.func
+    def to_mesh(frame: Frame, position: wp.vec3d) -> wp.vec3d:
+        """Position in a mesh's own frame."""
+        return wp.quat_rotate_inv(frame.rotation, position - frame.origin)
+
+    @wp.func
+    def touches(model: Model, w: int, number: int, position: wp.vec3d, radius: real, step: int) -> bool:
+        """Whether a sphere touches a wall or a triangle."""
+        wall = wall_of(model, w, number)
+        frame = frame_of(model, wall, step)
+        if wp.static(has_mesh):
+            if number >= walls_each:
+                facets = model.facets[wall]
+                q = to_mesh(frame, position)
+                return triangles.touches(model, facets.first, number - facets.number, q, wp.float64(radius))
+            if model.wall[wall].kind == MESH:
+                return False
+        return overlaps(model.wall[wall], frame, position, radius)
+
+    @wp.func
+    def triangle_overlap(
+        model: Model, wall: int, number: int, frame: Frame, position: wp.vec3d, radius: real
+    ):
+        facets = model.facets[wall]
+        t = model.triangle[facets.first + number - facets.number]
+        d = wp.quat_rotate(frame.rotation, triangles.from_triangle(t, to_mesh(frame, position)))
+        distance = wp.length(d)
+        return real(wp.float64(radius) - distance), rounded(d) / real(wp.max(distance, wp.float64(TINY)))
+
+    @wp.func
     def overlap_and_normal(wall: Wall, axis: wp.vec3d, r: wp.vec3d, radius: real):
         along = wp.dot(r, axis)
         distance = along
@@ -84,12 +137,23 @@ def wall_functions(precision: Precision) -> SimpleNamespace:
         return real(wp.float64(radius) - distance), normal
 
     @wp.func
-    def meet(wall: Wall, frame: Frame, position: wp.vec3d, radius: real):
-        """Overlap [m], unit normal from the wall to the sphere, and the wall's velocity there [m/s]."""
+    def meet(
+        model: Model, contact: Contact, wall: int, number: int, position: wp.vec3d, radius: real, step: int
+    ) -> Contact:
+        """Geometry of a contact with a wall, or with a triangle of it; the wall's motion is taken off."""
+        frame = frame_of(model, wall, step)
         r = position - frame.origin
-        overlap, normal = overlap_and_normal(wall, frame.axis, r, radius)
+        overlap, normal = overlap_and_normal(model.wall[wall], frame.axis, r, radius)
+        if wp.static(has_mesh):
+            if number >= walls_each:
+                overlap, normal = triangle_overlap(model, wall, number, frame, position, radius)
+        contact.overlap = overlap
+        contact.normal = normal
+        contact.radius = radius
         arm = rounded(r) + normal * (real(0.5) * overlap - radius)
-        return overlap, normal, frame.velocity + wp.cross(frame.spin, arm)
+        contact.velocity = -(frame.velocity + wp.cross(frame.spin, arm))
+        contact.spin = -frame.spin
+        return contact
 
     @wp.func
     def path(wall: Wall, frame: Frame, world: World, time: wp.float64) -> wp.float64:
@@ -97,13 +161,23 @@ def wall_functions(precision: Precision) -> SimpleNamespace:
 
         A spin about its own axis leaves a surface of revolution where it is.
         """
+        sway = wall.spin
+        if wall.kind != MESH:
+            sway -= frame.axis * wp.dot(wall.spin, frame.axis)
         reach = wp.min(wall.reach, wp.length(frame.origin - world.origin) + wp.length(world.half_extent))
-        sway = wall.spin - frame.axis * wp.dot(wall.spin, frame.axis)
         amplitude = wp.length(wall.amplitude)
         swing = wp.min(wp.float64(2.0), TURN * wall.frequency * time) * amplitude
         return (wp.length(wall.velocity) + wp.length(sway) * reach) * time + swing
 
-    return SimpleNamespace(frame_of=frame_of, overlaps=overlaps, meet=meet, path=path)
+    return SimpleNamespace(
+        wall_of=wall_of,
+        frame_of=frame_of,
+        to_mesh=to_mesh,
+        joined=joined,
+        touches=touches,
+        meet=meet,
+        path=path,
+    )
 
 
 @functools.cache

@@ -1,0 +1,104 @@
+"""How a sphere meets a mesh of triangles: in every place where the surface comes nearest to its centre.
+
+Each triangle is a partner of its own, so a sphere in a corner touches several. Where its nearest point lies
+on an edge or in a corner, other triangles have that point too. The contact then belongs to the one of them
+that comes nearest, and of equally near ones to the first. So of a sphere over a flat or concave edge, the
+triangle under it has the contact; over a convex edge or corner, one of those that share it; and no contact is
+lost or counted twice, because all of them work out the same distances, bit for bit.
+"""
+
+import functools
+from types import SimpleNamespace
+
+import warp as wp
+
+from dem_warp.types import Precision, device_structs
+
+CORNERS = 0b111
+CLOSE = 1.0e-5  # of a sphere's radius; this near to an edge or corner, a point lies on it
+
+
+@functools.cache
+def triangle_functions(precision: Precision) -> SimpleNamespace:
+    """`from_triangle`, `touches` and `joined`; positions are in the frame of the mesh, all in float64."""
+    types = device_structs(precision)
+    Model, Triangle = types.Model, types.Triangle
+
+    @wp.func
+    def from_segment(a: wp.vec3d, b: wp.vec3d, q: wp.vec3d) -> wp.vec3d:
+        """Vector to `q` from the nearest point of a segment, exact at its ends."""
+        side = b - a
+        part = wp.dot(q - a, side) / wp.dot(side, side)
+        if part >= wp.float64(1.0):
+            return q - b
+        return q - a - side * wp.max(part, wp.float64(0.0))
+
+    @wp.func
+    def shorter(d: wp.vec3d, e: wp.vec3d) -> wp.vec3d:
+        return wp.where(wp.dot(e, e) < wp.dot(d, d), e, d)
+
+    @wp.func
+    def from_triangle(t: Triangle, q: wp.vec3d) -> wp.vec3d:
+        """Vector to `q` from the nearest point of a triangle."""
+        ab = t.b - t.a
+        ac = t.c - t.a
+        r = q - t.a
+        beside_ac = wp.dot(wp.cross(r, ac), t.normal)
+        beside_ab = wp.dot(wp.cross(ab, r), t.normal)
+        inside = beside_ac >= wp.float64(0.0) and beside_ab >= wp.float64(0.0)
+        if inside and beside_ac + beside_ab <= wp.dot(wp.cross(ab, ac), t.normal):
+            return t.normal * wp.dot(r, t.normal)
+        d = shorter(from_segment(t.a, t.b, q), from_segment(t.a, t.c, q))
+        return shorter(d, from_segment(t.b, t.c, q))
+
+    @wp.func
+    def on_segment(a: wp.vec3d, b: wp.vec3d, p: wp.vec3d, near: wp.float64) -> bool:
+        return wp.length(from_segment(a, b, p)) < near
+
+    @wp.func
+    def corners_around(t: Triangle, p: wp.vec3d, near: wp.float64) -> int:
+        """Bits of the corners that span what a point lies on: a corner, an edge or the face."""
+        if wp.length(p - t.a) < near:
+            return 1
+        if wp.length(p - t.b) < near:
+            return 2
+        if wp.length(p - t.c) < near:
+            return 4
+        if on_segment(t.a, t.b, p, near):
+            return 1 | 2
+        if on_segment(t.a, t.c, p, near):
+            return 1 | 4
+        if on_segment(t.b, t.c, p, near):
+            return 2 | 4
+        return CORNERS
+
+    @wp.func
+    def touches(model: Model, first: int, index: int, q: wp.vec3d, radius: wp.float64) -> bool:
+        """Whether a sphere has a contact with triangle `index` of a mesh whose triangles begin at `first`."""
+        t = model.triangle[first + index]
+        d = from_triangle(t, q)
+        distance2 = wp.dot(d, d)
+        if not (distance2 < radius * radius):  # a radius that is not a number touches nothing
+            return False
+        corners = corners_around(t, q - d, wp.float64(CLOSE) * radius)
+        if corners == CORNERS:
+            return True
+        for k in range(t.first, t.first + t.count):
+            other = model.beside[k]
+            if corners & other == corners:
+                rival = other >> 3
+                e = from_triangle(model.triangle[first + rival], q)
+                if wp.dot(e, e) < distance2 or (wp.dot(e, e) == distance2 and rival < index):
+                    return False
+        return True
+
+    @wp.func
+    def joined(model: Model, index: int, other: int) -> bool:
+        """Whether triangle `index` of the table shares a corner with number `other` of its mesh."""
+        t = model.triangle[index]
+        found = bool(False)
+        for k in range(t.first, t.first + t.count):
+            found = found or model.beside[k] >> 3 == other
+        return found
+
+    return SimpleNamespace(from_triangle=from_triangle, touches=touches, joined=joined)
