@@ -76,6 +76,7 @@ class CaseProgress:
     def __init__(self, title: str) -> None:
         self._title = title
         self._last_line = QUIET_START - LINE_EVERY
+        self._first: BatchProgress | None = None
         self._bar = Progress(
             SpinnerColumn(),
             TextColumn("{task.description}"),
@@ -99,9 +100,10 @@ class CaseProgress:
 
     def __call__(self, progress: BatchProgress) -> None:
         """Show the engine's progress."""
+        self._first = self._first or progress
         if progress.seconds < QUIET_START:
             return
-        state = describe_progress(progress)
+        state = describe_progress(progress, self._first)
         if messages.is_terminal:
             self._bar.update(self._task, completed=progress.fraction, state=state, visible=True)
         elif progress.seconds - self._last_line >= LINE_EVERY:
@@ -109,8 +111,10 @@ class CaseProgress:
             messages.print(f"{self._title}: {100.0 * progress.fraction:.0f} %, {state}")
 
 
-def describe_progress(progress: BatchProgress) -> str:
+def describe_progress(progress: BatchProgress, first: BatchProgress | None = None) -> str:
     """Say how long it will take, how many cases are done, and what those that run are doing.
+
+    The speed is that since the `first` progress: what an earlier run had done is not this one's speed.
 
     Examples
     --------
@@ -118,8 +122,11 @@ def describe_progress(progress: BatchProgress) -> str:
     """
     parts = [f"{progress.done} of {progress.total} cases"]
     parts += [f"{count} {phase}" for phase, count in progress.phase_counts.items() if phase != "waiting"]
-    if FIRST_GUESS <= progress.fraction < 1.0:
-        left = progress.seconds * (1.0 - progress.fraction) / progress.fraction
+    done, seconds = progress.fraction, progress.seconds
+    if first is not None:
+        done, seconds = done - first.fraction, seconds - first.seconds
+    if done >= FIRST_GUESS and progress.fraction < 1.0:
+        left = seconds * (1.0 - progress.fraction) / done
         parts.insert(0, f"{duration(left)} left")
     return ", ".join(parts)
 

@@ -47,7 +47,8 @@ def run_campaign(
     workers
         Processes on the CPU; None: the engine's choice.
     resume
-        Go on in the folder of an earlier run: what it has simulated is not simulated again.
+        Go on in the folder of an earlier run: what it has simulated is not simulated again, and what it had
+        begun goes on from its checkpoint.
     watch
         Display of each batch of cases.
     on_stage

@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 import warp as wp
-from worlds import assert_same_bits, oblique_impact, pile, small_case, solve, state
+from worlds import assert_same_bits, assert_same_result, oblique_impact, pile, small_case, solve, state
 
-from dem_warp import simulate
+from dem_warp import CaseResult, simulate
+from dem_warp.batch import Batch
+from dem_warp.checkpoint import Checkpoints
 from dem_warp.device import resolve_device
 from dem_warp.model import WorldSetup
 from dem_warp.solver import Solver
@@ -38,6 +40,25 @@ def test_the_batch_does_not_change_the_bits():
     alone = state(run(pile(1)))
     together = run(pile(2), pile(3, count=31), pile(1), pile(4, count=5))
     assert_same_bits(state(together, 2), alone)
+
+
+def test_an_interruption_and_another_batch_do_not_change_the_bits(tmp_path):
+    def finish(batch: Batch) -> dict[int, CaseResult]:
+        results = {}
+        while batch.running:
+            results.update(batch.advance())
+        return results
+
+    device, cases = resolve_device("cuda"), [small_case(seed) for seed in range(31)]
+    alone = finish(Batch([cases[7]], device))[0]
+    batch = Batch(cases, device, Checkpoints(tmp_path))
+    while batch.phase(7) != "lift":
+        batch.advance()
+    batch.save()
+    assert_same_result(finish(batch)[7], alone)
+    resumed = Batch([cases[2], cases[7]], device, Checkpoints(tmp_path))
+    assert min(resumed.steps) > 0
+    assert_same_result(finish(resumed)[1], alone)
 
 
 def test_an_impact_follows_the_cpu():

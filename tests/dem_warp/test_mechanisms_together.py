@@ -24,6 +24,7 @@ from dem_warp.laws.mechanism import Mechanism
 from dem_warp.laws.rate_weakening import RateWeakening
 from dem_warp.laws.twisting import Twisting
 from dem_warp.model import WorldSetup
+from dem_warp.snapshot import put_snapshot, take_snapshot
 
 KINDS = (LinearCohesion, ElasticPlasticRolling, Twisting, RateWeakening, KineticFriction, HystereticSpring)
 ALL = (
@@ -70,6 +71,18 @@ def test_a_pile_with_all_of_them_comes_to_rest(settled):
     still = {"mixed": 1e-5, "double": 1e-9}[precision]
     assert len(end["slots"]) == 36
     assert np.abs(end["velocities"]).max() < still
+
+
+def test_what_a_contact_remembers_goes_along_to_another_batch(settled):
+    precision, midst, _ = settled
+    larger = replace(rich_pile(), grains=pile(2, count=40).grains)
+    first, second = solve(rich_pile(), precision=precision), solve(larger, rich_pile(), precision=precision)
+    run_for(first, 0.5 * FALL)
+    put_snapshot(second, 1, take_snapshot(first, 0))
+    assert np.abs(second.hood.memory.numpy()).max() > 0.0
+    run_for(second, FALL - first.view([0])[0].time)
+    assert second.view([1])[0].step == first.view([0])[0].step + second.view([0])[0].step
+    assert_same_bits(state(second, 1), midst)
 
 
 def test_what_a_contact_remembers_survives_rebuilds(settled):

@@ -266,9 +266,12 @@ def test_progress_tells_the_time_left(capsys: pytest.CaptureFixture[str]) -> Non
 
     halfway = Progress(done=3, total=12, fraction=0.25, phase_counts={"lift": 2, "waiting": 7}, seconds=20.0)
     assert describe_progress(halfway) == "1 min 0 s left, 3 of 12 cases, 2 lift"
+    # An earlier run had done a fifth: this one did a twentieth in its 20 s.
+    taken_up = Progress(done=0, total=12, fraction=0.2, phase_counts={}, seconds=0.0)
+    assert describe_progress(halfway, taken_up).startswith("5 min 0 s left")
     with CaseProgress("climb") as show:
-        show(Progress(0, 12, 0.01, {}, 1.0))
+        show(start := Progress(0, 12, 0.01, {}, 1.0))
         show(halfway)
         show(Progress(3, 12, 0.26, {}, 21.0))
     # Without a terminal: nothing in the first two seconds, then a line every ten.
-    assert capsys.readouterr().err.split() == f"climb: 25 %, {describe_progress(halfway)}".split()
+    assert capsys.readouterr().err.split() == f"climb: 25 %, {describe_progress(halfway, start)}".split()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from dem_warp import Case, CaseResult
+from dem_warp import Case, CaseResult, Progress, simulate, simulation
 from experiments.cases import Store, execute, run_cases
 from experiments.study import Study
 
@@ -30,11 +31,18 @@ class Engine:
         self.batches: list[list[Case]] = []
         self.endings: dict[int, tuple[str, str]] = {}
         self.interrupt_after: int | None = None
+        self.checkpoints: list[Path] = []
 
     def __call__(
-        self, cases: Sequence[Case], *, on_result: Callable[[int, CaseResult], None], **_: Any
+        self,
+        cases: Sequence[Case],
+        *,
+        on_result: Callable[[int, CaseResult], None],
+        checkpoint: Path,
+        **_: Any,
     ) -> list[CaseResult]:
         self.batches.append(list(cases))
+        self.checkpoints.append(checkpoint)
         results = []
         # The last case ends first: results do not come in order.
         for index in reversed(range(len(cases))):
@@ -100,6 +108,47 @@ def test_an_interrupted_batch_keeps_what_had_finished(
     results = run_cases(small_study, table_of([0.3, 0.4, 0.5, 0.6]), Store(tmp_path))
     assert [[case.seed for case in batch] for batch in engine.batches] == [[10, 20, 30, 40], [10, 20]]
     assert results["angle"].is_monotonic_increasing
+
+
+def test_checkpoints_outlive_an_interruption_and_no_more(
+    small_study: Study, engine: Engine, tmp_path: Path
+) -> None:
+    store = Store(tmp_path / "cases")
+    left = store.unfinished / "half.npz"
+    left.parent.mkdir(parents=True)
+    left.write_bytes(b"half a case")
+    engine.interrupt_after = 1
+    with pytest.raises(KeyboardInterrupt):
+        run_cases(small_study, table_of([0.3, 0.5]), store)
+    assert engine.checkpoints == [store.unfinished]
+    assert left.exists()
+    engine.interrupt_after = None
+    run_cases(small_study, table_of([0.3, 0.5]), store)
+    assert not store.unfinished.exists()
+    assert len(list(store.folder.iterdir())) == 2
+
+
+def test_an_interrupted_case_goes_on_in_the_middle(
+    small_study: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(execute, "simulate", partial(simulate, checkpoint_every=0.0))
+    monkeypatch.setattr(simulation, "REPORT_EVERY", 0.0)
+
+    def run(folder: str, progress: Callable[[Progress], None] | None = None) -> pd.DataFrame:
+        return run_cases(small_study, table_of([0.3]), Store(tmp_path / folder), "cpu", 1, progress)
+
+    def interrupt(progress: Progress) -> None:
+        if progress.fraction > 0.5:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run("cut", interrupt)
+    fractions: list[float] = []
+    resumed = run("cut", lambda progress: fractions.append(progress.fraction))
+    assert fractions[0] > 0.5
+    whole = run("whole")
+    assert whole["status"].iloc[0] == "finished"
+    pd.testing.assert_frame_equal(resumed, whole, check_exact=True)
 
 
 def test_a_failed_case_is_a_row(small_study: Study, engine: Engine, tmp_path: Path) -> None:
