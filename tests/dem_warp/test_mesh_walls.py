@@ -23,6 +23,7 @@ from worlds import (
 )
 
 from dem_warp.materials import rayleigh_time
+from dem_warp.snapshot import put_snapshot, take_snapshot
 from dem_warp.triangles import TriangleTable
 from dem_warp.types import SPHERE_MASK
 from dem_warp.walls import Mesh, Motion, Plane
@@ -235,6 +236,21 @@ def test_worlds_of_a_batch_have_meshes_of_their_own():
         assert_same_bits(state(together, w), state(alone))
         listed = alone.hood.entry.numpy() & SPHERE_MASK
         assert (listed >= 12 + 2).any()
+
+
+def test_a_world_goes_on_in_another_batch_with_its_moving_mesh():
+    setup = replace(heap_in(Mesh.tube(0.0245, 0.06, 12), 1), skin=3e-3)
+    larger = replace(heap_in(BOX, 2), grains=grains(np.mgrid[:2, :2, :5].reshape(3, -1).T * 0.012))
+    whole, first, second = solve(setup), solve(setup), solve(larger, setup)
+    for solver in (whole, first):
+        solver.move_wall(0, 0, Motion((0.0, 0.0, 0.01), spin=(0.2, 0.0, 0.3)))
+        run_for(solver, 0.05)
+    put_snapshot(second, 1, take_snapshot(first, 0))
+    for solver, w in ((whole, 0), (second, 1)):
+        run_for(solver, 0.02)
+        solver.move_wall(w, 0, Motion((0.0, 0.0, -0.01)))
+        run_for(solver, 0.02)
+    assert_same_bits(state(second, 1), state(whole))
 
 
 def test_the_skin_does_not_change_the_motion_on_a_mesh():
