@@ -12,7 +12,7 @@ from dem_warp.state import struct_array
 from dem_warp.types import Precision, device_structs
 from dem_warp.walls import Mesh
 
-SAMPLE = 500
+SAMPLE = 200
 """Triangles of a mesh, at the most, around which the others are counted."""
 
 
