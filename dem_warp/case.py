@@ -29,6 +29,8 @@ class Numerics:
         The grains' shear modulus is divided by it, for larger time steps; 1 leaves it.
     clamp_attraction : bool
         Keep the damping from attracting at the end of an impact.
+    tangential_damping : bool
+        Damp the tangential spring of a contact; not every code does.
     """
 
     time_step_fraction: float = 0.25
@@ -36,6 +38,7 @@ class Numerics:
     precision: str = "mixed"
     modulus_scale: float = 1.0
     clamp_attraction: bool = False
+    tangential_damping: bool = True
 
     def __post_init__(self) -> None:
         _require(
@@ -100,11 +103,16 @@ class Case(Generic[SceneT]):
 
     def contacts(self, wall_material: Material) -> tuple[ContactCoefficients, ContactCoefficients]:
         """Contacts of grains with grains, and with walls of a material."""
-        grain, clamp = self.grain_material, self.numerics.clamp_attraction
+        grain, numerics = self.grain_material, self.numerics
         pairs = (("grains", grain, self.grain_grain), ("walls", wall_material, self.grain_wall))
         first, second = (
             ContactCoefficients.of_pair(
-                grain, partner, interaction, clamp, tuple(m for m in self.mechanisms if m.acts_between(kind))
+                grain,
+                partner,
+                interaction,
+                numerics.clamp_attraction,
+                tuple(m for m in self.mechanisms if m.acts_between(kind)),
+                numerics.tangential_damping,
             )
             for kind, partner, interaction in pairs
         )

@@ -32,6 +32,8 @@ class ContactCoefficients:
         Whether the damping is kept from attracting at the end of an impact.
     mechanisms : tuple of Mechanism
         What the contact has beside the base law.
+    tangential_damping : bool
+        Whether the tangential spring is damped.
     """
 
     modulus: float
@@ -41,6 +43,7 @@ class ContactCoefficients:
     rolling_friction: float
     clamp_attraction: bool = False
     mechanisms: tuple[Mechanism, ...] = ()
+    tangential_damping: bool = True
 
     def __post_init__(self) -> None:
         names = [mechanism.name for mechanism in self.mechanisms]
@@ -55,6 +58,7 @@ class ContactCoefficients:
         interaction: Interaction,
         clamp_attraction: bool = False,
         mechanisms: tuple[Mechanism, ...] = (),
+        tangential_damping: bool = True,
     ) -> "ContactCoefficients":
         """Coefficients of two materials in contact."""
         modulus, shear_modulus = effective_moduli(a, b)
@@ -66,6 +70,7 @@ class ContactCoefficients:
             interaction.rolling_friction,
             clamp_attraction,
             mechanisms,
+            tangential_damping,
         )
 
     @property

@@ -115,6 +115,7 @@ def device_structs(precision: Precision) -> SimpleNamespace:
         static_friction: real  # [1]
         rolling_friction: real  # [1]
         clamp_attraction: real  # 1: the damping force may not attract; 0: it may
+        tangential_damping: real  # 1: the tangential spring is damped as the normal one is; 0: not at all
 
     @wp.struct
     class Contact:

@@ -32,7 +32,8 @@ def contact_law(mechanisms: Mechanisms) -> Any:
     the grain [N], the new tangential displacement [m], the torque [N m] beside that of the force, and the
     largest torque [N m] that rolling resistance may set against the grain's spin.
 
-    Both dampings use the same constant 2 sqrt(5/6) |beta|, each with its own stiffness, as in EDEM.
+    Both dampings use the same constant 2 sqrt(5/6) |beta|, each with its own stiffness, as in EDEM; the
+    tangential one can be left out.
 
     Raises
     ------
@@ -77,7 +78,7 @@ def contact_law(mechanisms: Mechanisms) -> Any:
         tangential_force, displacement = coulomb_spring(
             displacement,
             tangential_stiffness,
-            params.damping * wp.sqrt(tangential_stiffness * contact.mass),
+            params.tangential_damping * params.damping * wp.sqrt(tangential_stiffness * contact.mass),
             tangential_velocity,
             coefficient * support,
         )

@@ -12,7 +12,7 @@ from dem_warp.model import Grains, WorldSetup
 from dem_warp.scenes.rain import Rain, place_rain
 from dem_warp.scenes.scene import Course, Decision
 from dem_warp.solver import WorldView
-from dem_warp.walls import Cylinder, Motion, Plane
+from dem_warp.walls import Cylinder, Disc, Motion, Plane
 
 PLATE, TUBE = 0, 1
 GRAVITY = 9.81
@@ -52,6 +52,8 @@ class LiftedCylinder:
         The heap rests when it has been slower than this (CALM) for this long [m/s], [s].
     duration : float, optional
         Ends the case at a fixed simulated time [s] instead of at rest.
+    plate_diameter : float, optional
+        Of a round plate, over whose rim grains fall and are lost [m]; by default the plate has no end.
     """
 
     diameter: float
@@ -64,6 +66,7 @@ class LiftedCylinder:
     rest_speed: float = 1.0e-3
     rest_time: float = 0.05
     duration: float | None = None
+    plate_diameter: float | None = None
 
     def __post_init__(self) -> None:
         for name in (
@@ -82,6 +85,18 @@ class LiftedCylinder:
             raise ValueError(f"LiftedCylinder.grain_count: must be at least 1, got {self.grain_count!r}")
         if self.duration is not None and self.duration <= 0:
             raise ValueError(f"LiftedCylinder.duration: must be positive [s], got {self.duration!r}")
+        if self.plate_diameter is not None and not self.diameter < self.plate_diameter < np.inf:
+            raise ValueError(
+                f"LiftedCylinder.plate_diameter: must be finite and above the tube's {self.diameter!r} [m], "
+                f"got {self.plate_diameter!r}"
+            )
+
+    @property
+    def plate(self) -> Plane | Disc:
+        """What the tube stands on, at z = 0."""
+        if self.plate_diameter is None:
+            return Plane()
+        return Disc((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), self.plate_diameter / 2)
 
     @property
     def volume(self) -> float:
@@ -141,7 +156,7 @@ def _world(case: LiftCase, rain: Rain) -> WorldSetup:
         grains=grains,
         shapes=rain.grains.clumps,
         contacts=case.contacts(scene.wall_material),
-        walls=((Plane(), 1), (tube, 1)),
+        walls=((scene.plate, 1), (tube, 1)),
         time_step=case.time_step,
         skin=case.numerics.skin or default_skin(case),
         speed_limit=20 * scene.fall_speed,

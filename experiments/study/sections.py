@@ -16,6 +16,7 @@ from dem_warp.clumps import ClumpShape
 from dem_warp.materials import Interaction, Material
 from dem_warp.population import FRACTION_TOLERANCE, GrainPopulation, ShapeMixture
 from dem_warp.scenes.lifted_cylinder import LiftedCylinder
+from experiments.study.mechanisms import MechanismsSection
 from experiments.study.schema import Density, Length, Number, Pressure, Rate, Section, Speed, Time
 
 
@@ -184,6 +185,8 @@ class LiftedCylinderSection(Section):
     """... for this long."""
     duration: Time | None = Field(default=None, gt=0.0)
     """Ends the test after this simulated time, instead of at rest."""
+    plate_diameter: Length | None = Field(default=None, gt=0.0)
+    """Diameter of a round plate, over whose rim grains fall; left out: the plate has no end."""
 
 
 class SceneSection(Section):
@@ -206,6 +209,8 @@ class NumericsSection(Section):
     """Floating point precision of the forces."""
     clamp_attraction: bool = False
     """Keep the damping from attracting at the end of an impact."""
+    tangential_damping: bool = True
+    """Damp the tangential spring of a contact."""
 
     def numerics(self) -> Numerics:
         """Build the engine's numerics."""
@@ -225,6 +230,13 @@ class Physics(Section):
     """The physical test."""
     numerics: NumericsSection = NumericsSection()
     """Time step, softening, precision."""
+    mechanism: MechanismsSection = MechanismsSection()  # type: ignore[valid-type]
+    """Physical effects beside those of the base contact law."""
+
+    @model_validator(mode="after")
+    def _mechanisms_are_physical(self) -> Self:
+        self.mechanism.mechanisms()
+        return self
 
     def build_case(self, seed: int) -> Case:
         """Build one case of the engine."""
@@ -236,4 +248,5 @@ class Physics(Section):
             grain_wall=self.contact.grain_wall.interaction(),
             seed=seed,
             numerics=self.numerics.numerics(),
+            mechanisms=self.mechanism.mechanisms(),
         )

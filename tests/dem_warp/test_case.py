@@ -78,6 +78,8 @@ OTHER = {
     "skin": 1e-3,
     "precision": "double",
     "clamp_attraction": True,
+    "tangential_damping": False,
+    "plate_diameter": 0.1,
     "seed": 2,
     "modulus_scale": 200.0,
     "mechanisms": (LinearCohesion(cohesion_energy_density=1e4),),

@@ -61,6 +61,24 @@ def test_a_sliding_ball_comes_to_roll():
     assert end["spins"][0, 1] * lever(contact) == pytest.approx(rolling, rel=1e-6)
 
 
+@pytest.mark.parametrize("damped", [True, False])
+def test_the_tangential_spring_swings_on_where_it_is_not_damped(damped):
+    contact = pair(restitution=0.9, friction=10.0, tangential_damping=damped)
+    solver = solve(ball_on_plane(contact, velocity=(1e-3 * SPEED, 0.0, 0.0)))
+    seen = record(solver, 4000)
+    slip = seen.velocities[:, 0, 0] - lever(contact) * seen.spins[:, 0, 1]
+    # The contact point swings on S_t with the mass 1 / (1/m + L^2/I), 2/7 m for a solid ball; the damping is
+    # that of the contact, c = 2 sqrt(5/6) |beta| sqrt(S_t m).
+    overlap = static_overlap(contact, ball_mass() * GRAVITY)
+    stiffness = 8.0 * contact.shear_modulus * math.sqrt(RADIUS * overlap)
+    inverse_mass = (1.0 + 2.5 * (lever(contact) / RADIUS) ** 2) / ball_mass()
+    decay = 0.5 * damped * contact.damping * math.sqrt(stiffness * ball_mass()) * inverse_mass
+    cycle = round(2.0 * math.pi / math.sqrt(stiffness * inverse_mass - decay**2) / TIME_STEP)
+    first, last = (np.abs(part).max() for part in (slip[:cycle], slip[3 * cycle : 4 * cycle]))
+    # A peak is read within half a step, (0.18 / 2)^2 / 2, and a cycle is taken as whole steps, 35 for 35.4.
+    assert last / first == pytest.approx(math.exp(-3.0 * cycle * decay * TIME_STEP), rel=0.02)
+
+
 def test_a_sliding_ball_slows_down_by_friction():
     contact = pair(restitution=0.5, friction=0.1)
     solver = solve(ball_on_plane(contact, velocity=(SPEED, 0.0, 0.0)))

@@ -89,6 +89,23 @@ def test_a_fixed_count_is_poured_and_kept():
     assert result.observables["fill_height"] < 0.75 * SMALL_TUBE.height
 
 
+def test_grains_fall_over_the_rim_of_a_small_plate():
+    diameter = 1.25 * SMALL_TUBE.diameter
+    result = simulate([small_case(scene=replace(SMALL_TUBE, plate_diameter=diameter))], device="cpu")[0]
+    assert result.status == "finished"
+    assert result.observables["grains_lost"] == result.observables["grain_count"] - len(result.positions) > 0
+    # A grain lies still only where the plate is under its centre.
+    assert np.hypot(*result.positions.T[:2]).max() < diameter / 2
+    assert (result.positions[:, 2] > 0.0).all()
+
+
+def test_a_plate_is_wider_than_the_tube():
+    with pytest.raises(
+        ValueError, match=r"LiftedCylinder.plate_diameter: must be finite and above .* got 0.01"
+    ):
+        replace(SMALL_TUBE, plate_diameter=0.01)
+
+
 def test_a_case_of_fixed_duration_ends_then():
     scene = replace(SMALL_TUBE, grain_count=8, duration=0.5)
     result = simulate([small_case(scene=scene)], device="cpu", workers=1)[0]

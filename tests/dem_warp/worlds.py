@@ -94,10 +94,11 @@ def pair(
     clamp: bool = False,
     partner: Material = GRAIN,
     mechanisms: tuple[Mechanism, ...] = (),
+    tangential_damping: bool = True,
 ) -> ContactCoefficients:
     """Contact of the grains' material with a partner's."""
     interaction = Interaction(restitution, friction, rolling)
-    return ContactCoefficients.of_pair(GRAIN, partner, interaction, clamp, mechanisms)
+    return ContactCoefficients.of_pair(GRAIN, partner, interaction, clamp, mechanisms, tangential_damping)
 
 
 def world(

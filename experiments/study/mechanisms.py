@@ -1,0 +1,43 @@
+"""``[mechanism.NAME]`` sections: physical effects of contacts beside those of the base law."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import Any, Literal
+
+from pydantic import Field, create_model
+
+from dem_warp.laws.library import MECHANISMS
+from dem_warp.laws.mechanism import Mechanism
+from experiments.study.schema import Number, Section
+
+
+def _section(kind: type[Mechanism]) -> Any:
+    """Build the section of a mechanism: its parameters in SI, and which contacts have it."""
+    defaults = {field.name: field.default for field in fields(kind)}
+    parameters: dict[str, Any] = {
+        name: (Number, Field(default=defaults[name], ge=0.0)) for name in kind.parameter_names()
+    }
+    between: Any = (Literal["all", "grains", "walls"], "all")
+    return create_model(f"{kind.__name__}Section", __base__=Section, between=between, **parameters)
+
+
+class _Mechanisms(Section):
+    """The mechanisms of a study, in the order of the library."""
+
+    def mechanisms(self) -> tuple[Mechanism, ...]:
+        """Build the engine's mechanisms: those that the study names.
+
+        Raises
+        ------
+        ValueError
+            When a parameter leaves what is physical.
+        """
+        named = [(kind, getattr(self, name)) for name, kind in MECHANISMS.items()]
+        return tuple(kind(**dict(section)) for kind, section in named if section is not None)
+
+
+_SECTIONS: dict[str, Any] = {name: (_section(kind) | None, None) for name, kind in MECHANISMS.items()}
+
+MechanismsSection: Any = create_model("MechanismsSection", __base__=_Mechanisms, **_SECTIONS)
+"""``[mechanism]``: a section for each one of the library."""

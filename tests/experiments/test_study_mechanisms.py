@@ -1,0 +1,52 @@
+"""Mechanisms in study files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from dem_warp.laws.elastic_plastic_rolling import ElasticPlasticRolling
+from dem_warp.laws.jkr import JKR
+from experiments.errors import StudyError
+from experiments.study import load_study
+
+WriteStudy = Callable[..., Path]
+
+SPRING = "[mechanism.elastic_plastic_rolling]\nrolling_stiffness = 2.25\n"
+
+
+def test_mechanisms_are_those_of_the_library(write_study: WriteStudy) -> None:
+    study = load_study(
+        write_study(add=f'\n{SPRING}between = "grains"\n[mechanism.jkr]\nwork_of_adhesion = 0.1\n')
+    )
+    assert study.case({}, seed=1).mechanisms == (
+        JKR(work_of_adhesion=0.1),
+        ElasticPlasticRolling(rolling_stiffness=2.25, between="grains"),
+    )
+    assert load_study().case({}, seed=1).mechanisms == ()
+
+
+def test_a_mechanism_can_be_a_factor(write_study: WriteStudy) -> None:
+    varied = (
+        'parameter = "contact.grain-grain.static_friction"',
+        'parameter = "mechanism.elastic_plastic_rolling.rolling_stiffness"',
+    )
+    friction = ("restitution = 0.2", "restitution = 0.2\nstatic_friction = 0.3")
+    study = load_study(write_study(varied, friction))
+    assert study.case({"E": 0.5}, seed=1).mechanisms == (ElasticPlasticRolling(rolling_stiffness=0.5),)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "rule"),
+    [
+        ("[mechanism.jkrr]\nx = 1", r"small.toml:\d+: mechanism.jkrr: unknown key, did you mean 'jkr'"),
+        ("[mechanism.jkr]\nwork_of_adhesion = -1.0", r"mechanism.jkr.work_of_adhesion: must be greater than"),
+        ('[mechanism.jkr]\nbetween = "grain"', r"mechanism.jkr.between: must be 'all', 'grains' or 'walls'"),
+        ("[mechanism.kinetic_friction]\nfriction_drop = 1.5", r"friction_drop: must be .* got 1.5"),
+    ],
+)
+def test_a_wrong_mechanism_is_named_with_its_place(write_study: WriteStudy, wrong: str, rule: str) -> None:
+    with pytest.raises(StudyError, match=rule):
+        load_study(write_study(add=f"\n{wrong}\n"))
