@@ -1,0 +1,170 @@
+"""What a grain costs: time of a step and memory, against the grains of a world and the number of worlds.
+
+The scene is a settled bed of reference clumps, some 20 mm deep in a tube as wide as they need; they fall from
+a lattice and are timed at rest. Worlds are copies of one bed. The shear modulus is a hundredth of the
+study's, the skin that of the real modulus.
+
+    python -m experiments.benchmarks.grain_cost --device cpu --grains 300,1000,3000 --worlds 1,2
+    python -m experiments.benchmarks.grain_cost --device cuda
+
+Writes cost.csv, cost.png and cost.md to `--out`; `record.py` puts them into README.md.
+"""
+
+import gc
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import pandas as pd
+import typer
+import warp as wp
+
+from dem_warp.clumps import ClumpShape
+from dem_warp.device import resolve_device
+from dem_warp.model import ContactCoefficients, Grains, WorldSetup
+from dem_warp.solver import Solver
+from dem_warp.walls import Cylinder, Plane
+from experiments.benchmarks.columns import CLUMP, reference_case
+from experiments.benchmarks.roofline import memory_bytes
+from experiments.benchmarks.tables import machine, parse_counts, write_page
+from experiments.benchmarks.timing import run_in, time_steps
+
+DEPTH = 0.020
+"""Of a bed at rest, roughly [m]."""
+
+SOLID_FRACTION = 0.46
+"""Of a bed at rest, roughly."""
+
+SKIN = 4.0e-4
+"""Of the neighbour lists [m]."""
+
+FALL_SPEED = 0.5
+"""At the start [m/s]."""
+
+SETTLING = 0.45
+"""Simulated time from the lattice to rest [s]."""
+
+STEPS = 1024
+"""Of a stretch."""
+
+
+def bed(count: int, seed: int = 0) -> WorldSetup:
+    """Grains on a lattice over a plate, turned at random, that will settle to a bed.
+
+    Parameters
+    ----------
+    count : int
+        Number of grains.
+    seed : int
+        Of their orientations.
+    """
+    case = reference_case("soft")
+    grain, steel = case.grain_material, case.scene.wall_material
+    shape = ClumpShape.read(CLUMP)
+    reach = shape.bounding_radius
+    radius = float(np.sqrt(count * shape.volume / (SOLID_FRACTION * DEPTH * np.pi))) + reach
+    positions = _lattice(count, radius - reach, 2.0 * reach)
+    top = float(positions[:, 2].max()) + 2.0 * reach
+    grains = Grains(
+        positions=positions,
+        orientations=np.random.default_rng(seed).normal(size=(count, 4)),
+        velocities=np.tile([0.0, 0.0, -FALL_SPEED], (count, 1)),
+        spins=np.zeros((count, 3)),
+        sizes=np.ones(count),
+        densities=np.full(count, grain.density),
+        shapes=np.zeros(count, dtype=int),
+        release_steps=np.zeros(count, dtype=int),
+    )
+    return WorldSetup(
+        grains=grains,
+        shapes=(shape,),
+        contacts=(
+            ContactCoefficients.of_pair(grain, grain, case.grain_grain),
+            ContactCoefficients.of_pair(grain, steel, case.grain_wall),
+        ),
+        walls=((Plane(), 1), (Cylinder((0.0, 0.0, 0.0), radius, top), 1)),
+        time_step=case.time_step,
+        skin=SKIN,
+        speed_limit=20 * float(np.sqrt(FALL_SPEED**2 + 2 * 9.81 * top)),
+        domain=((-2 * radius, -2 * radius, -reach), (2 * radius, 2 * radius, top + reach)),
+    )
+
+
+def _lattice(count: int, radius: float, spacing: float) -> np.ndarray:
+    """Points of a cubic lattice in an upright cylinder, from the bottom up [m], (count, 3)."""
+    across = np.arange(-int(radius / spacing), int(radius / spacing) + 1) * spacing
+    x, y = (axis.ravel() for axis in np.meshgrid(across, across))
+    inside = x**2 + y**2 <= radius**2
+    layer = np.column_stack([x[inside], y[inside]])
+    number = np.arange(count)
+    return np.column_stack([layer[number % len(layer)], (0.5 + number // len(layer)) * spacing])
+
+
+def cost_row(grains: int, worlds: int, device: str) -> dict[str, float]:
+    """Time and memory of one batch of settled beds."""
+    target = wp.get_device(device)
+    gc.collect()  # a solver before this one gives its memory back
+    wp.synchronize_device(target)
+    free = target.free_memory if target.is_cuda else 0
+    solver = Solver([bed(grains)] * worlds, device)
+    run_in(solver, SETTLING)
+    timing = time_steps(solver, STEPS)
+    taken = free - target.free_memory if target.is_cuda else np.nan
+    total = grains * worlds
+    return {
+        "grains a world": grains,
+        "worlds": worlds,
+        "grains": total,
+        "us a step": 1e6 * timing.step_seconds,
+        "ns a grain and step": 1e9 * timing.step_seconds / total,
+        "million sphere-steps/s": timing.sphere_steps / 1e6,
+        "rebuilds per 1000": 1000 * timing.rebuilds,
+        "kB a grain": memory_bytes(solver) / total / 1e3,
+        "kB a grain, driver": taken / total / 1e3,
+    }
+
+
+def cost_table(grains: Sequence[int], worlds: Sequence[int], world_grains: int, device: str) -> pd.DataFrame:
+    """One row a size of a single world, then one a number of worlds of `world_grains`."""
+    batches = [(count, 1) for count in grains] + [(world_grains, count) for count in worlds]
+    return pd.DataFrame([cost_row(*batch, device) for batch in batches])
+
+
+def draw_cost(table: pd.DataFrame, singles: int, title: str, path: Path) -> None:
+    """Plot the cost against the grains of the batch; the table's first `singles` rows are single worlds."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(7.0, 4.2), layout="constrained")
+    axes = figure.subplots()
+    one, many = table.iloc[:singles], table.iloc[singles:]
+    axes.loglog(one["grains"], one["ns a grain and step"], "o-", color="#1f5f8b", label="one world")
+    label = f"worlds of {many['grains a world'].iloc[0]:.0f} grains"
+    axes.loglog(many["grains"], many["ns a grain and step"], "s--", color="#c8641b", label=label)
+    axes.set(xlabel="grains of the batch", ylabel="time [ns] a grain and step", title=title)
+    axes.grid(which="both", color="#dddddd", linewidth=0.6)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.legend(frameon=False)
+    figure.savefig(path, dpi=150)
+
+
+def main(
+    device: Annotated[str, typer.Option(help="cpu or cuda.")] = "cpu",
+    grains: Annotated[
+        str, typer.Option(help="Grains of a single world.")
+    ] = "300,1000,3000,10000,30000,100000,300000",
+    worlds: Annotated[str, typer.Option(help="Numbers of worlds.")] = "1,2,4,8,16,32,64,128,256,512",
+    world_grains: Annotated[int, typer.Option(help="Grains of each of these worlds.")] = 2600,
+    out: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("out/cost"),
+) -> None:
+    """Measure, print and write the table and its plot."""
+    name, sizes = resolve_device(device), parse_counts(grains)
+    table = cost_table(sizes, parse_counts(worlds), world_grains, name)
+    text = f"Settled beds of reference clumps on {machine(name)}."
+    page = write_page(out, "cost", [("cost", text, table)])
+    draw_cost(table, len(sizes), machine(name), out / "cost.png")
+    print(page.read_text(encoding="utf-8"))
+
+
+if __name__ == "__main__":
+    typer.run(main)

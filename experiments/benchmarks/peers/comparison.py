@@ -1,0 +1,93 @@
+"""A settled column here and in another code, each with the skin that suits it best."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from dem_warp.solver import CHUNK, Solver
+from experiments.benchmarks.columns import Columns, Moment
+from experiments.benchmarks.peers import liggghts
+from experiments.benchmarks.roofline import world_contacts
+from experiments.benchmarks.timing import RUN_IN, STRETCHES, Timing, run_in, start, time_steps
+
+SKINS = (5e-5, 1e-4, 2e-4, 4e-4)
+"""Skins that both codes try [m]."""
+
+SPEED = "million sphere-steps/s"
+
+
+def compare_with_liggghts(columns: Columns, steps: int, folder: Path) -> tuple[str, str, pd.DataFrame]:
+    """Time a settled column here, in LIGGGHTS, and here again.
+
+    Parameters
+    ----------
+    columns : Columns
+    steps : int
+        Of a stretch, in both codes.
+    folder : Path
+        For LIGGGHTS' files.
+    """
+    moment = columns.moments("settled", 1)[0]
+    default = moment.setup.skin
+    ours = {skin: _start(moment, skin, columns.device) for skin in (*SKINS, default)}
+    timings = {skin: [time_steps(solver, steps)] for skin, solver in ours.items()}
+    length = timings[default][0].steps
+    lead = int(np.ceil(RUN_IN / (moment.setup.time_step * CHUNK))) * CHUNK
+    theirs = liggghts.run(folder, columns.cases[0], moment, SKINS, lead, length, 2 * STRETCHES)
+    for skin, solver in ours.items():
+        timings[skin].append(time_steps(solver, steps))
+
+    rows = [_row("dem-warp", skin, _joined(pair)) for skin, pair in timings.items()]
+    rows += [_row(theirs.version, skin, timing) for skin, timing in theirs.timings.items()]
+    table = pd.DataFrame(rows)
+    return "liggghts", _summary(table, ours[default], theirs), table
+
+
+def _start(moment: Moment, skin: float, device: str) -> Solver:
+    solver = start([Moment(replace(moment.setup, skin=skin), 0.0)], device)
+    run_in(solver)
+    return solver
+
+
+def _joined(timings: Sequence[Timing]) -> Timing:
+    """One timing of the same batch's stretches."""
+    first, *rest = timings
+    seconds = sum((timing.seconds for timing in rest), first.seconds)
+    return replace(first, seconds=seconds, rebuilds=float(np.mean([timing.rebuilds for timing in timings])))
+
+
+def _row(code: str, skin: float, timing: Timing) -> dict[str, object]:
+    return {
+        "code": code,
+        "skin mm": 1e3 * skin,
+        "us a step": 1e6 * timing.step_seconds,
+        "fastest": 1e6 * min(timing.seconds) / timing.steps,
+        "slowest": 1e6 * max(timing.seconds) / timing.steps,
+        SPEED: timing.sphere_steps / 1e6,
+        "rebuilds per 1000": 1000 * timing.rebuilds,
+    }
+
+
+def _summary(table: pd.DataFrame, ours: Solver, theirs: liggghts.PeerRun) -> str:
+    here, there = table["code"] == "dem-warp", table["code"] != "dem-warp"
+    default = table[here].iloc[-1][SPEED]
+    best, peer = table.loc[here, SPEED].max(), table.loc[there, SPEED].max()
+    contacts = world_contacts(ours, 0)
+    return (
+        f"A settled column of {ours.layout.grain_count} clumps on one core, here and in {theirs.version}, "
+        f"each at its best skin: {best:.1f} against {peer:.1f} million sphere-steps/s, {best / peer:.2f} "
+        f"times as fast ({default / peer:.2f} at the default skin, the last of dem-warp's rows). At the end "
+        f"{contacts.grain_pairs} and {theirs.contacts.grain_pairs} contacts between grains, "
+        f"{contacts.wall_pairs} and {theirs.contacts.wall_pairs} with walls; kinetic energy "
+        f"{_kinetic_energy(ours):.1e} and {theirs.kinetic_energy:.1e} J. LIGGGHTS started within "
+        f"{1e9 * theirs.placement_error:.1f} nm of the same places."
+    )
+
+
+def _kinetic_energy(solver: Solver) -> float:
+    """Of the translation in the first world [J]."""
+    view = solver.view([0])[0]
+    return float(0.5 * view.masses[view.alive] @ (view.velocities[view.alive] ** 2).sum(axis=1))

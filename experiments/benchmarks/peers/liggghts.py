@@ -1,0 +1,247 @@
+"""The same settled column in LIGGGHTS, on one core.
+
+The input has the same clumps in the same poses, the same moduli, friction, restitution and time step, and the
+same contact law: `hertz` with `tangential history`, and `cdt`, the constant directional rolling resistance.
+Bodies are those of `fix multisphere`; each grain is inserted by a command of its own, in a region of a few
+nanometres, under a time step too short to move anything. Plate and tube are `primitive` walls, the tube
+endless. Neither code knows the contacts' histories at the start; both run in until the column is at rest.
+"""
+
+import re
+import shutil
+import subprocess
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from dem_warp import Case, LiftedCylinder
+from experiments.benchmarks.columns import Moment
+from experiments.benchmarks.contacts import ContactCounts, count_contacts, placed_centers
+from experiments.benchmarks.timing import Timing
+
+PROGRAM = "liggghts"
+MARGIN = 0.01
+"""Between the tube and the sides of LIGGGHTS' box [m]."""
+
+SPOT = 1e-9
+"""Half the side of the region that a grain is inserted in [m]."""
+
+_SEEDS = (15485863, 15485867, 32452843)  # LIGGGHTS wants primes; nothing is left to chance here
+
+_HEAD = """\
+atom_style granular
+atom_modify map array
+boundary f f f
+newton off
+communicate single vel yes
+units si
+soft_particles yes
+hard_particles yes
+region box block {low} {high} {low} {high} -{margin} {top} units box
+create_box 2 box
+neighbor {skin} bin
+neigh_modify delay 0 every 1 check yes
+fix young all property/global youngsModulus peratomtype {young}
+fix poisson all property/global poissonsRatio peratomtype {poisson}
+fix restitution all property/global coefficientRestitution peratomtypepair 2 {restitution}
+fix friction all property/global coefficientFriction peratomtypepair 2 {friction}
+fix rolling all property/global coefficientRollingFriction peratomtypepair 2 {rolling}
+pair_style gran model hertz tangential history rolling_friction cdt
+pair_coeff * *
+fix plate all wall/gran model hertz tangential history rolling_friction cdt primitive type 2 zplane 0.0
+fix tube all wall/gran model hertz tangential history rolling_friction cdt &
+    primitive type 2 zcylinder {radius} 0.0 0.0
+fix weight all gravity {gravity} vector 0.0 0.0 -1.0
+fix bodies all multisphere
+fix clump all particletemplate/multisphere {seeds[0]} atom_type 1 density constant {density} &
+    nspheres {spheres} ntry 100000 spheres file clump.txt scale {size} type 1 &
+    mass {mass} inertia_tensor {inertia[0]} 0 0 {inertia[1]} 0 {inertia[2]} use_density
+fix clumps all particledistribution/discrete {seeds[1]} 1 clump 1.0
+timestep 1e-12
+"""
+
+_GRAIN = """\
+region at{i} block {box} units box volume_limit 1e-40
+fix put{i} all insert/pack seed {seed} distributiontemplate clumps insert_every once overlapcheck no &
+    maxattempt 1 verbose no orientation constant {w} {x} {y} {z} &
+    region at{i} particles_in_region 1 ntry_mc 1001 warn_region no check_dist_from_subdomain_border no
+"""
+
+_DUMP = """\
+dump {name} all custom 1 {name}.txt id x y z radius
+dump_modify {name} sort id format "%d %.12g %.12g %.12g %.12g"
+run 0
+undump {name}
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class PeerRun:
+    """What LIGGGHTS did with a column.
+
+    Attributes
+    ----------
+    version : str
+    timings : dict
+        Loop times of the stretches, by skin [m].
+    kinetic_energy : float
+        Of the translation, at the end [J].
+    contacts : ContactCounts
+        At the end.
+    placement_error : float
+        Largest distance of a sphere from where it was to be at the start [m].
+    """
+
+    version: str
+    timings: dict[float, Timing]
+    kinetic_energy: float
+    contacts: ContactCounts
+    placement_error: float
+
+
+def run(
+    folder: Path,
+    case: Case[LiftedCylinder],
+    moment: Moment,
+    skins: Sequence[float],
+    run_in: int,
+    steps: int,
+    stretches: int,
+) -> PeerRun:
+    """Run a settled column of grains of one shape and size.
+
+    Parameters
+    ----------
+    folder : Path
+        For the input and what LIGGGHTS writes.
+    case, moment
+        The column.
+    skins : sequence of float
+        Neighbour skins to time, one after another on the same state [m].
+    run_in, steps, stretches : int
+        Steps before the first stretch, steps of a stretch, and stretches a skin.
+
+    Raises
+    ------
+    ValueError
+        If LIGGGHTS is not installed, or the grains differ in size.
+    RuntimeError
+        If it stops with an error.
+    """
+    program = shutil.which(PROGRAM)
+    if program is None:
+        raise ValueError(f"peer: {PROGRAM} must be installed (Debian package liggghts), found none")
+    folder.mkdir(parents=True, exist_ok=True)
+    write_input(folder, case, moment, skins, run_in, steps, stretches)
+    command = [program, "-in", "column.in", "-log", "column.log"]
+    # its screen output must exist (3.8.0 stops with a fault otherwise); it goes nowhere
+    done = subprocess.run(command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    log = (folder / "column.log").read_text(encoding="utf-8", errors="replace")
+    error = re.search(r"^ERROR.*", log, re.MULTILINE)
+    if done.returncode or error:
+        raise RuntimeError(f"{PROGRAM} failed in {folder}: {error[0] if error else done.returncode}")
+    return _read(folder, log, moment, skins, stretches)
+
+
+def write_input(
+    folder: Path,
+    case: Case[LiftedCylinder],
+    moment: Moment,
+    skins: Sequence[float],
+    run_in: int,
+    steps: int,
+    stretches: int,
+) -> None:
+    """Write `column.in` and `clump.txt`; parameters as for `run`."""
+    setup = moment.setup
+    sizes = np.unique(setup.grains.sizes)
+    if len(sizes) > 1:
+        raise ValueError(f"peer: grains must be of one size, got {len(sizes)} sizes from {sizes[0]:g}")
+    shape = setup.shapes[0]
+    np.savetxt(folder / "clump.txt", np.column_stack([shape.centers, shape.radii]), fmt="%.15g")
+    count = setup.grains.count
+    parts = [_head(case, moment, skins[0]), *(_grain(moment, i) for i in range(count)), "run 1\n"]
+    parts += [f"unfix put{i}\n" for i in range(count)]
+    parts += [
+        _DUMP.format(name="start"),
+        f"timestep {setup.time_step!r}\n",
+        "compute energy all ke/multisphere\nthermo_style custom step c_energy\n",
+        f"thermo {steps}\nrun {run_in}\n",
+    ]
+    parts += [f"neighbor {skin} bin\n" + f"run {steps}\n" * stretches for skin in skins]
+    parts.append(_DUMP.format(name="end"))
+    (folder / "column.in").write_text("".join(parts), encoding="utf-8")
+
+
+def _head(case: Case[LiftedCylinder], moment: Moment, skin: float) -> str:
+    setup, grain, wall = moment.setup, case.grain_material, case.scene.wall_material
+    shape, reach = setup.shapes[0], case.scene.diameter / 2 + MARGIN
+    among, with_wall = case.grain_grain, case.grain_wall
+
+    def pairs(name: str) -> str:
+        other = getattr(with_wall, name)
+        return f"{getattr(among, name)} {other} {other} {other}"
+
+    return _HEAD.format(
+        low=-reach,
+        high=reach,
+        margin=MARGIN,
+        top=case.scene.height + MARGIN,
+        skin=skin,
+        young=f"{grain.youngs_modulus!r} {wall.youngs_modulus!r}",
+        poisson=f"{grain.poisson_ratio} {wall.poisson_ratio}",
+        restitution=pairs("restitution"),
+        friction=pairs("static_friction"),
+        rolling=pairs("rolling_friction"),
+        radius=case.scene.diameter / 2,
+        gravity=-setup.gravity[2],
+        seeds=_SEEDS,
+        density=grain.density,
+        spheres=shape.sphere_count,
+        size=float(setup.grains.sizes[0]),
+        mass=float(setup.masses[0]),
+        inertia=setup.inertias[0].tolist(),
+    )
+
+
+def _grain(moment: Moment, i: int) -> str:
+    position, q = moment.setup.grains.positions[i], moment.setup.grains.orientations[i]
+    x, y, z, w = (q / np.linalg.norm(q)).tolist()
+    box = " ".join(f"{center - SPOT:.15g} {center + SPOT:.15g}" for center in position)
+    return _GRAIN.format(i=i, box=box, seed=_SEEDS[2], w=w, x=x, y=y, z=z)
+
+
+def _read(folder: Path, log: str, moment: Moment, skins: Sequence[float], stretches: int) -> PeerRun:
+    setup = moment.setup
+    shape, grains = setup.shapes[0], setup.grains
+    start, end = _spheres(folder / "start.txt"), _spheres(folder / "end.txt")
+    placed = placed_centers(shape, grains.positions, grains.orientations, grains.sizes)
+    grain = np.repeat(np.arange(grains.count), shape.sphere_count)
+    return PeerRun(
+        version=re.findall(r"LIGGGHTS-\w+ [\d.]+", log)[0],
+        timings=_timings(log, skins, stretches, len(end)),
+        kinetic_energy=float(re.findall(r"^ +\d+ +(\S+) *\nLoop time", log, re.MULTILINE)[-1]),
+        contacts=count_contacts(end[:, :3], end[:, 3], grain, [wall for wall, _ in setup.walls]),
+        placement_error=float(np.linalg.norm(start[:, :3] - placed, axis=1).max()),
+    )
+
+
+def _timings(log: str, skins: Sequence[float], stretches: int, spheres: int) -> dict[float, Timing]:
+    """Stretches by skin, after the three runs of insertion, its dump, and running in."""
+    loops = re.findall(r"^Loop time of (\S+) on 1 procs for (\d+) steps", log, re.MULTILINE)[3:]
+    builds = [int(n) for n in re.findall(r"^Neighbor list builds = (\d+)", log, re.MULTILINE)][3:]
+    steps, timings = int(loops[0][1]), {}
+    for k, skin in enumerate(skins):
+        rows = slice(k * stretches, (k + 1) * stretches)
+        seconds = tuple(float(duration) for duration, _ in loops[rows])
+        timings[skin] = Timing(steps, seconds, spheres, sum(builds[rows]) / (steps * stretches))
+    return timings
+
+
+def _spheres(path: Path) -> np.ndarray:
+    """Centres and radii of a dump, in the order of insertion, (n, 4)."""
+    lines = path.read_text(encoding="utf-8").splitlines()
+    first = next(i for i, line in enumerate(lines) if line.startswith("ITEM: ATOMS")) + 1
+    return np.array([line.split()[1:] for line in lines[first:]], dtype=float)
