@@ -18,6 +18,7 @@ from dem_warp.batch import Batch
 from dem_warp.model import Grains, WorldSetup
 from dem_warp.scenes.lifted_cylinder import TUBE
 from dem_warp.solver import WorldView
+from dem_warp.walls import Motion
 
 CLUMP = Path(__file__).parents[1] / "studies" / "buckwheat" / "clump.txt"
 BUCKWHEAT = Material(density=698.0, shear_modulus=34.325e6, poisson_ratio=0.29)
@@ -54,6 +55,9 @@ def reference_case(scale: str, seed: int = 0) -> Case[LiftedCylinder]:
     return Case(scene, grains, GRAIN_GRAIN, GRAIN_WALL, seed, Numerics(modulus_scale=softening))
 
 
+REST = Motion()
+
+
 @dataclass(frozen=True, eq=False)
 class Moment:
     """A column from a moment on.
@@ -62,12 +66,11 @@ class Moment:
     ----------
     setup : WorldSetup
         Its living grains, and its tube where it then is.
-    tube_speed : float
-        Upwards [m/s].
+    tube_motion : Motion
     """
 
     setup: WorldSetup
-    tube_speed: float
+    tube_motion: Motion = REST
 
 
 class Columns:
@@ -111,8 +114,9 @@ class Columns:
         walls = list(setup.walls)
         tube, pair = walls[TUBE]
         walls[TUBE] = (replace(tube, point=(0.0, 0.0, float(self._arrays[f"{place}/rise"]))), pair)
-        speed = self.cases[seed].scene.lift_speed if phase == "lifting" else 0.0
-        return Moment(replace(setup, grains=grains, walls=tuple(walls)), speed)
+        setup = replace(setup, grains=grains, walls=tuple(walls))
+        lift = Motion(velocity=(0.0, 0.0, self.cases[seed].scene.lift_speed))
+        return Moment(setup, lift if phase == "lifting" else REST)
 
     def _key(self) -> str:
         """Digest of what the arrays depend on, but for the code."""
@@ -137,31 +141,31 @@ class Columns:
             for phase, k, w in sorted(missing):
                 if elapsed[w][phase] >= MOMENTS[phase][k]:
                     missing.remove((phase, k, w))
-                    for name, array in _state(batch, w, views[w], elapsed[w]["lifting"]).items():
+                    for name, array in _state(batch, w, views[w]).items():
                         arrays[f"{phase}/{k}/{w}/{name}"] = array
         return arrays
 
 
-def _state(batch: Batch, world: int, view: WorldView, lifted: float) -> dict[str, np.ndarray]:
-    """Living grains of a column, and the height of its tube: `lifted` diameters."""
+def _state(batch: Batch, world: int, view: WorldView) -> dict[str, np.ndarray]:
+    """Living grains of a column, and how high its tube stands [m]."""
     poses = batch.solver.poses(world)
     slots, grains = poses.pop("slots"), batch.setups[world].grains
     return {
         **poses,
         "sizes": grains.sizes[slots],
         "release_steps": np.maximum(grains.release_steps[slots] - view.step, 0),
-        "rise": np.array(lifted * batch.cases[world].scene.diameter),
+        "rise": batch.solver.wall_pose(world, TUBE)[0][2],
     }
 
 
 def _elapsed(batch: Batch, world: int, view: WorldView) -> dict[str, float]:
     """How far a column is in each phase, in the parts of which MOMENTS speaks."""
-    controller, setup, scene = batch.controllers[world], batch.setups[world], batch.cases[world].scene
+    course, setup, scene = batch.controllers[world].course, batch.setups[world], batch.cases[world].scene
     rain = float(setup.grains.release_steps.max()) * setup.time_step
-    lifting = controller.phase == "lift"
-    since = view.time - sum(done["time"] for done in controller.phases)
+    lifting = course.phase == "lift"
+    since = view.time - course.phase_start
     return {
-        "filling": view.time / rain if controller.phase == "fill" else 0.0,
+        "filling": view.time / rain if course.phase == "fill" else 0.0,
         "settled": float(lifting),
         "lifting": since * scene.lift_speed / scene.diameter if lifting else 0.0,
     }

@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from dem_warp.clumps import ClumpShape
-from dem_warp.walls import Cylinder, Wall
+from dem_warp.walls import Cylinder, Plane, Wall
 
 
 def placed_centers(
@@ -52,6 +52,11 @@ def count_contacts(
         Of the spheres [m], and the grain that each belongs to.
     walls : sequence of Wall
         Planes, and cylinders of which the rims are left out.
+
+    Raises
+    ------
+    ValueError
+        If there is another kind of wall.
     """
     pairs = cKDTree(centers).query_pairs(2 * radii.max(), output_type="ndarray")
     a, b = pairs[grain[pairs[:, 0]] != grain[pairs[:, 1]]].T
@@ -63,9 +68,11 @@ def count_contacts(
 
 def _wall_distance(wall: Wall, points: np.ndarray) -> np.ndarray:
     """Distance of points from a wall [m]; infinite beyond a cylinder's rims."""
+    if not isinstance(wall, Plane | Cylinder):
+        raise ValueError(f"count_contacts.walls: must be planes and cylinders, got {wall!r}")
     offset = points - np.asarray(wall.point)
     along = offset @ np.asarray(wall.axis)
-    if not isinstance(wall, Cylinder):
+    if isinstance(wall, Plane):
         return along
     aside = np.abs(np.linalg.norm(offset - np.outer(along, wall.axis), axis=1) - wall.radius)
     return np.where((along >= 0.0) & (along <= wall.length), aside, np.inf)

@@ -67,8 +67,12 @@ def step_traffic(solver: Solver) -> Traffic:
     length, touching = _list_length(solver), _touching(solver)
     grains, hood = solver.layout.grain_total, solver.hood
     rows = [
-        *((name, array, array.size / grains, 2) for name, array in _by_grain(solver.grains[0], grains)),
-        *((name, array, array.size / grains, 1) for name, array in _by_grain(solver.model, grains)),
+        *(
+            (name, array, array.size / grains, 2)
+            for name, array in _arrays(solver.grains[0])
+            if name != "step"
+        ),
+        *((name, getattr(solver.model, name), 1.0, 1) for name in ("shape", "inertia", "release_step")),
         ("alive", solver.alive, 1.0, 1),
         ("list lengths", hood.count, 1.0, 1),
         ("list entries", hood.entry, length, 1),
@@ -108,11 +112,6 @@ def _touching(solver: Solver) -> float:
 
 def _arrays(holder: Any) -> list[tuple[str, Any]]:
     return [(name, value) for name, value in vars(holder).items() if isinstance(value, wp.array)]
-
-
-def _by_grain(holder: Any, grain_total: int) -> list[tuple[str, Any]]:
-    """Arrays with something for every grain."""
-    return [(name, array) for name, array in _arrays(holder) if array.size >= grain_total]
 
 
 def _element_bytes(array: Any) -> int:

@@ -10,7 +10,7 @@ import warp as wp
 
 from dem_warp.scenes.lifted_cylinder import TUBE
 from dem_warp.solver import CHUNK, Solver
-from experiments.benchmarks.columns import Moment
+from experiments.benchmarks.columns import REST, Moment
 
 RUN_IN = 0.05
 """Simulated time before the first stretch [s]: contact histories grow again, a settled column is at rest."""
@@ -55,8 +55,8 @@ def start(moments: Sequence[Moment], device: str) -> Solver:
     """Solver of columns from their moments on."""
     solver = Solver([moment.setup for moment in moments], device)
     for world, moment in enumerate(moments):
-        if moment.tube_speed > 0.0:
-            solver.move_wall(world, TUBE, (0.0, 0.0, moment.tube_speed))
+        if moment.tube_motion != REST:
+            solver.move_wall(world, TUBE, moment.tube_motion)
     return solver
 
 

@@ -4,7 +4,8 @@ The input has the same clumps in the same poses, the same moduli, friction, rest
 same contact law: `hertz` with `tangential history`, and `cdt`, the constant directional rolling resistance.
 Bodies are those of `fix multisphere`; each grain is inserted by a command of its own, in a region of a few
 nanometres, under a time step too short to move anything. Plate and tube are `primitive` walls, the tube
-endless. Neither code knows the contacts' histories at the start; both run in until the column is at rest.
+endless, so no grain may reach over its rim. Neither code knows the contacts' histories at the start; both run
+in until the column is at rest.
 """
 
 import re

@@ -1,0 +1,71 @@
+"""Where the time of settled columns goes: one step, and one rebuild of all neighbour lists, kernel by kernel.
+
+    python -m experiments.benchmarks.kernel_times --scale paper --device cuda --worlds 12
+
+Kernels are launched one by one with a pause between, which costs some microseconds each.
+"""
+
+import time
+from collections import defaultdict
+from pathlib import Path
+from typing import Annotated, Any
+
+import pandas as pd
+import typer
+import warp as wp
+
+from dem_warp.device import resolve_device
+from dem_warp.solver import Solver
+from experiments.benchmarks.columns import Columns
+from experiments.benchmarks.tables import machine, write_page
+from experiments.benchmarks.timing import run_in, start
+
+REPEATS = 20
+
+
+def kernel_times(solver: Solver) -> pd.DataFrame:
+    """Mean time of each kernel, every world being rebuilt [ms]."""
+    seconds: dict[str, float] = defaultdict(float)
+    launches: dict[str, int] = defaultdict(int)
+    launch = solver._launch
+
+    def timed(kernel: wp.Kernel, dim: int, inputs: list[Any]) -> None:
+        wp.synchronize_device(solver.device)
+        started = time.perf_counter()
+        launch(kernel, dim, inputs)
+        wp.synchronize_device(solver.device)
+        name = kernel.key.split("__")[-1]
+        seconds[name] += time.perf_counter() - started
+        launches[name] += 1
+
+    solver._launch = timed  # type: ignore[method-assign]
+    try:
+        for _ in range(REPEATS):
+            solver._step(0)
+            solver._step(1)
+            solver.stale.fill_(1)
+            solver._rebuild()
+    finally:
+        solver._launch = launch  # type: ignore[method-assign]
+    rows = [(name, 1e3 * total / launches[name]) for name, total in seconds.items()]
+    return pd.DataFrame(rows, columns=["kernel", "ms"])
+
+
+def main(
+    scale: Annotated[str, typer.Option(help="Scale of the buckwheat study: bench, soft or paper.")] = "soft",
+    device: Annotated[str, typer.Option(help="cpu or cuda.")] = "cpu",
+    worlds: Annotated[int, typer.Option(help="Number of worlds.")] = 1,
+    columns: Annotated[Path, typer.Option(help="Folder of simulated columns.")] = Path("out/columns"),
+    out: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("out/kernels"),
+) -> None:
+    """Measure, print and write the table."""
+    name = resolve_device(device)
+    solver = start(Columns(scale, worlds, name, columns).moments("settled", worlds), name)
+    run_in(solver)
+    text = f"One step, and one rebuild of {worlds} settled columns, by kernel; {machine(name)}."
+    page = write_page(out, "kernels", [("kernels", text, kernel_times(solver))])
+    print(page.read_text(encoding="utf-8"))
+
+
+if __name__ == "__main__":
+    typer.run(main)
