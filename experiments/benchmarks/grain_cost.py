@@ -11,7 +11,6 @@ Writes cost.csv, cost.png and cost.md to `--out`; `record.py` puts them into REA
 """
 
 import gc
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -125,12 +124,6 @@ def cost_row(grains: int, worlds: int, device: str) -> dict[str, float]:
     }
 
 
-def cost_table(grains: Sequence[int], worlds: Sequence[int], world_grains: int, device: str) -> pd.DataFrame:
-    """One row a size of a single world, then one a number of worlds of `world_grains`."""
-    batches = [(count, 1) for count in grains] + [(world_grains, count) for count in worlds]
-    return pd.DataFrame([cost_row(*batch, device) for batch in batches])
-
-
 def draw_cost(table: pd.DataFrame, singles: int, title: str, path: Path) -> None:
     """Plot the cost against the grains of the batch; the table's first `singles` rows are single worlds."""
     from matplotlib.figure import Figure
@@ -161,12 +154,15 @@ def main(
     world_grains: Annotated[int, typer.Option(help="Grains of each of these worlds.")] = 2600,
     out: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("out/cost"),
 ) -> None:
-    """Measure, print and write the table and its plot."""
+    """Measure, print and write the table and its plot; what is measured is on disk at once."""
     name, sizes = resolve_device(device), parse_counts(grains)
-    table = cost_table(sizes, parse_counts(worlds), world_grains, name)
     text = f"Settled beds of reference clumps on {machine(name)}."
-    page = write_page(out, "cost", [("cost", text, table)])
-    draw_cost(table, len(sizes), machine(name), out / "cost.png")
+    batches = [(count, 1) for count in sizes] + [(world_grains, count) for count in parse_counts(worlds)]
+    rows = []
+    for batch in batches:
+        rows.append(cost_row(*batch, name))
+        page = write_page(out, "cost", [("cost", text, pd.DataFrame(rows))])
+    draw_cost(pd.DataFrame(rows), len(sizes), machine(name), out / "cost.png")
     print(page.read_text(encoding="utf-8"))
 
 

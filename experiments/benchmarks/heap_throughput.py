@@ -10,25 +10,33 @@ moments.
 Every table goes to `--out` as CSV, and all of them to throughput.md; `record.py` puts them into README.md.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import pandas as pd
 import typer
 
 from dem_warp.device import resolve_device
+from dem_warp.solver import Solver
 from experiments.benchmarks.columns import MOMENTS, Columns
 from experiments.benchmarks.parallel import processes_table
 from experiments.benchmarks.peers.comparison import compare_with_liggghts
-from experiments.benchmarks.roofline import copy_bandwidth, step_traffic
+from experiments.benchmarks.roofline import Traffic, copy_bandwidth, step_traffic
 from experiments.benchmarks.tables import machine, parse_counts, write_page
-from experiments.benchmarks.timing import run_in, start, time_steps
+from experiments.benchmarks.timing import Timing, run_in, start, time_steps
 
 Section = tuple[str, str, pd.DataFrame]
 
 
-def speed_tables(columns: Columns, counts: Sequence[int], steps: int) -> list[Section]:
+class Peer(StrEnum):
+    """Codes to compare with."""
+
+    LIGGGHTS = "liggghts"
+
+
+def speed_tables(columns: Columns, counts: Sequence[int], steps: int) -> Iterator[list[Section]]:
     """Time every phase with each number of worlds, and count what a settled grain must move.
 
     Parameters
@@ -38,8 +46,18 @@ def speed_tables(columns: Columns, counts: Sequence[int], steps: int) -> list[Se
         Numbers of worlds.
     steps : int
         Of a stretch.
+
+    Yields
+    ------
+    list of (name, text, table)
+        All that is known so far, after each number of worlds.
     """
     bandwidth = copy_bandwidth(columns.device)
+    text = (
+        f"Scale `{columns.scale}` on {machine(columns.device)}. Grains are those of a world. A copy runs at "
+        f"{bandwidth / 1e9:.0f} GB/s; `floor` is the time that the least traffic of a step takes at it."
+    )
+    least = "Least traffic of a step in a settled column: bytes of an element, elements a grain, moves."
     rows, settled = [], pd.DataFrame()
     for count in counts:
         for phase in MOMENTS:
@@ -48,30 +66,26 @@ def speed_tables(columns: Columns, counts: Sequence[int], steps: int) -> list[Se
             timing, traffic = time_steps(solver, steps), step_traffic(solver)
             if phase == "settled":
                 settled = traffic.table
-            moved = traffic.bytes_per_grain * solver.layout.grain_total
-            rows.append(
-                {
-                    "worlds": count,
-                    "phase": phase,
-                    "grains": solver.layout.grain_count,
-                    "free grains": timing.free_spheres / solver.layout.sphere_count / count,
-                    "lanes": solver.lanes,
-                    "us a step": 1e6 * timing.step_seconds,
-                    "million sphere-steps/s": timing.sphere_steps / 1e6,
-                    "rebuilds per 1000": 1000 * timing.rebuilds,
-                    "list": traffic.list_length,
-                    "touching": traffic.touching,
-                    "B a grain": traffic.bytes_per_grain,
-                    "floor us": 1e6 * moved / bandwidth,
-                    "of floor": moved / bandwidth / timing.step_seconds,
-                }
-            )
-    text = (
-        f"Scale `{columns.scale}` on {machine(columns.device)}. Grains are those of a world. A copy runs at "
-        f"{bandwidth / 1e9:.0f} GB/s; `floor` is the time that the least traffic of a step takes at it."
-    )
-    least = "Least traffic of a step in a settled column: bytes of an element, elements a grain, moves."
-    return [("throughput", text, pd.DataFrame(rows)), ("traffic", least, settled)]
+            rows.append({"worlds": count, "phase": phase} | _speed_row(solver, timing, traffic, bandwidth))
+        yield [("throughput", text, pd.DataFrame(rows)), ("traffic", least, settled)]
+
+
+def _speed_row(solver: Solver, timing: Timing, traffic: Traffic, bandwidth: float) -> dict[str, float]:
+    layout = solver.layout
+    floor = traffic.bytes_per_grain * layout.grain_total / bandwidth
+    return {
+        "grains": layout.grain_count,
+        "free grains": timing.free_spheres / layout.sphere_count / layout.world_count,
+        "lanes": solver.lanes,
+        "us a step": 1e6 * timing.step_seconds,
+        "million sphere-steps/s": timing.sphere_steps / 1e6,
+        "rebuilds per 1000": 1000 * timing.rebuilds,
+        "list": traffic.list_length,
+        "touching": traffic.touching,
+        "B a grain": traffic.bytes_per_grain,
+        "floor us": 1e6 * floor,
+        "of floor": floor / timing.step_seconds,
+    }
 
 
 def main(
@@ -80,7 +94,7 @@ def main(
     worlds: Annotated[str, typer.Option(help="Numbers of worlds to measure, such as 1,12,31,128.")] = "1",
     seeds: Annotated[int, typer.Option(help="Most columns to simulate beforehand.")] = 32,
     steps: Annotated[int, typer.Option(help="Steps of a stretch.")] = 2048,
-    peer: Annotated[Literal["liggghts"] | None, typer.Option(help="A code to compare with.")] = None,
+    peer: Annotated[Peer | None, typer.Option(help="A code to compare with.")] = None,
     processes: Annotated[int, typer.Option(help="Processes to run at once on the CPU.")] = 1,
     columns: Annotated[Path, typer.Option(help="Folder of simulated columns.")] = Path("out/columns"),
     out: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("out/throughput"),
@@ -90,7 +104,9 @@ def main(
     if name != "cpu" and (peer or processes > 1):
         raise typer.BadParameter("--peer and --processes are for --device cpu")
     prepared = Columns(scale, min(max(counts), seeds), name, columns)
-    sections = speed_tables(prepared, counts, steps)
+    sections: list[Section] = []
+    for sections in speed_tables(prepared, counts, steps):
+        write_page(out, "throughput", sections)
     if peer:
         sections.append(compare_with_liggghts(prepared, steps, out / "liggghts"))
     if processes > 1:

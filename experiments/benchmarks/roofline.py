@@ -47,7 +47,8 @@ class Traffic:
     Attributes
     ----------
     list_length, touching : float
-        Entries of a free grain's neighbour list, and how many of them touch.
+        Entries of the neighbour lists that are read, and how many of them touch, by grain; a grain that waits
+        to be released has none.
     table : DataFrame
         Array, bytes of an element, elements a grain, and how often each is moved: 2 for in and out.
     """
@@ -123,5 +124,5 @@ def _list_length(solver: Solver) -> float:
     which = solver.hood.list.numpy()
     lengths = solver.hood.count.numpy().reshape(2, worlds, -1)[which, np.arange(worlds)]
     views = solver.view(range(worlds))
-    free = np.array([view.alive & view.released for view in views])
-    return float(lengths[free].mean())
+    alive, released = (np.array([getattr(view, name) for view in views]) for name in ("alive", "released"))
+    return float(lengths[alive & released].sum() / np.count_nonzero(alive))
