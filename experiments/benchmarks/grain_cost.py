@@ -137,9 +137,10 @@ def draw_cost(table: pd.DataFrame, singles: int, title: str, path: Path) -> None
     axes.set(xlabel="grains of the batch", ylabel="time [ns] a grain and step", title=title)
     decades = np.log10(table["ns a grain and step"])
     axes.set_ylim(10.0 ** np.floor(decades.min()), 10.0 ** np.ceil(decades.max()))
-    axes.yaxis.set_major_formatter("{x:g}")
-    axes.xaxis.set_major_formatter("{x:,.0f}")
-    axes.grid(which="major", color="#dddddd", linewidth=0.6)
+    for axis, form in ((axes.xaxis, "{x:,.0f}"), (axes.yaxis, "{x:g}")):
+        axis.set_major_formatter(form)
+        axis.set_minor_formatter("")
+    axes.grid(which="both", color="#dddddd", linewidth=0.6)
     axes.spines[["top", "right"]].set_visible(False)
     axes.legend(frameon=False)
     figure.savefig(path, dpi=150)
