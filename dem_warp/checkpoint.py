@@ -79,7 +79,7 @@ class Checkpoints:
         path = self.path(case)
         record = json.dumps({"format": FORMAT, "maker": maker, "course": asdict(course)})
         arrays = snapshot | {_RECORD: np.frombuffer(record.encode(), dtype=np.uint8)}
-        temporary = path.with_suffix(".part")
+        temporary = path.with_name(f".{path.stem}.{os.getpid()}")
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
             with temporary.open("wb") as file:

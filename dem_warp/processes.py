@@ -1,6 +1,8 @@
 """Cases spread over processes on a CPU: one world a task, as Warp's CPU kernels use one thread."""
 
 import multiprocessing
+import os
+import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from typing import Any
@@ -25,6 +27,14 @@ _shared: dict[str, Any] = {}
 
 def _start_worker(fractions: Any, phases: Any) -> None:
     _shared.update(fractions=fractions, phases=phases)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    """End this process when its parent is gone: a parent that was killed cannot tell its workers."""
+    if parent := multiprocessing.parent_process():
+        parent.join()
+        os._exit(1)
 
 
 def _run_case(index: int, case: Case, checkpoints: Checkpoints | None) -> CaseResult:
