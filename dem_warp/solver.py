@@ -14,6 +14,7 @@ from dem_warp.kernels.neighbours import neighbour_kernels
 from dem_warp.kernels.step import step_kernels
 from dem_warp.kernels.summation import MIN_LANES
 from dem_warp.kernels.walls import wall_kernels
+from dem_warp.kernels.watch import HEADROOM, watch_kernels
 from dem_warp.laws.contact_law import memory_size
 from dem_warp.model import WorldSetup
 from dem_warp.state import (
@@ -30,9 +31,12 @@ from dem_warp.walls import Motion
 CHUNK = 256
 """Steps that `advance` takes at the least; a multiple of every length of a cycle."""
 
-LONGEST_CYCLE = 32
+SHORTEST_CYCLE, LONGEST_CYCLE = 2, 32
 SKIN_PER_CYCLE = 0.15
-"""Part of the skin that the fastest expected grain may use up between two checks of the neighbour list."""
+"""Part of the skin that the pace of a world may use up between two looks at the neighbour list."""
+
+LOOK_CHUNKS = 16
+"""Chunks after which the length of a cycle is chosen anew, from how fast the grains have become."""
 
 FULL_DEVICE_THREADS = 60_000
 """Threads that fill a large GPU; below it, more lanes a grain shorten a step."""
@@ -104,6 +108,8 @@ class Solver:
         self._wall_kernels = wall_kernels(self.build.without_mechanisms)
         self._list_kernels = neighbour_kernels(self.build)
         room = [_neighbour_room(world) for world in worlds]
+        self._watch_kernels = watch_kernels(self.build)
+        self.cycle_limit = LONGEST_CYCLE
         with wp.ScopedDevice(self.device):
             self._build_state([(found, capacity or listed) for found, listed in room])
         self._running = list(range(len(worlds)))
@@ -123,6 +129,7 @@ class Solver:
             wp.zeros(layout.world_count, dtype=int) for _ in range(5)
         )
         self.any_stale = wp.zeros(1, dtype=int)
+        self.fastest = wp.zeros(layout.world_count, dtype=float)
         self.cells = self._build_cells(found_capacity)
 
     def _build_cells(self, found_capacity: int) -> Any:
@@ -148,7 +155,8 @@ class Solver:
         self._set_running(self._running)
         self._place_walls(FRAMES - 1)
         self.stale.fill_(1)
-        self._rebuild()
+        self._rebuild(0)
+        self._look_back(0)
 
     def _launch(self, kernel: Any, dim: int, inputs: list[Any]) -> None:
         wp.launch(kernel, dim, inputs=inputs, device=self.device, block_dim=BLOCK)
@@ -175,12 +183,12 @@ class Solver:
         ]  # fmt: skip
         self._launch(self._step_kernels.step, threads, inputs)
 
-    def _place_walls(self, ahead: int) -> None:
+    def _place_walls(self, ahead: int, read: int = 0) -> None:
         frames = len(self.worlds) * self.layout.wall_count * (ahead + 1)
-        self._launch(self._wall_kernels.place_walls, frames, [ahead, self.model, self.grains[0]])
+        self._launch(self._wall_kernels.place_walls, frames, [ahead, self.model, self.grains[read]])
 
-    def _rebuild(self) -> None:
-        spheres, grains = self.layout.sphere_total, self.grains[0]
+    def _rebuild(self, read: int) -> None:
+        spheres, grains = self.layout.sphere_total, self.grains[read]
         cells, lists = self._cell_kernels, self._list_kernels
         self._launch(cells.bin_spheres, spheres, [self.model, grains, self.alive, self.stale, self.cells])
         self._launch(cells.open_buckets, spheres, [self.model, self.stale, self.cells])
@@ -190,39 +198,67 @@ class Solver:
         finish = [grains, self.cells, self.hood, self.stale, self.any_stale, self.rebuilds]
         self._launch(lists.finish, self.layout.world_count, finish)
 
-    def _cycle(self) -> None:
-        self._place_walls(self.cycle)
-        for step in range(self.cycle):
-            self._step(step % 2)
-        inputs = [
-            self.cycle, self.model, self.grains[0], self.alive, self.idle, self.hood,
-            self.stale, self.any_stale, self.flags,
-        ]  # fmt: skip
-        self._launch(self._list_kernels.mark_stale, self.layout.grain_total, inputs)
-        wp.capture_if(self.any_stale, self._rebuild)
+    def _look_ahead(self, steps: int, read: int) -> None:
+        """See to it that the next steps meet every contact."""
+        watch, grains, total = self._watch_kernels, self.grains[read], self.layout.grain_total
+        self._place_walls(steps, read)
+        seen = [self.model, grains, self.alive, self.idle]
+        inputs = [steps, *seen, self.fastest, self.hood, self.stale, self.any_stale]
+        self._launch(watch.mark_stale, total, inputs)
+        wp.capture_if(self.any_stale, self._rebuild, read=read)
+        threads = total * WARP if self.device.is_cuda else total
+        self._launch(watch.select_near, threads, [*seen, self.hood, self.fastest])
 
-    def _graph(self) -> Any:
-        key = (self.lanes, len(self._running), self.cycle)
+    def _look_back(self, read: int) -> None:
+        """Find out how fast the grains have become, and whether all contacts were met."""
+        row = -(-self.layout.grain_count // WARP) * WARP if self.device.is_cuda else self.layout.grain_count
+        inputs = [
+            row, self.model, self.grains[read], self.alive, self.idle, self.hood, self.fastest, self.flags,
+        ]  # fmt: skip
+        self._launch(self._watch_kernels.find_fastest, row * self.layout.world_count, inputs)
+
+    def _cycle(self, steps: int, read: int = 0) -> None:
+        self._look_ahead(steps, read)
+        for step in range(steps):
+            self._step((read + step) % 2)
+        self._look_back((read + steps) % 2)
+
+    def _graph(self, cycle: int) -> Any:
+        key = (self.lanes, len(self._running), cycle)
         if key not in self._graphs:
             with wp.ScopedCapture(self.device) as capture:
-                for _ in range(CHUNK // self.cycle):
-                    self._cycle()
+                for _ in range(CHUNK // cycle):
+                    self._cycle(cycle)
             self._graphs[key] = capture.graph
         return self._graphs[key]
 
+    def _cycle_length(self, chunks: int) -> int:
+        """Steps of a cycle, a power of two: as many as the lists allow the fastest grain of any world.
+
+        Grains gain speed by their weight for some chunks; what else sets them in motion, the lists allow for.
+        """
+        fastest = self.fastest.numpy()
+        free = float(self.cycle_limit)
+        for w in self._running:
+            world = self.worlds[w]
+            falling = float(np.linalg.norm(world.gravity)) * chunks * CHUNK * world.time_step
+            path = HEADROOM * (fastest[w] + falling) * world.time_step
+            free = min(free, SKIN_PER_CYCLE * world.skin / path) if path > 0 else free
+        return int(2 ** np.floor(np.log2(max(free, SHORTEST_CYCLE))))
+
     def advance(self, chunks: int = 1) -> None:
         """Take `chunks` times CHUNK steps in every running world."""
-        if self._running:
-            graph = self._graph()
-            for _ in range(chunks):
+        while chunks > 0 and self._running:
+            ahead = min(chunks, LOOK_CHUNKS)
+            graph = self._graph(self._cycle_length(ahead))
+            for _ in range(ahead):
                 wp.capture_launch(graph)
+            chunks -= ahead
 
     # ---- what a scene does between chunks ------------------------------------------------------------------
 
     def _set_running(self, running: Sequence[int]) -> None:
         self._running = list(running)
-        if running:
-            self.cycle = _cycle_length([self.worlds[w] for w in running])
         slots = np.zeros(self.layout.world_count, dtype=np.int32)
         slots[: len(running)] = running
         idle = np.ones(self.layout.world_count, dtype=np.int32)
@@ -255,7 +291,7 @@ class Solver:
         self._place_walls(0)
         # the lists know of the old motion only
         self.stale[world : world + 1].fill_(1)
-        self._rebuild()
+        self._rebuild(0)
 
     def wall_pose(self, world: int, wall: int) -> tuple[np.ndarray, np.ndarray]:
         """Where the wall's own point is [m], and how far the wall has turned (quaternion x y z w)."""
@@ -306,17 +342,6 @@ def _padded_ones(worlds: Sequence[WorldSetup], layout: Layout, device: Any) -> w
     for w, world in enumerate(worlds):
         alive[w, : world.grains.count] = 1
     return wp.array(alive.ravel(), dtype=int, device=device)
-
-
-def _cycle_length(worlds: Sequence[WorldSetup]) -> int:
-    """Steps between two checks of the neighbour lists: a power of two, short enough for every world."""
-    free = min(SKIN_PER_CYCLE * world.skin / (world.time_step * expected_speed(world)) for world in worlds)
-    return int(2 ** np.clip(np.floor(np.log2(max(free, 1.0))), 1, np.log2(LONGEST_CYCLE)))
-
-
-def expected_speed(world: WorldSetup) -> float:
-    """Speed of the fastest grain that an ordinary course of events brings [m/s]."""
-    return world.speed_limit / 20
 
 
 def _neighbour_room(world: WorldSetup) -> tuple[int, int]:

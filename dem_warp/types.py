@@ -35,7 +35,7 @@ class WorldFlag(IntFlag):
     NEIGHBOUR_OVERFLOW = 2
     """A grain has more neighbours than the list holds."""
     LATE_REBUILD = 4
-    """A grain left its skin before the list was rebuilt, so a contact may have been seen late."""
+    """A grain came farther than its lists allow for, so a contact may have been seen late."""
 
 
 @dataclass(frozen=True)
@@ -226,8 +226,12 @@ def device_structs(precision: Precision) -> SimpleNamespace:
         entry: wp.array(dtype=int)  # own sphere's number and partner, (2 * grains * capacity,)
         history: wp.array(dtype=vec4)  # tangential displacement [m] and the step of it, one an entry
         memory: wp.array(dtype=real)  # what the mechanisms remember of a contact, in SI units
+        near: wp.array(dtype=wp.vec2i)  # entries that may touch soon, and their slots, (grains * capacity,)
+        near_count: wp.array(dtype=int)  # (grains,)
+        path: wp.array(dtype=real)  # farthest that a grain or wall may come while `near` holds [m], (worlds,)
         rebuilt: wp.array(dtype=int)  # step of the last rebuild, (worlds,)
         travel: wp.array(dtype=real)  # path of a grain's farthest point since the rebuild [m], (grains,)
+        travel_before: wp.array(dtype=real)  # the same when `near` was written [m], (grains,)
 
     @wp.struct
     class Cells:

@@ -1,4 +1,4 @@
-"""One entry of a grain's neighbour list: does it touch, and what does it do.
+"""One entry of a grain's neighbour list: is it near, and what does it do.
 
 An entry names one of the grain's spheres and a partner: a sphere of another grain or, numbered after, a wall.
 """
@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import warp as wp
 
+from dem_warp.kernels.lanes import load_pair
 from dem_warp.kernels.packing import packing
 from dem_warp.kernels.walls import wall_functions
 from dem_warp.laws.contact_law import acts_apart, contact_law, memory_size
@@ -16,7 +17,7 @@ from dem_warp.types import SPHERE_BITS, SPHERE_MASK, Build, device_structs
 
 @functools.cache
 def contact_functions(build: Build) -> SimpleNamespace:
-    """`touches` and `contact` of one build."""
+    """`nears` and `contact` of one build."""
     precision = build.precision
     real, vec3 = precision.real, precision.vec3
     Sphere = precision.sphere
@@ -25,22 +26,23 @@ def contact_functions(build: Build) -> SimpleNamespace:
     Contact = types.Contact
     pack = packing(precision)
     law = contact_law(build.mechanisms)
+    is_apart = acts_apart(build.mechanisms)
     memory_each = wp.constant(memory_size(build.mechanisms))
     walls = wall_functions(build.without_mechanisms)
     spheres_each = wp.constant(build.sphere_count)
     walls_each = wp.constant(build.wall_count)
 
     @wp.func
-    def touches(model: Model, world: World, grains: Grains, w: int, g: int, entry: int, step: int) -> bool:
-        """Whether the two partners of an entry act on each other: as a rule, whether they overlap."""
+    def nears(
+        model: Model, world: World, grains: Grains, w: int, g: int, entry: int, margin: real, step: int
+    ) -> bool:
+        """Whether the two partners of an entry are nearer to each other than a margin [m]."""
         partner = entry & SPHERE_MASK
         wall_base = model.grain_count * spheres_each
         a = pack.load_sphere(grains.spheres, g * spheres_each + (entry >> SPHERE_BITS))
-        reach = pack.last(a)
-        if wp.static(acts_apart(build.mechanisms)):
-            reach += world.reach
+        reach = pack.last(a) + margin
         if partner >= wall_base:
-            return walls.touches(model, w, partner - wall_base, pack.place(a, world), reach, step)
+            return walls.nears(model, w, partner - wall_base, pack.place(a, world), reach, step)
         b = pack.load_sphere(grains.spheres, w * wall_base + partner)
         d = pack.difference(a, b, world)
         reach += pack.last(b)
@@ -62,9 +64,10 @@ def contact_functions(build: Build) -> SimpleNamespace:
         return pack.difference(sphere, pack.load_sphere(grains.center, g), world) + to_contact
 
     @wp.func
-    def meet_sphere(grains: Grains, world: World, contact: Contact, j: int, a: Sphere, b: Sphere) -> Contact:
-        """Geometry of a contact with a sphere of grain `j`; the partner's motion is taken off."""
-        d = pack.difference(a, b, world)
+    def meet_sphere(
+        grains: Grains, world: World, contact: Contact, j: int, a: Sphere, b: Sphere, d: vec3
+    ) -> Contact:
+        """Geometry of a contact with a sphere of grain `j`, and its motion relative to that grain at rest."""
         distance = wp.length(d)
         ra = pack.last(a)
         rb = pack.last(b)
@@ -87,6 +90,18 @@ def contact_functions(build: Build) -> SimpleNamespace:
         return walls.joined(model, w, (entry & SPHERE_MASK) - wall_base, (other & SPHERE_MASK) - wall_base)
 
     @wp.func
+    def touches_triangle(
+        model: Model, world: World, grains: Grains, w: int, g: int, entry: int, step: int
+    ) -> bool:
+        """Whether the triangle of an entry has a contact with the entry's sphere."""
+        a = pack.load_sphere(grains.spheres, g * spheres_each + (entry >> SPHERE_BITS))
+        reach = pack.last(a)
+        if wp.static(is_apart):
+            reach += world.reach
+        number = (entry & SPHERE_MASK) - model.grain_count * spheres_each
+        return walls.touches(model, w, number, pack.place(a, world), reach, step)
+
+    @wp.func
     def take_over(
         model: Model, world: World, grains: Grains, hood: Neighbours, w: int, g: int, slot: int, step: int
     ):
@@ -101,7 +116,7 @@ def contact_functions(build: Build) -> SimpleNamespace:
         for k in range(first, first + hood.count[row]):
             other = hood.entry[k]
             if other >> SPHERE_BITS == entry >> SPHERE_BITS and joined(model, w, entry, other):
-                if not touches(model, world, grains, w, g, other, step):
+                if not touches_triangle(model, world, grains, w, g, other, step):
                     history = pack.load_vec4(hood.history, k)
                     if pack.stamped_step(history) == step:
                         pack.store_vec4(hood.history, slot, history)
@@ -111,43 +126,66 @@ def contact_functions(build: Build) -> SimpleNamespace:
 
     @wp.func
     def contact(
-        model: Model, world: World, grains: Grains, hood: Neighbours, w: int, g: int, slot: int, step: int
+        model: Model, world: World, grains: Grains, hood: Neighbours, w: int, g: int, item: int, step: int
     ):
-        """Force [N], torque and rolling torque [N m] of the acting entry in `slot`; updates its history."""
-        entry = hood.entry[slot]
+        """Force [N], torque and rolling torque [N m] of an item of `near`, none if the two do not meet.
+
+        Updates the history of the contact.
+        """
+        near = load_pair(hood.near, item)
+        entry = near[0]
+        slot = near[1]
+        force = vec3()
+        torque = vec3()
+        rolling = real(0.0)
         partner = entry & SPHERE_MASK
         wall_base = model.grain_count * spheres_each
         a = pack.load_sphere(grains.spheres, g * spheres_each + (entry >> SPHERE_BITS))
         radius = pack.last(a)
+        apart = real(0.0)
+        if wp.static(is_apart):
+            apart = world.reach
         pair = w * model.pair_count
+        meets = bool(False)
         mass = pack.load_vec4(grains.velocity, g)[3]
         c = Contact()
         c.mass = mass
         c.time_step = world.time_step
         if partner < wall_base:
             b = pack.load_sphere(grains.spheres, w * wall_base + partner)
-            c = meet_sphere(grains, world, c, w * model.grain_count + partner // spheres_each, a, b)
+            d = pack.difference(a, b, world)
+            reach = radius + pack.last(b) + apart
+            meets = wp.dot(d, d) < reach * reach
+            if meets:
+                c = meet_sphere(grains, world, c, w * model.grain_count + partner // spheres_each, a, b, d)
         else:
-            wall = walls.wall_of(model, w, partner - wall_base)
-            c = walls.meet(model, c, wall, partner - wall_base, pack.place(a, world), radius, step)
+            number = partner - wall_base
+            wall = walls.wall_of(model, w, number)
+            c = walls.meet(model, c, wall, number, pack.place(a, world), radius, step)
             pair += model.wall[wall].pair
-        c.lever = lever_of(grains, world, g, a, c.normal * (real(0.5) * c.overlap - radius))
-        c.mobility += real(1.0) / (mass * wp.dot(c.lever, c.lever))
-        c.velocity += surface_velocity(grains, g, c.lever)
-        c.spin += spin_of(grains, g)
-        if wp.static(build.has_mesh):
-            is_triangle = partner >= wall_base + walls_each
-            if is_triangle and pack.stamped_step(pack.load_vec4(hood.history, slot)) != step:
-                take_over(model, world, grains, hood, w, g, slot, step)
-        history = pack.load_vec4(hood.history, slot)
-        displacement = vec3(history[0], history[1], history[2])
-        c.is_new = pack.stamped_step(history) != step
-        if c.is_new:
-            displacement = vec3()
-        force, displacement, torque, limit = law(
-            model.contact[pair], c, displacement, hood.memory, slot * memory_each
-        )
-        pack.store_vec4(hood.history, slot, pack.stamp(displacement, step + 1))
-        return force, wp.cross(c.lever, force) + torque, limit
+            meets = c.overlap > -apart
+            if wp.static(build.has_mesh):
+                if number >= walls_each and meets:
+                    meets = walls.touches(model, w, number, pack.place(a, world), radius + apart, step)
+        if meets:
+            c.lever = lever_of(grains, world, g, a, c.normal * (real(0.5) * c.overlap - radius))
+            c.mobility += real(1.0) / (mass * wp.dot(c.lever, c.lever))
+            c.velocity += surface_velocity(grains, g, c.lever)
+            c.spin += spin_of(grains, g)
+            if wp.static(build.has_mesh):
+                is_triangle = partner >= wall_base + walls_each
+                if is_triangle and pack.stamped_step(pack.load_vec4(hood.history, slot)) != step:
+                    take_over(model, world, grains, hood, w, g, slot, step)
+            history = pack.load_vec4(hood.history, slot)
+            displacement = vec3(history[0], history[1], history[2])
+            c.is_new = pack.stamped_step(history) != step
+            if c.is_new:
+                displacement = vec3()
+            force, displacement, torque, rolling = law(
+                model.contact[pair], c, displacement, hood.memory, slot * memory_each
+            )
+            torque += wp.cross(c.lever, force)
+            pack.store_vec4(hood.history, slot, pack.stamp(displacement, step + 1))
+        return force, torque, rolling
 
-    return SimpleNamespace(touches=touches, contact=contact)
+    return SimpleNamespace(nears=nears, contact=contact)

@@ -27,12 +27,12 @@ def shared(kind: str, per_warp: int) -> str:
 
 @wp.func_native("""
 #if defined(__CUDA_ARCH__)
-    return __any_sync(0xffffffffu, value);
+    return (int)__ballot_sync(0xffffffffu, value);
 #else
-    return value;
+    return (int)value;
 #endif
 """)
-def any_lane(value: bool) -> bool: ...
+def lanes_with(value: bool) -> int: ...
 
 
 @wp.func_native("""
@@ -47,12 +47,11 @@ def bit_count(bits: int) -> int: ...
 
 @wp.func_native("""
 #if defined(__CUDA_ARCH__)
-    return __ffs(bits) - 1;
-#else
-    return __builtin_ffs(bits) - 1;
+    for (int o = 16; o > 0; o >>= 1) value = max(value, __shfl_xor_sync(0xffffffffu, value, o));
 #endif
+    return value;
 """)
-def lowest_bit(bits: int) -> int: ...
+def largest_of_warp(value: float) -> float: ...
 
 
 @wp.func_native("""
@@ -88,10 +87,10 @@ def from_lane(value: int, lane: int) -> int: ...
 
 @wp.func_native("""
 #if defined(__CUDA_ARCH__)
-    int4 t = reinterpret_cast<const int4*>(a.data + i)[0];
-    return wp::vec_t<4, wp::int32>(t.x, t.y, t.z, t.w);
+    int2 t = reinterpret_cast<const int2*>(a.data)[i];
+    return wp::vec_t<2, wp::int32>(t.x, t.y);
 #else
-    return wp::vec_t<4, wp::int32>(a.data[i], a.data[i + 1], a.data[i + 2], a.data[i + 3]);
+    return a.data[i];
 #endif
 """)
-def load_quad(a: wp.array(dtype=int), i: int) -> wp.vec4i: ...
+def load_pair(a: wp.array(dtype=wp.vec2i), i: int) -> wp.vec2i: ...

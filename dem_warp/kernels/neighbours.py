@@ -14,75 +14,24 @@ from types import SimpleNamespace
 import warp as wp
 
 from dem_warp.kernels.packing import packing
-from dem_warp.kernels.walls import wall_functions
 from dem_warp.laws.contact_law import memory_size
 from dem_warp.types import SPHERE_BITS, Build, WorldFlag, device_structs
 
 NEIGHBOUR_OVERFLOW = wp.constant(int(WorldFlag.NEIGHBOUR_OVERFLOW))
-LATE_REBUILD = wp.constant(int(WorldFlag.LATE_REBUILD))
 
 
 @functools.cache
 def neighbour_kernels(build: Build) -> SimpleNamespace:
-    """`mark_stale`, which calls for a rebuild, and its end after the search: `write_lists` and `finish`."""
+    """The end of a rebuild, after the search: `write_lists` and `finish`."""
     precision = build.precision
     real, vec4 = precision.real, precision.vec4
     types = device_structs(precision)
     Model, Grains, Neighbours, Cells = types.Model, types.Grains, types.Neighbours, types.Cells
     pack = packing(precision)
-    walls = wall_functions(build.without_mechanisms)
     spheres_each = wp.constant(build.sphere_count)
-    walls_each = wp.constant(build.wall_count)
     memory_each = wp.constant(memory_size(build.mechanisms))
     module = wp.get_module(f"dem_warp_neighbours_{build.name}")
     wp.set_module_options({"enable_backward": False}, module)
-
-    @wp.kernel(module=module)
-    def mark_stale(
-        ahead: int,
-        # model
-        model: Model,
-        # state in
-        grains: Grains,
-        alive: wp.array(dtype=int),
-        idle: wp.array(dtype=int),
-        hood: Neighbours,
-        # state out
-        stale: wp.array(dtype=int),
-        any_stale: wp.array(dtype=int),
-        flags: wp.array(dtype=int),
-    ):
-        """Marks a world in which a grain or a wall may use up its half of the skin within `ahead` steps."""
-        g = wp.tid()
-        w = g // model.grain_count
-        if idle[w] != 0:
-            return
-        world = model.world[w]
-        if g % model.grain_count == 0:
-            for i in range(walls_each):
-                wall = model.wall[w * walls_each + i]
-                frame = walls.frame_of(model, w * walls_each + i, grains.step[w])
-                past = wp.float64(grains.step[w] - hood.rebuilt[w]) * wp.float64(world.time_step)
-                coming = wp.float64(ahead) * wp.float64(world.time_step)
-                skin = wp.float64(world.skin)
-                if wp.float64(2.0) * walls.path(wall, frame, world, past + coming) > skin:
-                    stale[w] = 1
-                    any_stale[0] = 1
-                if wp.float64(2.0) * walls.path(wall, frame, world, past) > skin:
-                    wp.atomic_or(flags, w, LATE_REBUILD)
-        if alive[g] <= 0:
-            return
-        v = pack.load_vec4(grains.velocity, g)
-        omega = pack.load_vec4(grains.spin, g)
-        speed = wp.length(wp.vec3(float(v[0]), float(v[1]), float(v[2])))
-        speed += wp.length(wp.vec3(float(omega[0]), float(omega[1]), float(omega[2]))) * float(
-            model.inertia[g][3]
-        )
-        # a grain may be pushed on the way: allow for half as much again
-        reach = hood.travel[g] + real(1.5 * speed) * real(ahead) * world.time_step
-        if real(2.0) * reach > world.skin:
-            stale[w] = 1
-            any_stale[0] = 1
 
     @wp.func
     def sort_found(cells: Cells, i: int, count: int):
@@ -169,4 +118,4 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
         if w == 0:
             any_stale[0] = 0
 
-    return SimpleNamespace(mark_stale=mark_stale, write_lists=write_lists, finish=finish, module=module)
+    return SimpleNamespace(write_lists=write_lists, finish=finish, module=module)

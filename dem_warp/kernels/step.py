@@ -13,7 +13,6 @@ from dem_warp.types import Build, WorldFlag, device_structs
 
 DIVERGED = wp.constant(int(WorldFlag.DIVERGED))
 LEAVING = -2  # a grain whose spheres have yet to be taken out of both copies of the state
-LATE_REBUILD = wp.constant(int(WorldFlag.LATE_REBUILD))
 
 
 @functools.cache
@@ -92,12 +91,9 @@ def step_kernels(build: Build) -> SimpleNamespace:
             pack.store_vec4(out.velocity, g, vec4(velocity[0], velocity[1], velocity[2], v4[3]))
             pack.store_vec4(out.spin, g, vec4(spin[0], spin[1], spin[2], real(0.0)))
             pack.store_sphere(out.center, g, center)
-            travel = hood.travel[g] + speed * dt
-            hood.travel[g] = travel
+            hood.travel[g] = hood.travel[g] + speed * dt
             if not (speed < world.speed_limit):
                 wp.atomic_or(flags, w, DIVERGED)
-            elif real(2.0) * travel > world.skin:
-                wp.atomic_or(flags, w, LATE_REBUILD)
             if left_domain(world, position):
                 alive[g] = LEAVING
         spread_spheres(model, world, out, g, center, motion.rounded(turned), lane, lanes)
@@ -137,9 +133,8 @@ def step_kernels(build: Build) -> SimpleNamespace:
                 grains_out.step[w] = step + 1
         world = model.world[w]
         if moving and step >= model.release_step[g]:
-            row = hood.list[w] * model.shape.shape[0] + g
-            count = hood.count[row]
-            first = row * hood.capacity
+            count = hood.near_count[g]
+            first = g * hood.capacity
         force, torque, rolling = sum_contacts(
             model, world, grains_in, hood, w, g, count, first, step, thread & (WARP - 1), lane, lanes
         )

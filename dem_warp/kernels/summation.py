@@ -1,10 +1,8 @@
-"""Sum of a grain's contacts, in the order of its neighbour list, on one thread or by a warp of the GPU.
+"""Sum of the contacts of a grain, in the order of its neighbour list: on one thread, or by a warp of a GPU.
 
-A single thread walks through the list and evaluates what touches. A GPU warp would leave most of its lanes
-idle that way, as about one entry in four touches. So the warp first searches, each lane a stretch of its
-grain's list, and queues what touches; then all lanes evaluate the queue, 32 contacts at once; then the
-grains' lanes add up, component by component, in the order of the list. Both ways, and any number of lanes,
-add the same floats in the same order.
+A single thread walks through what is near the grain. The lanes of a GPU warp share out what is near all of
+its grains, 32 items at once; then the grains' lanes add up, component by component, in the order of the list.
+Both ways, and any number of lanes, add the same floats in the same order; what does not touch adds zero.
 """
 
 import functools
@@ -13,33 +11,12 @@ from types import SimpleNamespace
 import warp as wp
 
 from dem_warp.kernels.contacts import contact_functions
-from dem_warp.kernels.lanes import (
-    WARP,
-    any_lane,
-    bit_count,
-    from_lane,
-    load_quad,
-    lowest_bit,
-    running_sum,
-    shared,
-    sync_warp,
-)
+from dem_warp.kernels.lanes import WARP, from_lane, running_sum, shared, sync_warp
 from dem_warp.types import Build, device_structs
 
 MIN_LANES = 4
-STRETCH = 16
-"""Entries that a lane searches before the queue is emptied; a multiple of QUAD."""
-
-QUAD = 4
-"""List entries that a lane loads at once."""
-
 COMPONENTS = 7  # force, torque, rolling torque
-QUEUE = WARP * STRETCH  # every lane's stretch, all touching
 SUMS = COMPONENTS * WARP // MIN_LANES
-
-
-@wp.func_native(shared("int", QUEUE))
-def queue(index: int, value: int, write: bool) -> int: ...
 
 
 @functools.cache
@@ -58,12 +35,11 @@ def serial_sum(build: Build):
         force = vec3()
         torque = vec3()
         rolling = real(0.0)
-        for slot in range(first, first + count):
-            if contacts.touches(model, world, grains, w, g, hood.entry[slot], step):
-                f, t, r = contacts.contact(model, world, grains, hood, w, g, slot, step)
-                force += f
-                torque += t
-                rolling += r
+        for item in range(first, first + count):
+            f, t, r = contacts.contact(model, world, grains, hood, w, g, item, step)
+            force += f
+            torque += t
+            rolling += r
         return force, torque, rolling
 
     return sum_contacts
@@ -119,36 +95,15 @@ def cooperative_sum(build: Build):
     totals = _totals(build)
 
     @wp.func
-    def search(
-        model: Model,
-        world: World,
-        grains: Grains,
-        hood: Neighbours,
-        w: int,
-        g: int,
-        begin: int,
-        end: int,
-        step: int,
-    ) -> int:
-        """Bit set of the slots from `begin` to `end` that touch."""
-        bits = int(0)
-        for slot in range(begin, end, QUAD):
-            quad = load_quad(hood.entry, slot)
-            for k in range(QUAD):
-                if slot + k < end:
-                    if contacts.touches(model, world, grains, w, g, quad[k], step):
-                        bits = bits | (1 << (slot + k - begin))
-        return bits
-
-    @wp.func
-    def enqueue(bits: int, position: int, item: int):
-        """Queues the items `item` + bit in order."""
-        left = int(bits)
-        at = int(position)
-        while left != 0:
-            queue(at, item + lowest_bit(left), True)
-            left = left & (left - 1)
-            at += 1
+    def group_of(item: int, start: int, lanes: int) -> int:
+        """Group of lanes whose items, which begin at `start`, hold an item: the last to begin by then."""
+        group = int(0)
+        half = WARP // lanes // 2
+        while half > 0:
+            if from_lane(start, (group + half) * lanes) <= item:
+                group += half
+            half = half // 2
+        return group
 
     @wp.func
     def sum_contacts(
@@ -157,37 +112,25 @@ def cooperative_sum(build: Build):
     ):  # fmt: skip
         """`count` is 0 for a lane whose grain takes no part; `thread` is the lane's number in the warp."""
         group = thread // lanes
-        stretch = wp.min((((count + QUAD - 1) // QUAD + lanes - 1) // lanes) * QUAD, STRETCH)
         totals.clear(group, lane, lanes)
-        begin = int(0)
-        while any_lane(begin < count):
-            mine = wp.min(begin + lane * stretch, count)
-            bits = search(
-                model, world, grains, hood, w, g, first + mine, first + wp.min(mine + stretch, count), step
-            )
-            begin += lanes * stretch
-            through = running_sum(bit_count(bits))
-            before = through - bit_count(bits)
-            enqueue(bits, before, (group << 16) | mine)
-            start = from_lane(before, group * lanes)
-            end = from_lane(through, group * lanes + lanes - 1)
-            queued = from_lane(through, WARP - 1)
+        through = running_sum(wp.where(lane == 0, count, 0))
+        start = from_lane(through, group * lanes) - count
+        for batch in range(0, from_lane(through, WARP - 1), WARP):
+            item = batch + thread
+            source = group_of(item, start, lanes) * lanes
+            place = item - from_lane(start, source)
+            gi = from_lane(g, source)
+            wi = from_lane(w, source)
+            step_i = from_lane(step, source)
+            first_i = from_lane(first, source)
+            if place < from_lane(count, source):
+                f, t, r = contacts.contact(
+                    model, model.world[wi], grains, hood, wi, gi, first_i + place, step_i
+                )
+                totals.write(thread, f, t, r)
             sync_warp()
-            for batch in range(0, queued, WARP):
-                item = int(0)
-                if batch + thread < queued:
-                    item = queue(batch + thread, 0, False)
-                source = (item >> 16) * lanes
-                gi = from_lane(g, source)
-                wi = from_lane(w, source)
-                slot = from_lane(first, source) + (item & 0xFFFF)
-                step_i = from_lane(step, source)
-                if batch + thread < queued:
-                    f, t, r = contacts.contact(model, model.world[wi], grains, hood, wi, gi, slot, step_i)
-                    totals.write(thread, f, t, r)
-                sync_warp()
-                totals.add(group, lane, lanes, wp.max(start - batch, 0), wp.min(end - batch, WARP))
-                sync_warp()
+            totals.add(group, lane, lanes, wp.max(start - batch, 0), wp.min(start + count - batch, WARP))
+            sync_warp()
         sync_warp()
         force = vec3(totals.read(group, 0), totals.read(group, 1), totals.read(group, 2))
         torque = vec3(totals.read(group, 3), totals.read(group, 4), totals.read(group, 5))

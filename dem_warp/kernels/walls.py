@@ -15,7 +15,7 @@ TURN = wp.constant(wp.float64(2.0 * wp.pi))  # rad
 
 @functools.cache
 def wall_functions(build: Build) -> SimpleNamespace:
-    """`wall_of`, `frame_of`, `touches`, `meet` and `path` of one build.
+    """`wall_of`, `frame_of`, `touches`, `nears`, `meet` and `path` of one build.
 
     Among the partners of a sphere, walls have numbers from 0 and the triangles of their meshes those after.
     Geometry is in float64: an overlap is 1e-3 to 1e-6 of the distances that it is the difference of.
@@ -110,6 +110,18 @@ def wall_functions(build: Build) -> SimpleNamespace:
         return overlaps(model.wall[wall], frame, position, radius)
 
     @wp.func
+    def nears(model: Model, w: int, number: int, position: wp.vec3d, reach: real, step: int) -> bool:
+        """Whether a wall or a triangle has a point nearer to a position than `reach` [m]."""
+        if wp.static(has_mesh):
+            if number >= walls_each:
+                wall = wall_of(model, w, number)
+                facets = model.facets[wall]
+                t = model.triangle[facets.first + number - facets.number]
+                d = triangles.from_triangle(t, to_mesh(frame_of(model, wall, step), position))
+                return wp.dot(d, d) < wp.float64(reach) * wp.float64(reach)
+        return touches(model, w, number, position, reach, step)
+
+    @wp.func
     def triangle_overlap(
         model: Model, wall: int, number: int, frame: Frame, position: wp.vec3d, radius: real
     ):
@@ -175,6 +187,7 @@ def wall_functions(build: Build) -> SimpleNamespace:
         to_mesh=to_mesh,
         joined=joined,
         touches=touches,
+        nears=nears,
         meet=meet,
         path=path,
     )

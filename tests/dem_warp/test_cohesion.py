@@ -373,7 +373,7 @@ def test_lists_reach_as_far_beyond_the_skin_as_surfaces_act():
 def test_bonds_outlast_rebuilds_whatever_shares_the_batch():
     seldom = solve(damp_pile(2e-3), precision="mixed")
     often = solve(damp_pile(2e-3, seed=2), damp_pile(1e-4), precision="mixed")
-    often.cycle = 2
+    often.cycle_limit = 2
     for solver in (seldom, often):
         run_for(solver, 0.05)
         assert not solver.flags.numpy().any()

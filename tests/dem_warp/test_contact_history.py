@@ -37,9 +37,7 @@ def take_steps(solver: Solver, count: int, rebuild_every: int = 0) -> np.ndarray
     """Take an even number of steps; velocity and spin of both balls after each, (count, 2, 6)."""
     seen = []
     for step in range(count):
-        if step % 2 == 0:
-            solver._place_walls(1)
-        solver._step(step % 2)
+        solver._cycle(1, step % 2)
         after = solver.grains[1 - step % 2]
         seen.append(np.column_stack([after.velocity.numpy()[:, :3], after.spin.numpy()[:, :3]]))
         if rebuild_every and (step + 1) % rebuild_every == 0:
@@ -50,7 +48,7 @@ def take_steps(solver: Solver, count: int, rebuild_every: int = 0) -> np.ndarray
 def rebuild(solver: Solver) -> None:
     """Write the neighbour lists anew."""
     solver.stale.fill_(1)
-    solver._rebuild()
+    solver._rebuild(0)
 
 
 def springs(solver: Solver) -> dict[tuple[int, int], np.ndarray]:

@@ -88,7 +88,7 @@ def test_what_a_contact_remembers_goes_along_to_another_batch(settled):
 def test_what_a_contact_remembers_survives_rebuilds(settled):
     precision, midst, _ = settled
     solver = solve(rich_pile(skin=3e-4), precision=precision)
-    solver.cycle = 2
+    solver.cycle_limit = 2
     run_for(solver, FALL)
     assert solver.flags.numpy()[0] == 0
     assert solver.rebuilds.numpy()[0] > 500

@@ -183,7 +183,7 @@ def pile(seed: int = 1, count: int = 36, skin: float = 1e-3) -> WorldSetup:
     corners = 0.0045 * np.array([[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]])
     number = np.arange(count)
     bodies = grains(
-        np.column_stack([corners[number % 4], 0.004 + 0.0065 * (number // 4)]),
+        np.column_stack([corners[number % 4], 0.0045 + 0.0085 * (number // 4)]),
         velocities=np.column_stack([rng.normal(size=(count, 2)) * 0.02, np.full(count, -0.4)]),
         orientations=rng.normal(size=(count, 4)),
         sizes=rng.uniform(0.9, 1.1, count),
@@ -221,7 +221,7 @@ class Record:
 
 
 def record(solver: Solver, steps: int) -> Record:
-    """Take steps one at a time, without a rebuild of the neighbour lists, and keep every state."""
+    """Take steps one at a time and keep every state."""
     shape = (steps + 1, solver.layout.grain_total, 3)
     history = Record(*(np.full(shape, np.nan) for _ in range(3)))
 
@@ -232,9 +232,7 @@ def record(solver: Solver, steps: int) -> Record:
 
     keep(0, solver.grains[0])
     for step in range(steps):
-        if step % 2 == 0:
-            solver._place_walls(1)
-        solver._step(step % 2)
+        solver._cycle(1, step % 2)
         keep(step + 1, solver.grains[1 - step % 2])
     return history
 

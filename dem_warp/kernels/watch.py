@@ -1,0 +1,191 @@
+"""Between two rebuilds: how fast a world is, whether its neighbour lists still hold, and what is near.
+
+All is done for some steps ahead. From the speed of the fastest grain or wall follows how far any of them may
+come in that time, so that only the entries of a list that are nearer than two such paths can touch: the step
+looks at these alone. Afterwards it is seen whether all kept to it; a world whose grains did not is flagged.
+"""
+
+import functools
+from types import SimpleNamespace
+
+import warp as wp
+
+from dem_warp.kernels.contacts import contact_functions
+from dem_warp.kernels.lanes import WARP, bit_count, lanes_with, largest_of_warp
+from dem_warp.kernels.packing import packing
+from dem_warp.kernels.walls import wall_functions
+from dem_warp.types import Build, WorldFlag, device_structs
+
+HEADROOM = 3.0
+"""Speed allowed for, over that of the fastest grain: an impact makes a fast grain spin, a light one fly."""
+
+OWN_HEADROOM = 1.5
+"""Speed that a grain itself is expected to reach, over what it has."""
+
+LEAST_PATH = 0.05
+"""Part of the skin that is allowed for at the least: grains at rest may be set in motion."""
+
+LATE_REBUILD = wp.constant(int(WorldFlag.LATE_REBUILD))
+
+
+@functools.cache
+def watch_kernels(build: Build) -> SimpleNamespace:
+    """`mark_stale` and `select_near` before some steps, `find_fastest` after them."""
+    precision = build.precision
+    real = precision.real
+    types = device_structs(precision)
+    Model, World, Grains, Neighbours = types.Model, types.World, types.Grains, types.Neighbours
+    pack = packing(precision)
+    contacts = contact_functions(build)
+    walls = wall_functions(precision)
+    walls_each = wp.constant(build.wall_count)
+    lanes = wp.constant(WARP if build.cooperative else 1)
+    module = wp.get_module(f"dem_warp_watch_{build.name}")
+    wp.set_module_options({"enable_backward": False}, module)
+
+    @wp.func
+    def speed_of(model: Model, grains: Grains, g: int) -> float:
+        """Of the fastest point of a grain [m/s]."""
+        v = pack.load_vec4(grains.velocity, g)
+        omega = pack.load_vec4(grains.spin, g)
+        turning = wp.length(wp.vec3(float(omega[0]), float(omega[1]), float(omega[2])))
+        return wp.length(wp.vec3(float(v[0]), float(v[1]), float(v[2]))) + turning * float(
+            model.inertia[g][3]
+        )
+
+    @wp.func
+    def farthest_path(world: World, fastest: float, ahead: int) -> real:
+        """How far any grain or wall may come in some steps [m]."""
+        time = real(ahead) * world.time_step
+        path = real(HEADROOM) * (real(fastest) + wp.length(world.gravity) * time) * time
+        return wp.clamp(path, real(LEAST_PATH) * world.skin, real(0.5) * world.skin)
+
+    @wp.func
+    def wall_path(model: Model, world: World, grains: Grains, w: int, i: int, steps: int) -> real:
+        """How far a wall may come in some steps [m]."""
+        index = w * walls_each + i
+        time = wp.float64(steps) * wp.float64(world.time_step)
+        frame = walls.frame_of(model, index, grains.step[w])
+        return real(walls.path(model.wall[index], frame, world, time))
+
+    @wp.kernel(module=module)
+    def mark_stale(
+        ahead: int,
+        # model
+        model: Model,
+        # state in
+        grains: Grains,
+        alive: wp.array(dtype=int),
+        idle: wp.array(dtype=int),
+        fastest: wp.array(dtype=float),
+        hood: Neighbours,
+        # state out
+        stale: wp.array(dtype=int),
+        any_stale: wp.array(dtype=int),
+    ):
+        """Sets the path, and marks a world in which a grain or a wall may use up its half of the skin."""
+        g = wp.tid()
+        w = g // model.grain_count
+        if idle[w] != 0:
+            return
+        world = model.world[w]
+        if g % model.grain_count == 0:
+            hood.path[w] = farthest_path(world, fastest[w], ahead)
+            for i in range(walls_each):
+                hood.path[w] = wp.max(hood.path[w], wall_path(model, world, grains, w, i, ahead))
+                whole = wall_path(model, world, grains, w, i, grains.step[w] + ahead - hood.rebuilt[w])
+                if real(2.0) * whole > world.skin:
+                    stale[w] = 1
+                    any_stale[0] = 1
+        if alive[g] > 0:
+            speed = real(OWN_HEADROOM * speed_of(model, grains, g))
+            if real(2.0) * (hood.travel[g] + speed * real(ahead) * world.time_step) > world.skin:
+                stale[w] = 1
+                any_stale[0] = 1
+
+    @wp.kernel(module=module, grid_stride=False)
+    def select_near(
+        # model
+        model: Model,
+        # state in
+        grains: Grains,
+        alive: wp.array(dtype=int),
+        idle: wp.array(dtype=int),
+        # state in and out
+        hood: Neighbours,
+        fastest: wp.array(dtype=float),
+    ):
+        """Lists, in order, the entries that may touch in the next steps; a warp a grain on a GPU."""
+        thread = wp.tid()
+        g = thread // lanes
+        lane = thread - g * lanes
+        w = g // model.grain_count
+        if idle[w] != 0:
+            return
+        world = model.world[w]
+        margin = world.reach + real(2.0) * hood.path[w]
+        step = grains.step[w]
+        row = hood.list[w] * model.shape.shape[0] + g
+        count = hood.count[row]
+        if alive[g] <= 0:
+            count = 0
+        found = g * hood.capacity
+        for k in range(lane, count + lane, lanes):
+            slot = row * hood.capacity + k
+            entry = int(0)
+            is_near = bool(False)
+            if k < count:
+                entry = hood.entry[slot]
+                is_near = contacts.nears(model, world, grains, w, g, entry, margin, step)
+            bits = lanes_with(is_near)
+            if is_near:
+                hood.near[found + bit_count(bits & ((1 << lane) - 1))] = wp.vec2i(entry, slot)
+            found += bit_count(bits)
+        if lane == 0:
+            hood.near_count[g] = found - g * hood.capacity
+            hood.travel_before[g] = hood.travel[g]
+            if g % model.grain_count == 0:
+                fastest[w] = 0.0
+
+    @wp.kernel(module=module, grid_stride=False)
+    def find_fastest(
+        row: int,
+        # model
+        model: Model,
+        # state in
+        grains: Grains,
+        alive: wp.array(dtype=int),
+        idle: wp.array(dtype=int),
+        hood: Neighbours,
+        # state out
+        fastest: wp.array(dtype=float),
+        flags: wp.array(dtype=int),
+    ):
+        """Speed of the fastest grain of each world; `row` threads a world, whole warps on a GPU.
+
+        Flags the worlds in which a grain came farther than its lists allowed for.
+        """
+        thread = wp.tid()
+        w = thread // row
+        place = thread - w * row
+        speed = float(0.0)
+        if idle[w] == 0 and place < model.grain_count:
+            world = model.world[w]
+            g = w * model.grain_count + place
+            if alive[g] > 0:
+                speed = speed_of(model, grains, g)
+                travel = hood.travel[g]
+                if travel - hood.travel_before[g] > hood.path[w] or real(2.0) * travel > world.skin:
+                    wp.atomic_or(flags, w, LATE_REBUILD)
+            if place == 0:
+                for i in range(walls_each):
+                    whole = wall_path(model, world, grains, w, i, grains.step[w] - hood.rebuilt[w])
+                    if real(2.0) * whole > world.skin:
+                        wp.atomic_or(flags, w, LATE_REBUILD)
+        speed = largest_of_warp(speed)
+        if thread % lanes == 0 and speed > 0.0:
+            wp.atomic_max(fastest, w, speed)
+
+    return SimpleNamespace(
+        mark_stale=mark_stale, select_near=select_near, find_fastest=find_fastest, module=module
+    )
