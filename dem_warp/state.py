@@ -216,12 +216,14 @@ def build_neighbours(
     # all zero is a displacement of zero, remembered at step 0: no history
     hood.history = wp.zeros(slots, dtype=precision.vec4, device=device)
     hood.memory = wp.zeros(slots * remembered, dtype=precision.real, device=device)
-    hood.near = wp.zeros(layout.grain_total * capacity, dtype=wp.vec2i, device=device)
-    hood.near_count = wp.zeros(layout.grain_total, dtype=int, device=device)
-    hood.path = wp.zeros(layout.world_count, dtype=precision.real, device=device)
     hood.rebuilt = wp.zeros(layout.world_count, dtype=int, device=device)
     hood.travel = wp.zeros(layout.grain_total, dtype=precision.real, device=device)
-    hood.travel_before = wp.zeros(layout.grain_total, dtype=precision.real, device=device)
+    near = device_structs(precision).Near()
+    near.count = wp.zeros(layout.grain_total, dtype=int, device=device)
+    near.item = wp.zeros(layout.grain_total * capacity, dtype=wp.vec2i, device=device)
+    near.path = wp.zeros(layout.world_count, dtype=precision.real, device=device)
+    near.travel = wp.zeros(layout.grain_total, dtype=precision.real, device=device)
+    hood.near = near
     return hood
 
 

@@ -219,6 +219,13 @@ def device_structs(precision: Precision) -> SimpleNamespace:
         spheres: wp.array(dtype=sphere)  # position in counts and radius [m], (grains * spheres,)
 
     @wp.struct
+    class Near:  # what a step looks at; written anew every few steps
+        count: wp.array(dtype=int)  # (grains,)
+        item: wp.array(dtype=wp.vec2i)  # entries that may touch soon, and their slots, (grains * capacity,)
+        path: wp.array(dtype=real)  # farthest that a grain or wall may come meanwhile [m], (worlds,)
+        travel: wp.array(dtype=real)  # of a grain when this was written [m], (grains,)
+
+    @wp.struct
     class Neighbours:
         capacity: int  # entries a grain
         list: wp.array(dtype=int)  # which of the two lists holds, (worlds,)
@@ -226,12 +233,9 @@ def device_structs(precision: Precision) -> SimpleNamespace:
         entry: wp.array(dtype=int)  # own sphere's number and partner, (2 * grains * capacity,)
         history: wp.array(dtype=vec4)  # tangential displacement [m] and the step of it, one an entry
         memory: wp.array(dtype=real)  # what the mechanisms remember of a contact, in SI units
-        near: wp.array(dtype=wp.vec2i)  # entries that may touch soon, and their slots, (grains * capacity,)
-        near_count: wp.array(dtype=int)  # (grains,)
-        path: wp.array(dtype=real)  # farthest that a grain or wall may come while `near` holds [m], (worlds,)
         rebuilt: wp.array(dtype=int)  # step of the last rebuild, (worlds,)
         travel: wp.array(dtype=real)  # path of a grain's farthest point since the rebuild [m], (grains,)
-        travel_before: wp.array(dtype=real)  # the same when `near` was written [m], (grains,)
+        near: Near
 
     @wp.struct
     class Cells:
@@ -258,5 +262,6 @@ def device_structs(precision: Precision) -> SimpleNamespace:
         Wall=Wall,
         Model=Model,
         Grains=Grains,
+        Near=Near,
         Neighbours=Neighbours,
     )

@@ -132,7 +132,7 @@ def contact_functions(build: Build) -> SimpleNamespace:
 
         Updates the history of the contact.
         """
-        near = load_pair(hood.near, item)
+        near = load_pair(hood.near.item, item)
         entry = near[0]
         slot = near[1]
         force = vec3()

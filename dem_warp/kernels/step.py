@@ -133,7 +133,7 @@ def step_kernels(build: Build) -> SimpleNamespace:
                 grains_out.step[w] = step + 1
         world = model.world[w]
         if moving and step >= model.release_step[g]:
-            count = hood.near_count[g]
+            count = hood.near.count[g]
             first = g * hood.capacity
         force, torque, rolling = sum_contacts(
             model, world, grains_in, hood, w, g, count, first, step, thread & (WARP - 1), lane, lanes

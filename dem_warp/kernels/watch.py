@@ -90,9 +90,9 @@ def watch_kernels(build: Build) -> SimpleNamespace:
             return
         world = model.world[w]
         if g % model.grain_count == 0:
-            hood.path[w] = farthest_path(world, fastest[w], ahead)
+            hood.near.path[w] = farthest_path(world, fastest[w], ahead)
             for i in range(walls_each):
-                hood.path[w] = wp.max(hood.path[w], wall_path(model, world, grains, w, i, ahead))
+                hood.near.path[w] = wp.max(hood.near.path[w], wall_path(model, world, grains, w, i, ahead))
                 whole = wall_path(model, world, grains, w, i, grains.step[w] + ahead - hood.rebuilt[w])
                 if real(2.0) * whole > world.skin:
                     stale[w] = 1
@@ -123,7 +123,7 @@ def watch_kernels(build: Build) -> SimpleNamespace:
         if idle[w] != 0:
             return
         world = model.world[w]
-        margin = world.reach + real(2.0) * hood.path[w]
+        margin = world.reach + real(2.0) * hood.near.path[w]
         step = grains.step[w]
         row = hood.list[w] * model.shape.shape[0] + g
         count = hood.count[row]
@@ -139,11 +139,11 @@ def watch_kernels(build: Build) -> SimpleNamespace:
                 is_near = contacts.nears(model, world, grains, w, g, entry, margin, step)
             bits = lanes_with(is_near)
             if is_near:
-                hood.near[found + bit_count(bits & ((1 << lane) - 1))] = wp.vec2i(entry, slot)
+                hood.near.item[found + bit_count(bits & ((1 << lane) - 1))] = wp.vec2i(entry, slot)
             found += bit_count(bits)
         if lane == 0:
-            hood.near_count[g] = found - g * hood.capacity
-            hood.travel_before[g] = hood.travel[g]
+            hood.near.count[g] = found - g * hood.capacity
+            hood.near.travel[g] = hood.travel[g]
             if g % model.grain_count == 0:
                 fastest[w] = 0.0
 
@@ -175,7 +175,7 @@ def watch_kernels(build: Build) -> SimpleNamespace:
             if alive[g] > 0:
                 speed = speed_of(model, grains, g)
                 travel = hood.travel[g]
-                if travel - hood.travel_before[g] > hood.path[w] or real(2.0) * travel > world.skin:
+                if travel - hood.near.travel[g] > hood.near.path[w] or real(2.0) * travel > world.skin:
                     wp.atomic_or(flags, w, LATE_REBUILD)
             if place == 0:
                 for i in range(walls_each):
