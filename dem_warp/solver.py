@@ -292,6 +292,7 @@ class Solver:
         # the lists know of the old motion only
         self.stale[world : world + 1].fill_(1)
         self._rebuild(0)
+        self._look_back(0)
 
     def wall_pose(self, world: int, wall: int) -> tuple[np.ndarray, np.ndarray]:
         """Where the wall's own point is [m], and how far the wall has turned (quaternion x y z w)."""

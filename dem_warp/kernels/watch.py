@@ -161,7 +161,7 @@ def watch_kernels(build: Build) -> SimpleNamespace:
         fastest: wp.array(dtype=float),
         flags: wp.array(dtype=int),
     ):
-        """Speed of the fastest grain of each world; `row` threads a world, whole warps on a GPU.
+        """Speed of the fastest grain or wall of each world; `row` threads a world, whole warps on a GPU.
 
         Flags the worlds in which a grain came farther than its lists allowed for.
         """
@@ -182,6 +182,7 @@ def watch_kernels(build: Build) -> SimpleNamespace:
                     whole = wall_path(model, world, grains, w, i, grains.step[w] - hood.rebuilt[w])
                     if real(2.0) * whole > world.skin:
                         wp.atomic_or(flags, w, LATE_REBUILD)
+                    speed = wp.max(speed, float(wall_path(model, world, grains, w, i, 1) / world.time_step))
         speed = largest_of_warp(speed)
         if thread % lanes == 0 and speed > 0.0:
             wp.atomic_max(fastest, w, speed)

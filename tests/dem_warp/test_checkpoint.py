@@ -307,7 +307,7 @@ def test_a_world_goes_on_in_another_batch_with_its_walls_in_motion():
     for solver, w in ((whole, 0), (second, 1)):
         solver.move_wall(w, 0, Motion((0.0, 0.0, -0.01)))
         solver.advance(10)
-    assert_same_bits(take_snapshot(second, 1), take_snapshot(whole, 0))
+    assert_same_bits(state(second, 1), state(whole, 0))
     fresh = solve(pile(2, count=40), precision="mixed")
     assert_same_bits(bystander, take_snapshot(fresh, 0))
     fresh.advance(10)

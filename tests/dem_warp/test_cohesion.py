@@ -88,7 +88,7 @@ def drive(
     density, speed = 1e6, math.copysign(0.01, first - last)
     touching = RADIUS * (1.0 if partner is None else 1.0 + partner)
     bodies = grains(
-        [[0.0, 0.0, touching - first], [0.0, 0.0, 0.0 if partner else -0.1]],
+        [[0.0, 0.0, touching - first], [0.0, 0.0, 0.0 if partner else 0.1]],
         velocities=[[0.0, 0.0, speed], [0.0, 0.0, 0.0]],
         sizes=[1.0, partner or 1.0],
         density=density,

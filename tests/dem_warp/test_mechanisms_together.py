@@ -59,7 +59,7 @@ def settled(request):
     solver = solve(rich_pile(), precision=request.param)
     run_for(solver, FALL)
     midst = state(solver)
-    run_for(solver, 0.15)
+    run_for(solver, 0.25)
     assert solver.flags.numpy()[0] == 0
     return request.param, midst, state(solver)
 
