@@ -115,7 +115,7 @@ def test_a_ball_anywhere_about_a_box_has_one_contact_with_its_nearest_point(turn
     places = around_box()
     contact = pair()
     solver = solve(*(world(grains(turn.apply(p)), contact, TIME_STEP, walls=(box,)) for p in places))
-    solver._step(0)
+    solver._cycle(1)
     velocities = solver.grains[1].velocity.numpy()[:, :3]
     arm = places - np.clip(places, -0.5 * EDGE, 0.5 * EDGE)
     distance = np.linalg.norm(arm, axis=1)
