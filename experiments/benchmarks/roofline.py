@@ -1,8 +1,7 @@
 """What a step must move through memory at the least, and how fast the device's memory is.
 
 The floor counts every array that a step works on once in and once out, a grain's own part of it: poses,
-speeds, spheres and properties of the grains, the entries of the neighbour lists, the histories of what
-touches. Partners are taken to be found in the cache, where another grain's turn has brought them.
+speeds, spheres and properties of the grains, the near entries of their lists, the histories of what touches. Partners are taken to be found in the cache, where another grain's turn has brought them.
 """
 
 import time
@@ -47,8 +46,8 @@ class Traffic:
     Attributes
     ----------
     list_length, touching : float
-        Entries of the neighbour lists that are read, and how many of them touch, by grain; a grain that waits
-        to be released has none.
+        Near entries of the neighbour lists, and how many of them touch, by grain; a grain that waits to be
+        released has none.
     table : DataFrame
         Array, bytes of an element, elements a grain, and how often each is moved: 2 for in and out.
     """
@@ -75,8 +74,8 @@ def step_traffic(solver: Solver) -> Traffic:
         ),
         *((name, getattr(solver.model, name), 1.0, 1) for name in ("shape", "inertia", "release_step")),
         ("alive", solver.alive, 1.0, 1),
-        ("list lengths", hood.count, 1.0, 1),
-        ("list entries", hood.entry, length, 1),
+        ("numbers of near entries", hood.near.count, 1.0, 1),
+        ("near entries", hood.near.item, length, 1),
         ("histories", hood.history, touching, 2),
         ("memories of mechanisms", hood.memory, touching * hood.memory.size / hood.history.size, 2),
         ("path since the rebuild", hood.travel, 1.0, 2),
@@ -90,7 +89,7 @@ def step_traffic(solver: Solver) -> Traffic:
 
 def memory_bytes(solver: Solver) -> int:
     """Bytes of all device arrays of a solver."""
-    holders = (solver, solver.model, *solver.grains, solver.hood, solver.cells)
+    holders = (solver, solver.model, *solver.grains, solver.hood, solver.hood.near, solver.cells)
     return sum(array.size * _element_bytes(array) for holder in holders for _, array in _arrays(holder))
 
 
@@ -121,8 +120,7 @@ def _element_bytes(array: Any) -> int:
 
 def _list_length(solver: Solver) -> float:
     worlds = solver.layout.world_count
-    which = solver.hood.list.numpy()
-    lengths = solver.hood.count.numpy().reshape(2, worlds, -1)[which, np.arange(worlds)]
+    lengths = solver.hood.near.count.numpy().reshape(worlds, -1)
     views = solver.view(range(worlds))
     alive, released = (np.array([getattr(view, name) for view in views]) for name in ("alive", "released"))
     return float(lengths[alive & released].sum() / np.count_nonzero(alive))
