@@ -1,7 +1,8 @@
 """What a step must move through memory at the least, and how fast the device's memory is.
 
 The floor counts every array that a step works on once in and once out, a grain's own part of it: poses,
-speeds, spheres and properties of the grains, the near entries of their lists, the histories of what touches. Partners are taken to be found in the cache, where another grain's turn has brought them.
+speeds, spheres and properties of the grains, the near entries of their lists, the histories of what touches.
+Partners are taken to be found in the cache, where another grain's turn has brought them.
 """
 
 import time
