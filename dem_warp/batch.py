@@ -124,8 +124,8 @@ class Batch:
     def _carry_out(self, w: int, decision: Decision) -> None:
         if decision.remove is not None:
             self.solver.remove(w, decision.remove)
-        if decision.move is not None:
-            self.solver.move_wall(w, *decision.move)
+        for wall, motion in decision.move.items():
+            self.solver.move_wall(w, wall, motion)
 
     def _result(self, w: int, status: str, reason: str) -> CaseResult:
         poses, course, setup = self.solver.poses(w), self.controllers[w].course, self.setups[w]

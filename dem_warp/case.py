@@ -121,6 +121,7 @@ class Case(Generic[SceneT]):
     def to_dict(self) -> dict[str, Any]:
         """Everything that determines the result, as plain JSON values; the device and the skin do not."""
         content = _plain(self)
+        content["scene"] = {"kind": type(self.scene).__name__} | content["scene"]
         del content["numerics"]["skin"]
         return content
 

@@ -12,6 +12,24 @@ MAX_DELAYS = 4000
 """Heights passed over in a whole rain before it is given up."""
 
 
+@wp.func
+def place_in(section: wp.vec3, u: float, v: float) -> wp.vec2:
+    """Point of a cross-section, evenly distributed when `u` and `v` are in 0 to 1."""
+    if section[2] > 0.0:
+        angle = 2.0 * wp.pi * u
+        across = section[2] * wp.sqrt(v)
+        return wp.vec2(across * wp.cos(angle), across * wp.sin(angle))
+    return wp.vec2((2.0 * u - 1.0) * section[0], (2.0 * v - 1.0) * section[1])
+
+
+@wp.func
+def is_outside(section: wp.vec3, x: float, y: float, radius: float) -> bool:
+    """Whether a sphere passes the edge of a cross-section."""
+    if section[2] > 0.0:
+        return wp.sqrt(x * x + y * y) + radius > section[2]
+    return wp.abs(x) + radius > section[0] or wp.abs(y) + radius > section[1]
+
+
 @wp.kernel(enable_backward=False)
 def place_grains(
     # model
@@ -20,7 +38,7 @@ def place_grains(
     shape_spheres: wp.array(dtype=wp.vec4),
     shape_sphere_count: wp.array(dtype=int),
     reach: wp.array(dtype=float),
-    radius: wp.array(dtype=float),
+    section: wp.array(dtype=wp.vec3),
     spacing: wp.array(dtype=float),
     seed: wp.array(dtype=int),
     shape: wp.array(dtype=int),
@@ -31,7 +49,10 @@ def place_grains(
     spheres: wp.array(dtype=wp.vec4),
     delays: wp.array(dtype=int),
 ):
-    """One thread a world: places its grains, which begin at `first`, in order of arrival."""
+    """One thread a world: places its grains, which begin at `first`, in order of arrival.
+
+    A cross-section is its half sides along x and y, and its radius where it is round, 0 where it is not [m].
+    """
     w = wp.tid()
     state = wp.rand_init(seed[w])
     late = int(0)
@@ -43,16 +64,16 @@ def place_grains(
             z = spacing[w] * float(n + late)
             for _trial in range(TRIALS):
                 if not placed:
-                    angle = 2.0 * wp.pi * wp.randf(state)
-                    across = radius[w] * wp.sqrt(wp.randf(state))
-                    center = wp.vec3(across * wp.cos(angle), across * wp.sin(angle), z)
+                    u = wp.randf(state)
+                    place = place_in(section[w], u, wp.randf(state))
+                    center = wp.vec3(place[0], place[1], z)
                     free = bool(True)
                     for s in range(shape_sphere_count[shape_g]):
                         local = shape_spheres[shape_g * sphere_count + s] * size[g]
                         offset = wp.quat_rotate(orientation[g], wp.vec3(local[0], local[1], local[2]))
                         p = center + offset
                         spheres[g * sphere_count + s] = wp.vec4(p[0], p[1], p[2], local[3])
-                        if wp.sqrt(p[0] * p[0] + p[1] * p[1]) + CLEARANCE * local[3] > radius[w]:
+                        if is_outside(section[w], p[0], p[1], CLEARANCE * local[3]):
                             free = False
                     h = g - 1
                     while free and h >= first[w] and z - position[h][2] < 2.0 * reach[w]:

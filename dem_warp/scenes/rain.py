@@ -1,7 +1,7 @@
-"""Grains that rain into a tube: places without overlap, found one grain after another on the device.
+"""Grains that rain into a container: places without overlap, found one grain after another on the device.
 
 The rain is laid out in the frame that falls with it, grain i at height i times speed over rate, and each
-grain is tried at random places of the tube's cross-section until it overlaps no grain before it. In the
+grain is tried at random places of the container's cross-section until it overlaps no grain before it. In the
 laboratory the whole rain comes down at one speed; a grain is released to gravity when it crosses the release
 plane, so grains never overlap before that.
 """
@@ -16,6 +16,27 @@ import warp as wp
 from dem_warp.clumps import stack_spheres
 from dem_warp.kernels.rain import MAX_DELAYS, place_grains
 from dem_warp.population import DrawnGrains
+
+
+@dataclass(frozen=True)
+class CrossSection:
+    """What a rain falls through, about the z axis.
+
+    Attributes
+    ----------
+    half_sides : 2 floats
+        Along x and y [m].
+    is_round : bool
+        A circle, with `half_sides` both its radius; otherwise a rectangle.
+    """
+
+    half_sides: tuple[float, float]
+    is_round: bool = False
+
+    @classmethod
+    def circle(cls, radius: float) -> "CrossSection":
+        """Cross-section of a tube [m]."""
+        return cls((radius, radius), True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +61,7 @@ class Rain:
 def place_rain(
     grains: Sequence[DrawnGrains],
     seeds: Sequence[int],
-    radii: Sequence[float],
+    sections: Sequence[CrossSection],
     spacings: Sequence[float],
     device: Any,
 ) -> list[Rain]:
@@ -51,15 +72,15 @@ def place_rain(
     grains : sequence of DrawnGrains
         Of each world, in order of arrival.
     seeds : sequence of int
-    radii : sequence of float
-        Inner radius of each tube [m].
+    sections : sequence of CrossSection
+        Of each world's container.
     spacings : sequence of float
         Mean height between two grains, speed over rate [m].
 
     Raises
     ------
     ValueError
-        If a tube is too narrow, or its rain too dense, for the grains.
+        If a container is too narrow, or its rain too dense, for the grains.
     """
     orientations = [
         _random_orientations(drawn.count, seed) for drawn, seed in zip(grains, seeds, strict=True)
@@ -78,7 +99,7 @@ def place_rain(
             wp.array(spheres.reshape(-1, 4), dtype=wp.vec4),
             wp.array([clump.sphere_count for clump in table], dtype=int),
             wp.array(reaches, dtype=float),
-            wp.array(list(radii), dtype=float),
+            wp.array([_row(section) for section in sections], dtype=wp.vec3),
             wp.array(list(spacings), dtype=float),
             wp.array([seed & 0x7FFFFFFF for seed in seeds], dtype=int),
             wp.array(np.concatenate(shapes), dtype=int),
@@ -92,11 +113,17 @@ def place_rain(
         placed = np.split(position.numpy().astype(float), first[1:-1])
         crowded = np.flatnonzero(delays.numpy() >= MAX_DELAYS)
     if crowded.size:
+        width = 2e3 * min(sections[crowded[0]].half_sides)
         raise ValueError(
-            f"the rain finds no free place: grains of {2e3 * reaches[crowded[0]]:.2f} mm in a tube of "
-            f"{2e3 * radii[crowded[0]]:.2f} mm; lower rain_rate, raise rain_speed or widen the tube"
+            f"the rain finds no free place: grains of {2e3 * reaches[crowded[0]]:.2f} mm in a container of "
+            f"{width:.2f} mm; lower rain_rate, raise rain_speed or widen the container"
         )
     return [Rain(*world) for world in zip(grains, placed, orientations, strict=True)]
+
+
+def _row(section: CrossSection) -> tuple[float, float, float]:
+    """As the kernel takes it."""
+    return *section.half_sides, section.half_sides[0] if section.is_round else 0.0
 
 
 def _random_orientations(count: int, seed: int) -> np.ndarray:

@@ -1,8 +1,8 @@
 """What every scene offers: worlds to start from, and a controller that leads each through its phases."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -19,8 +19,8 @@ class Decision:
     ----------
     remove : (k,) int array, optional
         Grain slots to take out.
-    move : (wall, Motion), optional
-        Wall to set in motion, and how.
+    move : mapping of int to Motion
+        Walls to set in motion, by number, and how.
     done : bool
         The world has ended.
     failure : str
@@ -28,9 +28,16 @@ class Decision:
     """
 
     remove: np.ndarray | None = None
-    move: tuple[int, Motion] | None = None
+    move: Mapping[int, Motion] = field(default_factory=dict)
     done: bool = False
     failure: str = ""
+
+
+class Observable(NamedTuple):
+    """What a number that a scene measures is in, and how it is defined."""
+
+    unit: str
+    meaning: str
 
 
 @dataclass
@@ -49,7 +56,7 @@ class Course:
     phases : list of dict
         Name, time [s] and steps of each phase that has ended.
     observables : dict of float
-        In SI units.
+        In the units that the scene says.
     """
 
     phase: str
@@ -84,6 +91,11 @@ class Controller(Protocol):
 
 class Scene(Protocol):
     """A physical test, as its parameters."""
+
+    @property
+    def observables(self) -> Mapping[str, Observable]:
+        """Everything that the scene may measure, by name."""
+        ...
 
     def prepare(self, cases: Sequence[Any], device: Any) -> list[WorldSetup]:
         """Worlds of cases (of this kind of scene, each with its own parameters) before the first step."""

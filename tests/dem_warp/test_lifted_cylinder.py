@@ -10,8 +10,8 @@ from worlds import BOOT, GRAIN, PYRAMID, SMALL_TUBE, assert_same_result, small_c
 from dem_warp import Case, CaseResult, ClumpShape, GrainPopulation, ShapeMixture, simulate
 from dem_warp.batch import Batch
 from dem_warp.device import resolve_device
-from dem_warp.scenes.lifted_cylinder import bed_level
 from dem_warp.scenes.scene import Decision
+from dem_warp.scenes.surfaces import bed_level
 from dem_warp.simulation import batches
 from dem_warp.solver import WorldView
 
@@ -226,8 +226,8 @@ def test_an_unknown_device_is_refused():
 def test_the_level_of_a_bed_is_the_mean_height_of_its_surface():
     # Two grains of half height 1 in a tube of radius 2, over different cells, and one below the first.
     places = np.array([[-1.0, -1.0, 3.0], [1.0, 1.0, 5.0], [-1.0, -1.0, 1.0]])
-    assert bed_level(places, 2.0, 1.0) == 4.0 + 0.5
-    assert bed_level(np.empty((0, 3)), 2.0, 1.0) == 0.0
+    assert bed_level(places, (2.0, 2.0), 1.0) == 4.0 + 0.5
+    assert bed_level(np.empty((0, 3)), (2.0, 2.0), 1.0) == 0.0
 
 
 def test_sizes_stay_within_their_limits_and_follow_their_distribution():

@@ -11,7 +11,7 @@ from dem_warp import CaseResult, GrainPopulation, ShapeMixture
 from dem_warp.clumps import stack_spheres
 from dem_warp.device import resolve_device
 from dem_warp.population import DrawnGrains
-from dem_warp.scenes.rain import Rain, place_rain
+from dem_warp.scenes.rain import CrossSection, Rain, place_rain
 
 BOTH = ShapeMixture((PYRAMID, BOOT), (0.3, 0.7))
 COUNT = 4000
@@ -132,7 +132,7 @@ def test_a_result_places_the_spheres_of_each_shape():
 def fall(bodies: Sequence[DrawnGrains], seeds: Sequence[int]) -> list[Rain]:
     """Dense rains into tubes of 24 mm."""
     n = len(bodies)
-    return place_rain(bodies, seeds, [0.012] * n, [1e-4] * n, resolve_device("cpu"))
+    return place_rain(bodies, seeds, [CrossSection.circle(0.012)] * n, [1e-4] * n, resolve_device("cpu"))
 
 
 def test_a_mixed_rain_keeps_its_spheres_apart_and_inside():

@@ -6,7 +6,7 @@ from worlds import PYRAMID, small_case, spheres_of
 
 from dem_warp.device import resolve_device
 from dem_warp.population import DrawnGrains
-from dem_warp.scenes.rain import Rain, place_rain
+from dem_warp.scenes.rain import CrossSection, Rain, place_rain
 
 RADIUS = 0.012
 SPACING = 1.0e-4
@@ -22,7 +22,7 @@ def rain(seeds=(1,), spacing: float = SPACING, radius: float = RADIUS) -> list[R
     bodies = [
         DrawnGrains((PYRAMID,), one, np.random.default_rng(seed).uniform(0.85, 1.15, COUNT)) for seed in seeds
     ]
-    return place_rain(bodies, seeds, [radius] * n, [spacing] * n, resolve_device("cpu"))
+    return place_rain(bodies, seeds, [CrossSection.circle(radius)] * n, [spacing] * n, resolve_device("cpu"))
 
 
 def clearance(centers: np.ndarray, radii: np.ndarray, owner: np.ndarray) -> float:
@@ -72,7 +72,9 @@ def test_grains_are_turned_and_spread_evenly():
 
 
 def test_a_tube_too_narrow_for_the_grains_is_refused():
-    with pytest.raises(ValueError, match=r"grains of \d\.\d\d mm in a tube of 2\.00 mm; lower rain_rate"):
+    with pytest.raises(
+        ValueError, match=r"grains of \d\.\d\d mm in a container of 2\.00 mm; lower rain_rate"
+    ):
         rain(radius=0.5e-3 * 2)
 
 

@@ -1,0 +1,144 @@
+"""What scenes share in which a gate falls away and grains run out: the course and the rate."""
+
+from abc import abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+import numpy as np
+
+from dem_warp.case import Case
+from dem_warp.model import WorldSetup
+from dem_warp.scenes.poured_controller import Phase, PouredController
+from dem_warp.scenes.scene import Course, Decision, Observable
+from dem_warp.scenes.surfaces import LEAST_POINTS, slope
+from dem_warp.solver import WorldView
+from dem_warp.walls import Motion
+
+STEADY = (0.2, 0.7)
+"""The flow is steady between these parts of the mass that comes out: past the opening, before the end."""
+
+DISCHARGE_OBSERVABLES = {
+    "filled_mass": Observable("kg", "mass of the grains in the container when it opens"),
+    "fallen_mass": Observable("kg", "mass of the grains that have come out when all is at rest"),
+    "mass_left": Observable("kg", "mass of the grains that stay in the container"),
+    "discharge_time": Observable("s", "from the opening to the last grain that comes out, to within a look"),
+    "flow_rate": Observable(
+        "kg/s",
+        "slope of the least-squares line of the mass fallen over time, from 20 to 70 % of all that falls; "
+        "absent where fewer than three looks fall in between, and where the test failed",
+    ),
+    "clogged": Observable("1", "1: the grains came to rest over the outlet; 0: they did not"),
+    "grains_lost": Observable("1", "grains that are neither in the container nor came out of it"),
+}
+
+
+@dataclass
+class Discharge(Course):
+    """Course of a scene whose grains run out of a container.
+
+    Attributes
+    ----------
+    fallen : list of [float, float]
+        Time since the opening [s] and mass that has come out [kg], at the opening and every look after it.
+    """
+
+    fallen: list[list[float]] = field(default_factory=list)
+
+    @property
+    def last_fall(self) -> float:
+        """Time since the opening at which the last grain had come out [s]."""
+        time, mass = np.array(self.fallen).T
+        return float(time[np.argmax(mass == mass[-1])])
+
+    @property
+    def flow_rate(self) -> float | None:
+        """Rate of the steady part [kg/s]; None where too few looks show it."""
+        time, mass = np.array(self.fallen).T
+        low, high = np.array(STEADY) * mass[-1]
+        within = (mass >= low) & (mass <= high)
+        return slope(time[within], mass[within]) if within.sum() >= LEAST_POINTS else None
+
+
+class DischargeController(PouredController):
+    """Phases of a discharge: fill, settle, open until the gate is out of the way, discharge."""
+
+    course: Discharge
+
+    gate: ClassVar[int]
+    """Number of the wall that closes the outlet."""
+
+    def __init__(self, case: Case[Any], setup: WorldSetup, chunk: int) -> None:
+        super().__init__(case, setup, chunk)
+        self.course = Discharge("fill")
+        self.phases["open"] = Phase(self._open, 0.05)
+        self.phases["discharge"] = Phase(self._discharge, self.expected_discharge)
+
+    # ---- what a scene says of its outlet -------------------------------------------------------------------
+
+    @property
+    @abstractmethod
+    def gate_path(self) -> float:
+        """How far the gate falls, to where no grain is [m]."""
+
+    @property
+    @abstractmethod
+    def expected_discharge(self) -> float:
+        """Roughly how long the discharge takes [s]."""
+
+    @abstractmethod
+    def came_out(self, view: WorldView) -> np.ndarray:
+        """Which grains have come out of the container, also those that have left the world, (n,) bool."""
+
+    @abstractmethod
+    def end(self, view: WorldView) -> str:
+        """Measure the scene's own observables when all is at rest; why the test failed, or nothing."""
+
+    # ---- phases --------------------------------------------------------------------------------------------
+
+    def begin(self, view: WorldView, kept: np.ndarray) -> Mapping[int, Motion]:
+        """Let the gate fall, faster than grains can follow."""
+        self.course.observables["filled_mass"] = float(view.masses[kept].sum())
+        self.course.fallen.append([0.0, 0.0])
+        self.course.enter("open", view)
+        return {self.gate: Motion(velocity=(0.0, 0.0, -self.poured.top_speed))}
+
+    def _open(self, view: WorldView) -> Decision:
+        self._record(view, view.time - self.course.phase_start)
+        if (view.time - self.course.phase_start) * self.poured.top_speed < self.gate_path:
+            return Decision()
+        self.course.enter("discharge", view)
+        return Decision(move={self.gate: Motion()})
+
+    def _discharge(self, view: WorldView) -> Decision:
+        course = self.course
+        opened = course.phase_start - course.phases[-1]["time"]
+        self._record(view, view.time - opened)
+        if self.rests(view):
+            self._measure_masses(view)
+            failure = self.end(view)
+            if not failure and (rate := course.flow_rate) is not None:
+                course.observables["flow_rate"] = rate
+            course.enter("rest", view)
+            return Decision(done=True, failure=failure)
+        if view.time - opened - course.last_fall > self.SETTLE_LIMIT:
+            failure = (
+                f"the grains left did not come to rest within {self.SETTLE_LIMIT:g} s of the last that fell"
+            )
+            return Decision(done=True, failure=failure)
+        return Decision()
+
+    def _record(self, view: WorldView, time: float) -> None:
+        self.course.fallen.append([time, float(view.masses[self.came_out(view)].sum())])
+
+    def _measure_masses(self, view: WorldView) -> None:
+        out, seen = self.came_out(view), self.course.observables
+        inside = view.alive & ~out
+        seen |= {
+            "fallen_mass": self.course.fallen[-1][1],
+            "mass_left": float(view.masses[inside].sum()),
+            "discharge_time": self.course.last_fall,
+            "clogged": 0.0,
+            "grains_lost": seen["grain_count"] - float(np.count_nonzero(inside | out)),
+            "simulated_time": view.time,
+        }

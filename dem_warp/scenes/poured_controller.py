@@ -1,0 +1,125 @@
+"""Controllers of scenes that begin with a rain: the filling, the rest, and what the fill measures."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from dem_warp.case import Case
+from dem_warp.model import WorldSetup
+from dem_warp.scenes.poured_scene import PouredScene
+from dem_warp.scenes.scene import Course, Decision
+from dem_warp.scenes.surfaces import bed_level
+from dem_warp.solver import WorldView
+from dem_warp.walls import Motion
+
+HEAPED = 4
+"""Slow grains above the brim that show the container to be full."""
+
+CALM = 10.0
+"""Grains rest when their root mean square speed is below `rest_speed` and none passes CALM times that."""
+
+
+class Phase(NamedTuple):
+    """A part of a scene's course."""
+
+    look: Callable[[WorldView], Decision]
+    expected: float
+    """How long it takes, roughly [s]."""
+
+
+class PouredController(ABC):
+    """Fills the container and lets the grains settle; the phases after that are the scene's own.
+
+    It looks at its world every `period` steps, which follows from the world's time step alone.
+    """
+
+    LOOK = 4.0e-3
+    """Time between two looks [s]; rounded up to a power of two of chunks."""
+
+    FILL_MARGIN, SETTLE_LIMIT = 2.0, 3.0
+    """Time [s] allowed beyond the rain, and for the settling."""
+
+    def __init__(self, case: Case[Any], setup: WorldSetup, chunk: int) -> None:
+        self.case, self.setup = case, setup
+        self.poured: PouredScene = case.scene
+        self.reach = float(setup.bounding_radii.max())
+        self.period = chunk * 2 ** max(int(np.ceil(np.log2(self.LOOK / (chunk * setup.time_step)))), 0)
+        self.rain_end = float(setup.grains.release_steps.max() * setup.time_step)
+        self.phases = {
+            "fill": Phase(self._fill, self.rain_end + 0.1),
+            "settle": Phase(self._settle, 0.2),
+        }
+        self.course = Course("fill")
+
+    @abstractmethod
+    def begin(self, view: WorldView, kept: np.ndarray) -> Mapping[int, Motion]:
+        """Enter the scene's own first phase, the grains `kept` being at rest; which walls move then."""
+
+    def fraction(self, time: float) -> float:
+        """Roughly how much of the case is done at a simulated time [s], 0 to 1."""
+        expected = {name: phase.expected for name, phase in self.phases.items()}
+        done = sum(expected.get(phase["name"], 0.0) for phase in self.course.phases)
+        length = expected[self.course.phase]
+        return (done + min(time - self.course.phase_start, length)) / sum(expected.values())
+
+    def look(self, view: WorldView) -> Decision:
+        """Decide what happens next from the present state."""
+        return self.phases[self.course.phase].look(view)
+
+    def rests(self, view: WorldView) -> bool:
+        """Whether the grains have been slow for `rest_time`."""
+        speed = np.linalg.norm(view.velocities[view.alive], axis=1)
+        slow = not speed.size or (
+            np.sqrt(np.mean(speed**2)) < self.poured.rest_speed
+            and speed.max() < CALM * self.poured.rest_speed
+        )
+        if not slow:
+            self.course.slow_since = None
+            return False
+        if self.course.slow_since is None:
+            self.course.slow_since = view.time
+        return view.time - self.course.slow_since >= self.poured.rest_time
+
+    def _fill(self, view: WorldView) -> Decision:
+        free = view.alive & view.released
+        above = view.positions[:, 2] > self.poured.brim
+        slow = np.linalg.norm(view.velocities, axis=1) < 0.5 * self.poured.rain_speed
+        rained_out = bool(view.released[view.alive].all())
+        full = self.poured.grain_count is None and np.count_nonzero(free & above & slow) >= HEAPED
+        if view.time > self.rain_end + self.FILL_MARGIN:
+            return Decision(
+                done=True, failure=f"the filling did not end within {self.FILL_MARGIN:g} s of the rain"
+            )
+        if not (full or (rained_out and self.rests(view))):
+            return Decision()
+        self.course.enter("settle", view)
+        if self.poured.grain_count is not None:
+            return Decision()
+        return Decision(remove=np.flatnonzero(view.alive & (above | ~view.released)))
+
+    def _settle(self, view: WorldView) -> Decision:
+        if view.time - self.course.phase_start > self.SETTLE_LIMIT:
+            return Decision(
+                done=True, failure=f"the grains poured did not come to rest within {self.SETTLE_LIMIT:g} s"
+            )
+        if not self.rests(view):
+            return Decision()
+        above = view.alive & (view.positions[:, 2] > self.poured.brim)
+        if self.poured.grain_count is not None:
+            above[:] = False
+        kept = view.alive & ~above
+        self._measure_fill(view, kept)
+        return Decision(remove=np.flatnonzero(above), move=self.begin(view, kept))
+
+    def _measure_fill(self, view: WorldView, kept: np.ndarray) -> None:
+        scene, reach = self.poured, self.case.grains.grain_reach
+        volumes = self.setup.masses / self.setup.grains.densities
+        half_sides = scene.cross_section(self.reach).half_sides
+        level = bed_level(view.positions[kept], half_sides, reach)
+        self.course.observables |= {
+            "grain_count": float(np.count_nonzero(kept)),
+            "fill_height": level - scene.floor,
+            "solid_fraction": float(volumes[kept[: len(volumes)]].sum()) / scene.volume_below(level),
+        }
