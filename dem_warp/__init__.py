@@ -5,6 +5,9 @@ from dem_warp.clumps import ClumpShape
 from dem_warp.materials import Interaction, Material, effective_moduli, rayleigh_time
 from dem_warp.population import GrainPopulation, ShapeMixture
 from dem_warp.result import CaseResult, Progress
+from dem_warp.scenes.draw_down import DrawDown
+from dem_warp.scenes.drum import Drum
+from dem_warp.scenes.hopper import Hopper
 from dem_warp.scenes.lifted_cylinder import LiftedCylinder
 from dem_warp.simulation import simulate
 
@@ -12,7 +15,10 @@ __all__ = [
     "Case",
     "CaseResult",
     "ClumpShape",
+    "DrawDown",
+    "Drum",
     "GrainPopulation",
+    "Hopper",
     "Interaction",
     "LiftedCylinder",
     "Material",

@@ -50,7 +50,8 @@ class CaseResult:
         Local centre and radius of each sphere of each shape [m]; a shape of fewer than S spheres is filled up
         with radii of 0, which are no spheres.
     observables : dict of float
-        In SI units; see the scene. `late_rebuilds` is 1 when a grain may have outrun its neighbour list.
+        Those of the scene, in the units that it says. Beside them `rebuilds` of the neighbour lists, and
+        `late_rebuilds`: 1 when a grain may have outrun its list.
     phases : list of dict
         Name, time [s] and steps of each phase.
     provenance : dict

@@ -8,6 +8,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 Vector = tuple[float, float, float]
 
@@ -279,6 +280,16 @@ class Mesh:
         after = (lower + 1) % segments
         faces = [[lower, after, lower + segments], [after, after + segments, lower + segments]]
         return cls(vertices, np.concatenate(faces, axis=1).T)
+
+    @classmethod
+    def plates(cls, corners: ArrayLike) -> "Mesh":
+        """Flat plates of four corners each, (k, 4, 3) in the order around them [m]."""
+        vertices = np.asarray(corners, dtype=float)
+        if vertices.ndim != 3 or vertices.shape[1:] != (4, 3):
+            raise ValueError(f"Mesh.plates: must have shape (k, 4, 3), got {vertices.shape}")
+        first = 4 * np.arange(len(vertices))[:, None]
+        faces = np.hstack([first + np.array(triangle) for triangle in ((0, 1, 2), (0, 2, 3))])
+        return cls(vertices.reshape(-1, 3), faces.reshape(-1, 3))
 
     @property
     def triangle_count(self) -> int:

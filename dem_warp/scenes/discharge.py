@@ -60,17 +60,14 @@ class Discharge(Course):
         return slope(time[within], mass[within]) if within.sum() >= LEAST_POINTS else None
 
 
-class DischargeController(PouredController):
+class DischargeController(PouredController[Discharge]):
     """Phases of a discharge: fill, settle, open until the gate is out of the way, discharge."""
-
-    course: Discharge
 
     gate: ClassVar[int]
     """Number of the wall that closes the outlet."""
 
     def __init__(self, case: Case[Any], setup: WorldSetup, chunk: int) -> None:
-        super().__init__(case, setup, chunk)
-        self.course = Discharge("fill")
+        super().__init__(case, setup, chunk, Discharge("fill"))
         self.phases["open"] = Phase(self._open, 0.05)
         self.phases["discharge"] = Phase(self._discharge, self.expected_discharge)
 

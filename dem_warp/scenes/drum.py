@@ -160,15 +160,12 @@ class Turning(Course):
     angles: list[list[float]] = field(default_factory=list)
 
 
-class DrumController(PouredController):
+class DrumController(PouredController[Turning]):
     """Phases of one drum: fill, settle, start up, turn."""
 
-    course: Turning
-
     def __init__(self, case: Case[Drum], setup: WorldSetup, chunk: int) -> None:
-        super().__init__(case, setup, chunk)
+        super().__init__(case, setup, chunk, Turning("fill"))
         self.scene = scene = case.scene
-        self.course = Turning("fill")
         self.phases["start up"] = Phase(self._start_up, scene.start_up / scene.rotation_rate)
         self.phases["turn"] = Phase(self._turn, scene.revolutions / scene.rotation_rate)
 

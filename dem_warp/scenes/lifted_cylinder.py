@@ -12,7 +12,7 @@ from dem_warp.model import WorldSetup
 from dem_warp.scenes.poured_controller import Phase, PouredController
 from dem_warp.scenes.poured_scene import FILL_OBSERVABLES, PouredScene
 from dem_warp.scenes.rain import CrossSection
-from dem_warp.scenes.scene import Decision, Observable
+from dem_warp.scenes.scene import Course, Decision, Observable
 from dem_warp.solver import WorldView
 from dem_warp.walls import Cylinder, Disc, Motion, Plane, Wall
 
@@ -101,14 +101,14 @@ class LiftedCylinder(PouredScene):
         return LiftController(case, setup, chunk)
 
 
-class LiftController(PouredController):
+class LiftController(PouredController[Course]):
     """Phases of one lifted cylinder: fill, settle, lift."""
 
     LIFT_MARGIN = 6.0
     """Time [s] allowed beyond the tube's own height."""
 
     def __init__(self, case: Case[LiftedCylinder], setup: WorldSetup, chunk: int) -> None:
-        super().__init__(case, setup, chunk)
+        super().__init__(case, setup, chunk, Course("fill"))
         self.scene = case.scene
         lift = 0.5 * self.scene.diameter / self.scene.lift_speed
         self.phases["lift"] = Phase(self._lift, lift + 0.3)

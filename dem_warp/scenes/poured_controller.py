@@ -2,14 +2,14 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from typing import Any, Generic, NamedTuple
 
 import numpy as np
 
 from dem_warp.case import Case
 from dem_warp.model import WorldSetup
 from dem_warp.scenes.poured_scene import PouredScene
-from dem_warp.scenes.scene import Course, Decision
+from dem_warp.scenes.scene import CourseT, Decision
 from dem_warp.scenes.surfaces import bed_level
 from dem_warp.solver import WorldView
 from dem_warp.walls import Motion
@@ -29,7 +29,7 @@ class Phase(NamedTuple):
     """How long it takes, roughly [s]."""
 
 
-class PouredController(ABC):
+class PouredController(ABC, Generic[CourseT]):
     """Fills the container and lets the grains settle; the phases after that are the scene's own.
 
     It looks at its world every `period` steps, which follows from the world's time step alone.
@@ -41,7 +41,7 @@ class PouredController(ABC):
     FILL_MARGIN, SETTLE_LIMIT = 2.0, 3.0
     """Time [s] allowed beyond the rain, and for the settling."""
 
-    def __init__(self, case: Case[Any], setup: WorldSetup, chunk: int) -> None:
+    def __init__(self, case: Case[Any], setup: WorldSetup, chunk: int, course: CourseT) -> None:
         self.case, self.setup = case, setup
         self.poured: PouredScene = case.scene
         self.reach = float(setup.bounding_radii.max())
@@ -51,7 +51,7 @@ class PouredController(ABC):
             "fill": Phase(self._fill, self.rain_end + 0.1),
             "settle": Phase(self._settle, 0.2),
         }
-        self.course = Course("fill")
+        self.course = course
 
     @abstractmethod
     def begin(self, view: WorldView, kept: np.ndarray) -> Mapping[int, Motion]:

@@ -93,7 +93,7 @@ class PouredScene(ABC):
         """Half sides along x and y, and lowest height, of the space that grains may be in [m]."""
 
     @abstractmethod
-    def controller(self, case: Any, setup: WorldSetup, chunk: int) -> Controller:
+    def controller(self, case: Any, setup: WorldSetup, chunk: int) -> Controller[Any]:
         """Controller of one case."""
 
     def release(self, reach: float) -> float:

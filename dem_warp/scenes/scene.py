@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
@@ -72,12 +72,15 @@ class Course:
         self.phase, self.phase_start, self.slow_since = phase, view.time, None
 
 
-class Controller(Protocol):
+CourseT = TypeVar("CourseT", bound=Course)
+
+
+class Controller(Protocol[CourseT]):
     """Leads one world; what it decides depends on that world alone."""
 
     period: int
     """Steps between two looks, a power of two of chunks; follows from the world alone."""
-    course: Course
+    course: CourseT
     """Nothing else in a controller changes, so that with its course it takes up a world half-way."""
 
     def look(self, view: WorldView) -> Decision:
@@ -101,6 +104,6 @@ class Scene(Protocol):
         """Worlds of cases (of this kind of scene, each with its own parameters) before the first step."""
         ...
 
-    def controller(self, case: Any, setup: WorldSetup, chunk: int) -> Controller:
+    def controller(self, case: Any, setup: WorldSetup, chunk: int) -> Controller[Any]:
         """Controller of one case, which looks at multiples of `chunk` steps."""
         ...

@@ -8,7 +8,10 @@ TOP_OF_GRAIN = 0.5
 """The surface lies this part of a grain's bounding radius above the highest centres."""
 
 FLANK = (0.2, 0.8)
-"""A slope is fitted between these parts of its height, clear of its foot and of its rounded or flat top."""
+"""A flank is fitted where it rises between these parts of its height, clear of its foot and of a flat top."""
+
+LEAST_RISE = 4.0
+"""A flank that rises by less than this many bounding radii of a grain is none."""
 
 LEAST_POINTS = 3
 """Points of a profile that a line is fitted to, at the least."""
@@ -92,17 +95,23 @@ def slope(x: np.ndarray, z: np.ndarray) -> float | None:
     return float(offset @ z / (offset @ offset))
 
 
-def flank_angle(x: np.ndarray, z: np.ndarray) -> float | None:
-    """Inclination of a flank [deg]: of a line through what lies in FLANK of its height; None if unseen.
+def flank_angle(x: np.ndarray, z: np.ndarray, reach: float) -> float | None:
+    """Inclination of a flank [deg], None where it is too low or too short to be seen.
+
+    It is that of the least-squares line from the first to the last point within FLANK of the height. All
+    points in between count: a choice by height alone would favour those that make the line flatter.
 
     Parameters
     ----------
     x, z : (n,) arrays
-        A profile that rises, or falls, from one end to the other [m].
+        A profile that rises, or falls, from one end to the other, x ascending [m].
+    reach : float
+        Bounding radius of a grain [m].
     """
-    if not len(z):
+    if not len(z) or np.ptp(z) < LEAST_RISE * reach:
         return None
     low, high = z.min() + np.ptp(z) * np.array(FLANK)
-    within = (z >= low) & (z <= high)
-    gradient = slope(x[within], z[within])
+    within = np.flatnonzero((z >= low) & (z <= high))
+    flank = slice(within.min(initial=len(z)), within.max(initial=-1) + 1)
+    gradient = slope(x[flank], z[flank])
     return None if gradient is None else math.degrees(math.atan(abs(gradient)))

@@ -5,23 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from worlds import BOOT, GRAIN, PYRAMID, SMALL_TUBE, assert_same_result, small_case, spheres_of
+from worlds import BOOT, GRAIN, PYRAMID, SMALL_TUBE, assert_same_result, run_batch, small_case, spheres_of
 
 from dem_warp import Case, CaseResult, ClumpShape, GrainPopulation, ShapeMixture, simulate
-from dem_warp.batch import Batch
 from dem_warp.device import resolve_device
 from dem_warp.scenes.scene import Decision
-from dem_warp.scenes.surfaces import bed_level
 from dem_warp.simulation import batches
 from dem_warp.solver import WorldView
-
-
-def run_batch(cases) -> dict[int, CaseResult]:
-    """Results of cases that run in one launch on the CPU."""
-    batch, results = Batch(cases, resolve_device("cpu")), {}
-    while batch.running:
-        results.update(batch.advance())
-    return results
 
 
 def with_shapes(shapes: tuple[ClumpShape, ...], fractions: tuple[float, ...]) -> Case:
@@ -221,13 +211,6 @@ def test_no_cases_give_no_results():
 def test_an_unknown_device_is_refused():
     with pytest.raises(ValueError, match=r"device: must be one of \[.*'cpu'.*\], got 'gpu'"):
         simulate([small_case()], device="gpu")
-
-
-def test_the_level_of_a_bed_is_the_mean_height_of_its_surface():
-    # Two grains of half height 1 in a tube of radius 2, over different cells, and one below the first.
-    places = np.array([[-1.0, -1.0, 3.0], [1.0, 1.0, 5.0], [-1.0, -1.0, 1.0]])
-    assert bed_level(places, (2.0, 2.0), 1.0) == 4.0 + 0.5
-    assert bed_level(np.empty((0, 3)), (2.0, 2.0), 1.0) == 0.0
 
 
 def test_sizes_stay_within_their_limits_and_follow_their_distribution():

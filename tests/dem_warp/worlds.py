@@ -1,7 +1,7 @@
 """Builders of small worlds, closed forms of their contacts, and a step-by-step record of their motion.
 
-Every world has two walls, far-off planes where a test needs none, and its grains have one sphere or nine: so
-all tests together compile four builds of the kernels.
+Every world but those of some scenes has two walls, far-off planes where a test needs none, and its grains have
+one sphere or nine: so all tests together compile few builds of the kernels.
 """
 
 import math
@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
+from dem_warp.batch import Batch
 from dem_warp.case import Case, Numerics
 from dem_warp.clumps import ClumpShape
 from dem_warp.device import resolve_device
@@ -22,6 +23,7 @@ from dem_warp.model import ContactCoefficients, Grains, WorldSetup
 from dem_warp.population import GrainPopulation
 from dem_warp.result import CaseResult
 from dem_warp.scenes.lifted_cylinder import LiftedCylinder
+from dem_warp.scenes.scene import Scene
 from dem_warp.solver import Solver
 from dem_warp.walls import Cylinder, Plane, Wall
 
@@ -287,6 +289,35 @@ def assert_same_result(a: CaseResult, b: CaseResult) -> None:
         for result in (a, b)
     ]
     assert kept[0] == kept[1]
+
+
+def run_batch(cases: Sequence[Case]) -> dict[int, CaseResult]:
+    """Results of cases that run in one launch on the CPU."""
+    batch, results = Batch(cases, resolve_device("cpu")), {}
+    while batch.running:
+        results.update(batch.advance())
+    return results
+
+
+def assert_measured_as_told(case: Case, result: CaseResult, absent: frozenset[str] = frozenset()) -> None:
+    """A result has every observable that its scene tells of, but for some, and no other; none was late."""
+    told = set(case.scene.observables)
+    assert set(result.observables) == (told - absent) | {"rebuilds", "late_rebuilds"}
+    assert absent <= told
+    assert result.observables["late_rebuilds"] == 0
+
+
+def ball_case(scene: Scene, friction: float, rolling: float = 0.0, seed: int = 1) -> Case:
+    """Balls of 4 mm in a scene, so soft that a second takes 7,000 steps."""
+    surfaces = Interaction(0.5, friction, rolling)
+    return Case(
+        scene=scene,
+        grains=GrainPopulation(ClumpShape.sphere(2e-3), GRAIN),
+        grain_grain=surfaces,
+        grain_wall=surfaces,
+        seed=seed,
+        numerics=Numerics(modulus_scale=100.0),
+    )
 
 
 def small_case(seed: int = 1, scene: LiftedCylinder | None = None, **numerics: Any) -> Case:
