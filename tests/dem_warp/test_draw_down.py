@@ -56,7 +56,7 @@ def test_a_draw_down_is_symmetric(runs):
     for name in ("shear_angle", "repose_angle"):
         left, right = seen[f"{name}_left"], seen[f"{name}_right"]
         assert seen[name] == (left + right) / 2
-        # Flanks of four to eight balls: over three sets of frictions the two sides differed by 1 to 13 degrees,
+        # Flanks of four to eight balls: over three sets of frictions the sides differed by 1 to 13 degrees,
         # 7.4 in the root mean square; three times that.
         assert left == pytest.approx(right, abs=22.0)
         assert 15.0 < seen[name] < 60.0

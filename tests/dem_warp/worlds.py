@@ -1,7 +1,7 @@
 """Builders of small worlds, closed forms of their contacts, and a step-by-step record of their motion.
 
-Every world but those of some scenes has two walls, far-off planes where a test needs none, and its grains have
-one sphere or nine: so all tests together compile few builds of the kernels.
+Every world but those of some scenes has two walls, far-off planes where a test needs none, and its grains
+have one sphere or nine: so all tests together compile few builds of the kernels.
 """
 
 import math
