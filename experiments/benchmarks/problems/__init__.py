@@ -1,0 +1,1 @@
+"""Verification problems: what must come out, by closed form or published reference, and what does."""

@@ -1,0 +1,115 @@
+"""Where grains touch, found anew from their poses: every pair of spheres, every sphere and wall."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from dem_warp.model import WorldSetup
+from dem_warp.walls import Cylinder, Plane
+
+
+@dataclass(frozen=True)
+class Touching:
+    """Contacts of one moment; arrays by contact.
+
+    Attributes
+    ----------
+    candidate : int array
+        Number of the pair among all that may ever touch.
+    first, second : int arrays
+        Grains; a wall is the number after the last grain.
+    normal : (n, 3) array
+        From the second to the first.
+    overlap, radius, mass : arrays
+        Overlap [m], effective radius [m] and effective mass [kg].
+    levers : (2, n, 3) array
+        From both grains' centres to the contact [m].
+    """
+
+    candidate: np.ndarray
+    first: np.ndarray
+    second: np.ndarray
+    normal: np.ndarray
+    overlap: np.ndarray
+    radius: np.ndarray
+    mass: np.ndarray
+    levers: np.ndarray
+
+
+class ContactFinder:
+    """Finds the contacts of a world's grains, without neighbour lists."""
+
+    def __init__(self, setup: WorldSetup) -> None:
+        grains = setup.grains
+        shapes = [setup.shapes[k] for k in grains.shapes]
+        self.owner = np.repeat(np.arange(grains.count), [shape.sphere_count for shape in shapes])
+        self.local = np.concatenate([s.centers * size for s, size in zip(shapes, grains.sizes, strict=True)])
+        self.radii = np.concatenate([s.radii * size for s, size in zip(shapes, grains.sizes, strict=True)])
+        self.masses = np.append(setup.masses, np.inf)
+        first, second = np.triu_indices(len(self.owner), 1)
+        apart = self.owner[first] != self.owner[second]
+        self.first, self.second = first[apart], second[apart]
+        self.walls = [wall for wall, _ in setup.walls]
+        self.wall_body = grains.count
+        self.candidate_count = len(self.first) + len(self.walls) * len(self.owner)
+
+    def find(self, positions: np.ndarray, orientations: np.ndarray) -> Touching:
+        """Contacts of grains at positions [m], (n, 3), and orientations, quaternions x y z w, (n, 4)."""
+        arms = Rotation.from_quat(orientations[self.owner]).apply(self.local)
+        centers = positions[self.owner] + arms
+        parts = [self._pairs(centers, arms)]
+        offset = len(self.first)
+        for wall in self.walls:
+            parts.append(self._on_wall(wall, offset, centers, arms))
+            offset += len(self.owner)
+        names = Touching.__dataclass_fields__
+        return Touching(
+            *(np.concatenate([getattr(p, n) for p in parts], axis=1 if n == "levers" else 0) for n in names)
+        )
+
+    def _pairs(self, centers: np.ndarray, arms: np.ndarray) -> Touching:
+        reach = self.radii[self.first] + self.radii[self.second]
+        across = centers[self.first] - centers[self.second]
+        hit = np.flatnonzero(np.einsum("ij,ij->i", across, across) < reach**2)
+        a, b = self.first[hit], self.second[hit]
+        distance = np.linalg.norm(across[hit], axis=1)
+        normal = across[hit] / distance[:, None]
+        overlap = reach[hit] - distance
+        ra, rb = self.radii[a], self.radii[b]
+        ma, mb = self.masses[self.owner[a]], self.masses[self.owner[b]]
+        levers = np.stack(
+            [
+                arms[a] + normal * (0.5 * overlap - ra)[:, None],
+                arms[b] + normal * (rb - 0.5 * overlap)[:, None],
+            ]
+        )
+        return Touching(
+            hit, self.owner[a], self.owner[b], normal, overlap, ra * rb / (ra + rb), ma * mb / (ma + mb), levers
+        )
+
+    def _on_wall(self, wall: object, offset: int, centers: np.ndarray, arms: np.ndarray) -> Touching:
+        if isinstance(wall, Plane):
+            normals = np.broadcast_to(wall.axis, centers.shape)
+            gap = (centers - wall.point) @ np.array(wall.axis)
+        elif isinstance(wall, Cylinder):
+            out = (centers - wall.point) * [1.0, 1.0, 0.0]
+            distance = np.linalg.norm(out, axis=1)
+            normals = -out / np.maximum(distance, 1e-300)[:, None]
+            gap = wall.radius - distance
+        else:
+            raise ValueError(f"ContactFinder: walls are planes and upright cylinders from inside, got {wall!r}")
+        hit = np.flatnonzero(gap < self.radii)
+        overlap, normal = self.radii[hit] - gap[hit], normals[hit]
+        lever = arms[hit] + normal * (0.5 * overlap - self.radii[hit])[:, None]
+        wall_body = np.full(len(hit), self.wall_body)
+        return Touching(
+            offset + hit,
+            self.owner[hit],
+            wall_body,
+            normal,
+            overlap,
+            self.radii[hit],
+            self.masses[self.owner[hit]],
+            np.stack([lever, np.zeros_like(lever)]),
+        )
