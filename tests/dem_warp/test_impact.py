@@ -193,7 +193,10 @@ def slide(restitution: float, friction: float, clamp: bool, angles: np.ndarray):
     return np.diff(seen.velocities, axis=0), np.diff(seen.spins, axis=0)
 
 
-@pytest.mark.parametrize(("restitution", "clamp", "comes"), [(1.0, False, 1.0), (0.5, True, 0.5502831696)])
+@pytest.mark.parametrize(
+    ("restitution", "clamp", "comes"),
+    [(1.0, False, 1.0), (0.5, True, 0.5502831696), (0.5, False, 0.5502831696)],
+)
 def test_an_impact_in_full_sliding_is_that_of_rigid_bodies(restitution, clamp, comes):
     friction = 0.2
     # Sliding throughout: tan(angle) > 3.5 mu (1 + e), beyond which friction cannot stop the contact point.

@@ -52,7 +52,9 @@ def relative_row(
 
     `labels` are the problem, the case, the quantity and the reference.
     """
-    want, got = np.broadcast_arrays(*(np.atleast_1d(np.asarray(a, dtype=float)) for a in (expected, simulated)))
+    want, got = np.broadcast_arrays(
+        *(np.atleast_1d(np.asarray(a, dtype=float)) for a in (expected, simulated))
+    )
     errors = np.abs(got - want) / (np.abs(want) if scale is None else scale)
     worst = _worst(errors)
     return Row(*labels, float(want[worst]), float(got[worst]), float(errors[worst]), tolerance)
@@ -62,26 +64,33 @@ def absolute_row(
     labels: tuple[str, str, str, str], expected: ArrayLike, simulated: ArrayLike, tolerance: float | None
 ) -> Row:
     """Row of the worst of several values, whose error is in the quantity's own unit."""
-    want, got = np.broadcast_arrays(*(np.atleast_1d(np.asarray(a, dtype=float)) for a in (expected, simulated)))
+    want, got = np.broadcast_arrays(
+        *(np.atleast_1d(np.asarray(a, dtype=float)) for a in (expected, simulated))
+    )
     errors = np.abs(got - want)
     worst = _worst(errors)
-    return Row(*labels, float(want[worst]), float(got[worst]), float(errors[worst]), tolerance, relative=False)
+    return Row(
+        *labels, float(want[worst]), float(got[worst]), float(errors[worst]), tolerance, relative=False
+    )
 
 
 def order_row(
     problem: str, case: str, quantity: str, steps: ArrayLike, errors: ArrayLike, expected: float, least: float
 ) -> Row:
-    """Row of an order of convergence: the slope of errors against steps; `least` is the lowest that passes."""
+    """Row of an order of convergence: the slope of errors against steps; `least` is the lowest that
+    passes."""
     slope = -float(np.polyfit(np.log(np.asarray(steps, float)), np.log(np.asarray(errors, float)), 1)[0])
     shortfall = max(expected - slope, 0.0)
     reference = f"order {expected:g} of the scheme, {least:g} at the least"
-    return Row(problem, case, quantity, reference, expected, slope, shortfall, expected - least, relative=False)
+    return Row(
+        problem, case, quantity, reference, expected, slope, shortfall, expected - least, relative=False
+    )
 
 
 def detection_row(problem: str, case: str, quantity: str, least: float, simulated: float) -> Row:
-    """Row of a wrong model that must be seen: the simulated number must reach `least`."""
+    """Row of something that must be seen, as a wrong law: the simulated number must reach `least`."""
     short = max(least - simulated, 0.0)
-    return Row(problem, case, quantity, "a wrong law must be seen", least, simulated, short, 0.0, relative=False)
+    return Row(problem, case, quantity, "at the least", least, simulated, short, 0.0, relative=False)
 
 
 def _worst(errors: np.ndarray) -> tuple[np.intp, ...]:
@@ -96,7 +105,9 @@ class Curve:
     label: str
     x: np.ndarray
     y: np.ndarray
-    style: Literal["line", "dashed", "points", "steps"] = "line"
+    style: Literal["line", "dashed", "points"] = "line"
+    colour: int | None = None
+    """Curves of one number share a colour; by default each has its own."""
 
 
 @dataclass(frozen=True)

@@ -85,7 +85,14 @@ class ContactFinder:
             ]
         )
         return Touching(
-            hit, self.owner[a], self.owner[b], normal, overlap, ra * rb / (ra + rb), ma * mb / (ma + mb), levers
+            hit,
+            self.owner[a],
+            self.owner[b],
+            normal,
+            overlap,
+            ra * rb / (ra + rb),
+            ma * mb / (ma + mb),
+            levers,
         )
 
     def _on_wall(self, wall: object, offset: int, centers: np.ndarray, arms: np.ndarray) -> Touching:
@@ -98,7 +105,9 @@ class ContactFinder:
             normals = -out / np.maximum(distance, 1e-300)[:, None]
             gap = wall.radius - distance
         else:
-            raise ValueError(f"ContactFinder: walls are planes and upright cylinders from inside, got {wall!r}")
+            raise ValueError(
+                f"ContactFinder: walls are planes and upright cylinders from inside, got {wall!r}"
+            )
         hit = np.flatnonzero(gap < self.radii)
         overlap, normal = self.radii[hit] - gap[hit], normals[hit]
         lever = arms[hit] + normal * (0.5 * overlap - self.radii[hit])[:, None]

@@ -18,6 +18,9 @@ START = 1e-7
 ACCURACY = 1e-10
 """Relative tolerance of the integration."""
 
+MOST_ARCS = 50
+"""Arcs of stick or slip in one impact; there are four at the most in the tests."""
+
 
 @dataclass(frozen=True)
 class Rebound:
@@ -85,6 +88,11 @@ class _Contact:
         """Direction of a spring at or past its limit, 0 of one within it."""
         return math.copysign(1.0, y[5]) if self.forces(y)[1] * abs(y[5]) >= self.limit(y) else 0.0
 
+    def rebound(self, y: np.ndarray) -> Rebound:
+        """Velocities of a state."""
+        v, w = self.tangential_velocities(y), self.spins_at(y)
+        return Rebound(float(-y[1]), (float(v[0]), float(v[1])), (float(w[0]), float(w[1])))
+
     def rates(self, _: float, y: np.ndarray, sliding: float) -> np.ndarray:
         force = self.friction(y, sliding)
         normal = self.forces(y)[0]
@@ -108,7 +116,7 @@ def _events(contact: _Contact, sliding: float) -> list:
         return contact.forces(y)[1] * abs(y[5]) - contact.limit(y)
 
     def sticks(_: float, y: np.ndarray, __: float) -> float:
-        if contact.forces(y)[0] <= 0.0:
+        if contact.limit(y) <= 0.0:
             return 1.0
         return sliding * contact.slip(y) - contact.spring_limit_rate(y)
 
@@ -124,7 +132,7 @@ def solve_impact(impact: Impact) -> Rebound:
     y = np.array([START * impact.peak_overlap, impact.normal_speed, 0.0, 0.0, 0.0, 0.0])
     y[5] = contact.slip(y) * y[0] / y[1]
     time, sliding = 0.0, contact.sliding_of(y)
-    while True:
+    for _ in range(MOST_ARCS):
         arc = solve_ivp(
             contact.rates,
             (time, time + 20.0 * impact.duration),
@@ -138,12 +146,11 @@ def solve_impact(impact: Impact) -> Rebound:
         )
         time, y = float(arc.t[-1]), arc.y[:, -1]
         if len(arc.t_events[0]):
-            break
+            return contact.rebound(y)
         if sliding:
             y[5] = sliding * contact.limit(y) / contact.forces(y)[1]
         sliding = 0.0 if sliding else math.copysign(1.0, y[5])
-    v, w = contact.tangential_velocities(y), contact.spins_at(y)
-    return Rebound(float(-y[1]), (float(v[0]), float(v[1])), (float(w[0]), float(w[1])))
+    raise RuntimeError(f"solve_impact: more than {MOST_ARCS} changes of stick and slip in {impact!r}")
 
 
 def _sizes(impact: Impact) -> tuple[float, float, float, float]:

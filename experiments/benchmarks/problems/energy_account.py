@@ -2,9 +2,9 @@
 
 From the poses and velocities of every step, and from nothing else of the simulator, the account finds the
 contacts, works out the documented law anew and books what each part of it does. The kinetic energy at a step
-is m v(-) . v(+) / 2, of the velocities half a step before and after: its change is exactly the work of the forces
-by the trapezoidal rule. So what is left over is that rule's error in the elastic energies, which falls with the
-time step, and any difference between the law as documented and as simulated.
+is m v(-) . v(+) / 2, of the velocities half a step before and after: its change is exactly the work of the
+forces by the trapezoidal rule. So what is left over is that rule's error in the elastic energies, which
+falls with the time step, and any difference between the law as documented and as simulated.
 """
 
 from dataclasses import dataclass
@@ -94,13 +94,15 @@ class EnergyAccount:
     Attributes
     ----------
     force_gap, torque_gap : float
-        Largest difference between a force or torque of the law and what moved a grain, over all steps and grains
-        [N], [N m].
+        Largest difference between a force or torque of the law and what moved a grain, over all steps and
+        grains [N], [N m].
     largest_force, largest_torque : float
         [N], [N m]
     """
 
     def __init__(self, setup: WorldSetup, law: ContactCoefficients | None = None) -> None:
+        if len(set(setup.contacts)) > 1 or setup.contacts[0].mechanisms:
+            raise ValueError(f"EnergyAccount: needs one base law for all contacts, got {setup.contacts!r}")
         self.setup = setup
         self.law = law or setup.contacts[0]
         self.finder = ContactFinder(setup)
@@ -113,7 +115,8 @@ class EnergyAccount:
 
     @property
     def parts(self) -> np.ndarray:
-        """Energies of the `PARTS` after each step but the last: stored, and lost so far, (steps, parts) [J]."""
+        """Energies of the `PARTS` after each step but the last: stored, and lost so far, (steps, parts)
+        [J]."""
         return np.array(self._rows)
 
     def see(self, state: Any) -> None:
@@ -132,7 +135,7 @@ class EnergyAccount:
         self._stiffnesses[touching.candidate] = moment.stiffness
         self._last = now, moment, [*self._potentials(now, moment), *self.lost.values()]
 
-    # ---- the law ---------------------------------------------------------------------------------------------
+    # ---- the law -------------------------------------------------------------------------------------------
 
     def _slip_velocities(self, touching: Touching, now: Snapshot) -> np.ndarray:
         """Velocity of the first surface against the second at each contact [m/s]; walls are at rest."""
@@ -209,7 +212,7 @@ class EnergyAccount:
         loss = np.where(stops[:, None], spins, loss)
         return turns.apply(-inertias * loss / dt)
 
-    # ---- the books -------------------------------------------------------------------------------------------
+    # ---- the books -----------------------------------------------------------------------------------------
 
     def _compare(self, before: Snapshot, after: Snapshot, moment: Moment) -> None:
         """Keep the largest gap between the law's forces and what changed the grains' momenta."""
@@ -219,7 +222,9 @@ class EnergyAccount:
         gaps = np.abs(pushes - moment.forces).max(), np.abs(twists - moment.torques - moment.rolling).max()
         largest = np.abs(moment.forces).max(), np.abs(moment.torques).max()
         self.force_gap, self.torque_gap = np.maximum((self.force_gap, self.torque_gap), gaps)
-        self.largest_force, self.largest_torque = np.maximum((self.largest_force, self.largest_torque), largest)
+        self.largest_force, self.largest_torque = np.maximum(
+            (self.largest_force, self.largest_torque), largest
+        )
 
     def _kinetic(self, before: Snapshot, after: Snapshot) -> float:
         """Kinetic energy [J] at a step, from the velocities half a step before it and after."""
@@ -236,14 +241,23 @@ class EnergyAccount:
         height = -float(self.setup.masses @ (now.positions @ np.array(self.setup.gravity)))
         touching = moment.touching
         normal = 8.0 / 15.0 * self.law.modulus * np.sqrt(touching.radius) * touching.overlap**2.5
-        return height, float(normal.sum()), float(_spring_energies(moment.stiffness, moment.displacement).sum())
+        return (
+            height,
+            float(normal.sum()),
+            float(_spring_energies(moment.stiffness, moment.displacement).sum()),
+        )
 
     def _book(self, now: Snapshot, earlier: Moment, moment: Moment) -> None:
         """Add what was lost between two steps, by the trapezoidal rule."""
         half = 0.5 * self.setup.time_step
         velocities = [self._slip_velocities(at.touching, now) for at in (earlier, moment)]
-        for name, part in (("normal damping", "normal_damping"), ("tangential damping", "tangential_damping")):
-            works = [np.sum(getattr(at, part) * v) for at, v in zip((earlier, moment), velocities, strict=True)]
+        for name, part in (
+            ("normal damping", "normal_damping"),
+            ("tangential damping", "tangential_damping"),
+        ):
+            works = [
+                np.sum(getattr(at, part) * v) for at, v in zip((earlier, moment), velocities, strict=True)
+            ]
             self.lost[name] -= half * float(works[0] + works[1])
         self.lost["rolling friction"] -= half * float(np.sum((earlier.rolling + moment.rolling) * now.spins))
         at = moment.touching.candidate

@@ -1,4 +1,5 @@
-"""One impact of a sphere on a plane or on another sphere: its settings, its Hertz solution, its simulation."""
+"""One impact of a sphere on a plane or on another sphere: its settings, its Hertz solution, its
+simulation."""
 
 import math
 from collections.abc import Sequence
@@ -180,7 +181,9 @@ def simulate_impacts(
     for k, world_ in enumerate(worlds):
         impact, dt = impacts[k // len(phases)], world_.time_step
         z, v = motion.positions[:, k, :, 2], motion.velocities[:, k, :, 2]
-        reach, below = (impact.radius + impact.partner.radius, z[:, 1]) if impact.partner else (impact.radius, 0.0)
+        reach, below = (
+            (impact.radius + impact.partner.radius, z[:, 1]) if impact.partner else (impact.radius, 0.0)
+        )
         separation = v[:, 0] - (v[:, 1] if impact.partner else 0.0)
         courses.append(
             Course(

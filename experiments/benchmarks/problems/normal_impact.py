@@ -9,7 +9,15 @@ from dem_warp.clumps import ClumpShape
 from dem_warp.materials import Material, rayleigh_time
 from dem_warp.walls import Plane
 from experiments.benchmarks.problems import chung_ooi
-from experiments.benchmarks.problems.chapter import Chapter, Curve, Plot, Row, order_row, relative_row
+from experiments.benchmarks.problems.chapter import (
+    Chapter,
+    Curve,
+    Plot,
+    Row,
+    absolute_row,
+    order_row,
+    relative_row,
+)
 from experiments.benchmarks.problems.impact import HERTZ_DURATION, Course, Impact, simulate_impacts
 from experiments.benchmarks.problems.setups import BUCKWHEAT, CLUMP, STEEL, bodies, contact, record, world
 
@@ -28,9 +36,31 @@ FINE = 1000
 AS_CHOSEN = "the restitution that was chosen"
 CLAMPED = "exp(-2 t / tan t), cos t the damping ratio"
 
-ELASTIC_TEXT = """ELASTIC"""
+ELASTIC_TEXT = """Impacts are those of Y. C. Chung and J. Y. Ooi, Granular Matter 13 (2011) 643-656, eight
+tests. The paper itself was not at hand: radii, speeds and constants are those that Yade (tests 1 to 4) and
+Kratos Multiphysics (1 to 8) state for the same tests. Not had are the constants of polyethylene (test 5),
+nylon (6) and copper (7), the pairs that test 8 compares, and the paper's own curves. Materials matter
+little: over the normal speed, an impact of this law is set by restitution, Poisson's ratio, and slip over
+friction.
 
-RESTITUTION_TEXT = """REST"""
+Here two like spheres meet head-on, and a sphere meets a rigid plane, without damping. The reference is
+Hertz's solution: largest overlap, largest force, duration, and the force at every step (K. L. Johnson,
+Contact Mechanics, 1985). The surfaces meet at four phases of a step, and the worst counts. The scheme is of
+second order. At the step of production, 25 % of the Rayleigh time, these stiff and fast spheres leave 11 to
+27 steps to an impact. A buckwheat grain of the study is many times heavier than its smallest sphere, so its
+impacts take more."""
+
+RESTITUTION_TEXT = """The damping is EDEM's, linear in the speed with the root of the contact's stiffness.
+Near the end of an impact it exceeds the spring and attracts. Left alone until the overlap is gone, the
+restitution that was chosen comes back. Kept from attracting (`clamp_attraction`), a higher one does: the
+table has it against the closed form.
+
+*The campaign leaves the damping alone.* Its factors C and D are restitutions, as are the paper's, and they
+mean what they say only in this form, which is EDEM's; clamped, the paper's 0.18 would be 0.31. The damping
+force takes the speed of half a step before, so restitution converges at first order: at e = 0.1 it needs
+about 1,000 steps an impact for half a percent. At the step of production, a buckwheat grain on steel
+(chapter before) comes back with 0.495 for 0.5 and 0.174 for 0.18; the small stiff spheres of test 3, with 18
+steps an impact, are further off."""
 
 TIP_SPEED = 1.5
 """Of a grain that falls through the whole tube of the study [m/s]."""
@@ -67,17 +97,18 @@ def _hertz(impact: Impact) -> tuple[float, float, float, float]:
     return impact.peak_overlap, impact.peak_force, impact.duration, impact.normal_speed
 
 
-def hertz_rows(problem: str, case: str, courses: list[Course], tolerance: float | None) -> list[Row]:
-    """Overlap, force, duration, speed after, and the whole force curve against Hertz, the worst phase each."""
-    impact = courses[0].impact
+def hertz_rows(problem: str, case: str, courses: list[Course], tolerance: float) -> list[Row]:
+    """Overlap, force, duration, speed after, and the whole force curve against Hertz, the worst course
+    each."""
+    want = np.array([_hertz(c.impact) for c in courses])
+    seen = np.array([_seen(c) for c in courses])
     rows = [
-        relative_row((problem, case, quantity, HERTZ), want, [_seen(c)[k] for c in courses], tolerance)
-        for k, (quantity, want) in enumerate(zip(QUANTITIES, _hertz(impact), strict=True))
+        relative_row((problem, case, quantity, HERTZ), want[:, k], seen[:, k], tolerance)
+        for k, quantity in enumerate(QUANTITIES)
     ]
-    gaps = [c.force - hertz_force(impact, c.time) for c in courses]
-    worst = max(gaps, key=lambda gap: float(np.abs(gap).max()))
-    labels = (problem, case, "force at every step, off by [N] (of the largest)", HERTZ)
-    return [*rows, relative_row(labels, 0.0, float(np.abs(worst).max()), tolerance, scale=impact.peak_force)]
+    gaps = [np.abs(c.force - hertz_force(c.impact, c.time)).max() / c.impact.peak_force for c in courses]
+    labels = (problem, case, "force at any step, off by, over the largest", HERTZ)
+    return [*rows, absolute_row(labels, 0.0, gaps, tolerance)]
 
 
 def _hertz_errors(courses: list[Course]) -> np.ndarray:
@@ -87,10 +118,11 @@ def _hertz_errors(courses: list[Course]) -> np.ndarray:
 
 
 def _drop_on_tip(restitution: float, device: str) -> tuple[float, np.ndarray, np.ndarray]:
-    """Steps, largest forces [N] and speeds after [m/s] of a buckwheat grain on steel, as the campaign takes them.
+    """Steps, largest forces [N] and speeds after [m/s] of a buckwheat grain on steel, as the campaign takes
+    them.
 
-    The grain falls along its axis, and the contact under its centre, at `TIP_SPEED`: mass and sphere are those
-    of a head-on impact. One value a phase.
+    The grain falls along its axis, and the contact under its centre, at `TIP_SPEED`: mass and sphere are
+    those of a head-on impact. One value a phase.
     """
     shape = ClumpShape.read(CLUMP)
     time_step = 0.25 * rayleigh_time(float(shape.radii.min()), BUCKWHEAT)
@@ -128,8 +160,8 @@ def _tip_impact(shape: ClumpShape) -> Impact:
 def clamped_restitution(chosen: float) -> float:
     """Restitution of the damped Hertz contact when it ends where the force, not the overlap, vanishes.
 
-    The contact maps onto a damped oscillator (Antypov and Elliott, EPL 94 (2011) 50004): e = exp(-2 t / tan t)
-    with cos t its damping ratio.
+    The contact maps onto a damped oscillator (Antypov and Elliott, EPL 94 (2011) 50004): e = exp(-2 t / tan
+    t) with cos t its damping ratio.
     """
     if chosen == 1.0:
         return 1.0
@@ -148,17 +180,22 @@ def elastic_impact(device: str) -> Chapter:
         seen = {steps: simulate_impacts(cases, steps, device, PHASES) for steps in HERTZ_ORDERS}
         coarse = simulate_impacts(cases, None, device, PHASES)
         mixed = simulate_impacts(cases, 200, device, PHASES, "mixed")
-        errors = np.array([[_hertz_errors(seen[steps][k]) for steps in HERTZ_ORDERS] for k in range(len(names))])
-        for k, name in enumerate(names):
-            rows += hertz_rows(problem, f"{name}, 200 steps", seen[200][k], 1e-3)
-            rows += hertz_rows(problem, f"{name}, 200 steps, production precision", mixed[k], 1e-3)
-            for q, quantity in enumerate(QUANTITIES):
-                labels = (problem, name, f"order of the {quantity.split(' [')[0]}")
-                rows.append(order_row(*labels, HERTZ_ORDERS, errors[k, :, q], 2.0, 1.9))
-            step = f"{name}, 25 % of the Rayleigh time ({cases[k].production_steps:.1f} steps)"
-            rows += hertz_rows(problem, step, coarse[k], 0.01)
+        errors = np.array([_hertz_errors(seen[steps][0]) for steps in HERTZ_ORDERS])
+        both = " and ".join(names)
+        slowest = min(impact.production_steps for impact in cases)
+        runs = {
+            f"{both}, 200 steps, float64": (seen[200], 1e-3),
+            f"{both}, 200 steps, production precision": (mixed, 1e-3),
+            f"{both}, 25 % of the Rayleigh time (from {slowest:.0f} steps)": (coarse, 0.01),
+        }
+        for case, (by_material, tolerance) in runs.items():
+            rows += hertz_rows(problem, case, [c for phases in by_material for c in phases], tolerance)
+        for q, quantity in enumerate(QUANTITIES):
+            labels = (problem, names[0], f"order of the {quantity.split(' [')[0]}")
+            rows.append(order_row(*labels, HERTZ_ORDERS, errors[:, q], 2.0, 1.9))
         plots.append(_force_plot(test, names, [courses[0] for courses in seen[50]]))
-        plots.append(_order_plot(f"hertz-order-{test[0]}", f"Test {test}", HERTZ_ORDERS, errors[0].T, QUANTITIES))
+    # the errors of both tests are the same: a Hertz impact is one curve, whatever its size
+    plots.append(_order_plot("hertz-order", "Tests 1 and 2", HERTZ_ORDERS, errors.T, QUANTITIES))
     return Chapter("Elastic normal impact", ELASTIC_TEXT, (*rows, *_grain_rows(device)), tuple(plots))
 
 
@@ -178,13 +215,13 @@ def _grain_rows(device: str) -> list[Row]:
 
 def _force_plot(test: str, names: list[str], courses: list[Course]) -> Plot:
     curves = []
-    for name, course in zip(names, courses, strict=True):
+    for k, (name, course) in enumerate(zip(names, courses, strict=True)):
         impact = course.impact
         times = np.linspace(0.0, impact.duration, 200)
         shown = (course.time > -course.time_step) & (course.time < impact.duration + course.time_step)
-        curves.append(Curve(f"{name}, Hertz", 1e6 * times, 1e-3 * hertz_force(impact, times)))
+        curves.append(Curve(f"{name}, Hertz", 1e6 * times, 1e-3 * hertz_force(impact, times), colour=k))
         points = (1e6 * course.time[shown], 1e-3 * course.force[shown])
-        curves.append(Curve(f"{name}, 50 steps", *points, "points"))
+        curves.append(Curve(f"{name}, 50 steps", *points, "points", colour=k))
     return Plot(f"hertz-force-{test[0]}", f"Test {test}", "time [us]", "normal force [kN]", tuple(curves))
 
 
@@ -192,7 +229,9 @@ def _order_plot(
     name: str, title: str, steps: tuple[int, ...], errors: np.ndarray, labels: tuple[str, ...], power: int = 2
 ) -> Plot:
     at = np.array(steps, dtype=float)
-    curves = [Curve(label.split(" [")[0], at, error, "points") for label, error in zip(labels, errors, strict=True)]
+    curves = [
+        Curve(label.split(" [")[0], at, error, "points") for label, error in zip(labels, errors, strict=True)
+    ]
     slope = Curve(f"order {power}", at, float(np.max(errors[:, 0])) * (at[0] / at) ** power, "dashed")
     return Plot(name, title, "steps an impact", "relative error", (*curves, slope), logarithmic=True)
 
@@ -211,7 +250,9 @@ def restitution(device: str) -> Chapter:
             for substance in chung_ooi.RESTITUTION_MATERIALS.values()
         ]
         courses = simulate_impacts(impacts, FINE, device, PHASES, length=4.0)
-        seen[clamp] = np.array([[c.restitution for c in phases] for phases in courses]).reshape(len(chosen), -1)
+        seen[clamp] = np.array([[c.restitution for c in phases] for phases in courses]).reshape(
+            len(chosen), -1
+        )
         for e, comes in zip(chosen, seen[clamp], strict=True):
             want, source = (clamped_restitution(e), CLAMPED) if clamp else (e, AS_CHOSEN)
             case = f"e = {e:g}, {'clamped' if clamp else 'damping may attract'}, {FINE} steps, both materials"
@@ -236,7 +277,7 @@ def restitution(device: str) -> Chapter:
 
 
 def _restitution_orders(problem: str, device: str) -> tuple[list[Row], np.ndarray]:
-    """Orders of convergence, and errors at the step of production; errors (e, steps), the mean over phases."""
+    """Orders of convergence and errors at the step of production; mean errors over phases, (e, steps)."""
     chosen = (0.1, 0.18, 0.5)
     substance = chung_ooi.ALUMINIUM_OXIDE
     impacts = [chung_ooi.damped(substance, e) for e in chosen]
@@ -251,5 +292,7 @@ def _restitution_orders(problem: str, device: str) -> tuple[list[Row], np.ndarra
     ]
     for e, phases in zip(chosen, simulate_impacts(impacts, None, device, PHASES, length=4.0), strict=True):
         case = f"e = {e:g}, 25 % of the Rayleigh time ({impacts[0].production_steps:.1f} steps)"
-        rows.append(relative_row((problem, case, "restitution", AS_CHOSEN), e, [c.restitution for c in phases], None))
+        rows.append(
+            relative_row((problem, case, "restitution", AS_CHOSEN), e, [c.restitution for c in phases], None)
+        )
     return rows, errors

@@ -6,7 +6,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from experiments.benchmarks.problems import chung_ooi
-from experiments.benchmarks.problems.chapter import Chapter, Curve, Plot, Row, absolute_row, order_row, relative_row
+from experiments.benchmarks.problems.chapter import (
+    Chapter,
+    Curve,
+    Plot,
+    Row,
+    absolute_row,
+    order_row,
+    relative_row,
+)
 from experiments.benchmarks.problems.contact_ode import solve_impact
 from experiments.benchmarks.problems.impact import Course, Impact, Partner, simulate_impacts
 from experiments.benchmarks.problems.normal_impact import clamped_restitution
@@ -20,17 +28,39 @@ ANGLES = np.array([2.0, *np.arange(5.0, 86.0, 5.0)])
 SLIPS = np.array([0.05, 0.1, 0.2, 0.5, 0.8, 1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 4.5, 5.0, 6.0, 8.0, 12.0])
 """Slip before the impact over friction and normal speed."""
 
-SPINS = np.array([0.2, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 12.0, 20.0])
+SPINS = np.array([0.1, 0.2, 0.4, 0.6, 0.8, 1.0, 1.3, 1.6, 2.0, 2.5, 3.0, 3.5, 4.0, 4.5, 5.0, 6.0, 7.0, 8.0])
 ORDERS = (100, 200, 400, 800)
 SAME_LAW = "the same law as a differential equation"
 RIGID_BODY = "rigid body in full sliding: impulse mu (1 + e') m v"
 """With e' the restitution at the end of repulsion, where friction ends with the normal force."""
 
-OBLIQUE_TEXT = """OBLIQUE"""
+OBLIQUE_TEXT = """A sphere meets a rigid plane at 3.9 m/s under angles from 2 to 85 degrees, with the
+constants of the experiment of Kharaz, Gorham and Salman (Powder Technology 120 (2001) 281-291). Two
+references. *The same law as a differential equation*: Hertz spring, damping, no-slip spring and Coulomb
+limit written anew and integrated by SciPy to 1e-10 between events of stick and slip. *Rigid bodies*, where
+the contact slides throughout: an impulse of friction times the normal impulse, and 5/2 of it as spin. With
+damping that may attract, friction ends where repulsion ends, so the normal impulse that friction sees is 1 +
+e' with e' the clamped restitution of the chapter before: 1.55 instead of 1.5 at e = 0.5, and 1.31 instead of
+1.18 at the e = 0.18 of buckwheat. Changes are over mu (1 + e) v, with v the normal speed."""
 
-MICRO_SLIP_TEXT = """MICRO"""
+MICRO_SLIP_TEXT = """An elastic impact at constant normal speed. The contact law, *Mindlin without slip*, is
+one spring of stiffness 8 G* sqrt(R* d) on the whole tangential displacement, which sticks or slides as one.
+In a real contact an outer ring slips from the first moment on (N. Maw, J. R. Barber and J. N. Fawcett, Wear
+38 (1976) 101-114). Their curve is computed here with the method of dimensionality reduction, 2,000 springs
+that stick or slip by themselves.
 
-SPIN_TEXT = """SPIN"""
+The simulator follows *its law* to a few parts in ten thousand, and the gap closes at first order. The law
+itself, solved exactly, misses the curve by the amounts in the rows below: within about 5 % above a slip of 3
+mu v, not below. The two reasons have numbers. In loading, the stiffness at the present overlap acts on
+displacement that was made while the contact was smaller: in proportional loading that is 3/2 of the
+incremental force. And without the ring that slips, a sticking contact returns its tangential energy: at
+small slips the contact point leaves as fast as it came, where theory has it nearly stop. It is the
+law of EDEM's Hertz-Mindlin (no slip) model, with which the calibrated paper simulated."""
+
+SPIN_TEXT = """A spinning sphere falls on a plane (test 6), on its like (test 7: opposite spins, whose
+surfaces run together, and equal ones), and on a sphere five times as large at rest (test 8). A partner a
+thousand times as stiff and dense must act as the plane does. References as in the chapter on oblique impact;
+linear momentum is kept to rounding. Over the normal speed, the slips of all pairs fall on one curve."""
 
 
 def _friction_speed(impact: Impact) -> float:
@@ -39,7 +69,9 @@ def _friction_speed(impact: Impact) -> float:
     return impact.friction * (1.0 + impact.restitution) * impact.normal_speed * share
 
 
-def _simulated(impacts: Sequence[Impact], steps: float | None, device: str, precision: str = "double") -> list[Course]:
+def _simulated(
+    impacts: Sequence[Impact], steps: float | None, device: str, precision: str = "double"
+) -> list[Course]:
     return [phases[0] for phases in simulate_impacts(impacts, steps, device, precision=precision, length=2.0)]
 
 
@@ -62,7 +94,9 @@ def _scaled(impact: Impact, tangential: float, spin: float) -> tuple[float, floa
 KICKS = ("change of tangential speed over mu (1 + e) v", "change of surface speed by spin over mu (1 + e) v")
 
 
-def _law_rows(problem: str, case: str, got: np.ndarray, want: np.ndarray, tolerance: float | None) -> list[Row]:
+def _law_rows(
+    problem: str, case: str, got: np.ndarray, want: np.ndarray, tolerance: float | None
+) -> list[Row]:
     return [
         absolute_row((problem, case, kick, SAME_LAW), want[:, k], got[:, k], tolerance)
         for k, kick in enumerate(KICKS)
@@ -107,7 +141,11 @@ def oblique_impact(device: str) -> Chapter:
         step = f"{name}, 25 % of the Rayleigh time ({impacts[0].production_steps:.1f} steps at 2 deg)"
         rows += _law_rows(problem, step, _kicks(_simulated(impacts, None, device)), want, None)
         for key, points, line in _angle_curves(impacts, got, want):
-            curves[key] += [Curve(name, ANGLES, points, "points"), Curve(f"{name}, law", ANGLES, line)]
+            colour = len(curves[key])
+            curves[key] += [
+                Curve(name, ANGLES, points, "points", colour),
+                Curve(f"{name}, law", ANGLES, line, colour=colour),
+            ]
     titles = {
         "restitution": "tangential speed after / before",
         "spin": "spin after [rad/s]",
@@ -143,11 +181,13 @@ def micro_slip(device: str) -> Chapter:
     law = impacts[0].law
     ratio = 4.0 * law.shear_modulus / law.modulus
     got, want = _kicks(_simulated(impacts, STEPS, device)), _solved_kicks(impacts)
-    slip, impulse = rebound_slip(ratio, SLIPS)
+    _, impulse = rebound_slip(ratio, SLIPS)
     case = f"steel, {len(SLIPS)} slips, {STEPS} steps"
     rows = [*_law_rows(problem, case, got, want, 5e-3), *_sliding_rows(problem, "steel", impacts, got)]
     errors = [np.abs(_kicks(_simulated(impacts, s, device)) - want).max() for s in ORDERS]
-    rows.append(order_row(problem, "steel", "order of the worst gap to the law", ORDERS, np.array(errors), 1.0, 0.9))
+    rows.append(
+        order_row(problem, "steel", "order of the worst gap to the law", ORDERS, np.array(errors), 1.0, 0.9)
+    )
     rows += _micro_slip_rows(problem, want, impulse)
     dense = np.linspace(0.02, 12.0, 120)
     curve = rebound_slip(ratio, dense)
@@ -193,7 +233,9 @@ def _micro_slip_rows(problem: str, want: np.ndarray, impulse: np.ndarray) -> lis
         rows.append(absolute_row(labels, 0.5 * impulse[inside], -want[inside, 0], None))
         labels = (problem, f"the law, not the code: {case}", "tangential speed after / before", theory)
         before = SLIPS[inside]
-        rows.append(relative_row(labels, 1.0 - impulse[inside] / before, 1.0 + 2.0 * want[inside, 0] / before, None))
+        rows.append(
+            relative_row(labels, 1.0 - impulse[inside] / before, 1.0 + 2.0 * want[inside, 0] / before, None)
+        )
     return rows
 
 
@@ -255,14 +297,14 @@ def _recoil_plot(tests: dict[str, list[Impact]], kicks: dict[str, np.ndarray]) -
         if "opposite" in test:
             continue
         before = np.array([_slip_before(i) / i.normal_speed for i in impacts])
-        sizes = np.array([_friction_speed(i) / (i.restitution * i.normal_speed) for i in impacts])
-        speeds = np.array([i.radius * i.spin / (i.restitution * i.normal_speed) for i in impacts])
-        surface = sizes * (kicks[test][:, 0] - kicks[test][:, 1]) - speeds
-        curves.append(Curve(test, before, -surface, "points"))
+        # any two solid spheres: slip changes by 1 + 5/2 of the impulse over the effective mass
+        slowed = np.array([3.5 * i.friction * (1.0 + i.restitution) for i in impacts]) * kicks[test][:, 0]
+        after = (before - slowed) / np.array([i.restitution for i in impacts])
+        curves.append(Curve(test, before, after, "points"))
     return Plot(
         "spinning-recoil",
-        "Tests 6 to 8: the falling sphere's contact point",
+        "Tests 6 to 8: slip of the contact point",
         "slip before / normal speed",
-        "surface velocity after / normal speed after",
+        "slip after / normal speed after",
         tuple(curves),
     )

@@ -1,9 +1,10 @@
 """Oblique elastic impact of a sphere with micro-slip in the contact: the problem of Maw, Barber and Fawcett.
 
-N. Maw, J. R. Barber and J. N. Fawcett, The oblique impact of elastic spheres, Wear 38 (1976) 101-114, cut the
-contact into annuli that each stick or slip. Here the contact is the equivalent row of independent springs (method
-of dimensionality reduction: V. L. Popov and M. Hess, 2015), which holds Mindlin's partial slip for any history of
-loading; I. A. Lyashenko and V. L. Popov, Scientific Reports 5 (2015) 8479, show that it gives their solution.
+N. Maw, J. R. Barber and J. N. Fawcett, The oblique impact of elastic spheres, Wear 38 (1976) 101-114, cut
+the contact into annuli that each stick or slip. Here the contact is the equivalent row of independent
+springs (method of dimensionality reduction: V. L. Popov and M. Hess, 2015), which holds Mindlin's partial
+slip for any history of loading; I. A. Lyashenko and V. L. Popov, Scientific Reports 5 (2015) 8479, show that
+it gives their solution.
 """
 
 import numpy as np
@@ -27,13 +28,13 @@ def rebound_slip(stiffness_ratio: float, slips: np.ndarray) -> tuple[np.ndarray,
     Returns
     -------
     slip, impulse : (n,) arrays
-        Slip velocity after, over normal speed and friction; tangential impulse over friction and the momentum
-        of the approach (2 in full sliding).
+        Slip velocity after, over normal speed and friction; tangential impulse over friction and the
+        momentum of the approach (2 in full sliding).
 
     Notes
     -----
-    Units: mass, normal speed, E* and radius are 1. The force changes the slip by 1 + 5/2 of its impulse over the
-    mass. Elastic similarity makes friction a factor of all tangential quantities.
+    Units: mass, normal speed, E* and radius are 1. The force changes the slip by 1 + 5/2 of its impulse over
+    the mass. Elastic similarity makes friction a factor of all tangential quantities.
     """
     peak = (15.0 / 16.0) ** 0.4
     time_step = HERTZ_DURATION * peak / STEPS

@@ -1,6 +1,5 @@
-"""Motion of a free rigid grain: Poinsot's invariants and Euler's equations; momentum of clumps that collide."""
-
-import math
+"""Motion of a free rigid grain: Poinsot's invariants and Euler's equations; momentum of clumps that
+collide."""
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -9,7 +8,15 @@ from scipy.spatial.transform import Rotation
 from dem_warp.clumps import ClumpShape
 from dem_warp.model import WorldSetup
 from dem_warp.solver import CHUNK, Solver
-from experiments.benchmarks.problems.chapter import Chapter, Curve, Plot, Row, absolute_row, order_row
+from experiments.benchmarks.problems.chapter import (
+    Chapter,
+    Curve,
+    Plot,
+    Row,
+    absolute_row,
+    detection_row,
+    order_row,
+)
 from experiments.benchmarks.problems.setups import BUCKWHEAT, CLUMP, bodies, contact, world
 
 BOOT = ClumpShape.from_spheres(
@@ -30,7 +37,11 @@ COARSER = (16, 8, 4, 2)
 POINSOT = "Poinsot: constant for a free body"
 EULER = "Euler's equations, integrated to 1e-12"
 
-TEXT = """RIGID"""
+TEXT = """A free body with three different moments tumbles about its middle axis, 1e5 steps or six turns. The
+integrator carries the angular momentum and turns the body about the spin half a step on: momentum is kept to
+rounding and energy to second order. In the production precision (spins in float32) the drifts are those of
+rounding, stated below. Clumps that collide with friction and damping keep linear and angular momentum to
+rounding."""
 
 
 def tumbling(time_step: float) -> WorldSetup:
@@ -91,17 +102,29 @@ def _top(device: str) -> tuple[list[Row], Plot]:
         want = euler_spins(moments, times)
         error = np.linalg.norm(spins - want, axis=1).max() / np.linalg.norm(SPIN)
         rows += [
-            absolute_row((problem, case, "drift of angular momentum, relative", POINSOT), 0.0, momentum.max(), tolerance),
+            absolute_row(
+                (problem, case, "drift of angular momentum, relative", POINSOT),
+                0.0,
+                momentum.max(),
+                tolerance,
+            ),
             absolute_row((problem, case, "drift of energy, relative", POINSOT), 0.0, energy.max(), tolerance),
-            absolute_row((problem, case, "spin in the body, over its size", EULER), 0.0, error, 1e-5 if tolerance else None),
+            absolute_row(
+                (problem, case, "spin in the body, over its size", EULER),
+                0.0,
+                error,
+                1e-5 if tolerance else None,
+            ),
         ]
         if precision == "double":
             fine = np.linspace(0.0, times[-1], 800)
             path = euler_spins(moments, fine)
             for k, axis in enumerate("xyz"):
-                curves.append(Curve(f"{axis}, Euler", fine, path[:, k]))
-                curves.append(Curve(f"{axis}, simulated", times, spins[:, k], "points"))
-    plot = Plot("free-top", "Free asymmetric top", "time [s]", "spin in the body's frame [rad/s]", tuple(curves))
+                curves.append(Curve(f"{axis}, Euler", fine, path[:, k], colour=k))
+                curves.append(Curve(f"{axis}, simulated", times, spins[:, k], "points", colour=k))
+    plot = Plot(
+        "free-top", "Free asymmetric top", "time [s]", "spin in the body's frame [rad/s]", tuple(curves)
+    )
     return rows, plot
 
 
@@ -115,7 +138,9 @@ def _orders(device: str) -> list[Row]:
         errors.append((energy.max(), np.linalg.norm(spins - want, axis=1).max()))
     steps = 1.0 / np.array(COARSER)
     return [
-        order_row("Free asymmetric top", "float64", f"order of the {name}", steps, np.array(errors)[:, k], 2.0, 1.9)
+        order_row(
+            "Free asymmetric top", "float64", f"order of the {name}", steps, np.array(errors)[:, k], 2.0, 1.9
+        )
         for k, name in enumerate(("energy drift", "spin in the body"))
     ]
 
@@ -149,7 +174,9 @@ def _collision_rows(device: str) -> list[Row]:
             labels = ("Clumps collide", case, f"change of {quantity} over that of a grain", "conservation")
             rows.append(absolute_row(labels, 0.0, change, tolerance))
         share = 1.0 - after[2] / before[2]
-        rows.append(absolute_row(("Clumps collide", case, "share of the energy lost", "they did collide"), 0.5, share, 0.45))
+        rows.append(
+            detection_row("Clumps collide", case, "share of the energy lost (they did collide)", 0.2, share)
+        )
     return rows
 
 
