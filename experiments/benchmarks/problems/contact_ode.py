@@ -53,7 +53,7 @@ class _Contact:
         normal = 2.0 / 3.0 * stiffness * y[0] + law.damping * math.sqrt(stiffness * mass) * y[1]
         if law.clamp_attraction:
             normal = max(normal, 0.0)
-        return normal, tangential, law.damping * math.sqrt(tangential * mass)
+        return normal, tangential, law.tangential_damping * law.damping * math.sqrt(tangential * mass)
 
     def levers(self, y: np.ndarray) -> np.ndarray:
         """From the centres to the contact point, half the overlap inside [m]; none for a plane."""

@@ -165,7 +165,8 @@ class EnergyAccount:
         keep = _share(stiffness * np.linalg.norm(advanced, axis=1), limit)
         displacement = advanced * keep[:, None]
         pull = -stiffness[:, None] * displacement
-        drag = -(law.damping * np.sqrt(stiffness * touching.mass))[:, None] * tangential
+        rate = law.tangential_damping * law.damping * np.sqrt(stiffness * touching.mass)
+        drag = -rate[:, None] * tangential
         drag = np.where(keep[:, None] < 1.0, 0.0, drag)
         drag = (pull + drag) * _share(np.linalg.norm(pull + drag, axis=1), limit)[:, None] - pull
 

@@ -128,7 +128,7 @@ def _error(value: float, relative: bool) -> str:
 
 def _write_rows(chapters: Sequence[Chapter], path: Path) -> None:
     with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
+        writer = csv.writer(file, lineterminator="\n")
         writer.writerow(("chapter", *COLUMNS))
         for chapter in chapters:
             for row in chapter.rows:
@@ -138,7 +138,7 @@ def _write_rows(chapters: Sequence[Chapter], path: Path) -> None:
 
 def _write_data(plot: Plot, path: Path) -> None:
     with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
+        writer = csv.writer(file, lineterminator="\n")
         writer.writerow(("curve", plot.x, plot.y))
         for curve in plot.curves:
             writer.writerows(

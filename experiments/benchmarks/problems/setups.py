@@ -128,8 +128,11 @@ class WatchedSolver(Solver):
     def watch(self, steps: int, see: Callable[[Any], None]) -> None:
         """Take `steps` steps, or a few more to end a cycle, and hand the state after each to `see`."""
         self._see = see
-        for _ in range(-(-steps // self.cycle)):
-            self._cycle()
+        taken = 0
+        while taken < steps:
+            cycle = self._cycle_length(1)
+            self._cycle(cycle)
+            taken += cycle
         self._see = None
 
 
