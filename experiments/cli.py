@@ -17,6 +17,7 @@ from experiments.commands.console import FAILED_RUN, CaseProgress, clear_errors,
 
 if TYPE_CHECKING:
     from experiments.calibrate.results import StageResult
+    from experiments.cases import Heap
 
 app = typer.Typer(
     name="dem-warp",
@@ -86,7 +87,10 @@ def heap(
     device: Device = None,
     as_json: AsJson = False,
 ) -> None:
-    """Simulate one heap: heap.vtp (ParaView), snapshot.png with the fitted flanks, angle.json."""
+    """Simulate one heap: heap.vtp (ParaView), snapshot.png with the fitted flanks, angle.json.
+
+    A study of a hopper, a drum or a draw-down gives what that test measures instead of the angle.
+    """
     with clear_errors():
         from experiments.cases import require_unused, simulate_heap, write_heap
         from experiments.commands.choices import chosen_device, chosen_study, default_folder
@@ -102,10 +106,10 @@ def heap(
     if as_json:
         typer.echo(json.dumps(simulated.to_dict(), allow_nan=False))
     messages.print(f"Files: {folder}")
-    if simulated.angle is None:
-        fail(f"no angle, the case {simulated.result.status}: {simulated.reason}", FAILED_RUN)
+    if simulated.reason:
+        fail(f"the case {simulated.result.status}: {simulated.reason}", FAILED_RUN)
     elif not as_json:
-        typer.echo(f"{simulated.angle.mean:.2f} +- {simulated.angle.se:.2f} degrees")
+        _print_measured(simulated)
 
 
 @app.command(epilog="Example: [bold]dem-warp angle photos/*.jpg --fit middle --overlay measured[/]")
@@ -224,6 +228,16 @@ def _print_clump(facts: dict[str, Any]) -> None:
 def _resume_command(study: Path | None, folder: Path, scale: str | None, device: str) -> str:
     words = ["dem-warp calibrate", *([str(study)] if study else []), f"--out {folder}"]
     return " ".join([*words, *([f"--scale {scale}"] if scale else []), f"--device {device}", "--resume"])
+
+
+def _print_measured(simulated: Heap) -> None:
+    """Show the angle of a heap; for a test that leaves none, what else it measures, one a line."""
+    if simulated.angle:
+        typer.echo(f"{simulated.angle.mean:.2f} +- {simulated.angle.se:.2f} degrees")
+        return
+    for name, unit in simulated.units.items():
+        value = simulated.result.observables[name]
+        typer.echo(f"{name.replace('_', ' ')}: {value:.5g} {'' if unit == '1' else unit}".rstrip())
 
 
 def _print_angles(rows: list[dict[str, Any]], fit: str) -> None:

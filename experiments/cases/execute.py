@@ -59,7 +59,7 @@ def run_cases(
     pandas.DataFrame
         The same rows and index with ``status``, ``reason``, ``angle`` and ``angle_se`` [deg], ``case_key``,
         and one column an observable. A case that fails is a row with its status and reason, and without an
-        angle; so is a heap that cannot be measured.
+        angle; so is a heap that cannot be measured. The cases of a test that leaves no heap have no angles.
 
     Raises
     ------
@@ -99,6 +99,19 @@ def measure_heap(study: Study, result: CaseResult) -> HeapAngle:
         fit=settings.fit,
         pixels=settings.pixels,
     )
+
+
+def heap_angle_or_reason(study: Study, result: CaseResult) -> tuple[HeapAngle | None, str]:
+    """Angle of a case's heap; or None, and why: the case failed, or there is no measurable heap.
+
+    A test that leaves no heap, as a hopper, has no angle and no reason.
+    """
+    if result.status != "finished" or not study.scene.leaves_a_heap:
+        return None, result.reason
+    try:
+        return measure_heap(study, result), ""
+    except PictureError as error:
+        return None, f"no angle: {error}"
 
 
 def _check_columns(table: pd.DataFrame) -> None:
@@ -168,13 +181,10 @@ def _stored_outcome(study: Study, store: Store, key: str) -> dict[str, Any]:
 
 
 def _outcome_of(study: Study, result: CaseResult) -> dict[str, Any]:
-    if result.status != "finished":
-        return _outcome(result.status, result.reason, **result.observables)
-    try:
-        angle = measure_heap(study, result)
-    except PictureError as error:
-        return _outcome(result.status, f"no angle: {error}", **result.observables)
-    return _outcome(result.status, "", angle.mean, angle.se, **result.observables)
+    angle, reason = heap_angle_or_reason(study, result)
+    if angle is None:
+        return _outcome(result.status, reason, **result.observables)
+    return _outcome(result.status, reason, angle.mean, angle.se, **result.observables)
 
 
 def _outcome(

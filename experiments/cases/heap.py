@@ -1,4 +1,4 @@
-"""One heap: simulated, measured, and written as spheres, as a picture with its flanks, and as its angle."""
+"""One case: simulated, measured, and written as spheres, as a picture of its heap, and as its numbers."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from typing import Any
 import numpy as np
 
 from dem_warp import CaseResult, Progress, simulate
-from experiments.cases.execute import measure_heap
+from experiments.cases.execute import heap_angle_or_reason
 from experiments.files import replacing, write_text
 from experiments.study import Study
-from imaging import HeapAngle, PictureError, overlay, save_picture, snapshot
+from imaging import HeapAngle, overlay, save_picture, snapshot
 
 
 @dataclass(frozen=True)
 class Heap:
-    """A simulated heap and its repose angle."""
+    """A simulated case and the repose angle of its heap, if the test leaves one."""
 
     study: Study
     """What it was made from."""
@@ -31,9 +31,15 @@ class Heap:
     result: CaseResult
     """How the case ended."""
     angle: HeapAngle | None
-    """Its angle; None when the case failed or there is no measurable heap."""
+    """Its angle; None when the case failed, there is no measurable heap, or the test leaves none."""
     reason: str
-    """Why there is no angle; empty when there is one."""
+    """Why the case or the measurement failed; empty when neither did."""
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Unit of every observable that the scene tells of."""
+        told = self.study.scene.observables
+        return {name: told[name].unit for name in self.result.observables if name in told}
 
     def to_dict(self) -> dict[str, Any]:
         """Everything but the grains as JSON-able data: angles in degrees, observables in SI."""
@@ -50,6 +56,7 @@ class Heap:
             "angle": {"mean": angle.mean, "se": angle.se} if angle else None,
             "views": _views(angle) if angle else [],
             "observables": self.result.observables,
+            "observable_units": self.units,
             "provenance": self.result.provenance,
         }
 
@@ -83,12 +90,7 @@ def simulate_heap(
     """
     [result] = simulate([study.case(settings, seed)], device=device, workers=1, on_progress=progress)
     values = {factor.name: settings.get(factor.name, factor.center) for factor in study.factors}
-    if result.status != "finished":
-        return Heap(study, values, seed, result, None, result.reason)
-    try:
-        return Heap(study, values, seed, result, measure_heap(study, result), "")
-    except PictureError as error:
-        return Heap(study, values, seed, result, None, str(error))
+    return Heap(study, values, seed, result, *heap_angle_or_reason(study, result))
 
 
 def heap_picture(study: Study, result: CaseResult, angle: HeapAngle | None, view: int = 0) -> np.ndarray:
@@ -121,11 +123,15 @@ def heap_picture(study: Study, result: CaseResult, angle: HeapAngle | None, view
 
 
 def write_heap(heap: Heap, folder: Path) -> None:
-    """Write ``heap.vtp``, ``snapshot.png`` and ``angle.json`` into a folder, made when it is missing."""
-    with replacing(folder / "heap.vtp") as temporary:
-        write_spheres(temporary, heap.result)
-    with replacing(folder / "snapshot.png") as temporary:
-        save_picture(temporary, heap_picture(heap.study, heap.result, heap.angle))
+    """Write ``heap.vtp``, ``snapshot.png`` and ``angle.json`` into a folder, made when it is missing.
+
+    Where no grain is left, as may be in a hopper, there is nothing to draw.
+    """
+    if len(heap.result.positions):
+        with replacing(folder / "heap.vtp") as temporary:
+            write_spheres(temporary, heap.result)
+        with replacing(folder / "snapshot.png") as temporary:
+            save_picture(temporary, heap_picture(heap.study, heap.result, heap.angle))
     write_text(folder / "angle.json", json.dumps(heap.to_dict(), indent=1, allow_nan=False) + "\n")
 
 

@@ -85,6 +85,9 @@ def run_campaign(
 
 
 def _require_calibratable(study: Study) -> None:
+    if not study.scene.leaves_a_heap:
+        rule = "a calibration measures heaps, so its test must be [scene.lifted-cylinder]"
+        raise StudyError(rule, "another", f"{study.file}: scene")
     if not study.factors:
         raise StudyError("a calibration needs at least one [[factor]]", "none", str(study.file))
     try:

@@ -15,9 +15,9 @@ from dem_warp.case import Case, Numerics
 from dem_warp.clumps import ClumpShape
 from dem_warp.materials import Interaction, Material
 from dem_warp.population import FRACTION_TOLERANCE, GrainPopulation, ShapeMixture
-from dem_warp.scenes.lifted_cylinder import LiftedCylinder
 from experiments.study.mechanisms import MechanismsSection
-from experiments.study.schema import Density, Length, Number, Pressure, Rate, Section, Speed, Time
+from experiments.study.scene_sections import SceneSection
+from experiments.study.schema import Density, Length, Number, Pressure, Section
 
 
 class MaterialSection(Section):
@@ -161,39 +161,7 @@ class ContactSection(Section):
     grain_grain: InteractionSection = Field(alias="grain-grain")
     """Grain on grain."""
     grain_wall: InteractionSection = Field(alias="grain-wall")
-    """Grain on tube and plate."""
-
-
-class LiftedCylinderSection(Section):
-    """``[scene.lifted-cylinder]``: a tube full of grains is lifted off a plate."""
-
-    diameter: Length = Field(gt=0.0)
-    """Inner diameter of the tube."""
-    height: Length = Field(gt=0.0)
-    """Height of the tube."""
-    lift_speed: Speed = Field(default=0.05, gt=0.0)
-    """Speed of the tube."""
-    rain_rate: Rate = Field(default=3000.0, gt=0.0)
-    """Grains per second while filling."""
-    rain_speed: Speed = Field(default=0.5, ge=0.0)
-    """Speed of the raining grains."""
-    grain_count: int | None = Field(default=None, ge=1)
-    """Grains; left out: until the tube is full."""
-    rest_speed: Speed = Field(default=1.0e-3, gt=0.0)
-    """The heap rests when its grains have been slower than this ..."""
-    rest_time: Time = Field(default=0.05, gt=0.0)
-    """... for this long."""
-    duration: Time | None = Field(default=None, gt=0.0)
-    """Ends the test after this simulated time, instead of at rest."""
-    plate_diameter: Length | None = Field(default=None, gt=0.0)
-    """Diameter of a round plate, over whose rim grains fall; left out: the plate has no end."""
-
-
-class SceneSection(Section):
-    """``[scene]``: the physical test."""
-
-    lifted_cylinder: LiftedCylinderSection = Field(alias="lifted-cylinder")
-    """The lifted cylinder."""
+    """Grain on every wall."""
 
 
 class NumericsSection(Section):
@@ -223,7 +191,7 @@ class Physics(Section):
     grain: GrainSection
     """The grains."""
     wall: MaterialSection
-    """The tube and the plate."""
+    """Tube and plate, or whatever holds the grains."""
     contact: ContactSection
     """Contact properties of each pair of surfaces."""
     scene: SceneSection
@@ -240,9 +208,8 @@ class Physics(Section):
 
     def build_case(self, seed: int) -> Case:
         """Build one case of the engine."""
-        tube = self.scene.lifted_cylinder
         return Case(
-            scene=LiftedCylinder(wall_material=self.wall.material(), **dict(tube)),
+            scene=self.scene.scene(self.wall.material()),
             grains=self.grain.population(),
             grain_grain=self.contact.grain_grain.interaction(),
             grain_wall=self.contact.grain_wall.interaction(),

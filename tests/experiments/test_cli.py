@@ -125,6 +125,39 @@ def test_a_study_without_a_target_cannot_be_calibrated(write_study: WriteStudy) 
     assert "[target]" in err
 
 
+HOPPER = """[scene.hopper]
+diameter = "28 mm"
+fill_depth = "16 mm"
+outlet = "20 mm"
+"""
+
+
+def of_a_hopper(write_study: WriteStudy) -> Path:
+    """Write a study of a hopper."""
+    tube = '[scene.lifted-cylinder]\ndiameter = "28 mm"\nheight = "28 mm"\ngrain_count = 30\n'
+    return write_study((tube, HOPPER))
+
+
+def test_another_test_than_a_heap_gives_what_it_measures(write_study: WriteStudy) -> None:
+    code, out, err = dem_warp("heap", of_a_hopper(write_study), "--device", "cpu", "--out", "results")
+    assert (code, err.splitlines()[-1]) == (0, "Files: results")
+    printed = dict(line.split(": ") for line in out.splitlines())
+    kept = json.loads(Path("results/angle.json").read_text(encoding="utf-8"))
+    assert kept["angle"] is None
+    fallen = kept["observables"]["fallen_mass"]
+    assert printed["fallen mass"] == f"{fallen:.5g} kg"
+    assert kept["observable_units"]["fallen_mass"] == "kg"
+    assert Path("results/snapshot.png").is_file()
+
+
+def test_only_heaps_can_be_calibrated(write_study: WriteStudy) -> None:
+    path = of_a_hopper(write_study)
+    code, _, err = dem_warp("calibrate", path, "--device", "cpu", "--out", "results")
+    assert (code, Path("results").exists()) == (2, False)
+    assert "[scene.lifted-cylinder]" in err
+    assert f"{path}: scene" in err
+
+
 def test_a_used_folder_is_refused(write_study: WriteStudy) -> None:
     Path("results").mkdir()
     Path("results/mine.txt").write_text("mine", encoding="utf-8")
