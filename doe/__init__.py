@@ -1,5 +1,6 @@
 """Designs of experiments and their analysis: screening, climbing, response surfaces, comparison of means."""
 
+from doe.agreement import Agreement, Estimate, agreement
 from doe.anova import ErrorTerm, pure_error
 from doe.central_composite import central_composite
 from doe.compare import Comparison, Sample, compare_means
@@ -23,11 +24,13 @@ from doe.steepest import ClimbPath, climb_table, steepest_path
 from doe.surface import Surface, fit_surface
 
 __all__ = [
+    "Agreement",
     "ClimbPath",
     "Comparison",
     "Design",
     "DesignError",
     "ErrorTerm",
+    "Estimate",
     "Factor",
     "NoiseFloor",
     "Region",
@@ -37,6 +40,7 @@ __all__ = [
     "Surface",
     "TargetError",
     "VarianceRatio",
+    "agreement",
     "aliases",
     "central_composite",
     "climb_table",
