@@ -51,21 +51,34 @@ def calibrate(
     device: Device = None,
     workers: Workers = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on in the folder of an earlier run.")] = False,
+    follow_paper: Annotated[
+        bool, typer.Option("--follow-paper", help="Simulate the paper's own runs too, and set them beside.")
+    ] = False,
+    only_paper: Annotated[
+        bool, typer.Option("--only-paper", help="Simulate the paper's own runs, and no campaign.")
+    ] = False,
+    paper_replicates: Annotated[int, typer.Option(min=1, help="Heaps of each of the paper's runs.")] = 3,
     as_json: AsJson = False,
 ) -> None:
     """Run a whole calibration: noise floor, screening, climb, surface, optimum, verification, report."""
     with clear_errors():
         from experiments.commands.choices import chosen_device, chosen_study, default_folder
-        from experiments.commands.run import run_campaign
+        from experiments.commands.run import Desk, check_runs, record_paper, replay_paper, run_campaign
 
         device = chosen_device(device)
         chosen = chosen_study(study, scale, device)
         folder = out or default_folder(chosen)
-    with clear_errors(resume=_resume_command(study, folder, chosen.scale, device)):
+        check_runs(chosen, campaign=not only_paper, paper=follow_paper or only_paper)
+    again = {"--follow-paper": follow_paper, "--only-paper": only_paper}
+    with clear_errors(resume=_resume_command(study, folder, chosen.scale, device, again, paper_replicates)):
         messages.print(f"{chosen.name}, on {device}", chosen.note, sep="\n", markup=False)
-        campaign = run_campaign(
-            chosen, folder, device, workers, resume, watch=CaseProgress, on_stage=_show_stage
-        )
+        desk = Desk.open(chosen, folder, device, workers, resume, CaseProgress)
+        replay = replay_paper(desk, paper_replicates) if follow_paper or only_paper else None
+        campaign = None if only_paper else run_campaign(desk, _show_stage, replay)
+        if replay is not None:
+            messages.print(f"The paper's runs: {record_paper(desk, replay, campaign)}")
+    if campaign is None:
+        return
     if as_json:
         typer.echo(json.dumps(campaign.to_dict(), allow_nan=False))
     messages.print(f"{campaign.outcome}: {campaign.reason}")
@@ -225,9 +238,14 @@ def _print_clump(facts: dict[str, Any]) -> None:
         typer.echo(f"covers {facts['coverage']:.1%} of the solid, passes it by {facts['overshoot']:.1%}")
 
 
-def _resume_command(study: Path | None, folder: Path, scale: str | None, device: str) -> str:
+def _resume_command(
+    study: Path | None, folder: Path, scale: str | None, device: str, flags: dict[str, bool], replicates: int
+) -> str:
     words = ["dem-warp calibrate", *([str(study)] if study else []), f"--out {folder}"]
-    return " ".join([*words, *([f"--scale {scale}"] if scale else []), f"--device {device}", "--resume"])
+    words += [*([f"--scale {scale}"] if scale else []), f"--device {device}"]
+    if given := [flag for flag, wanted in flags.items() if wanted]:
+        words += [*given, f"--paper-replicates {replicates}"]
+    return " ".join([*words, "--resume"])
 
 
 def _print_measured(simulated: Heap) -> None:

@@ -51,6 +51,10 @@ class Store:
         """File of a case."""
         return self.folder / f"{key}.npz"
 
+    def __len__(self) -> int:
+        """Number of cases stored."""
+        return len(list(self.folder.glob("*.npz")))
+
     def has(self, key: str) -> bool:
         """Whether the case is stored and whole."""
         return self.path(key).is_file() and self.damage(key) is None

@@ -1,12 +1,15 @@
-"""A whole calibration in a folder: every case stored as it finishes, the report at the end."""
+"""A calibration in a folder, and the paper's own runs: cases stored as they finish, reports at the end."""
 
 from __future__ import annotations
 
+import datetime
 import logging
 import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
@@ -14,77 +17,176 @@ from dem_warp import Progress
 from experiments.calibrate import Campaign, calibrate
 from experiments.calibrate.campaign import StageHook
 from experiments.calibrate.checks import check_study
-from experiments.cases import open_folder, run_cases
+from experiments.cases import Store, open_folder, run_cases
 from experiments.errors import StudyError
+from experiments.files import write_text
 from experiments.report import heap_pictures, write_report
+from experiments.report.record import draw_heaps, write_record
+from experiments.report.writer import library_versions, source_commit
+from experiments.studies.buckwheat.replay import Replay
+from experiments.studies.buckwheat.runs import STAGES, planned_cases
 from experiments.study import Study
 
 Watch = Callable[[str], AbstractContextManager[Callable[[Progress], None] | None]]
 """Opens the display of one batch, named by its stages, and hands out what its progress is reported to."""
 
+WALLS = "walls.csv"
+"""File of the wall times of a folder's batches, over all runs that went on in it."""
+
+RECORD = "record"
+"""Folder of the page on the paper's runs."""
+
 _log = logging.getLogger(__name__)
 
 
-def run_campaign(
-    study: Study,
-    folder: Path,
-    device: str | None = None,
-    workers: int | None = None,
-    resume: bool = False,
-    watch: Watch = lambda title: nullcontext(),
-    on_stage: StageHook | None = None,
-) -> Campaign:
-    """Calibrate a study and write its report.
+@dataclass(frozen=True)
+class Desk:
+    """Where and how cases are run: a study, its folder, the device."""
+
+    study: Study
+    folder: Path
+    store: Store
+    device: str | None
+    workers: int | None
+    watch: Watch
+
+    @classmethod
+    def open(
+        cls,
+        study: Study,
+        folder: Path,
+        device: str | None = None,
+        workers: int | None = None,
+        resume: bool = False,
+        watch: Watch = lambda title: nullcontext(),
+    ) -> Desk:
+        """Make the folder of a study, or go on in it.
+
+        Parameters
+        ----------
+        study
+            What is simulated.
+        folder
+            Where everything goes.
+        device
+            ``"cpu"``, ``"cuda"``, ``"cuda:1"``; None: the engine's choice.
+        workers
+            Processes on the CPU; None: the engine's choice.
+        resume
+            Go on in the folder of an earlier run: what it has simulated is not simulated again.
+        watch
+            Display of each batch of cases.
+
+        Raises
+        ------
+        StoreError
+            When the folder is in use, or is not one to resume; nothing is written then.
+        """
+        store, changes = open_folder(folder, study, resume)
+        for change in changes:
+            _log.warning("The study has changed since the earlier run: %s", change)
+        return cls(study, folder, store, device, workers, watch)
+
+    def run(self, table: pd.DataFrame, title: str) -> pd.DataFrame:
+        """Simulate a table of cases as one batch, and note the wall time of what was not stored yet."""
+        before, started = len(self.store), time.perf_counter()
+        with self.watch(title) as progress:
+            cases = run_cases(self.study, table, self.store, self.device, self.workers, progress)
+        if simulated := len(self.store) - before:
+            self._note_wall(title, simulated, time.perf_counter() - started)
+        return cases
+
+    @property
+    def walls(self) -> pd.DataFrame:
+        """Wall times so far: stage, simulated (cases), seconds."""
+        path = self.folder / WALLS
+        return (
+            pd.read_csv(path) if path.is_file() else pd.DataFrame(columns=["stage", "simulated", "seconds"])
+        )
+
+    def _note_wall(self, title: str, simulated: int, seconds: float) -> None:
+        row = {"stage": title, "simulated": simulated, "seconds": round(seconds, 1)}
+        noted = [*self.walls.to_dict("records"), row]
+        write_text(self.folder / WALLS, pd.DataFrame(noted).to_csv(index=False))
+
+
+def run_campaign(desk: Desk, on_stage: StageHook | None = None, replay: Replay | None = None) -> Campaign:
+    """Calibrate a study and write its report: ``report.html``, ``results.json``, ``tables/*.csv``.
 
     Parameters
     ----------
-    study
-        What to calibrate.
-    folder
-        Where everything goes: the cases, ``report.html``, ``results.json``, ``tables/*.csv``.
-    device
-        ``"cpu"``, ``"cuda"``, ``"cuda:1"``; None: the engine's choice.
-    workers
-        Processes on the CPU; None: the engine's choice.
-    resume
-        Go on in the folder of an earlier run: what it has simulated is not simulated again, and what it had
-        begun goes on from its checkpoint.
-    watch
-        Display of each batch of cases.
+    desk
+        The study, and where it is run.
     on_stage
         Called with the name and the result of every finished stage.
+    replay
+        The paper's own runs simulated again, to be shown beside.
 
     Returns
     -------
     Campaign
         What every stage found, and how the campaign ended.
+    """
+    started = time.perf_counter()
+
+    def runner(table: pd.DataFrame) -> pd.DataFrame:
+        return desk.run(table, ", ".join(str(stage).replace("_", " ") for stage in table["stage"].unique()))
+
+    campaign = calibrate(desk.study, runner, on_stage)
+    provenance = {
+        "device": desk.device,
+        "workers": desk.workers,
+        "seconds": round(time.perf_counter() - started, 1),
+    }
+    pictures = heap_pictures(campaign, desk.study, desk.store.load)
+    write_report(campaign, desk.study, desk.folder, pictures, provenance, replay)
+    return campaign
+
+
+def replay_paper(desk: Desk, replicates: int) -> Replay:
+    """Simulate the paper's own runs again, each of its stages as one batch.
+
+    Parameters
+    ----------
+    desk
+        The paper's study, and where it is run.
+    replicates
+        Heaps of every run.
+    """
+    tables = [desk.run(planned_cases(replicates, [stage]), f"the paper's {stage}") for stage in STAGES]
+    return Replay(pd.concat(tables, ignore_index=True))
+
+
+def record_paper(desk: Desk, replay: Replay, campaign: Campaign | None = None) -> Path:
+    """Write the page on the paper's runs, its tables and its picture into the folder ``record``."""
+    folder = desk.folder / RECORD
+    draw_heaps(folder, desk.study, replay, desk.store.load)
+    return write_record(folder, replay.cases, _provenance(desk, replay), campaign)
+
+
+def check_runs(study: Study, campaign: bool = True, paper: bool = False) -> None:
+    """Check that what is wanted can be run, before a folder is made.
+
+    Parameters
+    ----------
+    study
+        The study.
+    campaign
+        Whether it is to be calibrated.
+    paper
+        Whether the paper's own runs are to be simulated.
 
     Raises
     ------
     StudyError
-        When the study cannot be calibrated; nothing is written then.
-    StoreError
-        When the folder is in use, or is not one to resume; nothing is written then.
+        When the study has no factors, its decisions do not fit them, or it is not the paper's.
     """
-    _require_calibratable(study)
-    store, changes = open_folder(folder, study, resume)
-    for change in changes:
-        _log.warning("The study has changed since the earlier run: %s", change)
-    started = time.perf_counter()
-
-    def runner(table: pd.DataFrame) -> pd.DataFrame:
-        title = ", ".join(str(stage).replace("_", " ") for stage in table["stage"].unique())
-        with watch(title) as progress:
-            return run_cases(study, table, store, device, workers, progress)
-
-    campaign = calibrate(study, runner, on_stage)
-    provenance = {"device": device, "workers": workers, "seconds": round(time.perf_counter() - started, 1)}
-    pictures = heap_pictures(campaign, study, store.load)
-    write_report(campaign, study, folder, pictures=pictures, provenance=provenance)
-    return campaign
-
-
-def _require_calibratable(study: Study) -> None:
+    if paper and not study.paper:
+        raise StudyError(
+            "only the paper's own study has its runs (paper = true)", study.name, str(study.file)
+        )
+    if not campaign:
+        return
     if not study.scene.leaves_a_heap:
         rule = "a calibration measures heaps, so its test must be [scene.lifted-cylinder]"
         raise StudyError(rule, "another", f"{study.file}: scene")
@@ -96,3 +198,18 @@ def _require_calibratable(study: Study) -> None:
         raise
     except ValueError as error:
         raise StudyError("the decisions must fit the factors", str(error), str(study.file)) from error
+
+
+def _provenance(desk: Desk, replay: Replay) -> dict[str, Any]:
+    """What made the paper's runs: commit, day, machine, scale, wall times."""
+    keys = replay.cases["case_key"]
+    made_by = desk.store.load(keys.iloc[0]).provenance if desk.store.has(keys.iloc[0]) else {}
+    return {
+        "scale": desk.study.scale,
+        "fit": desk.study.measurement.fit,
+        "commit": source_commit(),
+        "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
+        **made_by,
+        "versions": library_versions(),
+        "walls": desk.walls.to_dict("records"),
+    }

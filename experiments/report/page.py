@@ -20,8 +20,10 @@ from experiments.report.sections import (
     Section,
     failed_section,
     paper_sections,
+    replay_sections,
     stage_sections,
 )
+from experiments.studies.buckwheat.replay import Replay
 from experiments.study import Study
 
 OUTCOMES = {
@@ -41,6 +43,7 @@ def render_page(
     study: Study,
     pictures: Sequence[HeapPicture] = (),
     provenance: Mapping[str, Any] | None = None,
+    replay: Replay | None = None,
 ) -> str:
     """Render the report of a campaign as one self-contained HTML page.
 
@@ -52,12 +55,15 @@ def render_page(
         Heaps to show.
     provenance
         What made the numbers: names and values, nested as they come.
+    replay
+        The paper's own runs simulated again.
     """
     context = Context(campaign, _labels(study), published_for(study))
     sections = stage_sections(context)
     if pictures:
         sections.append(Section("heaps"))
-    sections += [failed_section(campaign), *paper_sections(context.published), Section("provenance")]
+    sections += [failed_section(campaign), *replay_sections(replay, campaign)]
+    sections += [*paper_sections(context.published), Section("provenance")]
     page = _environment().get_template("report.html.j2")
     return page.render(
         campaign=campaign,

@@ -16,9 +16,13 @@ from experiments.calibrate.results import Campaign
 from experiments.cases import measure_heap
 from experiments.report.numbers import trimmed
 from experiments.study import Study
-from imaging import overlay, snapshot
+from imaging import HeapAngle, overlay, snapshot
+from imaging.render import Snapshot
 
 JPEG_QUALITY = 88
+
+ROW_HEAD = 40
+"""Rows above the heaps of a row for what is written there."""
 
 SHOWN_OF_A_STAGE = {"target": 1, "screening": 2, "climb": 2, "verification": 3}
 """Heaps shown of each stage, evenly from its flattest to its steepest."""
@@ -70,8 +74,44 @@ def _spread(cases: pd.DataFrame, count: int) -> pd.DataFrame:
     return ordered.iloc[picked[picked < len(ordered)]]
 
 
-def _picture(case: Mapping[str, Any], study: Study, result: CaseResult, kept: tuple[str, ...]) -> HeapPicture:
-    """Draw a heap in the view whose angle is nearest to the mean over all views."""
+def heap_row(study: Study, heaps: Mapping[str, CaseResult]) -> np.ndarray:
+    """Draw heaps next to each other at one scale, on one plate.
+
+    Parameters
+    ----------
+    study
+        The study whose measurement gives the angles.
+    heaps
+        Finished cases by what is written above them (ASCII).
+
+    Returns
+    -------
+    numpy.ndarray
+        Picture (rows, columns, 3), blue-green-red.
+    """
+    drawn = [_drawn(study, result) for result in heaps.values()]
+    coarsest = max(picture.meters_per_pixel for _, picture, _ in drawn)
+    panels = []
+    for _, picture, image in drawn:
+        ratio = picture.meters_per_pixel / coarsest
+        size = (round(ratio * image.shape[1]), round(ratio * image.shape[0]))
+        shrunk = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+        panels.append((shrunk, round(ratio * (picture.ground_row + 0.5))))
+    above = max(ground for _, ground in panels) + ROW_HEAD
+    below = max(len(image) - ground for image, ground in panels)
+    row = []
+    for (image, ground), title in zip(panels, heaps, strict=True):
+        top, bottom = above - ground, below - (len(image) - ground)
+        panel = cv2.copyMakeBorder(image, top, bottom, 0, 0, cv2.BORDER_REPLICATE)
+        cv2.putText(
+            panel, title, (12, ROW_HEAD - 12), cv2.FONT_HERSHEY_DUPLEX, 0.7, (40, 32, 28), 1, cv2.LINE_AA
+        )
+        row.append(panel)
+    return np.hstack(row)
+
+
+def _drawn(study: Study, result: CaseResult) -> tuple[tuple[HeapAngle, int], Snapshot, np.ndarray]:
+    """Measure and draw a heap in the view nearest to the mean over all: angle and view, picture, overlay."""
     angle = measure_heap(study, result)
     view = int(np.argmin([abs(seen.mean - angle.mean) for seen in angle.views]))
     picture = snapshot(
@@ -82,10 +122,16 @@ def _picture(case: Mapping[str, Any], study: Study, result: CaseResult, kept: tu
         backend="raster",  # a second each also without a GPU, and the same picture on every machine
         grains=result.sphere_grain,
     )
+    return (angle, view), picture, overlay(picture, angle.views[view])
+
+
+def _picture(case: Mapping[str, Any], study: Study, result: CaseResult, kept: tuple[str, ...]) -> HeapPicture:
+    """Draw a heap in the view whose angle is nearest to the mean over all views."""
+    (angle, view), _, image = _drawn(study, result)
     values = "".join(f", {name} = {trimmed(case[name], 3)}" for name in kept)
     return HeapPicture(
         title=f"{STAGE_NAMES[case['stage']]}, run {case['run']}, heap {case['replicate']}",
         caption=f"{angle.mean:.2f}° ± {angle.se:.2f}° over {len(angle.views)} views{values}; "
         f"this view: left {angle.views[view].left:.1f}°, right {angle.views[view].right:.1f}°.",
-        image=overlay(picture, angle.views[view]),
+        image=image,
     )

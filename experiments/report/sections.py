@@ -8,8 +8,10 @@ from dataclasses import dataclass, field
 from experiments.calibrate.results import Campaign
 from experiments.report import charts, stage_tables, surfaces
 from experiments.report.published import Published
+from experiments.report.replay_tables import replay_tables
 from experiments.report.tables import Table
 from experiments.report.theme import Chart
+from experiments.studies.buckwheat.replay import Replay
 
 TITLES = {
     "factors": "Factors",
@@ -23,6 +25,7 @@ TITLES = {
     "verification": "Verification",
     "heaps": "Heaps",
     "failed": "Failed runs",
+    "replay": "The paper's runs, simulated again",
     "paper": "The paper's numbers",
     "provenance": "Settings and provenance",
 }
@@ -73,6 +76,14 @@ def failed_section(campaign: Campaign) -> Section:
     """Build the section of the cases that gave no angle."""
     table = stage_tables.failed_table(campaign)
     return Section("failed", {"cases": table} if table else {})
+
+
+def replay_sections(replay: Replay | None, campaign: Campaign) -> list[Section]:
+    """Build the section on the paper's runs simulated again, where they were."""
+    if replay is None:
+        return []
+    effects = campaign.screening.screen.table if campaign.screening else None
+    return [Section("replay", replay_tables(replay, effects), [charts.replay_chart(replay)])]
 
 
 def paper_sections(published: Published | None) -> list[Section]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import platform
+import subprocess
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
@@ -14,6 +15,7 @@ from experiments.calibrate.results import Campaign
 from experiments.files import write_text
 from experiments.report.page import render_page
 from experiments.report.pictures import HeapPicture
+from experiments.studies.buckwheat.replay import Replay
 from experiments.study import Study
 
 LIBRARIES = ("warp-lang", "numpy", "scipy", "pandas", "statsmodels", "opencv-python-headless")
@@ -26,6 +28,7 @@ def write_report(
     out_dir: str | Path,
     pictures: Sequence[HeapPicture] = (),
     provenance: Mapping[str, Any] | None = None,
+    replay: Replay | None = None,
 ) -> Path:
     """Write ``report.html``, ``results.json`` and ``tables/*.csv``, each whole or not at all.
 
@@ -39,6 +42,8 @@ def write_report(
         Heaps to show, from `heap_pictures`.
     provenance
         What the caller knows of the run (device, seconds, ...), nested as it comes; versions are added.
+    replay
+        The paper's own runs simulated again, to be shown beside.
 
     Returns
     -------
@@ -47,8 +52,9 @@ def write_report(
     """
     folder = Path(out_dir)
     made_by = {**(provenance or {}), "versions": library_versions()}
-    page = render_page(campaign, study, pictures, made_by)
-    tables = {name: table.to_csv(index=False) for name, table in campaign.tables().items()}
+    page = render_page(campaign, study, pictures, made_by, replay)
+    frames = campaign.tables() | (replay.tables() if replay else {})
+    tables = {name: table.to_csv(index=False) for name, table in frames.items()}
     results = {
         "study": {
             "name": study.name,
@@ -65,6 +71,18 @@ def write_report(
     write_text(folder / "results.json", text)
     write_text(folder / "report.html", page)
     return folder / "report.html"
+
+
+def source_commit() -> str | None:
+    """Return the commit that this source is checked out at, "-dirty" with changes; None where it is not."""
+    root = Path(__file__).parents[2]
+    if not (root / ".git").exists():
+        return None
+    command = ["git", "-C", str(root), "describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"]
+    try:
+        return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
+    except (OSError, subprocess.CalledProcessError):
+        return None
 
 
 def library_versions() -> dict[str, str]:

@@ -195,7 +195,9 @@ class Study(Physics):
             raise StudyError(str(error), dict(settings), str(self.file)) from error
 
 
-def load_study(path: str | Path | None = None, scale: str | None = None) -> Study:
+def load_study(
+    path: str | Path | None = None, scale: str | None = None, changes: Mapping[str, Any] | None = None
+) -> Study:
     """Read and check a study file.
 
     Parameters
@@ -204,6 +206,8 @@ def load_study(path: str | Path | None = None, scale: str | None = None) -> Stud
         The TOML file; None: the paper's buckwheat.
     scale
         Name of a ``[scale.NAME]`` table to merge over the rest; None: the study as written.
+    changes
+        What a caller merges over that, table by table, as written in a study file.
 
     Raises
     ------
@@ -220,6 +224,7 @@ def load_study(path: str | Path | None = None, scale: str | None = None) -> Stud
             rule = f"the scale must be one that the study has, {nearest_name(scale, list(scales))}"
             raise StudyError(rule, scale, str(path))
         document = merge(document, scales[scale])
+    document = merge(document, changes or {})
     sections = validated(FactorTable, {"factor": document.get("factor", [])}, places).factor
     check_one_home(document, sections, places)
     plain = with_factor_values(_without_units(document, sections, places), sections, {})

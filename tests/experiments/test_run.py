@@ -15,9 +15,10 @@ import pytest
 
 from dem_warp import Case, CaseResult
 from experiments.calibrate import Campaign, Outcome
+from experiments.calibrate.campaign import StageHook
 from experiments.cases import execute
 from experiments.commands import run
-from experiments.commands.run import run_campaign
+from experiments.commands.run import Desk
 from experiments.study import Study, load_study
 
 SLOPE = 30.0
@@ -67,6 +68,12 @@ def study(write_study: Callable[..., Path]) -> Study:
     return load_study(write_study(add="[campaign.noise_floor]\nreplicates = 5\n"))
 
 
+def run_campaign(
+    study: Study, folder: Path, resume: bool = False, on_stage: StageHook | None = None
+) -> Campaign:
+    return run.run_campaign(Desk.open(study, folder, resume=resume), on_stage)
+
+
 def same_findings(a: Campaign, b: Campaign) -> bool:
     return json.dumps(a.to_dict(), sort_keys=True) == json.dumps(b.to_dict(), sort_keys=True)
 
@@ -83,7 +90,7 @@ def test_a_campaign_leaves_its_report_results_and_tables(
     assert campaign.optimum.point["E"] == pytest.approx(0.5, abs=0.3 / SLOPE)
     assert stages[0] == "target"
     assert stages[-1] == "verification"
-    assert {"report.html", "results.json", "study.json", "tables", "cases"} == {
+    assert {"report.html", "results.json", "study.json", "tables", "cases", "walls.csv"} == {
         p.name for p in folder.iterdir()
     }
     results = json.loads((folder / "results.json").read_text(encoding="utf-8"))

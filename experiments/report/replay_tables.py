@@ -1,0 +1,198 @@
+"""Tables of the paper's runs simulated again, beside the published angles and their analysis."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import pandas as pd
+
+from experiments.report.numbers import fixed, p_value, term
+from experiments.report.tables import Column, Table, make_table
+from experiments.studies.buckwheat.replay import Replay, published_noise
+from experiments.studies.buckwheat.runs import STAGES
+
+STRAY = 5.0
+"""A run is marked when its angle strays from the published one by more than this [deg]."""
+
+SIGNIFICANT = 0.05
+
+
+def replay_tables(replay: Replay, campaign: pd.DataFrame | None = None) -> dict[str, Table]:
+    """Lay out everything that the paper's runs have to say, by name.
+
+    Parameters
+    ----------
+    replay
+        The cases, and their analysis.
+    campaign
+        Effects of a campaign of our own by factor (effect, p, rank), set beside those at the paper's runs.
+    """
+    stages = set(replay.measured["stage"])
+    tables = {"agreement": agreement_table(replay), "runs": runs_table(replay)}
+    if "screening" in stages:
+        tables["effects"] = replay_effects_table(replay, campaign)
+    if "composite" in stages:
+        tables["anova"] = replay_anova_table(replay)
+        tables["coefficients"] = replay_coefficients_table(replay)
+    if "verification" in stages:
+        tables["verification"] = replay_verification_table(replay)
+    return tables
+
+
+def agreement_table(replay: Replay) -> Table:
+    """Lay out how near the angles come to the published ones, by table."""
+    frame = replay.agreement_table.copy()
+    for name in ("rmse", "bias", "slope", "spearman"):
+        frame[f"{name}_interval"] = [
+            f"{fixed(low, 2)} to {fixed(high, 2)}"
+            for low, high in zip(frame[f"{name}_low"], frame[f"{name}_high"], strict=True)
+        ]
+    low, high = published_noise()
+    columns = [
+        Column("table", "runs of"),
+        Column("runs", "runs", "label"),
+        Column("rmse", "rmse", "angle", "°"),
+        Column("rmse_interval", "interval"),
+        Column("rmse_without_own_noise", "rmse, our seed noise out", "angle", "°"),
+        Column("rmse_without_noise", "rmse, noise of both out", "angle", "°"),
+        Column("bias", "bias", "angle", "°"),
+        Column("bias_interval", "interval"),
+        Column("slope", "slope", "ratio"),
+        Column("slope_interval", "interval"),
+        Column("spearman", "Spearman", "ratio"),
+        Column("spearman_interval", "interval"),
+        Column("ceiling", f"highest, noise {fixed(low, 2)}°", "ratio"),
+        Column("ceiling_noisier", f"highest, noise {fixed(high, 2)}°", "ratio"),
+    ]
+    noise = replay.noise()
+    own = f"{fixed(noise.mean_sq**0.5, 2)}° ({fixed(noise.df, 0)} df)" if noise.df > 0 else "not known"
+    note = (
+        f"Angles are means over the heaps of a run; one heap of ours varies by {own}, one of the paper's by "
+        f"{fixed(low, 2)}° (its composite centre) or {fixed(high, 2)}° (its verification). Noise is taken "
+        "out of the mean square: less the mean of s²/n, and less the square of the first of the paper's two. "
+        "Slope: our degrees per true published degree. “Highest” is the mean Spearman that a perfect model "
+        "would show through the noise of both. Intervals (95 %) resample the runs within their table: rough "
+        "for six runs, next to meaningless for three."
+    )
+    return make_table("replay-agreement", frame, columns, "Agreement with the published angles.", note)
+
+
+def runs_table(replay: Replay) -> Table:
+    """Lay out every run beside its published angle."""
+    frame = replay.runs.assign(table=replay.runs["stage"].map(lambda stage: STAGES[stage].partition(",")[0]))
+    columns = [
+        Column("table", "stage"),
+        Column("run", "run", "label"),
+        *(Column(name, name, "value") for name in "ABCDEFGH"),
+        Column("published", "published", "angle", "°"),
+        Column("angle", "simulated", "angle", "°"),
+        Column("sd", "sd", "angle", "°"),
+        Column("n", "heaps", "label"),
+        Column("difference", "difference", "angle", "°"),
+    ]
+    marks = ["strong" if abs(value) > STRAY else "" for value in replay.runs["difference"]]
+    note = f"Empty factors are at their middle. Marked: more than {STRAY:g}° off."
+    return make_table("replay-runs", frame, columns, "Every run.", note, marks)
+
+
+def replay_effects_table(replay: Replay, campaign: pd.DataFrame | None) -> Table:
+    """Lay out the screening's effects: the paper's, ours at its runs, those of our own campaign."""
+    frame = replay.effects.copy()
+    columns = [
+        Column("factor", "factor"),
+        Column("paper_effect", "published effect", "angle", "°"),
+        Column("paper_p", "p", "p"),
+        Column("paper_rank", "rank", "label"),
+        Column("effect", "simulated again", "angle", "°"),
+        Column("noise_se", "se by seeds", "angle", "°"),
+        Column("p", "p", "p"),
+        Column("rank", "rank", "label"),
+    ]
+    if campaign is not None:
+        frame = frame.join(campaign[["effect", "p", "rank"]].add_prefix("campaign_"))
+        columns += [
+            Column("campaign_effect", "own campaign", "angle", "°"),
+            Column("campaign_p", "p", "p"),
+            Column("campaign_rank", "rank", "label"),
+        ]
+    note = (
+        "The effect is the change of the mean angle from low to high. The published ones are recomputed from "
+        "the printed runs; they and ours at the same runs are tested against the idle columns, as the paper "
+        "does."
+    )
+    marks = ["strong" if p < SIGNIFICANT else "" for p in frame["p"]]
+    return make_table("replay-effects", frame, columns, "Effects of the screening.", note, marks)
+
+
+def replay_anova_table(replay: Replay) -> Table:
+    """Lay out both analyses of variance of the composite design."""
+    columns = [
+        Column("source", "source", write=term),
+        Column("paper_df", "published, df", "label"),
+        Column("paper_sum_sq", "sum of squares", "sum"),
+        Column("paper_F", "F", "ratio"),
+        Column("paper_p", "p", "p"),
+        Column("df", "simulated again, df", "label"),
+        Column("sum_sq", "sum of squares", "sum"),
+        Column("F", "F", "ratio"),
+        Column("p", "p", "p"),
+    ]
+    caption = "Analysis of variance of the full quadratic at the paper's composite runs."
+    note = "The published columns are recomputed from the printed runs. Every heap of ours is an observation."
+    return make_table("replay-anova", replay.anova, columns, caption, note)
+
+
+def replay_coefficients_table(replay: Replay) -> Table:
+    """Lay out the coded coefficients of both surfaces."""
+    columns = [
+        Column("term", "term", write=term),
+        Column("paper_coefficient", "published", "angle", "°"),
+        Column("paper_se", "se", "angle", "°"),
+        Column("coefficient", "simulated again", "angle", "°"),
+        Column("se", "se", "angle", "°"),
+    ]
+    return make_table(
+        "replay-coefficients", replay.coefficients, columns, "Coefficients of the full quadratic, coded."
+    )
+
+
+def replay_verification_table(replay: Replay) -> Table:
+    """Lay out the heaps at the published optimum against the measured angle."""
+    rows: list[Mapping[str, float | str]] = [
+        {
+            "heaps": name,
+            "mean": test.a.mean,
+            "sd": test.a.sd,
+            "n": test.a.n,
+            "difference": test.difference,
+            "low": test.interval[0],
+            "high": test.interval[1],
+            "p": test.p,
+            "smallest_margin": test.smallest_margin,
+        }
+        for name, test in replay.verification.items()
+    ]
+    columns = [
+        Column("heaps", "heaps"),
+        Column("mean", "mean", "angle", "°"),
+        Column("sd", "sd", "angle", "°"),
+        Column("n", "n", "label"),
+        Column("difference", "less measured", "angle", "°"),
+        Column("low", "95 % from", "angle", "°"),
+        Column("high", "to", "angle", "°"),
+        Column("p", "p, no difference", "p"),
+        Column("smallest_margin", "equivalent from", "angle", "°"),
+    ]
+    caption = "Heaps at the published optimum against the measured angle."
+    return make_table("replay-verification", pd.DataFrame(rows), columns, caption)
+
+
+def ranking_sentence(replay: Replay) -> str:
+    """Say which factors move the angle most, here and in the paper."""
+    table = replay.effects
+    ours, theirs = (table.sort_values(column).index[:2] for column in ("rank", "paper_rank"))
+    values = ", ".join(f"{name} {table['effect'][name]:+.1f}° ({p_value(table['p'][name])})" for name in ours)
+    return (
+        f"The two strongest factors of the screening are {' and '.join(ours)} here ({values}), "
+        f"{' and '.join(theirs)} in the paper."
+    )

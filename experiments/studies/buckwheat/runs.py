@@ -1,0 +1,105 @@
+"""The paper's simulated runs: every design point that it prints an angle for, to be simulated again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import pandas as pd
+
+from doe import Design
+from experiments.studies.buckwheat import paper
+
+STAGES = {
+    "screening": "Table 3, Plackett-Burman screening",
+    "climb": "Table 5, steepest climb",
+    "composite": "Table 6, central composite design",
+    "verification": "verification at the optimum",
+}
+"""The paper's stages, in order, and where its angles stand."""
+
+DESIGNS = ("screening", "climb", "composite")
+"""Stages whose points differ: the 31 runs that a model is held against."""
+
+OPTIMUM = {"E": 0.482, "F": 0.446}
+"""The published optimum, where the verification was simulated."""
+
+ANGLE = "repose_angle_deg"
+
+FIRST_SEED = 40_000
+SEEDS_A_REPLICATE = 1_000
+"""Run i, from 0, of replicate r, from 1, has the seed FIRST_SEED + i + (r - 1) SEEDS_A_REPLICATE."""
+
+
+def published_runs() -> pd.DataFrame:
+    """Every simulated run of the paper.
+
+    Returns
+    -------
+    DataFrame
+        A row a run: stage, run (from 1), the factors that its stage varies in natural units (NaN: at its
+        middle), published (angle [deg]).
+    """
+    names = [factor.name for factor in paper.factors()]
+    tables = []
+    for stage, (settings, angles) in _stages().items():
+        table = settings.reset_index(drop=True).reindex(columns=names)
+        label = {"stage": stage, "run": range(1, len(table) + 1)}
+        tables.append(pd.concat([pd.DataFrame(label), table], axis=1).assign(published=list(angles)))
+    return pd.concat(tables, ignore_index=True)
+
+
+def screening_design() -> Design:
+    """The Plackett-Burman design in printed order, its idle columns as dummies."""
+    return Design.from_table(paper.published("plackett_burman").drop(columns=ANGLE), paper.factors())
+
+
+def composite_design() -> Design:
+    """The central composite design in printed order, star points at 1.414 half ranges."""
+    coded = paper.published("central_composite")[["E_coded", "F_coded"]].set_axis(["E", "F"], axis=1)
+    return Design.from_table(coded, paper.composite_factors())
+
+
+def planned_cases(replicates: int, stages: Iterable[str] = tuple(STAGES)) -> pd.DataFrame:
+    """Lay out the cases of some stages: every run so many times, each case with its own seed.
+
+    Parameters
+    ----------
+    replicates
+        Heaps of every run.
+    stages
+        Of `STAGES`.
+
+    Returns
+    -------
+    DataFrame
+        A row a case: stage, run, replicate, every factor in its natural unit, published (angle [deg]), seed.
+
+    Raises
+    ------
+    ValueError
+        When there is less than one replicate, or no such stage.
+    """
+    wanted = list(stages)
+    if replicates < 1:
+        raise ValueError(f"replicates: must be at least 1, got {replicates}")
+    if unknown := [stage for stage in wanted if stage not in STAGES]:
+        raise ValueError(f"a stage of the paper is one of {', '.join(STAGES)}, got {unknown[0]!r}")
+    runs = published_runs().fillna({factor.name: factor.center for factor in paper.factors()})
+    runs = runs.assign(seed=FIRST_SEED + runs.index)[runs["stage"].isin(wanted)]
+    copies = [
+        runs.assign(replicate=number, seed=runs["seed"] + (number - 1) * SEEDS_A_REPLICATE)
+        for number in range(1, replicates + 1)
+    ]
+    return pd.concat(copies).sort_index(kind="stable").reset_index(drop=True)
+
+
+def _stages() -> dict[str, tuple[pd.DataFrame, Iterable[float]]]:
+    """Natural settings and angles of every stage."""
+    screening, composite = paper.published("plackett_burman"), paper.published("central_composite")
+    climb, angles = paper.published("steepest_climb"), paper.verification()
+    return {
+        "screening": (screening_design().natural, screening[ANGLE]),
+        "climb": (climb[["E", "F"]], climb[ANGLE]),
+        "composite": (composite_design().natural, composite[ANGLE]),
+        "verification": (pd.DataFrame([OPTIMUM] * len(angles)), angles),
+    }
