@@ -36,7 +36,7 @@ class Agreement:
     Tibshirani, An Introduction to the Bootstrap, 1993, chapter 13). Of few runs they are rough.
     """
 
-    values: FloatArray
+    response: FloatArray
     reference: FloatArray
     value_variance: FloatArray
     """Variance of each value by noise: that of one replicate over the replicates averaged."""
@@ -50,7 +50,7 @@ class Agreement:
     @property
     def runs(self) -> int:
         """Number of runs."""
-        return len(self.values)
+        return len(self.response)
 
     @cached_property
     def rmse(self) -> Estimate:
@@ -95,7 +95,7 @@ class Agreement:
     @cached_property
     def spearman(self) -> Estimate:
         """Rank correlation, as it stands."""
-        return self._estimate(lambda rows: _spearman(self.values[rows], self.reference[rows]))
+        return self._estimate(lambda rows: _spearman(self.response[rows], self.reference[rows]))
 
     @cached_property
     def spearman_ceiling(self) -> Estimate:
@@ -113,13 +113,13 @@ class Agreement:
 
     @cached_property
     def _difference(self) -> FloatArray:
-        return self.values - self.reference
+        return self.response - self.reference
 
     def _mean_square(self, rows: NDArray[np.int_]) -> FloatArray:
         return (self._difference[rows] ** 2).mean(axis=-1)
 
     def _slopes(self, rows: NDArray[np.int_]) -> FloatArray:
-        values, reference = _centred(self.values[rows]), _centred(self.reference[rows])
+        values, reference = _centred(self.response[rows]), _centred(self.reference[rows])
         noise = (rows.shape[-1] - 1) * self.reference_variance
         true_spread = (reference**2).sum(axis=-1) - noise
         products = (values * reference).sum(axis=-1)

@@ -1,6 +1,7 @@
 """Figures for print (matplotlib): every function returns a Figure and shows nothing."""
 
 from collections.abc import Mapping, Sequence
+from itertools import cycle
 
 import numpy as np
 import pandas as pd
@@ -11,6 +12,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike
 
+from doe.agreement import Agreement
 from doe.plot_data import (
     half_normal_points,
     normal_points,
@@ -195,6 +197,47 @@ def surface_plot(
         axis.labelpad = 8.0
     axes.set_box_aspect(None, zoom=0.85)
     return figure
+
+
+def agreement_plot(
+    result: Agreement,
+    groups: Sequence[str],
+    value_label: str = "value",
+    reference_label: str = "reference",
+) -> Figure:
+    """Draw values against their reference, one colour a group, with the noise (+- 1 sd) of both.
+
+    Parameters
+    ----------
+    result : Agreement
+    groups : sequence of str, one a run
+    value_label, reference_label : str
+    """
+    figure = Figure(figsize=(WIDTH, 4.6), layout="constrained")
+    axes = figure.subplots()
+    ends = [
+        min(result.response.min(), result.reference.min()),
+        max(result.response.max(), result.reference.max()),
+    ]
+    axes.plot(ends, ends, color=GREY, linewidth=1.0, linestyle="--", label="equal")
+    names = list(dict.fromkeys(groups))
+    for name, color in zip(names, cycle((BLUE, RED, GREEN, ORANGE)), strict=False):
+        rows = np.flatnonzero(np.asarray(groups) == name)
+        axes.errorbar(
+            result.reference[rows],
+            result.response[rows],
+            xerr=np.sqrt(result.reference_variance),
+            yerr=np.sqrt(result.value_variance[rows]),
+            fmt="o",
+            markersize=5,
+            color=color,
+            elinewidth=0.8,
+            label=name,
+        )
+    axes.set(xlabel=reference_label, ylabel=value_label)
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.legend(frameon=False, fontsize=8, loc="upper left")
+    return _plain(figure)
 
 
 def _draw_region(axes: Axes, region: Region, x: str, y: str) -> Patch:

@@ -153,7 +153,7 @@ def replay_paper(desk: Desk, replicates: int) -> Replay:
     replicates
         Heaps of every run.
     """
-    tables = [desk.run(planned_cases(replicates, [stage]), f"the paper's {stage}") for stage in STAGES]
+    tables = [desk.run(planned_cases(replicates, [stage]), f"paper, {stage}") for stage in STAGES]
     return Replay(pd.concat(tables, ignore_index=True))
 
 

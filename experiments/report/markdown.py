@@ -6,7 +6,7 @@ from experiments.report.tables import Row, Table
 
 
 def markdown_table(table: Table) -> str:
-    """Write a table as Markdown: caption, rows and note; rows that matter are bold."""
+    """Write a table as Markdown: caption, rows and note; rows that matter begin bold."""
     heads = [
         f"{column.head} [{column.unit}]" if column.unit else str(column.head) for column in table.columns
     ]
@@ -17,8 +17,8 @@ def markdown_table(table: Table) -> str:
 
 
 def _texts(row: Row) -> list[str]:
-    texts = [str(cell.text).replace("|", "\\|") for cell in row.cells]
-    return [f"**{text}**" if text and row.mark in ("strong", "chosen") else text for text in texts]
+    first, *rest = [str(cell.text).replace("|", "\\|") for cell in row.cells]
+    return [f"**{first}**" if row.mark in ("strong", "chosen") else first, *rest]
 
 
 def _line(cells: list[str]) -> str:

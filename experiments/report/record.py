@@ -12,6 +12,7 @@ import pandas as pd
 
 from dem_warp import CaseResult
 from doe import Agreement, agreement
+from doe.plots import agreement_plot
 from experiments.calibrate.export import jsonable
 from experiments.calibrate.results import Campaign
 from experiments.files import replacing, write_text
@@ -22,13 +23,13 @@ from experiments.report.replay_tables import ranking_sentence, replay_tables
 from experiments.report.sensitivity_tables import sensitivity_tables
 from experiments.report.tables import Column, Table, make_table
 from experiments.studies.buckwheat.replay import RUN, Replay
-from experiments.studies.buckwheat.runs import DESIGNS
+from experiments.studies.buckwheat.runs import DESIGNS, STAGES
 from experiments.studies.buckwheat.sensitivities import Sensitivities
 from experiments.study import Study
 from imaging import save_picture
 
 PAGE, RUNS, PROVENANCE, CAMPAIGN = "README.md", "runs.csv", "provenance.json", "campaign.json"
-HEAPS = "heaps.png"
+HEAPS, SCATTER, NOTES = "heaps.png", "agreement.png", "notes.md"
 SENSITIVITIES = "sensitivities"
 """Folder of the variants' angles."""
 
@@ -51,6 +52,8 @@ class Record:
     sensitivities: Sensitivities | None = None
     picture: bool = False
     """Whether there is a picture of heaps."""
+    notes: str = ""
+    """What a person makes of the numbers, Markdown."""
 
     @classmethod
     def read(cls, folder: Path) -> Record:
@@ -70,6 +73,7 @@ class Record:
             {name: Replay(pd.read_csv(path)) for name, path in scales.items()},
             Sensitivities.read(folder / SENSITIVITIES),
             (folder / HEAPS).is_file(),
+            (folder / NOTES).read_text(encoding="utf-8") if (folder / NOTES).is_file() else "",
         )
 
 
@@ -129,8 +133,14 @@ def draw_heaps(folder: Path, study: Study, replay: Replay, load: Callable[[str],
 
 
 def write_page(folder: Path) -> Path:
-    """Write the page of a record anew from the tables beside it."""
-    write_text(folder / PAGE, record_page(Record.read(folder)))
+    """Write the page of a record, and its plot, anew from the tables beside it."""
+    record = Record.read(folder)
+    runs = record.replay.runs[lambda runs: runs["stage"].isin(DESIGNS) & runs["angle"].notna()]
+    groups = [STAGES[stage].partition(",")[0] for stage in runs["stage"]]
+    figure = agreement_plot(record.replay.agreement(), groups, "simulated angle [°]", "published angle [°]")
+    with replacing(folder / SCATTER) as temporary:
+        figure.savefig(temporary, dpi=130)
+    write_text(folder / PAGE, record_page(record))
     return folder / PAGE
 
 
@@ -160,6 +170,8 @@ def record_page(record: Record) -> str:
         *_provenance(record.provenance),
         "## Agreement",
         markdown_table(tables["agreement"]),
+        f"![Simulated against published angles]({SCATTER})",
+        record.notes,
         *_picture(record),
         "## Screening",
         *([ranking_sentence(record.replay)] if "effects" in tables else []),
@@ -175,7 +187,7 @@ def record_page(record: Record) -> str:
         markdown_table(tables["runs"]),
         f"Every heap, with its seed, stands in [{RUNS}]({RUNS}).",
     ]
-    return "\n\n".join(part.strip() for part in parts) + "\n"
+    return "\n\n".join(text for part in parts if (text := part.strip())) + "\n"
 
 
 def _tables(tables: Mapping[str, Table], *names: str) -> list[str]:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import pandas as pd
 
-from experiments.report.numbers import fixed, p_value, term
+from experiments.report.numbers import fixed, interval, p_value, term
 from experiments.report.tables import Column, Table, make_table
 from experiments.studies.buckwheat.replay import Replay, published_noise
 from experiments.studies.buckwheat.runs import STAGES
@@ -43,24 +43,18 @@ def agreement_table(replay: Replay) -> Table:
     """Lay out how near the angles come to the published ones, by table."""
     frame = replay.agreement_table.copy()
     for name in ("rmse", "bias", "slope", "spearman"):
-        frame[f"{name}_interval"] = [
-            f"{fixed(low, 2)} to {fixed(high, 2)}"
-            for low, high in zip(frame[f"{name}_low"], frame[f"{name}_high"], strict=True)
-        ]
+        ends = zip(*(frame[f"{name}{end}"] for end in ("", "_low", "_high")), strict=True)
+        frame[name] = [f"{fixed(value, 2)} {interval((low, high))}" for value, low, high in ends]
     low, high = published_noise()
     columns = [
         Column("table", "runs of"),
         Column("runs", "runs", "label"),
-        Column("rmse", "rmse", "angle", "°"),
-        Column("rmse_interval", "interval"),
+        Column("rmse", "rmse", unit="°"),
         Column("rmse_without_own_noise", "rmse, our seed noise out", "angle", "°"),
         Column("rmse_without_noise", "rmse, noise of both out", "angle", "°"),
-        Column("bias", "bias", "angle", "°"),
-        Column("bias_interval", "interval"),
-        Column("slope", "slope", "ratio"),
-        Column("slope_interval", "interval"),
-        Column("spearman", "Spearman", "ratio"),
-        Column("spearman_interval", "interval"),
+        Column("bias", "bias", unit="°"),
+        Column("slope", "slope"),
+        Column("spearman", "Spearman"),
         Column("ceiling", f"highest, noise {fixed(low, 2)}°", "ratio"),
         Column("ceiling_noisier", f"highest, noise {fixed(high, 2)}°", "ratio"),
     ]
@@ -191,8 +185,15 @@ def ranking_sentence(replay: Replay) -> str:
     """Say which factors move the angle most, here and in the paper."""
     table = replay.effects
     ours, theirs = (table.sort_values(column).index[:2] for column in ("rank", "paper_rank"))
-    values = ", ".join(f"{name} {table['effect'][name]:+.1f}° ({p_value(table['p'][name])})" for name in ours)
+    values = ", ".join(
+        f"{name} {table['effect'][name]:+.1f}° (p {_against(table['p'][name])})" for name in ours
+    )
     return (
         f"The two strongest factors of the screening are {' and '.join(ours)} here ({values}), "
         f"{' and '.join(theirs)} in the paper."
     )
+
+
+def _against(p: float) -> str:
+    text = p_value(p)
+    return text if text.startswith("<") else f"= {text}"
