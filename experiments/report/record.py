@@ -173,13 +173,10 @@ def record_page(record: Record) -> str:
         f"![Simulated against published angles]({SCATTER})",
         record.notes,
         *_picture(record),
-        "## Screening",
+        *_section("Screening", tables, "effects"),
         *([ranking_sentence(record.replay)] if "effects" in tables else []),
-        *_tables(tables, "effects"),
-        "## Response surface",
-        *_tables(tables, "anova", "coefficients"),
-        "## Verification",
-        *_tables(tables, "verification"),
+        *_section("Response surface", tables, "anova", "coefficients"),
+        *_section("Verification", tables, "verification"),
         *_campaign(record.campaign),
         *_scales(record),
         *_sensitivities(record.sensitivities),
@@ -190,8 +187,9 @@ def record_page(record: Record) -> str:
     return "\n\n".join(text for part in parts if (text := part.strip())) + "\n"
 
 
-def _tables(tables: Mapping[str, Table], *names: str) -> list[str]:
-    return [markdown_table(tables[name]) for name in names if name in tables]
+def _section(title: str, tables: Mapping[str, Table], *names: str) -> list[str]:
+    found = [markdown_table(tables[name]) for name in names if name in tables]
+    return [f"## {title}", *found] if found else []
 
 
 def _provenance(provenance: Mapping[str, Any]) -> list[str]:

@@ -27,14 +27,13 @@ def replay_tables(replay: Replay, campaign: pd.DataFrame | None = None) -> dict[
     campaign
         Effects of a campaign of our own by factor (effect, p, rank), set beside those at the paper's runs.
     """
-    stages = set(replay.measured["stage"])
     tables = {"agreement": agreement_table(replay), "runs": runs_table(replay)}
-    if "screening" in stages:
+    if "screening" in replay.analysed:
         tables["effects"] = replay_effects_table(replay, campaign)
-    if "composite" in stages:
+    if "composite" in replay.analysed:
         tables["anova"] = replay_anova_table(replay)
         tables["coefficients"] = replay_coefficients_table(replay)
-    if "verification" in stages:
+    if "verification" in replay.analysed:
         tables["verification"] = replay_verification_table(replay)
     return tables
 

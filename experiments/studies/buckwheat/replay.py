@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -12,6 +12,7 @@ import pandas as pd
 from doe import (
     Agreement,
     Comparison,
+    DesignError,
     ErrorTerm,
     Sample,
     ScreenResult,
@@ -36,6 +37,10 @@ RUN = ["stage", "run"]
 
 ALL = "Tables 3, 5 and 6"
 """The 31 runs of all designs together."""
+
+
+LEAST_RUNS = 3
+"""Agreement is not spoken of for fewer runs."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,10 +108,11 @@ class Replay:
     @cached_property
     def agreement_table(self) -> pd.DataFrame:
         """Agreement by table and in all; every estimate with the ends of its 95 % interval."""
+        measured = self.runs.dropna(subset=["angle"])["stage"].value_counts()
         groups: dict[str, tuple[str, ...]] = {
-            STAGES[stage]: (stage,) for stage in STAGES if (self.runs["stage"] == stage).any()
+            STAGES[stage]: (stage,) for stage in STAGES if measured.get(stage, 0) >= LEAST_RUNS
         }
-        groups |= {ALL: DESIGNS} if set(DESIGNS) <= set(self.runs["stage"]) else {}
+        groups |= {ALL: DESIGNS} if set(DESIGNS) <= set(measured.index) else {}
         rows = {name: self._agreement_row(stages) for name, stages in groups.items()}
         return pd.DataFrame.from_dict(rows, orient="index").rename_axis("table")
 
@@ -156,14 +162,30 @@ class Replay:
             found["simulated again"] = compare_means(ours, target, margin=2.0 * target.sd)
         return found
 
+    @cached_property
+    def analysed(self) -> frozenset[str]:
+        """Stages of which enough cases gave an angle for their analysis."""
+        analyses: dict[str, Callable[[], object]] = {
+            "screening": lambda: self.effects,
+            "composite": lambda: self.anova,
+            "verification": lambda: self.verification["simulated again"],
+        }
+        found = []
+        for stage, analyse in analyses.items():
+            try:
+                analyse()
+            except (DesignError, KeyError):
+                continue
+            found.append(stage)
+        return frozenset(found)
+
     def tables(self) -> dict[str, pd.DataFrame]:
         """Tables for CSV files, by name."""
-        stages = set(self.measured["stage"])
         tables = {"paper_cases": self.cases, "paper_runs": self.runs}
         tables["paper_agreement"] = self.agreement_table.reset_index()
-        if "screening" in stages:
+        if "screening" in self.analysed:
             tables["paper_effects"] = self.effects.reset_index()
-        if "composite" in stages:
+        if "composite" in self.analysed:
             tables["paper_anova"] = self.anova.reset_index()
         return tables
 
