@@ -21,6 +21,9 @@ from imaging.render import Snapshot
 
 JPEG_QUALITY = 88
 
+ROW_WIDTH = 1500
+"""Columns of a row of heaps, at most."""
+
 ROW_HEAD = 40
 """Rows above the heaps of a row for what is written there."""
 
@@ -91,9 +94,10 @@ def heap_row(study: Study, heaps: Mapping[str, CaseResult]) -> np.ndarray:
     """
     drawn = [_drawn(study, result) for result in heaps.values()]
     coarsest = max(picture.meters_per_pixel for _, picture, _ in drawn)
+    width = sum(image.shape[1] * picture.meters_per_pixel / coarsest for _, picture, image in drawn)
     panels = []
     for _, picture, image in drawn:
-        ratio = picture.meters_per_pixel / coarsest
+        ratio = min(1.0, ROW_WIDTH / width) * picture.meters_per_pixel / coarsest
         size = (round(ratio * image.shape[1]), round(ratio * image.shape[0]))
         shrunk = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
         panels.append((shrunk, round(ratio * (picture.ground_row + 0.5))))
@@ -104,7 +108,7 @@ def heap_row(study: Study, heaps: Mapping[str, CaseResult]) -> np.ndarray:
         top, bottom = above - ground, below - (len(image) - ground)
         panel = cv2.copyMakeBorder(image, top, bottom, 0, 0, cv2.BORDER_REPLICATE)
         cv2.putText(
-            panel, title, (12, ROW_HEAD - 12), cv2.FONT_HERSHEY_DUPLEX, 0.7, (40, 32, 28), 1, cv2.LINE_AA
+            panel, title, (12, ROW_HEAD - 12), cv2.FONT_HERSHEY_DUPLEX, 0.6, (40, 32, 28), 1, cv2.LINE_AA
         )
         row.append(panel)
     return np.hstack(row)

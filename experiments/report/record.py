@@ -106,7 +106,7 @@ def write_record(
 
 
 def draw_heaps(folder: Path, study: Study, replay: Replay, load: Callable[[str], CaseResult]) -> None:
-    """Draw the first heaps of three runs next to each other, where all of them were measured.
+    """Draw the first heaps of three runs next to each other, those that were measured.
 
     Parameters
     ----------
@@ -124,10 +124,12 @@ def draw_heaps(folder: Path, study: Study, replay: Replay, load: Callable[[str],
     for title, (stage, run) in SHOWN.items():
         found = cases[(cases["stage"] == stage) & (cases["run"] == run)]
         if found.empty:
-            return
+            continue
         published = replay.runs.set_index(RUN)["published"][stage, run]
         first = found.iloc[0]
         shown[f"{title}: {first['angle']:.1f} deg, published {published:.1f}"] = load(str(first["case_key"]))
+    if not shown:
+        return
     with replacing(folder / HEAPS) as temporary:
         save_picture(temporary, heap_row(study, shown))
 
