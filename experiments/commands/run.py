@@ -111,7 +111,7 @@ class Desk:
 
 
 def run_campaign(desk: Desk, on_stage: StageHook | None = None, replay: Replay | None = None) -> Campaign:
-    """Calibrate a study and write its report: ``report.html``, ``results.json``, ``tables/*.csv``.
+    """Calibrate a study and write its report, its tables and its material card.
 
     Parameters
     ----------

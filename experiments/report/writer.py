@@ -13,6 +13,7 @@ from typing import Any
 from experiments.calibrate.export import jsonable
 from experiments.calibrate.results import Campaign
 from experiments.files import write_text
+from experiments.report.material_card import write_material_card
 from experiments.report.page import render_page
 from experiments.report.pictures import HeapPicture
 from experiments.studies.buckwheat.replay import Replay
@@ -30,7 +31,7 @@ def write_report(
     provenance: Mapping[str, Any] | None = None,
     replay: Replay | None = None,
 ) -> Path:
-    """Write ``report.html``, ``results.json`` and ``tables/*.csv``, each whole or not at all.
+    """Write ``report.html``, ``results.json``, ``tables/*.csv``, ``material.toml``, each whole or not at all.
 
     Parameters
     ----------
@@ -70,6 +71,7 @@ def write_report(
         write_text(folder / "tables" / f"{name}.csv", table)
     write_text(folder / "results.json", text)
     write_text(folder / "report.html", page)
+    write_material_card(campaign, study, folder)
     return folder / "report.html"
 
 

@@ -7,8 +7,6 @@ is a `StudyError` with the rule, the value received and the file, line and key. 
 from __future__ import annotations
 
 import copy
-import re
-import tomllib
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
@@ -20,6 +18,7 @@ from dem_warp.case import Case
 from doe.factors import Factor
 from experiments.calibrate.settings import CampaignSettings, MeasuredTarget, TwinTarget
 from experiments.errors import StudyError
+from experiments.study.card import with_material
 from experiments.study.factor_section import (
     FactorSection,
     FactorTable,
@@ -31,6 +30,7 @@ from experiments.study.factor_section import (
 from experiments.study.places import Places, value_at
 from experiments.study.schema import Angle, Dimension, Section, nearest_name, validated
 from experiments.study.sections import Physics
+from experiments.study.toml_files import read_toml
 from imaging import FITS
 
 BUCKWHEAT = Path(__file__).parents[1] / "studies" / "buckwheat" / "study.toml"
@@ -215,7 +215,7 @@ def load_study(
         When the file cannot be read or breaks a rule: the rules, the values received, and their places.
     """
     path = BUCKWHEAT if path is None else Path(path)
-    text, document = _read(path)
+    text, document = read_toml(path)
     places = Places.read(path, text, scale)
     scales = _scales(path, document)
     document.pop("scale", None)
@@ -224,7 +224,7 @@ def load_study(
             rule = f"the scale must be one that the study has, {nearest_name(scale, list(scales))}"
             raise StudyError(rule, scale, str(path))
         document = merge(document, scales[scale])
-    document = merge(document, changes or {})
+    document = with_material(merge(document, changes or {}), path.parent)
     sections = validated(FactorTable, {"factor": document.get("factor", [])}, places).factor
     check_one_home(document, sections, places)
     plain = with_factor_values(_without_units(document, sections, places), sections, {})
@@ -242,7 +242,7 @@ def study_scales(path: str | Path | None = None) -> tuple[str, ...]:
         When the file cannot be read.
     """
     path = BUCKWHEAT if path is None else Path(path)
-    return tuple(_scales(path, _read(path)[1]))
+    return tuple(_scales(path, read_toml(path)[1]))
 
 
 def _scales(path: Path, document: Mapping[str, Any]) -> Mapping[str, Mapping[str, Any]]:
@@ -250,21 +250,6 @@ def _scales(path: Path, document: Mapping[str, Any]) -> Mapping[str, Mapping[str
     if not isinstance(scales, Mapping) or not all(isinstance(table, Mapping) for table in scales.values()):
         raise StudyError("scales are tables, [scale.NAME]", scales, str(path))
     return scales
-
-
-def _read(path: Path) -> tuple[str, dict[str, Any]]:
-    try:
-        text = path.read_text(encoding="utf-8")
-        return text, tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        found = re.search(r"at line (\d+)", str(error))
-        number = int(found[1]) if found else len(text.splitlines())
-        shown = text.splitlines()[number - 1].strip()
-        raise StudyError(f"must be valid TOML: {error}", shown, f"{path}:{number}") from None
-    except UnicodeDecodeError:
-        raise StudyError("must be a text file in UTF-8", "other bytes", str(path)) from None
-    except OSError as error:
-        raise StudyError("the study must be a readable file", error.strerror or "none", str(path)) from None
 
 
 def _without_units(

@@ -90,7 +90,7 @@ def test_a_campaign_leaves_its_report_results_and_tables(
     assert campaign.optimum.point["E"] == pytest.approx(0.5, abs=0.3 / SLOPE)
     assert stages[0] == "target"
     assert stages[-1] == "verification"
-    assert {"report.html", "results.json", "study.json", "tables", "cases", "walls.csv"} == {
+    assert {"report.html", "results.json", "study.json", "tables", "cases", "walls.csv", "material.toml"} == {
         p.name for p in folder.iterdir()
     }
     results = json.loads((folder / "results.json").read_text(encoding="utf-8"))

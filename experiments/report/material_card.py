@@ -1,0 +1,132 @@
+"""The material that a campaign found, as a card: values, what they were fitted to, and what is as good."""
+
+from __future__ import annotations
+
+import copy
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from doe import Region
+from experiments.calibrate.results import Campaign, OptimumResult
+from experiments.files import replacing, write_text
+from experiments.study import Study
+from experiments.study.card import MATERIAL, SECTIONS, shapes_of
+from experiments.study.factor_section import with_factor_values
+from experiments.study.toml_files import toml_text
+
+CARD = "material.toml"
+
+FORMAT = 1
+"""Version of the card."""
+
+MOST_POINTS = 60
+"""Compatible settings that a card lists."""
+
+HEAD = """\
+# Material card, written by dem-warp calibrate. A study takes its values by  material = "{card}"
+# They hold together with the contact law, the clump and the estimator that they were found with. One angle is
+# one equation: every point of [compatible] is as good as the chosen one; not so every pair of the ranges.
+
+"""
+
+
+def write_material_card(campaign: Campaign, study: Study, folder: Path) -> Path | None:
+    """Write the card of a campaign that chose a point, and its clump files beside it.
+
+    Parameters
+    ----------
+    campaign, study
+        What was run.
+    folder
+        Where ``material.toml`` goes.
+
+    Returns
+    -------
+    Path or None
+        The card; None where the campaign chose no point.
+    """
+    if campaign.optimum is None:
+        return None
+    card = material_card(campaign, campaign.optimum, study)
+    for shape in shapes_of(card[MATERIAL]):
+        source = study.file.parent / shape["clump"]
+        shape["clump"] = f"material-{source.name}"
+        with replacing(folder / shape["clump"]) as temporary:
+            shutil.copyfile(source, temporary)
+    write_text(folder / CARD, HEAD.format(card=CARD) + toml_text(card))
+    return folder / CARD
+
+
+def material_card(campaign: Campaign, optimum: OptimumResult, study: Study) -> dict[str, Any]:
+    """What a card says, as nested tables; clump files as the study names them."""
+    chosen = with_factor_values(study.document, study.factor_sections, optimum.settings)
+    return {
+        "format": FORMAT,
+        "name": study.name,
+        "fitted": _fitted(campaign, study),
+        "factor": _factors(optimum, study),
+        "compatible": _compatible(optimum.region),
+        MATERIAL: copy.deepcopy({key: chosen[key] for key in SECTIONS if key in chosen}),
+    }
+
+
+def _fitted(campaign: Campaign, study: Study) -> dict[str, Any]:
+    """What the values were fitted to, and how well they do."""
+    measurement, numerics = study.measurement, study.numerics
+    facts: dict[str, Any] = {
+        "outcome": campaign.outcome.value,
+        "reason": campaign.reason,
+        "scale": study.scale,
+        "test": study.document["scene"],
+        "response": f"repose angle, {measurement.fit!r} fit, mean of {measurement.azimuths} views",
+        "modulus_scale": numerics.modulus_scale,
+        "time_step_fraction": numerics.time_step_fraction,
+    }
+    if campaign.target is not None:
+        sample = campaign.target.sample
+        facts["target"] = {"mean": _angle(sample.mean), "sd": _angle(sample.sd), "n": sample.n}
+    if campaign.verification is not None:
+        test = campaign.verification.comparison
+        facts["heaps"] = {"mean": _angle(test.a.mean), "sd": _angle(test.a.sd), "n": test.a.n}
+        facts["heaps"] |= {"difference": _angle(test.difference), "interval": [*map(_angle, test.interval)]}
+    return facts
+
+
+def _factors(optimum: OptimumResult, study: Study) -> dict[str, Any]:
+    """Chosen value of every kept factor, and the range of those that are as good."""
+    region, found = optimum.region, bool(optimum.region.mask.any())
+    parameters = {section.name: section.parameter for section in study.factor_sections}
+    return {
+        factor.name: {
+            "parameter": parameters[factor.name],
+            "unit": factor.unit,
+            "chosen": _short(optimum.point[factor.name]),
+            "low": _short(region.ranges["low"][factor.name]) if found else None,
+            "high": _short(region.ranges["high"][factor.name]) if found else None,
+            "identified": factor.name not in optimum.unidentified,
+        }
+        for factor in region.factors
+    }
+
+
+def _compatible(region: Region) -> dict[str, Any]:
+    """Points all over the compatible region."""
+    inside = np.flatnonzero(region.mask)
+    count = min(len(inside), MOST_POINTS)
+    points = region.natural.to_numpy()[inside[np.linspace(0, len(inside) - 1, count).astype(int)]]
+    return {
+        "share_of_design": _short(region.fraction),
+        "factors": [factor.name for factor in region.factors],
+        "points": [[_short(value) for value in point] for point in points],
+    }
+
+
+def _short(value: float) -> float:
+    return float(f"{value:.4g}")
+
+
+def _angle(value: float) -> str:
+    return f"{value:.3f} deg"
