@@ -63,7 +63,14 @@ def calibrate(
     """Run a whole calibration: noise floor, screening, climb, surface, optimum, verification, report."""
     with clear_errors():
         from experiments.commands.choices import chosen_device, chosen_study, default_folder
-        from experiments.commands.run import Desk, check_runs, record_paper, replay_paper, run_campaign
+        from experiments.commands.run import (
+            Desk,
+            check_runs,
+            found_by,
+            record_paper,
+            replay_paper,
+            run_campaign,
+        )
 
         device = chosen_device(device)
         chosen = chosen_study(study, scale, device)
@@ -77,10 +84,10 @@ def calibrate(
         campaign = None if only_paper else run_campaign(desk, _show_stage, replay)
         if replay is not None:
             messages.print(f"The paper's runs: {record_paper(desk, replay, campaign)}")
+    if as_json:
+        typer.echo(json.dumps(found_by(campaign, replay), allow_nan=False))
     if campaign is None:
         return
-    if as_json:
-        typer.echo(json.dumps(campaign.to_dict(), allow_nan=False))
     messages.print(f"{campaign.outcome}: {campaign.reason}")
     messages.print(f"Report: {folder / 'report.html'}")
     if campaign.outcome == "too-many-failed-runs":

@@ -17,6 +17,7 @@ from dem_warp import Progress
 from experiments.calibrate import Campaign, calibrate
 from experiments.calibrate.campaign import StageHook
 from experiments.calibrate.checks import check_study
+from experiments.calibrate.export import jsonable
 from experiments.cases import Store, open_folder, run_cases
 from experiments.errors import StudyError
 from experiments.files import write_text
@@ -162,6 +163,12 @@ def record_paper(desk: Desk, replay: Replay, campaign: Campaign | None = None) -
     folder = desk.folder / RECORD
     draw_heaps(folder, desk.study, replay, desk.store.load)
     return write_record(folder, replay.cases, _provenance(desk, replay), campaign)
+
+
+def found_by(campaign: Campaign | None, replay: Replay | None) -> dict[str, Any]:
+    """Everything that was found as JSON-able data: the campaign's results, the paper's runs as ``paper``."""
+    found = campaign.to_dict() if campaign else {}
+    return found | ({"paper": jsonable(replay.tables())} if replay else {})
 
 
 def check_runs(study: Study, campaign: bool = True, paper: bool = False) -> None:

@@ -139,3 +139,23 @@ def test_another_replicate_simulates_only_that(
     assert second.noise_floor is not None
     pd.testing.assert_frame_equal(second.noise_floor.cases.iloc[:5], first.noise_floor.cases)
     assert len(engine.seeds) == count + 1
+
+
+def test_the_papers_runs_stand_beside_the_campaign_and_in_the_record(engine: Engine, tmp_path: Path) -> None:
+    rough = {"measurement": {"azimuths": 2, "pixels": 200}}  # the picture of heaps in less time
+    study, folder = load_study(scale="bench", changes=rough), tmp_path / "out"
+    desk = Desk.open(study, folder)
+    replay = run.replay_paper(desk, 1)
+    assert len(engine.seeds) == 34
+    campaign = run.run_campaign(desk, replay=replay)
+    page = run.record_paper(desk, replay, campaign)
+    agreement = pd.read_csv(folder / "tables" / "paper_agreement.csv")
+    assert agreement["runs"].tolist() == [12, 6, 13, 3, 31]
+    assert 'id="replay"' in (folder / "report.html").read_text(encoding="utf-8")
+    assert campaign.reason in page.read_text(encoding="utf-8")
+    assert (folder / "record" / "heaps.png").is_file()
+    total, found = len(engine.seeds), run.found_by(campaign, replay)
+    assert json.loads(json.dumps(found))["paper"]["paper_agreement"][-1]["runs"] == 31
+    again = run.replay_paper(Desk.open(study, folder, resume=True), 1)
+    pd.testing.assert_frame_equal(again.cases, replay.cases)
+    assert len(engine.seeds) == total

@@ -32,6 +32,8 @@ def test_files_hold_the_same_numbers(campaign: Campaign, study: Study, tmp_path:
     effects = pd.read_csv(files["screening_effects"], index_col="factor")
     np.testing.assert_array_equal(effects.to_numpy(), campaign.screening.screen.table.to_numpy())
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
+        "material-clump.txt",
+        "material.toml",
         "report.html",
         "results.json",
         "tables",
