@@ -138,7 +138,8 @@ class Agreement:
         """Rows of every resample, shape (resamples, runs): each stratum keeps its number of runs."""
         rng = np.random.default_rng(SEED)
         places = [np.flatnonzero(self.strata == stratum) for stratum in np.unique(self.strata)]
-        return np.hstack([rng.choice(rows, (RESAMPLES, len(rows))) for rows in places])
+        picks = [(rng.random((RESAMPLES, len(rows))) * len(rows)).astype(int) for rows in places]
+        return np.hstack([rows[pick] for rows, pick in zip(places, picks, strict=True)])
 
     def _estimate(self, statistic: Callable[[NDArray[np.int_]], FloatArray]) -> Estimate:
         value = float(statistic(np.arange(self.runs)))

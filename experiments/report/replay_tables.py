@@ -16,6 +16,9 @@ STRAY = 5.0
 
 SIGNIFICANT = 0.05
 
+NO_BREAK = "\u00a0"
+"""A space at which no line ends."""
+
 
 def replay_tables(replay: Replay, campaign: pd.DataFrame | None = None) -> dict[str, Table]:
     """Lay out everything that the paper's runs have to say, by name.
@@ -27,7 +30,7 @@ def replay_tables(replay: Replay, campaign: pd.DataFrame | None = None) -> dict[
     campaign
         Effects of a campaign of our own by factor (effect, p, rank), set beside those at the paper's runs.
     """
-    tables = {"agreement": agreement_table(replay), "runs": runs_table(replay)}
+    tables = {"agreement": agreement_table(replay)}
     if "screening" in replay.analysed:
         tables["effects"] = replay_effects_table(replay, campaign)
     if "composite" in replay.analysed:
@@ -35,7 +38,7 @@ def replay_tables(replay: Replay, campaign: pd.DataFrame | None = None) -> dict[
         tables["coefficients"] = replay_coefficients_table(replay)
     if "verification" in replay.analysed:
         tables["verification"] = replay_verification_table(replay)
-    return tables
+    return tables | {"runs": runs_table(replay)}
 
 
 def agreement_table(replay: Replay) -> Table:
@@ -43,7 +46,10 @@ def agreement_table(replay: Replay) -> Table:
     frame = replay.agreement_table.copy()
     for name in ("rmse", "bias", "slope", "spearman"):
         ends = zip(*(frame[f"{name}{end}"] for end in ("", "_low", "_high")), strict=True)
-        frame[name] = [f"{fixed(value, 2)} {interval((low, high))}" for value, low, high in ends]
+        # No break inside an interval.
+        frame[name] = [
+            f"{fixed(value, 2)} {interval((low, high)).replace(' ', NO_BREAK)}" for value, low, high in ends
+        ]
     low, high = published_noise()
     columns = [
         Column("table", "runs of"),

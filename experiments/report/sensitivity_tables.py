@@ -8,7 +8,7 @@ from experiments.studies.buckwheat.runs import DESIGNS, STAGES
 from experiments.studies.buckwheat.sensitivities import Sensitivities
 from experiments.studies.buckwheat.variants import variants
 
-NOT_RUN = "not run"
+NOT_RUN, TOO_FEW = "not run", "too few angles"
 
 
 def sensitivity_tables(found: Sensitivities) -> dict[str, Table]:
@@ -23,7 +23,8 @@ def sensitivity_tables(found: Sensitivities) -> dict[str, Table]:
 def shifts_table(found: Sensitivities) -> Table:
     """Lay out every variant: how far the angles move, and how near they come to the published ones."""
     frame = found.shifts.copy()
-    frame["state"] = ["" if name in found.replays else NOT_RUN for name in frame.index]
+    states = dict.fromkeys(found.replays, "") | dict.fromkeys(found.spoilt, TOO_FEW)
+    frame["state"] = [states.get(name, NOT_RUN) for name in frame.index]
     columns = [
         Column("group", "what"),
         Column("title", "variant"),

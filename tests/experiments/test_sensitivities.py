@@ -149,6 +149,18 @@ def test_a_variant_is_one_batch_and_is_not_run_twice(
         sensitivities.main(["base"], "bench", 10.0, 1, None, tmp_path)
 
 
+def test_a_variant_of_too_few_angles_is_not_compared(tmp_path: Path) -> None:
+    (tmp_path / "settings.json").write_text("{}", encoding="utf-8")
+    cases = variants()[BASE].planned_cases(1).assign(status="finished", reason="")
+    whole = cases.assign(angle=cases["published"])
+    whole.to_csv(tmp_path / "base.csv")
+    whole.assign(angle=whole["angle"].where(whole["stage"] != "climb")).to_csv(tmp_path / "fill-slow.csv")
+    read = Sensitivities.read(tmp_path)
+    assert read is not None
+    assert (set(read.replays), read.spoilt) == ({BASE}, ("fill-slow",))
+    assert read.left_out["chosen"].tolist() == [BASE] * 3
+
+
 def test_without_a_base_nothing_is_compared(tmp_path: Path) -> None:
     assert Sensitivities.read(tmp_path) is None
 

@@ -21,7 +21,9 @@ CLUMP = Path(__file__).with_name("clump.txt")
 """File of the reference clump, nine spheres."""
 
 _FOLDER = Path(__file__).with_name("paper")
-_RESPONSE = "repose_angle_deg"
+RESPONSE = "repose_angle_deg"
+"""Column of the angles in the published tables."""
+
 _MODELS = ("quadratic", "reduced")
 
 
@@ -92,14 +94,24 @@ def measured() -> Sample:
 
 def verification() -> list[float]:
     """Return the three angles simulated at the published optimum [deg]."""
-    return published("verification")[_RESPONSE].tolist()
+    return published("verification")[RESPONSE].tolist()
+
+
+def screening_design() -> Design:
+    """Return the Plackett-Burman design in printed order, its idle columns as dummies."""
+    return Design.from_table(published("plackett_burman").drop(columns=RESPONSE), factors())
+
+
+def composite_design() -> Design:
+    """Return the central composite design in printed order, its star points at 1.414 half ranges."""
+    coded = published("central_composite")[["E_coded", "F_coded"]].set_axis(["E", "F"], axis=1)
+    return Design.from_table(coded, composite_factors())
 
 
 @cache
 def screening() -> ScreenResult:
     """Analyse the published Plackett-Burman runs, their three idle columns as error."""
-    table = published("plackett_burman")
-    return screen(Design.from_table(table.drop(columns=_RESPONSE), factors()), table[_RESPONSE])
+    return screen(screening_design(), published("plackett_burman")[RESPONSE])
 
 
 @cache
@@ -123,9 +135,7 @@ def surface(model: str = "quadratic") -> Surface:
     """
     if model not in _MODELS:
         raise ValueError(f"a model of the paper is one of {', '.join(_MODELS)}, got {model!r}")
-    table = published("central_composite")
-    coded = table[["E_coded", "F_coded"]].set_axis(["E", "F"], axis=1)
-    full = fit_surface(Design.from_table(coded, composite_factors()), table[_RESPONSE])
+    full = fit_surface(composite_design(), published("central_composite")[RESPONSE])
     return full if model == "quadratic" else full.drop("F^2")
 
 
@@ -260,7 +270,7 @@ def _points_outside() -> Iterator[Misprint]:
 def _recomputed_tables() -> Iterator[tuple[str, str, pd.DataFrame]]:
     """Yield place, name of the published table and the recomputed values of some of its cells."""
     yield "Table 4", "screening_anova", screening().table[["sum_sq", "F", "p", "rank"]]
-    angles, target = published("steepest_climb")[_RESPONSE], measured().mean
+    angles, target = published("steepest_climb")[RESPONSE], measured().mean
     yield (
         "Table 5",
         "steepest_climb",

@@ -27,9 +27,7 @@ from experiments.studies.buckwheat import paper
 from experiments.studies.buckwheat.runs import (
     DESIGNS,
     STAGES,
-    composite_design,
     published_runs,
-    screening_design,
 )
 
 RUN = ["stage", "run"]
@@ -120,7 +118,7 @@ class Replay:
     def screening(self) -> ScreenResult:
         """Effects at the paper's screening runs, tested against the idle columns as the paper does."""
         cases = self._of("screening")
-        return screen(screening_design().select(cases["run"].tolist()), cases["angle"], error="dummies")
+        return screen(paper.screening_design().select(cases["run"].tolist()), cases["angle"], error="dummies")
 
     @cached_property
     def effects(self) -> pd.DataFrame:
@@ -135,7 +133,7 @@ class Replay:
     def surface(self) -> Surface:
         """Full quadratic at the paper's composite runs."""
         cases = self._of("composite")
-        return fit_surface(composite_design().select(cases["run"].tolist()), cases["angle"])
+        return fit_surface(paper.composite_design().select(cases["run"].tolist()), cases["angle"])
 
     @cached_property
     def anova(self) -> pd.DataFrame:

@@ -6,14 +6,13 @@ from collections.abc import Iterable
 
 import pandas as pd
 
-from doe import Design
 from experiments.studies.buckwheat import paper
 
 STAGES = {
     "screening": "Table 3, Plackett-Burman screening",
     "climb": "Table 5, steepest climb",
     "composite": "Table 6, central composite design",
-    "verification": "verification at the optimum",
+    "verification": "verification, at the optimum",
 }
 """The paper's stages, in order, and where its angles stand."""
 
@@ -22,8 +21,6 @@ DESIGNS = ("screening", "climb", "composite")
 
 OPTIMUM = {"E": 0.482, "F": 0.446}
 """The published optimum, where the verification was simulated."""
-
-ANGLE = "repose_angle_deg"
 
 FIRST_SEED = 40_000
 SEEDS_A_REPLICATE = 1_000
@@ -46,17 +43,6 @@ def published_runs() -> pd.DataFrame:
         label = {"stage": stage, "run": range(1, len(table) + 1)}
         tables.append(pd.concat([pd.DataFrame(label), table], axis=1).assign(published=list(angles)))
     return pd.concat(tables, ignore_index=True)
-
-
-def screening_design() -> Design:
-    """The Plackett-Burman design in printed order, its idle columns as dummies."""
-    return Design.from_table(paper.published("plackett_burman").drop(columns=ANGLE), paper.factors())
-
-
-def composite_design() -> Design:
-    """The central composite design in printed order, star points at 1.414 half ranges."""
-    coded = paper.published("central_composite")[["E_coded", "F_coded"]].set_axis(["E", "F"], axis=1)
-    return Design.from_table(coded, paper.composite_factors())
 
 
 def planned_cases(replicates: int, stages: Iterable[str] = tuple(STAGES)) -> pd.DataFrame:
@@ -98,8 +84,8 @@ def _stages() -> dict[str, tuple[pd.DataFrame, Iterable[float]]]:
     screening, composite = paper.published("plackett_burman"), paper.published("central_composite")
     climb, angles = paper.published("steepest_climb"), paper.verification()
     return {
-        "screening": (screening_design().natural, screening[ANGLE]),
-        "climb": (climb[["E", "F"]], climb[ANGLE]),
-        "composite": (composite_design().natural, composite[ANGLE]),
+        "screening": (paper.screening_design().natural, screening[paper.RESPONSE]),
+        "climb": (climb[["E", "F"]], climb[paper.RESPONSE]),
+        "composite": (paper.composite_design().natural, composite[paper.RESPONSE]),
         "verification": (pd.DataFrame([OPTIMUM] * len(angles)), angles),
     }

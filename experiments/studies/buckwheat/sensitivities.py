@@ -23,7 +23,7 @@ import typer
 from experiments.cases import Store, run_cases
 from experiments.errors import StoreError
 from experiments.files import write_text
-from experiments.studies.buckwheat.replay import Replay
+from experiments.studies.buckwheat.replay import LEAST_RUNS, Replay
 from experiments.studies.buckwheat.runs import DESIGNS
 from experiments.studies.buckwheat.variants import BASE, Variant, chosen_variants, variants
 
@@ -42,17 +42,22 @@ class Sensitivities:
     """The 31 runs of every variant that was simulated, the base among them."""
 
     replays: dict[str, Replay]
+    """By variant; each with enough angles for its analysis."""
     settings: dict[str, Any]
     """How they were simulated: scale, modulus_scale, replicates."""
+    spoilt: tuple[str, ...] = ()
+    """Variants of which too few cases gave an angle."""
 
     @classmethod
     def read(cls, folder: Path) -> Sensitivities | None:
-        """Read what a folder holds; None where the base is missing."""
+        """Read what a folder holds; None without a base to compare with."""
         paths = {name: folder / f"{name}.csv" for name in variants()}
-        replays = {name: Replay(pd.read_csv(path)) for name, path in paths.items() if path.is_file()}
+        found = {name: Replay(pd.read_csv(path)) for name, path in paths.items() if path.is_file()}
+        replays = {name: replay for name, replay in found.items() if _is_usable(replay)}
         if BASE not in replays:
             return None
-        return cls(replays, json.loads((folder / SETTINGS).read_text(encoding="utf-8")))
+        settings = json.loads((folder / SETTINGS).read_text(encoding="utf-8"))
+        return cls(replays, settings, tuple(name for name in found if name not in replays))
 
     @cached_property
     def shifts(self) -> pd.DataFrame:
@@ -123,6 +128,12 @@ class Sensitivities:
         return self.replays[name].agreement(stages).rmse_without_own_noise.value
 
 
+def _is_usable(replay: Replay) -> bool:
+    """Whether every table has runs to compare, and the screening its effects."""
+    runs = replay.runs.dropna(subset=["angle"])["stage"].value_counts()
+    return "screening" in replay.analysed and all(runs.get(stage, 0) >= LEAST_RUNS for stage in DESIGNS)
+
+
 def run_variant(
     variant: Variant, store: Store, settings: dict[str, Any], device: str | None = None
 ) -> pd.DataFrame:
@@ -189,7 +200,7 @@ def main(
         print(f"{chosen.name}: {len(cases)} cases in {time.perf_counter() - started:.1f} s", flush=True)
     found = Sensitivities.read(out)
     if found is None:
-        print(f"nothing to compare yet: the variant {BASE} is missing")
+        print(f"nothing to compare yet: the variant {BASE} is missing, or gave too few angles")
         return
     for table in (
         found.shifts.drop(columns=["group", "title"]).dropna(how="all"),

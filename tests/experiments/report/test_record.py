@@ -49,7 +49,7 @@ def test_a_page_shows_the_numbers_of_its_cases(tmp_path: Path, campaign: Campaig
     replay = Replay(cases(1.5))
     shown = numbers_of(page, "Agreement")
     expected = replay.agreement().bias
-    assert shown[-1][5] == f"{expected.value:.2f} [{expected.low:.2f}, {expected.high:.2f}]"
+    assert shown[-1][5] == f"{expected.value:.2f} [{expected.low:.2f},\u00a0{expected.high:.2f}]"
     assert [row[0] for row in numbers_of(page, "Every run")].count("Table 6") == 13
     assert "In all 6 heaps in 45 s." in page
     # The campaign's own screening stands beside.
