@@ -28,7 +28,9 @@ DISCHARGE_OBSERVABLES = {
         "slope of the least-squares line of the mass fallen over time, from 20 to 70 % of all that falls; "
         "absent where fewer than three looks fall in between, and where the test failed",
     ),
-    "clogged": Observable("1", "1: the grains came to rest over the outlet; 0: they did not"),
+    "clogged": Observable(
+        "1", "1: grains rest over the middle of the outlet, or none came out; 0: the way is free"
+    ),
     "grains_lost": Observable("1", "grains that are neither in the container nor came out of it"),
 }
 
@@ -88,8 +90,18 @@ class DischargeController(PouredController[Discharge]):
         """Which grains have come out of the container, also those that have left the world, (n,) bool."""
 
     @abstractmethod
-    def end(self, view: WorldView) -> str:
-        """Measure the scene's own observables when all is at rest; why the test failed, or nothing."""
+    def over_outlet(self, view: WorldView) -> np.ndarray:
+        """Which grains are above the middle of the outlet, where no slope can end, (n,) bool."""
+
+    def why_clogged(self, view: WorldView) -> str:
+        """Reason of the failure when grains rest over the outlet."""
+        seen = self.course.observables
+        left, filled = seen["mass_left"], seen["filled_mass"]
+        return f"the outlet is clogged: {left:.3g} kg of {filled:.3g} kg stay above it"
+
+    def measure(self, view: WorldView) -> dict[str, float]:
+        """Observables of the scene's own, when all that could has come out and is at rest."""
+        return {}
 
     # ---- phases --------------------------------------------------------------------------------------------
 
@@ -111,19 +123,15 @@ class DischargeController(PouredController[Discharge]):
         course = self.course
         opened = course.phase_start - course.phases[-1]["time"]
         self._record(view, view.time - opened)
-        if self.rests(view):
-            self._measure_masses(view)
-            failure = self.end(view)
-            if not failure and (rate := course.flow_rate) is not None:
-                course.observables["flow_rate"] = rate
-            course.enter("rest", view)
+        at_rest, limit = self.rests(view), self.SETTLE_LIMIT
+        if not at_rest and view.time - opened - course.last_fall <= limit:
+            return Decision()
+        self._measure_masses(view)
+        course.enter("rest", view)
+        if not at_rest:
+            failure = f"the grains left did not come to rest within {limit:g} s of the last that fell"
             return Decision(done=True, failure=failure)
-        if view.time - opened - course.last_fall > self.SETTLE_LIMIT:
-            failure = (
-                f"the grains left did not come to rest within {self.SETTLE_LIMIT:g} s of the last that fell"
-            )
-            return Decision(done=True, failure=failure)
-        return Decision()
+        return Decision(done=True, failure=self._judge(view))
 
     def _record(self, view: WorldView, time: float) -> None:
         self.course.fallen.append([time, float(view.masses[self.came_out(view)].sum())])
@@ -135,7 +143,18 @@ class DischargeController(PouredController[Discharge]):
             "fallen_mass": self.course.fallen[-1][1],
             "mass_left": float(view.masses[inside].sum()),
             "discharge_time": self.course.last_fall,
-            "clogged": 0.0,
             "grains_lost": seen["grain_count"] - float(np.count_nonzero(inside | out)),
             "simulated_time": view.time,
         }
+
+    def _judge(self, view: WorldView) -> str:
+        """Measure a world at rest whose outlet is free; why the test failed where it is not."""
+        out, seen = self.came_out(view), self.course.observables
+        blocked = (view.alive & ~out & self.over_outlet(view)).any() or not out.any()
+        seen["clogged"] = float(blocked)
+        if blocked:
+            return self.why_clogged(view)
+        seen |= self.measure(view)
+        if (rate := self.course.flow_rate) is not None:
+            seen["flow_rate"] = rate
+        return ""

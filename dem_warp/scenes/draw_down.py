@@ -20,9 +20,9 @@ from dem_warp.walls import Mesh, Plane, Wall
 
 GATE = 2
 OVER_SLOT = 0.25
-"""Grains at rest nearer to the middle than this part of the slot's width stand on an arch, or on the heap."""
+"""Grains nearer to the middle than this part of the slot's width are above its middle."""
 
-_FLANK = "of the least-squares line through the part that rises from 20 to 80 % of its height"
+_FLANK = "of the least-squares line through the part that rises from 10 to 90 % of its height"
 
 
 @dataclass(frozen=True)
@@ -140,22 +140,28 @@ class DrawDownController(DischargeController):
         """Below the upper floor."""
         return view.alive & (view.positions[:, 2] < self.case.scene.drop)
 
-    def end(self, view: WorldView) -> str:
-        """Measure the slopes and the heap, and see whether the way was free between them."""
-        box, below = self.case.scene, self.came_out(view)
-        above = view.alive & ~below
-        x = view.positions[:, 0]
-        stopped = above & (np.abs(x) < OVER_SLOT * box.slot)
-        if not stopped.any():
-            self.course.observables["mass_left_left"] = float(view.masses[above & (x < 0)].sum())
-            self.course.observables |= self._angles("shear_angle", view.positions[above])
-            self.course.observables |= self._angles("repose_angle", view.positions[below])
-            return ""
-        self.course.observables["clogged"] = 1.0
-        under = below & (np.abs(x) < box.slot / 2) & (view.positions[:, 2] > box.drop - 2 * self.reach)
+    def over_outlet(self, view: WorldView) -> np.ndarray:
+        """Near the plane in the middle of the slot."""
+        return np.abs(view.positions[:, 0]) < OVER_SLOT * self.case.scene.slot
+
+    def why_clogged(self, view: WorldView) -> str:
+        """The heap stopped the flow, or an arch did."""
+        box, (x, _, z) = self.case.scene, view.positions.T
+        under = self.came_out(view) & (np.abs(x) < box.slot / 2) & (z > box.drop - 2 * self.reach)
         if under.any():
             return "the heap has grown up to the slot: raise the drop, or lower the fill"
-        return f"the slot is clogged: {np.count_nonzero(stopped)} grains stand over its middle"
+        return super().why_clogged(view)
+
+    def measure(self, view: WorldView) -> dict[str, float]:
+        """The slopes above and the heap below."""
+        below = self.came_out(view)
+        above = view.alive & ~below
+        left = view.masses[above & (view.positions[:, 0] < 0)].sum()
+        return (
+            {"mass_left_left": float(left)}
+            | self._angles("shear_angle", view.positions[above])
+            | self._angles("repose_angle", view.positions[below])
+        )
 
     def _angles(self, name: str, positions: np.ndarray) -> dict[str, float]:
         """Slopes of a bed to either side of the middle that can be seen, and their mean where both can."""

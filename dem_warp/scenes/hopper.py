@@ -21,7 +21,7 @@ DEPTH = 6.0
 """Grains leave the world this many of their bounding radii below the outlet, where they fall freely."""
 
 OVER_OUTLET = 0.25
-"""Grains at rest nearer to the axis than this part of the outlet's diameter stand on an arch."""
+"""Grains nearer to the axis than this part of the outlet's diameter are above its middle."""
 
 
 @dataclass(frozen=True)
@@ -108,14 +108,7 @@ class HopperController(DischargeController):
         """Below the floor, where a grain that left the world has its last place."""
         return view.positions[:, 2] < 0.0
 
-    def end(self, view: WorldView) -> str:
-        """Look for an arch over the outlet."""
+    def over_outlet(self, view: WorldView) -> np.ndarray:
+        """Near the axis."""
         from_axis = np.hypot(view.positions[:, 0], view.positions[:, 1])
-        arch = view.alive & ~self.came_out(view) & (from_axis < OVER_OUTLET * self.case.scene.outlet)
-        if not arch.any():
-            return ""
-        seen = self.course.observables
-        seen["clogged"] = 1.0
-        return (
-            f"the outlet is clogged: {seen['mass_left']:.3g} kg of {seen['filled_mass']:.3g} kg stay above it"
-        )
+        return from_axis < OVER_OUTLET * self.case.scene.outlet

@@ -35,7 +35,7 @@ class PouredScene(ABC):
     rain_rate, rain_speed : float
         Grains a second, and the speed at which they enter [m/s].
     grain_count : int, optional
-        Grains to pour; by default as many as fill the container, what stands above its brim being removed.
+        Grains to pour; by default until four lie above the brim, and what stands above it is removed.
     rest_speed, rest_time : float
         Grains rest when their root mean square speed has been below `rest_speed` [m/s], and none has passed
         ten times that, for `rest_time` [s].

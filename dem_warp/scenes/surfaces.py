@@ -7,7 +7,7 @@ import numpy as np
 TOP_OF_GRAIN = 0.5
 """The surface lies this part of a grain's bounding radius above the highest centres."""
 
-FLANK = (0.2, 0.8)
+FLANK = (0.1, 0.9)
 """A flank is fitted where it rises between these parts of its height, clear of its foot and of a flat top."""
 
 LEAST_RISE = 4.0

@@ -51,7 +51,7 @@ def test_a_flank_is_measured_without_its_foot_and_its_flat_top(degrees):
     rise = math.tan(math.radians(degrees))
     x = np.arange(40.0)
     z = np.clip(rise * (x - 8.0), 0.0, rise * 20.0)
-    # The foot ends at 0 and the top at 20 rises, of which 20 to 80 % are 4 to 16: on the straight part alone.
+    # The foot ends at 0 and the top at 20 rises, of which 10 to 90 % are 2 to 18: on the straight part alone.
     assert flank_angle(x, z, 0.1) == pytest.approx(degrees, rel=1e-12)
     assert flank_angle(x, z[::-1], 0.1) == pytest.approx(degrees, rel=1e-12)
 
@@ -62,7 +62,7 @@ def test_no_flank_is_seen_where_there_is_none():
     assert flank_angle(x[:2], x[:2], 0.1) is None
     # A bed of one layer, whose surface is rough by less than two grains.
     assert flank_angle(x, 0.4 * x, 1.0) is None
-    # A step, of which nothing lies between 20 and 80 %.
+    # A step, of which nothing lies between 10 and 90 %.
     assert flank_angle(x, 9.0 * (x > 4.0), 1.0) is None
 
 
