@@ -68,8 +68,8 @@ SKETCHES = {
         after=1.9,
     ),
     "draw-down": Sketch(
-        DrawDown(width=0.13, depth=0.022, fill_depth=0.06, slot=0.032, drop=0.07, wall_material=STEEL),
-        View(half_width=0.07, bottom=-0.003, top=0.14),
+        DrawDown(width=0.13, depth=0.022, fill_depth=0.06, slot=0.032, drop=0.085, wall_material=STEEL),
+        View(half_width=0.07, bottom=-0.003, top=0.155),
         phase="rest",
         after=0.0,
     ),

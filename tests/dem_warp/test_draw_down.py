@@ -82,7 +82,7 @@ def test_a_heap_that_reaches_the_slot_is_a_failure_with_its_reason(runs):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"slot": 0.096}, r"DrawDown.slot: must be below the width 0.096 \[m\], got 0.096"),
+        ({"slot": 0.08}, r"DrawDown.slot: must be below the width 0.08 \[m\], got 0.08"),
         ({"drop": 0.0}, "DrawDown.drop: must be positive and finite, got 0.0"),
         ({"depth": float("inf")}, "DrawDown.depth: must be positive and finite, got inf"),
     ],
