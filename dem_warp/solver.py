@@ -31,15 +31,18 @@ from dem_warp.walls import Motion
 CHUNK = 256
 """Steps that `advance` takes at the least; a multiple of every length of a cycle."""
 
-SHORTEST_CYCLE, LONGEST_CYCLE = 2, 32
+SHORTEST_CYCLE, LONGEST_CYCLE = 2, 64
 SKIN_PER_CYCLE = 0.15
 """Part of the skin that the pace of a world may use up between two looks at the neighbour list."""
 
 LOOK_CHUNKS = 16
 """Chunks after which the length of a cycle is chosen anew, from how fast the grains have become."""
 
-FULL_DEVICE_THREADS = 60_000
-"""Threads that fill a large GPU; below it, more lanes a grain shorten a step."""
+FULL_DEVICE_THREADS = 84_480
+"""Threads of a step that a large GPU, of 132 multiprocessors, runs at once; with fewer of them there is room
+for more lanes a grain, which shorten a step."""
+
+MOST_LANES = 16
 
 
 @dataclass(frozen=True)
@@ -158,6 +161,10 @@ class Solver:
         self._rebuild(0)
         self._look_back(0)
 
+    def _whole_warps(self, threads: int) -> int:
+        """Threads that fill whole warps of a GPU, whose lanes work together."""
+        return -(-threads // WARP) * WARP if self.device.is_cuda else threads
+
     def _launch(self, kernel: Any, dim: int, inputs: list[Any]) -> None:
         wp.launch(kernel, dim, inputs=inputs, device=self.device, block_dim=BLOCK)
 
@@ -169,14 +176,14 @@ class Solver:
         if not self.device.is_cuda:
             return 1
         grains = max(len(self._running) * self.layout.grain_count, 1)
-        lanes = MIN_LANES
-        while lanes < WARP // 2 and lanes * grains < FULL_DEVICE_THREADS:
-            lanes *= 2
+        lanes = MOST_LANES
+        while lanes > MIN_LANES and lanes * grains > FULL_DEVICE_THREADS:
+            lanes //= 2
         return lanes
 
     def _step(self, read: int) -> None:
         slots = len(self._running) * self.layout.grain_count
-        threads = -(-slots * self.lanes // WARP) * WARP if self.device.is_cuda else slots
+        threads = self._whole_warps(slots * self.lanes)
         inputs = [
             self.lanes, slots, self.model, self.running, self.grains[read], self.hood, self.alive, self.flags,
             self.grains[1 - read],
@@ -191,12 +198,17 @@ class Solver:
         spheres, grains = self.layout.sphere_total, self.grains[read]
         cells, lists = self._cell_kernels, self._list_kernels
         self._launch(cells.bin_spheres, spheres, [self.model, grains, self.alive, self.stale, self.cells])
-        self._launch(cells.open_buckets, spheres, [self.model, self.stale, self.cells])
+        self._launch(cells.open_buckets, self._whole_warps(spheres), [self.model, self.stale, self.cells])
         self._launch(cells.fill_buckets, spheres, [self.model, grains, self.stale, self.cells])
         self._launch(cells.search, spheres, [self.model, grains, self.stale, self.cells])
         self._launch(lists.write_lists, spheres, [self.model, self.stale, self.cells, self.hood, self.flags])
         finish = [grains, self.cells, self.hood, self.stale, self.any_stale, self.rebuilds]
         self._launch(lists.finish, self.layout.world_count, finish)
+
+    def _rebuild_together(self, steps: int, read: int) -> None:
+        inputs = [steps, self.model, self.grains[read], self.alive, self.idle, self.hood, self.stale]
+        self._launch(self._watch_kernels.join, self.layout.grain_total, inputs)
+        self._rebuild(read)
 
     def _look_ahead(self, steps: int, read: int) -> None:
         """See to it that the next steps meet every contact."""
@@ -205,13 +217,13 @@ class Solver:
         seen = [self.model, grains, self.alive, self.idle]
         inputs = [steps, *seen, self.fastest, self.hood, self.stale, self.any_stale]
         self._launch(watch.mark_stale, total, inputs)
-        wp.capture_if(self.any_stale, self._rebuild, read=read)
+        wp.capture_if(self.any_stale, self._rebuild_together, steps=steps, read=read)
         threads = total * WARP if self.device.is_cuda else total
         self._launch(watch.select_near, threads, [*seen, self.hood, self.fastest])
 
     def _look_back(self, read: int) -> None:
         """Find out how fast the grains have become, and whether all contacts were met."""
-        row = -(-self.layout.grain_count // WARP) * WARP if self.device.is_cuda else self.layout.grain_count
+        row = self._whole_warps(self.layout.grain_count)
         inputs = [
             row, self.model, self.grains[read], self.alive, self.idle, self.hood, self.fastest, self.flags,
         ]  # fmt: skip

@@ -23,7 +23,7 @@ SPHERE_MASK = (1 << SPHERE_BITS) - 1
 MAX_PARTNERS = 1 << SPHERE_BITS
 MAX_SPHERES_PER_GRAIN = 1 << (31 - SPHERE_BITS)
 
-FRAMES = 64
+FRAMES = 128
 """Steps for which the places of the walls are kept: a power of two above the longest cycle."""
 
 

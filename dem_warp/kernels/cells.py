@@ -10,6 +10,7 @@ from types import SimpleNamespace
 
 import warp as wp
 
+from dem_warp.kernels.lanes import ALL_LANES, WARP, from_lane, lanes_with, running_sum
 from dem_warp.kernels.packing import packing
 from dem_warp.kernels.triangles import triangle_functions
 from dem_warp.kernels.walls import wall_functions
@@ -32,6 +33,7 @@ def cell_kernels(build: Build) -> SimpleNamespace:
     triangles = triangle_functions(precision)
     spheres_each = wp.constant(build.sphere_count)
     walls_each = wp.constant(build.wall_count)
+    first_cell = wp.constant(0 if build.cooperative else OWN_CELL)
     module = wp.get_module(f"dem_warp_cells_{build.name}")
     wp.set_module_options({"enable_backward": False}, module)
 
@@ -73,14 +75,32 @@ def cell_kernels(build: Build) -> SimpleNamespace:
         cells.found_count[i] = 0
         cells.rank[i] = wp.atomic_add(cells.bucket_size, b, 1)
 
-    @wp.kernel(module=module)
+    @wp.func
+    def room_for(cells: Cells, thread: int, w: int, size: int) -> int:
+        """Where `size` places of a world begin; the lanes of a warp, if all of that world, ask at once."""
+        through = running_sum(size)
+        of_warp = from_lane(through, WARP - 1)
+        begin = int(0)
+        if lanes_with(w == from_lane(w, 0)) == ALL_LANES:
+            if thread % WARP == 0 and of_warp > 0:
+                begin = wp.atomic_add(cells.cursor, w, of_warp)
+            begin = from_lane(begin, 0) + through - size
+        elif size > 0:
+            begin = wp.atomic_add(cells.cursor, w, size)
+        return begin
+
+    @wp.kernel(module=module, grid_stride=False)
     def open_buckets(model: Model, stale: wp.array(dtype=int), cells: Cells):
         """Gives each occupied bucket its place; which place is a race, and nothing depends on it."""
         i = wp.tid()
-        w = i // (spheres_each * model.grain_count)
-        if stale[w] != 0 and cells.rank[i] == 0:
-            b = cells.bucket[i]
-            cells.bucket_start[b] = wp.atomic_add(cells.cursor, w, cells.bucket_size[b])
+        w = wp.min(i // (spheres_each * model.grain_count), stale.shape[0] - 1)
+        size = int(0)
+        if i < cells.rank.shape[0] and stale[w] != 0:
+            if cells.rank[i] == 0:
+                size = cells.bucket_size[cells.bucket[i]]
+        begin = room_for(cells, i, w, size)
+        if size > 0:
+            cells.bucket_start[cells.bucket[i]] = begin
 
     @wp.kernel(module=module)
     def fill_buckets(model: Model, grains: Grains, stale: wp.array(dtype=int), cells: Cells):
@@ -95,9 +115,10 @@ def cell_kernels(build: Build) -> SimpleNamespace:
     @wp.func
     def append(cells: Cells, i: int, partner: int):
         """Adds a partner to those of sphere `i`, in any order; past the capacity only the count goes on."""
-        n = wp.atomic_add(cells.found_count, i, 1)
+        n = cells.found_count[i]
         if n < cells.found_capacity:
             cells.found[i * cells.found_capacity + n] = partner
+        cells.found_count[i] = n + 1
 
     @wp.func
     def append_triangles(
@@ -123,9 +144,11 @@ def cell_kernels(build: Build) -> SimpleNamespace:
 
     @wp.kernel(module=module)
     def search(model: Model, grains: Grains, stale: wp.array(dtype=int), cells: Cells):
-        """Partners of each sphere: pairs in its own bucket, and with the half of the buckets ahead of it.
+        """Partners of each sphere.
 
-        Threads follow the buckets, so that neighbouring threads read the same memory.
+        Threads follow the buckets, so that neighbouring threads read the same memory. One thread alone meets
+        each pair once: in its own bucket, and in the half of the buckets ahead of it. Many at once find each
+        its own partners, so that nobody has to wait for a place in another one's list.
         """
         slot = wp.tid()
         w = slot // (spheres_each * model.grain_count)
@@ -138,11 +161,12 @@ def cell_kernels(build: Build) -> SimpleNamespace:
         a = pack.load_sphere(cells.ordered, slot)
         reach = pack.last(a) + world.skin + world.reach
         c = cell_of(a, world)
-        for n in range(OWN_CELL, CELLS_AROUND):
+        own = int(0)
+        for n in range(first_cell, CELLS_AROUND):
             b = bucket_of(c[0] + n % 3 - 1, c[1] + (n // 3) % 3 - 1, c[2] + n // 9 - 1, cells.bits, w)
             begin = first + cells.bucket_start[b]
             end = begin + cells.bucket_size[b]
-            if n == OWN_CELL:
+            if n == OWN_CELL and first_cell == OWN_CELL:
                 begin = slot + 1
             for k in range(begin, end):
                 q = pack.load_sphere(cells.ordered, k)
@@ -151,8 +175,15 @@ def cell_kernels(build: Build) -> SimpleNamespace:
                 if wp.dot(d, d) < touching * touching:
                     j = cells.order[k]
                     if j // spheres_each != g:
-                        append(cells, i, j - first)
-                        append(cells, j, i - first)
+                        if wp.static(build.cooperative):
+                            if own < cells.found_capacity:
+                                cells.found[i * cells.found_capacity + own] = j - first
+                            own += 1
+                        else:
+                            append(cells, i, j - first)
+                            append(cells, j, i - first)
+        if wp.static(build.cooperative):
+            cells.found_count[i] = own
         for k in range(walls_each):
             if walls.touches(model, w, k, pack.place(a, world), reach, grains.step[w]):
                 append(cells, i, model.grain_count * spheres_each + k)

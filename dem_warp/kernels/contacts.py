@@ -28,6 +28,9 @@ def contact_functions(build: Build) -> SimpleNamespace:
     law = contact_law(build.mechanisms)
     is_apart = acts_apart(build.mechanisms)
     memory_each = wp.constant(memory_size(build.mechanisms))
+    # the lanes of a warp that meet nothing wait for the others: let them load and work as if, so that nobody
+    # waits for the distance before the rest is loaded
+    is_speculative = build.cooperative and not build.mechanisms and not build.has_mesh
     walls = wall_functions(build.without_mechanisms)
     spheres_each = wp.constant(build.sphere_count)
     walls_each = wp.constant(build.wall_count)
@@ -156,7 +159,7 @@ def contact_functions(build: Build) -> SimpleNamespace:
             d = pack.difference(a, b, world)
             reach = radius + pack.last(b) + apart
             meets = wp.dot(d, d) < reach * reach
-            if meets:
+            if wp.static(is_speculative) or meets:
                 c = meet_sphere(grains, world, c, w * model.grain_count + partner // spheres_each, a, b, d)
         else:
             number = partner - wall_base
@@ -167,7 +170,7 @@ def contact_functions(build: Build) -> SimpleNamespace:
             if wp.static(build.has_mesh):
                 if number >= walls_each and meets:
                     meets = walls.touches(model, w, number, pack.place(a, world), radius + apart, step)
-        if meets:
+        if wp.static(is_speculative) or meets:
             c.lever = lever_of(grains, world, g, a, c.normal * (real(0.5) * c.overlap - radius))
             c.mobility += real(1.0) / (mass * wp.dot(c.lever, c.lever))
             c.velocity += surface_velocity(grains, g, c.lever)
@@ -185,7 +188,12 @@ def contact_functions(build: Build) -> SimpleNamespace:
                 model.contact[pair], c, displacement, hood.memory, slot * memory_each
             )
             torque += wp.cross(c.lever, force)
-            pack.store_vec4(hood.history, slot, pack.stamp(displacement, step + 1))
+            if meets:
+                pack.store_vec4(hood.history, slot, pack.stamp(displacement, step + 1))
+        if wp.static(is_speculative) and not meets:
+            force = vec3()
+            torque = vec3()
+            rolling = real(0.0)
         return force, torque, rolling
 
     return SimpleNamespace(nears=nears, contact=contact)

@@ -1,9 +1,15 @@
 """What the lanes of a GPU warp tell one another; on a CPU each is a warp of its own lane."""
 
+import functools
+from typing import Any
+
 import warp as wp
 
 WARP = 32
 """Lanes of a warp."""
+
+ALL_LANES = wp.constant(-1)
+"""What `lanes_with` gives when all lanes of a GPU warp have it."""
 
 BLOCK = 128
 """Threads of a block, that share memory."""
@@ -16,6 +22,12 @@ SHARED = """
     return cell;
 #else
     return value;
+#endif
+"""
+
+PREFETCH = """
+#if defined(__CUDA_ARCH__)
+    asm volatile("prefetch.global.L1 [%0];" :: "l"(a.data + i));
 #endif
 """
 
@@ -94,3 +106,13 @@ def from_lane(value: int, lane: int) -> int: ...
 #endif
 """)
 def load_pair(a: wp.array(dtype=wp.vec2i), i: int) -> wp.vec2i: ...
+
+
+@functools.cache
+def prefetcher(kind: Any) -> Any:
+    """Function (array of `kind`, index) that calls for an element which will be read a while later."""
+
+    @wp.func_native(PREFETCH)
+    def prefetch(a: wp.array(dtype=kind), i: int): ...
+
+    return prefetch

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import warp as wp
 
 from dem_warp.kernels.integration import integration_functions
-from dem_warp.kernels.lanes import WARP
+from dem_warp.kernels.lanes import WARP, prefetcher
 from dem_warp.kernels.packing import packing
 from dem_warp.kernels.summation import cooperative_sum, serial_sum
 from dem_warp.types import Build, WorldFlag, device_structs
@@ -27,11 +27,18 @@ def step_kernels(build: Build) -> SimpleNamespace:
     pack = packing(precision)
     motion = integration_functions(precision)
     sum_contacts = (cooperative_sum if build.cooperative else serial_sum)(build)
+    prefetch_items, prefetch_turns, prefetch_places, prefetch_inertia = (
+        prefetcher(kind) for kind in (wp.vec2i, wp.quatd, wp.vec3d, vec4)
+    )
     spheres_each = wp.constant(build.sphere_count)
     module = wp.get_module(f"dem_warp_step_{build.name}")
     wp.set_module_options(
         {"fast_math": build.cooperative and precision.is_fixed_point, "enable_backward": False}, module
     )
+
+    # five blocks find room on a multiprocessor instead of four; laws beyond the base need the registers
+    is_base = precision.is_fixed_point and not build.mechanisms and not build.has_mesh
+    limits = {"cuda_max_registers": 96} if is_base else {}
 
     @wp.func
     def spread_spheres(
@@ -63,11 +70,12 @@ def step_kernels(build: Build) -> SimpleNamespace:
 
     @wp.func
     def move(
-        model: Model, world: World, grains: Grains, out: Grains, hood: Neighbours, alive: wp.array(dtype=int),
+        model: Model, grains: Grains, out: Grains, hood: Neighbours, alive: wp.array(dtype=int),
         flags: wp.array(dtype=int), w: int, g: int, step: int, force: vec3, torque: vec3, rolling: real,
         lane: int, lanes: int,
     ):  # fmt: skip
         """New pose, velocity, spin and spheres of a grain; every lane works it out, the first stores it."""
+        world = model.world[w]
         dt = world.time_step
         v4 = pack.load_vec4(grains.velocity, g)
         w4 = pack.load_vec4(grains.spin, g)
@@ -98,7 +106,7 @@ def step_kernels(build: Build) -> SimpleNamespace:
                 alive[g] = LEAVING
         spread_spheres(model, world, out, g, center, motion.rounded(turned), lane, lanes)
 
-    @wp.kernel(module=module, grid_stride=False)
+    @wp.kernel(module=module, grid_stride=False, **limits)
     def step(
         lanes: int,
         slot_count: int,
@@ -131,16 +139,20 @@ def step_kernels(build: Build) -> SimpleNamespace:
             step = grains_in.step[w]
             if lane == 0 and slot % model.grain_count == 0:
                 grains_out.step[w] = step + 1
-        world = model.world[w]
         if moving and step >= model.release_step[g]:
             count = hood.near.count[g]
             first = g * hood.capacity
+            if lane == 0:
+                prefetch_items(hood.near.item, first)
+                prefetch_turns(grains_in.orientation, g)
+                prefetch_places(grains_in.position, g)
+                prefetch_inertia(model.inertia, g)
         force, torque, rolling = sum_contacts(
-            model, world, grains_in, hood, w, g, count, first, step, thread & (WARP - 1), lane, lanes
+            model, grains_in, hood, w, g, count, first, step, thread & (WARP - 1), lane, lanes
         )
         if moving:
             move(
-                model, world, grains_in, grains_out, hood, alive,
+                model, grains_in, grains_out, hood, alive,
                 flags, w, g, step, force, torque, rolling,
                 lane, lanes,
             )  # fmt: skip

@@ -14,8 +14,11 @@ from dem_warp.kernels.contacts import contact_functions
 from dem_warp.kernels.lanes import WARP, from_lane, running_sum, shared, sync_warp
 from dem_warp.types import Build, device_structs
 
-MIN_LANES = 4
+MIN_LANES = 2
 COMPONENTS = 7  # force, torque, rolling torque
+ADDERS = 8
+"""Lanes that add up one grain's components; a power of two."""
+
 SUMS = COMPONENTS * WARP // MIN_LANES
 
 
@@ -24,17 +27,18 @@ def serial_sum(build: Build):
     """Function that sums a grain's contacts on one thread."""
     real, vec3 = build.precision.real, build.precision.vec3
     types = device_structs(build.precision)
-    Model, World, Grains, Neighbours = types.Model, types.World, types.Grains, types.Neighbours
+    Model, Grains, Neighbours = types.Model, types.Grains, types.Neighbours
     contacts = contact_functions(build)
 
     @wp.func
     def sum_contacts(
-        model: Model, world: World, grains: Grains, hood: Neighbours, w: int, g: int, count: int, first: int,
+        model: Model, grains: Grains, hood: Neighbours, w: int, g: int, count: int, first: int,
         step: int, thread: int, lane: int, lanes: int,
     ):  # fmt: skip
         force = vec3()
         torque = vec3()
         rolling = real(0.0)
+        world = model.world[w]
         for item in range(first, first + count):
             f, t, r = contacts.contact(model, world, grains, hood, w, g, item, step)
             force += f
@@ -70,13 +74,12 @@ def _totals(build: Build) -> SimpleNamespace:
         result(6 * (WARP + 1) + thread, r, True)
 
     @wp.func
-    def add(group: int, lane: int, lanes: int, begin: int, end: int):
-        """Adds results `begin` to `end` to the group's sums, one component a lane, in order."""
-        for i in range(lane, COMPONENTS, lanes):
-            value = total(group * COMPONENTS + i, real(0.0), False)
-            for k in range(begin, end):
-                value += result(i * (WARP + 1) + k, real(0.0), False)
-            total(group * COMPONENTS + i, value, True)
+    def add(group: int, i: int, begin: int, end: int):
+        """Adds component `i` of the results from `begin` to `end` to the group's sum, in order."""
+        value = total(group * COMPONENTS + i, real(0.0), False)
+        for k in range(begin, end):
+            value += result(i * (WARP + 1) + k, real(0.0), False)
+        total(group * COMPONENTS + i, value, True)
 
     @wp.func
     def read(group: int, i: int) -> real:
@@ -90,7 +93,7 @@ def cooperative_sum(build: Build):
     """Function that sums the contacts of a warp's grains; every lane of the warp must call it."""
     vec3 = build.precision.vec3
     types = device_structs(build.precision)
-    Model, World, Grains, Neighbours = types.Model, types.World, types.Grains, types.Neighbours
+    Model, Grains, Neighbours = types.Model, types.Grains, types.Neighbours
     contacts = contact_functions(build)
     totals = _totals(build)
 
@@ -106,8 +109,22 @@ def cooperative_sum(build: Build):
         return group
 
     @wp.func
+    def add_up(thread: int, lanes: int, start: int, count: int, batch: int, group: int, last: int):
+        """Adds the results of a batch to the sums of its groups, from `group` to the `last`.
+
+        Several groups at a time, a component a lane.
+        """
+        i = thread % ADDERS
+        for n in range((last - group) // (WARP // ADDERS) + 1):
+            own = group + n * (WARP // ADDERS) + thread // ADDERS
+            begin = from_lane(start, own * lanes) - batch
+            end = begin + from_lane(count, own * lanes)
+            if own <= last and i < COMPONENTS:
+                totals.add(own, i, wp.max(begin, 0), wp.min(end, WARP))
+
+    @wp.func
     def sum_contacts(
-        model: Model, world: World, grains: Grains, hood: Neighbours, w: int, g: int, count: int, first: int,
+        model: Model, grains: Grains, hood: Neighbours, w: int, g: int, count: int, first: int,
         step: int, thread: int, lane: int, lanes: int,
     ):  # fmt: skip
         """`count` is 0 for a lane whose grain takes no part; `thread` is the lane's number in the warp."""
@@ -115,21 +132,25 @@ def cooperative_sum(build: Build):
         totals.clear(group, lane, lanes)
         through = running_sum(wp.where(lane == 0, count, 0))
         start = from_lane(through, group * lanes) - count
-        for batch in range(0, from_lane(through, WARP - 1), WARP):
-            item = batch + thread
-            source = group_of(item, start, lanes) * lanes
+        items = from_lane(through, WARP - 1)
+        for batch in range(0, items, WARP):
+            item = wp.min(batch + thread, items - 1)
+            its_group = group_of(item, start, lanes)
+            source = its_group * lanes
             place = item - from_lane(start, source)
             gi = from_lane(g, source)
             wi = from_lane(w, source)
             step_i = from_lane(step, source)
             first_i = from_lane(first, source)
-            if place < from_lane(count, source):
+            if batch + thread < items:
                 f, t, r = contacts.contact(
                     model, model.world[wi], grains, hood, wi, gi, first_i + place, step_i
                 )
                 totals.write(thread, f, t, r)
             sync_warp()
-            totals.add(group, lane, lanes, wp.max(start - batch, 0), wp.min(start + count - batch, WARP))
+            add_up(
+                thread, lanes, start, count, batch, from_lane(its_group, 0), from_lane(its_group, WARP - 1)
+            )
             sync_warp()
         sync_warp()
         force = vec3(totals.read(group, 0), totals.read(group, 1), totals.read(group, 2))

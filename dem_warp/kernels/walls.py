@@ -33,6 +33,15 @@ def wall_functions(build: Build) -> SimpleNamespace:
         return vec3(real(v[0]), real(v[1]), real(v[2]))
 
     @wp.func
+    def root(x: wp.float64) -> wp.float64:
+        """Square root; in the mixed precision a float32 root and a step of Newton's, good to 1e-14."""
+        if wp.static(build.precision.is_fixed_point):
+            guess = wp.max(wp.sqrt(float(x)), float(TINY))
+            rest = x - wp.float64(guess) * wp.float64(guess)
+            return wp.float64(guess) + rest * wp.float64(0.5 / guess)
+        return wp.sqrt(x)
+
+    @wp.func
     def frame_of(model: Model, wall: int, step: int) -> Frame:
         """Where a wall stands in a step, one of those that `place_walls` was last asked for."""
         return model.frame[wall * FRAMES + step % FRAMES]
@@ -138,7 +147,7 @@ def wall_functions(build: Build) -> SimpleNamespace:
         normal = rounded(axis)
         if wall.kind == CYLINDER and along >= wp.float64(0.0) and along <= wall.length:
             across = r - axis * along
-            off_axis = wp.max(wp.length(across), wp.float64(TINY))
+            off_axis = wp.max(root(wp.dot(across, across)), wp.float64(TINY))
             distance = wp.abs(off_axis - wall.radius)
             outward = rounded(across) / real(off_axis)
             normal = wp.where(off_axis > wall.radius, outward, -outward)

@@ -22,15 +22,18 @@ HEADROOM = 3.0
 OWN_HEADROOM = 1.5
 """Speed that a grain itself is expected to reach, over what it has."""
 
-LEAST_PATH = 0.05
+LEAST_PATH = 0.025
 """Part of the skin that is allowed for at the least: grains at rest may be set in motion."""
+
+JOINED = 0.25
+"""Part of the skin, up to one half, from which on a world joins a rebuild that another one calls for."""
 
 LATE_REBUILD = wp.constant(int(WorldFlag.LATE_REBUILD))
 
 
 @functools.cache
 def watch_kernels(build: Build) -> SimpleNamespace:
-    """`mark_stale` and `select_near` before some steps, `find_fastest` after them."""
+    """`mark_stale`, `join` and `select_near` before some steps, `find_fastest` after them."""
     precision = build.precision
     real = precision.real
     types = device_structs(precision)
@@ -68,6 +71,14 @@ def watch_kernels(build: Build) -> SimpleNamespace:
         frame = walls.frame_of(model, index, grains.step[w])
         return real(walls.path(model.wall[index], frame, world, time))
 
+    @wp.func
+    def uses_up(
+        model: Model, world: World, grains: Grains, hood: Neighbours, g: int, ahead: int, part: real
+    ) -> bool:
+        """Whether a grain may come farther than a part of the skin within some steps."""
+        speed = real(OWN_HEADROOM * speed_of(model, grains, g))
+        return hood.travel[g] + speed * real(ahead) * world.time_step > part * world.skin
+
     @wp.kernel(module=module)
     def mark_stale(
         ahead: int,
@@ -97,11 +108,29 @@ def watch_kernels(build: Build) -> SimpleNamespace:
                 if real(2.0) * whole > world.skin:
                     stale[w] = 1
                     any_stale[0] = 1
-        if alive[g] > 0:
-            speed = real(OWN_HEADROOM * speed_of(model, grains, g))
-            if real(2.0) * (hood.travel[g] + speed * real(ahead) * world.time_step) > world.skin:
+        if alive[g] > 0 and uses_up(model, world, grains, hood, g, ahead, real(0.5)):
+            stale[w] = 1
+            any_stale[0] = 1
+
+    @wp.kernel(module=module)
+    def join(
+        ahead: int,
+        # model
+        model: Model,
+        # state in
+        grains: Grains,
+        alive: wp.array(dtype=int),
+        idle: wp.array(dtype=int),
+        hood: Neighbours,
+        # state out
+        stale: wp.array(dtype=int),
+    ):
+        """Marks the worlds that would soon be stale too: a rebuild of many is hardly longer than of one."""
+        g = wp.tid()
+        w = g // model.grain_count
+        if idle[w] == 0 and alive[g] > 0 and stale[w] == 0:
+            if uses_up(model, model.world[w], grains, hood, g, ahead, real(JOINED)):
                 stale[w] = 1
-                any_stale[0] = 1
 
     @wp.kernel(module=module, grid_stride=False)
     def select_near(
@@ -188,5 +217,5 @@ def watch_kernels(build: Build) -> SimpleNamespace:
             wp.atomic_max(fastest, w, speed)
 
     return SimpleNamespace(
-        mark_stale=mark_stale, select_near=select_near, find_fastest=find_fastest, module=module
+        mark_stale=mark_stale, join=join, select_near=select_near, find_fastest=find_fastest, module=module
     )
