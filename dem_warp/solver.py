@@ -14,7 +14,7 @@ from dem_warp.kernels.neighbours import neighbour_kernels
 from dem_warp.kernels.step import step_kernels
 from dem_warp.kernels.summation import MIN_LANES
 from dem_warp.kernels.walls import wall_kernels
-from dem_warp.kernels.watch import HEADROOM, watch_kernels
+from dem_warp.kernels.watch import watch_kernels
 from dem_warp.laws.contact_law import memory_size
 from dem_warp.model import WorldSetup
 from dem_warp.state import (
@@ -32,8 +32,8 @@ CHUNK = 256
 """Steps that `advance` takes at the least; a multiple of every length of a cycle."""
 
 SHORTEST_CYCLE, LONGEST_CYCLE = 2, 64
-SKIN_PER_CYCLE = 0.15
-"""Part of the skin that the pace of a world may use up between two looks at the neighbour list."""
+SKIN_PER_CYCLE = 0.1
+"""Part of the skin that the fastest grain of a world may use up between two looks at the neighbour list."""
 
 LOOK_CHUNKS = 16
 """Chunks after which the length of a cycle is chosen anew, from how fast the grains have become."""
@@ -254,7 +254,7 @@ class Solver:
         for w in self._running:
             world = self.worlds[w]
             falling = float(np.linalg.norm(world.gravity)) * chunks * CHUNK * world.time_step
-            path = HEADROOM * (fastest[w] + falling) * world.time_step
+            path = (fastest[w] + falling) * world.time_step
             free = min(free, SKIN_PER_CYCLE * world.skin / path) if path > 0 else free
         return int(2 ** np.floor(np.log2(max(free, SHORTEST_CYCLE))))
 

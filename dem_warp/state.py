@@ -221,7 +221,8 @@ def build_neighbours(
     near = device_structs(precision).Near()
     near.count = wp.zeros(layout.grain_total, dtype=int, device=device)
     near.item = wp.zeros(layout.grain_total * capacity, dtype=wp.vec2i, device=device)
-    near.path = wp.zeros(layout.world_count, dtype=precision.real, device=device)
+    near.path = wp.zeros(layout.grain_total, dtype=precision.real, device=device)
+    near.wall_path = wp.zeros(layout.world_count, dtype=precision.real, device=device)
     near.travel = wp.zeros(layout.grain_total, dtype=precision.real, device=device)
     hood.near = near
     return hood

@@ -222,7 +222,8 @@ def device_structs(precision: Precision) -> SimpleNamespace:
     class Near:  # what a step looks at; written anew every few steps
         count: wp.array(dtype=int)  # (grains,)
         item: wp.array(dtype=wp.vec2i)  # entries that may touch soon, and their slots, (grains * capacity,)
-        path: wp.array(dtype=real)  # farthest that a grain or wall may come meanwhile [m], (worlds,)
+        path: wp.array(dtype=real)  # farthest that a grain may come meanwhile [m], (grains,)
+        wall_path: wp.array(dtype=real)  # and any wall [m], (worlds,)
         travel: wp.array(dtype=real)  # of a grain when this was written [m], (grains,)
 
     @wp.struct

@@ -27,8 +27,8 @@ def step_kernels(build: Build) -> SimpleNamespace:
     pack = packing(precision)
     motion = integration_functions(precision)
     sum_contacts = (cooperative_sum if build.cooperative else serial_sum)(build)
-    prefetch_items, prefetch_turns, prefetch_places, prefetch_inertia = (
-        prefetcher(kind) for kind in (wp.vec2i, wp.quatd, wp.vec3d, vec4)
+    prefetch_item, prefetch_turn, prefetch_place, prefetch_four, prefetch_real = (
+        prefetcher(kind) for kind in (wp.vec2i, wp.quatd, wp.vec3d, vec4, real)
     )
     spheres_each = wp.constant(build.sphere_count)
     module = wp.get_module(f"dem_warp_step_{build.name}")
@@ -133,20 +133,26 @@ def step_kernels(build: Build) -> SimpleNamespace:
         step = int(0)
         moving = bool(False)
         if slot < slot_count:
-            w = running[slot // model.grain_count]
-            g = w * model.grain_count + slot % model.grain_count
-            moving = alive[g] > 0
-            step = grains_in.step[w]
-            if lane == 0 and slot % model.grain_count == 0:
-                grains_out.step[w] = step + 1
-        if moving and step >= model.release_step[g]:
-            count = hood.near.count[g]
+            w = slot // model.grain_count
+            place = slot - w * model.grain_count
+            if slot_count < alive.shape[0]:
+                w = running[w]
+            g = w * model.grain_count + place
             first = g * hood.capacity
             if lane == 0:
-                prefetch_items(hood.near.item, first)
-                prefetch_turns(grains_in.orientation, g)
-                prefetch_places(grains_in.position, g)
-                prefetch_inertia(model.inertia, g)
+                prefetch_item(hood.near.item, first)
+                prefetch_turn(grains_in.orientation, g)
+                prefetch_place(grains_in.position, g)
+                prefetch_four(model.inertia, g)
+                prefetch_real(hood.travel, g)
+            prefetch_four(model.shape_spheres, model.shape[g] * spheres_each + lane)
+            count = hood.near.count[g]
+            moving = alive[g] > 0
+            step = grains_in.step[w]
+            if not moving or step < model.release_step[g]:
+                count = 0
+            if lane == 0 and place == 0:
+                grains_out.step[w] = step + 1
         force, torque, rolling = sum_contacts(
             model, grains_in, hood, w, g, count, first, step, thread & (WARP - 1), lane, lanes
         )

@@ -1,8 +1,9 @@
 """Between two rebuilds: how fast a world is, whether its neighbour lists still hold, and what is near.
 
-All is done for some steps ahead. From the speed of the fastest grain or wall follows how far any of them may
-come in that time, so that only the entries of a list that are nearer than two such paths can touch: the step
-looks at these alone. Afterwards it is seen whether all kept to it; a world whose grains did not is flagged.
+All is done for some steps ahead. From the speeds of a grain and of the fastest one, which may strike it,
+follows how far it may come in that time, so that only the entries of a list that are nearer than the paths of
+the two can touch: the step looks at these alone. Afterwards it is seen whether all kept to it; a world whose
+grains did not is flagged.
 """
 
 import functools
@@ -14,13 +15,13 @@ from dem_warp.kernels.contacts import contact_functions
 from dem_warp.kernels.lanes import WARP, bit_count, lanes_with, largest_of_warp
 from dem_warp.kernels.packing import packing
 from dem_warp.kernels.walls import wall_functions
-from dem_warp.types import Build, WorldFlag, device_structs
+from dem_warp.types import SPHERE_MASK, Build, WorldFlag, device_structs
 
 HEADROOM = 3.0
-"""Speed allowed for, over that of the fastest grain: an impact makes a fast grain spin, a light one fly."""
+"""Speed that a grain is allowed to reach, over what it has: an impact makes a falling grain spin."""
 
-OWN_HEADROOM = 1.5
-"""Speed that a grain itself is expected to reach, over what it has."""
+EXPECTED = 1.5
+"""Speed that a grain is expected to reach, over what it has."""
 
 LEAST_PATH = 0.025
 """Part of the skin that is allowed for at the least: grains at rest may be set in motion."""
@@ -41,6 +42,7 @@ def watch_kernels(build: Build) -> SimpleNamespace:
     pack = packing(precision)
     contacts = contact_functions(build)
     walls = wall_functions(build.without_mechanisms)
+    spheres_each = wp.constant(build.sphere_count)
     walls_each = wp.constant(build.wall_count)
     lanes = wp.constant(WARP if build.cooperative else 1)
     module = wp.get_module(f"dem_warp_watch_{build.name}")
@@ -57,11 +59,12 @@ def watch_kernels(build: Build) -> SimpleNamespace:
         )
 
     @wp.func
-    def farthest_path(world: World, fastest: float, ahead: int) -> real:
-        """How far any grain or wall may come in some steps [m]."""
+    def farthest(world: World, speed: float, fastest: float, ahead: int) -> real:
+        """How far a grain may come in some steps [m], at its own speed or at that of one that strikes it."""
         time = real(ahead) * world.time_step
-        path = real(HEADROOM) * (real(fastest) + wp.length(world.gravity) * time) * time
-        return wp.clamp(path, real(LEAST_PATH) * world.skin, real(0.5) * world.skin)
+        falling = real(HEADROOM) * wp.length(world.gravity) * time
+        reached = real(wp.max(float(HEADROOM) * speed, fastest)) + falling
+        return wp.clamp(reached * time, real(LEAST_PATH) * world.skin, real(0.5) * world.skin)
 
     @wp.func
     def wall_path(model: Model, world: World, grains: Grains, w: int, i: int, steps: int) -> real:
@@ -76,7 +79,7 @@ def watch_kernels(build: Build) -> SimpleNamespace:
         model: Model, world: World, grains: Grains, hood: Neighbours, g: int, ahead: int, part: real
     ) -> bool:
         """Whether a grain may come farther than a part of the skin within some steps."""
-        speed = real(OWN_HEADROOM * speed_of(model, grains, g))
+        speed = real(EXPECTED * speed_of(model, grains, g))
         return hood.travel[g] + speed * real(ahead) * world.time_step > part * world.skin
 
     @wp.kernel(module=module)
@@ -94,20 +97,22 @@ def watch_kernels(build: Build) -> SimpleNamespace:
         stale: wp.array(dtype=int),
         any_stale: wp.array(dtype=int),
     ):
-        """Sets the path, and marks a world in which a grain or a wall may use up its half of the skin."""
+        """Sets the paths, and marks a world in which a grain or a wall may use up its half of the skin."""
         g = wp.tid()
         w = g // model.grain_count
         if idle[w] != 0:
             return
         world = model.world[w]
         if g % model.grain_count == 0:
-            hood.near.path[w] = farthest_path(world, fastest[w], ahead)
+            hood.near.wall_path[w] = real(0.0)
             for i in range(walls_each):
-                hood.near.path[w] = wp.max(hood.near.path[w], wall_path(model, world, grains, w, i, ahead))
+                path = wall_path(model, world, grains, w, i, ahead)
+                hood.near.wall_path[w] = wp.max(hood.near.wall_path[w], path)
                 whole = wall_path(model, world, grains, w, i, grains.step[w] + ahead - hood.rebuilt[w])
                 if real(2.0) * whole > world.skin:
                     stale[w] = 1
                     any_stale[0] = 1
+        hood.near.path[g] = farthest(world, speed_of(model, grains, g), fastest[w], ahead)
         if alive[g] > 0 and uses_up(model, world, grains, hood, g, ahead, real(0.5)):
             stale[w] = 1
             any_stale[0] = 1
@@ -152,7 +157,7 @@ def watch_kernels(build: Build) -> SimpleNamespace:
         if idle[w] != 0:
             return
         world = model.world[w]
-        margin = world.reach + real(2.0) * hood.near.path[w]
+        margin = world.reach + hood.near.path[g]
         step = grains.step[w]
         row = hood.list[w] * model.shape.shape[0] + g
         count = hood.count[row]
@@ -165,7 +170,11 @@ def watch_kernels(build: Build) -> SimpleNamespace:
             is_near = bool(False)
             if k < count:
                 entry = hood.entry[slot]
-                is_near = contacts.nears(model, world, grains, w, g, entry, margin, step)
+                partner = entry & SPHERE_MASK
+                path = hood.near.wall_path[w]
+                if partner < model.grain_count * spheres_each:
+                    path = hood.near.path[w * model.grain_count + partner // spheres_each]
+                is_near = contacts.nears(model, world, grains, w, g, entry, margin + path, step)
             bits = lanes_with(is_near)
             if is_near:
                 hood.near.item[found + bit_count(bits & ((1 << lane) - 1))] = wp.vec2i(entry, slot)
@@ -204,7 +213,7 @@ def watch_kernels(build: Build) -> SimpleNamespace:
             if alive[g] > 0:
                 speed = speed_of(model, grains, g)
                 travel = hood.travel[g]
-                if travel - hood.near.travel[g] > hood.near.path[w] or real(2.0) * travel > world.skin:
+                if travel - hood.near.travel[g] > hood.near.path[g] or real(2.0) * travel > world.skin:
                     wp.atomic_or(flags, w, LATE_REBUILD)
             if place == 0:
                 for i in range(walls_each):

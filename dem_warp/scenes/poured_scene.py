@@ -180,4 +180,4 @@ def default_skin(case: Case[Any]) -> float:
     """Skin that keeps both the lists short and the rebuilds rare [m]; longer steps want a larger one."""
     radius = case.grains.mean(lambda shape: float(shape.radii.mean())) * case.grains.size_mean
     path = case.scene.top_speed * case.time_step
-    return float(np.clip(24.0 * path, 0.5 * radius, radius))
+    return float(np.clip(24.0 * path, 0.7 * radius, radius))
