@@ -3,7 +3,8 @@
 Each family of problems is one file of `problems` and one line of `PROBLEMS`.
 
     python -m experiments.benchmarks.verification
-    python -m experiments.benchmarks.verification --only energy --only rigid-body --out out/verification
+    python -m experiments.benchmarks.verification --only energy --only rigid-body
+    python -m experiments.benchmarks.verification --only heap-angle --device cuda --out out/gpu
 
 The page of the last recorded run is record/verification/README.md. The exit code is 1 when a row fails.
 """
@@ -17,13 +18,17 @@ import typer
 import warp as wp
 
 from dem_warp.device import resolve_device
+from experiments.benchmarks.problems.beverloo import beverloo
 from experiments.benchmarks.problems.chapter import Chapter, Problem
 from experiments.benchmarks.problems.energy import energy
 from experiments.benchmarks.problems.friction_and_rolling import friction_and_rolling
+from experiments.benchmarks.problems.heap_angle import heap_angle
+from experiments.benchmarks.problems.janssen import janssen
 from experiments.benchmarks.problems.normal_impact import elastic_impact, restitution
 from experiments.benchmarks.problems.oblique_impact import micro_slip, oblique_impact, spinning_impact
-from experiments.benchmarks.problems.page import summary, write_page
+from experiments.benchmarks.problems.page import summary, write_chapter, write_page
 from experiments.benchmarks.problems.rigid_body import rigid_body
+from experiments.benchmarks.problems.stability import stability
 
 PROBLEMS: dict[str, Problem] = {
     "elastic-impact": elastic_impact,
@@ -34,46 +39,62 @@ PROBLEMS: dict[str, Problem] = {
     "friction-and-rolling": friction_and_rolling,
     "rigid-body": rigid_body,
     "energy": energy,
+    "janssen": janssen,
+    "beverloo": beverloo,
+    "heap-angle": heap_angle,
+    "stability": stability,
 }
+
+HEAVY = ("beverloo", "heap-angle", "stability")
+"""Problems that run only when they are named: minutes on a GPU, up to an hour on two cores."""
 
 RECORD = Path(__file__).with_name("record") / "verification"
 
 
-def run_problems(names: list[str], device: str) -> list[Chapter]:
-    """Chapters of the named problems, in the order of `PROBLEMS`; all where none is named."""
-    chapters = []
-    for name, problem in PROBLEMS.items():
-        if not names or name in names:
-            started = time.perf_counter()
-            chapters.append(problem(device))
-            seconds = time.perf_counter() - started
-            print(f"{name}: {summary(chapters[-1:])}, {seconds:.0f} s", flush=True)
-    return chapters
+def run_problem(name: str, device: str, folder: Path) -> Chapter:
+    """Run a problem and write its section of the page into a folder."""
+    started = time.perf_counter()
+    chapter = PROBLEMS[name](device)
+    seconds = time.perf_counter() - started
+    machine = f"{wp.get_device(device).name}, Warp {wp.__version__}, {seconds:.0f} s."
+    write_chapter(name, chapter, machine, folder)
+    print(f"{name}: {summary(chapter.rows)}, {seconds:.0f} s", flush=True)
+    return chapter
 
 
 def main(
-    only: Annotated[list[str] | None, typer.Option(help="A problem to run; may be repeated.")] = None,
-    out: Annotated[Path | None, typer.Option(help="Folder; by default the record, if all is run.")] = None,
+    only: Annotated[
+        list[str] | None,
+        typer.Option(help=f"A problem to run; may be repeated. By default all but {', '.join(HEAVY)}."),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder; by default out/verification for named problems, otherwise the record."),
+    ] = None,
     device: Annotated[str, typer.Option(help="cpu or cuda.")] = "cpu",
+    page_only: Annotated[
+        bool, typer.Option("--page-only", help="Run nothing; write the page from the chapters in the folder.")
+    ] = False,
 ) -> None:
-    """Run the verification problems and write their page."""
-    names = only or []
-    unknown = sorted(set(names) - set(PROBLEMS))
+    """Run the verification problems and write their page; the heavy ones only when they are named.
+
+    A page keeps the chapters that stand in its folder already, from whatever machine.
+    """
+    unknown = sorted(set(only or []) - set(PROBLEMS))
     if unknown:
         raise typer.BadParameter(f"a problem is one of {', '.join(PROBLEMS)}, got {', '.join(unknown)}")
     mpl.use("agg")
-    resolved = resolve_device(device)
-    started = time.perf_counter()
-    chapters = run_problems(names, resolved)
-    seconds = time.perf_counter() - started
-    machine = f"Device {wp.get_device(resolved).name}, Warp {wp.__version__}, {seconds:.0f} s."
-    page = write_page(chapters, out or (Path("out/verification") if names else RECORD), machine)
-    print(f"{summary(chapters)}; {page}")
-    for row in (row for chapter in chapters for row in chapter.rows if row.passed is False):
+    folder = out or (Path("out/verification") if only else RECORD)
+    names = [name for name in PROBLEMS if (name in only if only else name not in HEAVY)]
+    chapters = [] if page_only else [run_problem(name, resolve_device(device), folder) for name in names]
+    rows = [row for chapter in chapters for row in chapter.rows]
+    print(f"{summary(rows)}; {write_page(folder, PROBLEMS)}")
+    failed = [row for row in rows if row.passed is False]
+    for row in failed:
         print(
             f"failed: {row.problem}, {row.case}, {row.quantity}: error {row.error:.3g} > {row.tolerance:.3g}"
         )
-    if any(row.passed is False for chapter in chapters for row in chapter.rows):
+    if failed:
         raise typer.Exit(1)
 
 

@@ -149,6 +149,27 @@ def test_the_page_holds_rows_plots_and_their_data(tmp_path: Path, monkeypatch):
         assert list(csv.reader(file))[1] == ["line", "0", "0"]
 
 
+def test_a_page_keeps_the_chapters_that_ran_elsewhere(tmp_path: Path, monkeypatch):
+    def second(device: str) -> Chapter:
+        return replace(_chapter(0.02), title="A heavy chapter", plots=())
+
+    problems = {"one": lambda device: _chapter(0.01), "stability": second}
+    monkeypatch.setattr(verification, "PROBLEMS", problems)
+    verification.main(only=["stability"], out=tmp_path)
+    page = tmp_path / "README.md"
+    assert "## A chapter" not in page.read_text(encoding="utf-8")
+    # Heavy problems run only when they are named.
+    monkeypatch.setitem(problems, "stability", lambda device: pytest.fail("it was not named"))
+    verification.main(out=tmp_path)
+    both = page.read_text(encoding="utf-8")
+    assert both.index("## A chapter") < both.index("## A heavy chapter")
+    assert "2 rows pass, 0 fail" in both
+    assert both.count("CPU, Warp") == 4
+    page.unlink()
+    verification.main(out=tmp_path, page_only=True)
+    assert page.read_text(encoding="utf-8") == both
+
+
 def test_a_failing_row_ends_the_command_with_1(tmp_path: Path, monkeypatch):
     monkeypatch.setattr(verification, "PROBLEMS", {"one": lambda device: _chapter(0.2)})
     with pytest.raises(typer.Exit) as ending:

@@ -1,7 +1,9 @@
 """The page of the verification: tables, plots with their data, and one Markdown text to be read in one go."""
 
 import csv
-from collections.abc import Sequence
+import json
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -9,6 +11,7 @@ import numpy as np
 from matplotlib.ticker import NullLocator
 
 from experiments.benchmarks.problems.chapter import Chapter, Curve, Plot, Row
+from experiments.files import write_text
 
 COLOURS = (
     "#0072B2",
@@ -43,67 +46,127 @@ HEADING = "| case | quantity | reference | expected | simulated | error | tolera
 
 INTRODUCTION = """# Verification
 
-Written by `python -m experiments.benchmarks.verification`; the same rows are in `rows.csv`, and every plot
-has its data beside it. An error is relative (in %) or in the unit of the quantity. A row passes when its
-error is within its tolerance; a row that is only *stated* has none. "Production precision" has poses in
-float64 and forces in float32.
+Written by `python -m experiments.benchmarks.verification`; the same rows are in `rows.csv`, and every
+plot has its data beside it. Every chapter says what it ran on. An error is relative (in %) or in the unit
+of the quantity. A row passes when its error is within its tolerance; a row that is only *stated* has
+none. "Production precision" has poses in float64 and forces in float32.
 """
 
 
-def write_page(chapters: Sequence[Chapter], folder: Path, machine: str) -> Path:
-    """Write table, plots, data and page into a folder; the page's path.
+@dataclass(frozen=True)
+class Section:
+    """A chapter as the page has it, its plots drawn already.
+
+    Attributes
+    ----------
+    title, text : str
+    machine : str
+        What it ran on, in words.
+    rows : tuple of Row
+    pictures : tuple of (str, str)
+        Stem of each picture's files, and its title.
+    """
+
+    title: str
+    text: str
+    machine: str
+    rows: tuple[Row, ...]
+    pictures: tuple[tuple[str, str], ...]
+
+
+def write_chapter(name: str, chapter: Chapter, machine: str, folder: Path) -> None:
+    """Write plots, their data and the section of one problem into a folder, for `write_page`.
 
     Parameters
     ----------
-    chapters
-        What was run.
-    folder
-        Made if missing; files of the same names are written over.
+    name
+        Of the problem.
+    chapter
+        What it gave.
     machine
         What it ran on, in words.
+    folder
+        Made if missing; files of the same names are written over.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    for chapter in chapters:
-        for plot in chapter.plots:
-            _draw(plot, folder / f"{plot.name}.png")
-            _write_data(plot, folder / f"{plot.name}.csv")
-    _write_rows(chapters, folder / "rows.csv")
+    for plot in chapter.plots:
+        _draw(plot, folder / f"{plot.name}.png")
+        _write_data(plot, folder / f"{plot.name}.csv")
+    pictures = tuple((plot.name, plot.title) for plot in chapter.plots)
+    section = Section(chapter.title, chapter.text, machine, chapter.rows, pictures)
+    write_text(_section_file(folder, name), json.dumps(asdict(section), indent=1) + "\n")
+
+
+def write_page(folder: Path, names: Iterable[str]) -> Path:
+    """Write the page and the table of rows from the sections that a folder has.
+
+    Parameters
+    ----------
+    folder
+        Where `write_chapter` wrote, perhaps on several machines.
+    names
+        Of the problems, in the order of the page; one without a section is left out.
+
+    Returns
+    -------
+    Path
+        The page.
+    """
+    files = [_section_file(folder, name) for name in names]
+    sections = [_read_section(file) for file in files if file.exists()]
+    _write_rows(sections, folder / "rows.csv")
     page = folder / "README.md"
-    page.write_text(_page(chapters, machine), encoding="utf-8")
+    write_text(page, _page(sections))
     return page
 
 
-def summary(chapters: Sequence[Chapter]) -> str:
+def _section_file(folder: Path, name: str) -> Path:
+    return folder / f"{name}.json"
+
+
+def _read_section(path: Path) -> Section:
+    values = json.loads(path.read_text(encoding="utf-8"))
+    rows = tuple(Row(**row) for row in values.pop("rows"))
+    pictures = tuple((stem, title) for stem, title in values.pop("pictures"))
+    return Section(rows=rows, pictures=pictures, **values)
+
+
+def summary(rows: Iterable[Row]) -> str:
     """Line that says how many rows passed, failed and were stated."""
-    verdicts = [row.passed for chapter in chapters for row in chapter.rows]
-    passed, failed, stated = (verdicts.count(verdict) for verdict in (True, False, None))
+    passed, failed, stated = _counts(rows)
     return f"{passed} rows pass, {failed} fail, {stated} are stated without a tolerance"
 
 
-def _page(chapters: Sequence[Chapter], machine: str) -> str:
-    parts = [INTRODUCTION, f"**{summary(chapters)}.** {machine}\n", _contents(chapters)]
-    for chapter in chapters:
+def _counts(rows: Iterable[Row]) -> tuple[int, int, int]:
+    verdicts = [row.passed for row in rows]
+    return verdicts.count(True), verdicts.count(False), verdicts.count(None)
+
+
+def _page(sections: Sequence[Section]) -> str:
+    every = summary(row for section in sections for row in section.rows)
+    parts = [INTRODUCTION, f"**{every}.**\n", _contents(sections)]
+    for section in sections:
         parts += [
-            f"## {chapter.title}\n",
-            chapter.text.strip() + "\n",
-            _pictures(chapter.plots),
-            _table(chapter.rows),
+            f"## {section.title}\n",
+            section.text.strip() + "\n",
+            f"*{section.machine}*\n",
+            _pictures(section.pictures),
+            _table(section.rows),
         ]
     return "\n".join(part for part in parts if part)
 
 
-def _contents(chapters: Sequence[Chapter]) -> str:
-    lines = ["| chapter | pass | fail | stated |", "|---|---|---|---|"]
-    for chapter in chapters:
-        verdicts = [row.passed for row in chapter.rows]
-        counts = " | ".join(str(verdicts.count(v)) for v in (True, False, None))
-        anchor = chapter.title.lower().replace(" ", "-")
-        lines.append(f"| [{chapter.title}](#{anchor}) | {counts} |")
+def _contents(sections: Sequence[Section]) -> str:
+    lines = ["| chapter | pass | fail | stated | ran on |", "|---|---|---|---|---|"]
+    for section in sections:
+        counts = " | ".join(str(count) for count in _counts(section.rows))
+        anchor = section.title.lower().replace(" ", "-")
+        lines.append(f"| [{section.title}](#{anchor}) | {counts} | {section.machine} |")
     return "\n".join(lines) + "\n"
 
 
-def _pictures(plots: Sequence[Plot]) -> str:
-    return "\n".join(f"![{plot.title}]({plot.name}.png)" for plot in plots) + "\n" if plots else ""
+def _pictures(pictures: Sequence[tuple[str, str]]) -> str:
+    return "\n".join(f"![{title}]({stem}.png)" for stem, title in pictures) + "\n" if pictures else ""
 
 
 def _table(rows: Sequence[Row]) -> str:
@@ -126,14 +189,14 @@ def _error(value: float, relative: bool) -> str:
     return f"{100.0 * value:.2g} %" if relative else f"{value:.2g}"
 
 
-def _write_rows(chapters: Sequence[Chapter], path: Path) -> None:
+def _write_rows(sections: Sequence[Section], path: Path) -> None:
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(("chapter", *COLUMNS))
-        for chapter in chapters:
-            for row in chapter.rows:
+        for section in sections:
+            for row in section.rows:
                 verdict = VERDICTS[row.passed].strip("*").lower()
-                writer.writerow((chapter.title, *(getattr(row, name) for name in COLUMNS[:-1]), verdict))
+                writer.writerow((section.title, *(getattr(row, name) for name in COLUMNS[:-1]), verdict))
 
 
 def _write_data(plot: Plot, path: Path) -> None:
