@@ -46,7 +46,7 @@ PROBLEMS: dict[str, Problem] = {
 }
 
 HEAVY = ("beverloo", "heap-angle", "stability")
-"""Problems that run only when they are named: minutes on a GPU, up to an hour on two cores."""
+"""Problems that run only when they are named: minutes on a GPU, up to hours on two cores."""
 
 RECORD = Path(__file__).with_name("record") / "verification"
 

@@ -46,7 +46,9 @@ class Trial:
 
 
 TRIALS = {
-    "cpu": Trial("bench", 40, "Here at bench scale: 400 grains, shear modulus / 400, {} heaps of each kind."),
+    "cpu": Trial(
+        "bench", 120, "Here at bench scale: 400 grains, shear modulus / 400, {} heaps of each kind."
+    ),
     "cuda": Trial(
         "soft", 48, "Here at the paper's size with its shear modulus / 100, {} heaps of each kind."
     ),

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from dem_warp import Case, CaseResult
-from experiments.benchmarks.paper_runs import published_runs
 from experiments.benchmarks.problems.chapter import Chapter, Curve, Plot, Row, absolute_row
 from experiments.benchmarks.problems.heap_angle import with_numerics
 from experiments.benchmarks.problems.stored import finished_cases, repose_angles
+from experiments.studies.buckwheat.runs import planned_cases
 from experiments.study import Study, load_study
 
 FRACTIONS = (0.25, 0.5, 1.0)
@@ -35,7 +35,7 @@ the limit is, and what a flag says.
 
 def corners(study: Study) -> list[Case]:
     """The runs of the screening, one seed each."""
-    runs = published_runs().query("stage == 'screening'")
+    runs = planned_cases(1, ["screening"])
     names = [factor.name for factor in study.factors]
     return [
         study.case(settings, int(seed))
