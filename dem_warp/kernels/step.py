@@ -27,8 +27,8 @@ def step_kernels(build: Build) -> SimpleNamespace:
     pack = packing(precision)
     motion = integration_functions(precision)
     sum_contacts = (cooperative_sum if build.cooperative else serial_sum)(build)
-    prefetch_item, prefetch_turn, prefetch_place, prefetch_four, prefetch_real = (
-        prefetcher(kind) for kind in (wp.vec2i, wp.quatd, wp.vec3d, vec4, real)
+    prefetch_item, prefetch_turn, prefetch_place, prefetch_four = (
+        prefetcher(kind) for kind in (wp.vec2i, wp.quatd, wp.vec3d, vec4)
     )
     spheres_each = wp.constant(build.sphere_count)
     module = wp.get_module(f"dem_warp_step_{build.name}")
@@ -144,8 +144,6 @@ def step_kernels(build: Build) -> SimpleNamespace:
                 prefetch_turn(grains_in.orientation, g)
                 prefetch_place(grains_in.position, g)
                 prefetch_four(model.inertia, g)
-                prefetch_real(hood.travel, g)
-            prefetch_four(model.shape_spheres, model.shape[g] * spheres_each + lane)
             count = hood.near.count[g]
             moving = alive[g] > 0
             step = grains_in.step[w]

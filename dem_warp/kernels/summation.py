@@ -77,13 +77,8 @@ def _totals(build: Build) -> SimpleNamespace:
     def add(group: int, i: int, begin: int, end: int):
         """Adds component `i` of the results from `begin` to `end` to the group's sum, in order."""
         value = total(group * COMPONENTS + i, real(0.0), False)
-        row = i * (WARP + 1)
-        for k in range(begin, end - 1, 2):
-            first = result(row + k, real(0.0), False)
-            second = result(row + k + 1, real(0.0), False)
-            value = value + first + second
-        if (end - begin) % 2 == 1:
-            value += result(row + end - 1, real(0.0), False)
+        for k in range(begin, end):
+            value += result(i * (WARP + 1) + k, real(0.0), False)
         total(group * COMPONENTS + i, value, True)
 
     @wp.func
