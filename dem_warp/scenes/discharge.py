@@ -9,7 +9,7 @@ import numpy as np
 
 from dem_warp.case import Case
 from dem_warp.model import WorldSetup
-from dem_warp.scenes.poured_controller import Phase, PouredController
+from dem_warp.scenes.poured_controller import UNREST, Phase, PouredController
 from dem_warp.scenes.scene import Course, Decision, Observable
 from dem_warp.scenes.surfaces import LEAST_POINTS, slope
 from dem_warp.solver import WorldView
@@ -129,7 +129,7 @@ class DischargeController(PouredController[Discharge]):
         self._measure_masses(view)
         course.enter("rest", view)
         if not at_rest:
-            failure = f"the grains left did not come to rest within {limit:g} s of the last that fell"
+            failure = f"the grains left did not rest within {limit:g} s of the last that fell; {UNREST}"
             return Decision(done=True, failure=failure)
         return Decision(done=True, failure=self._judge(view))
 

@@ -9,7 +9,7 @@ import numpy as np
 from dem_warp.case import Case
 from dem_warp.materials import Material
 from dem_warp.model import WorldSetup
-from dem_warp.scenes.poured_controller import Phase, PouredController
+from dem_warp.scenes.poured_controller import UNREST, Phase, PouredController
 from dem_warp.scenes.poured_scene import FILL_OBSERVABLES, PouredScene
 from dem_warp.scenes.rain import CrossSection
 from dem_warp.scenes.scene import Course, Decision, Observable
@@ -136,9 +136,8 @@ class LiftController(PouredController[Course]):
                 return Decision(done=True, failure=f"the tube is clogged: {count} grains rose with it")
             return Decision(remove=np.flatnonzero(riding))
         if elapsed > self.scene.height / self.scene.lift_speed + self.LIFT_MARGIN:
-            return Decision(
-                done=True, failure=f"the heap did not come to rest within {elapsed:.1f} s of the lift"
-            )
+            failure = f"the heap did not come to rest within {elapsed:.1f} s of the lift; {UNREST}"
+            return Decision(done=True, failure=failure)
         return Decision()
 
     def _finish(self, view: WorldView, elapsed: float) -> None:

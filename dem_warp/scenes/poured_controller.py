@@ -20,6 +20,9 @@ HEAPED = 4
 CALM = 10.0
 """Grains rest when their root mean square speed is below `rest_speed` and none passes CALM times that."""
 
+UNREST = "grains that tremble in place without end want a lower time_step_fraction"
+"""Advice where grains did not come to rest: damping over too long a step feeds a motion."""
+
 
 class Phase(NamedTuple):
     """A part of a scene's course."""
@@ -89,9 +92,8 @@ class PouredController(ABC, Generic[CourseT]):
         rained_out = bool(view.released[view.alive].all())
         full = self.poured.grain_count is None and np.count_nonzero(free & above & slow) >= HEAPED
         if view.time > self.rain_end + self.FILL_MARGIN:
-            return Decision(
-                done=True, failure=f"the filling did not end within {self.FILL_MARGIN:g} s of the rain"
-            )
+            failure = f"the filling did not end within {self.FILL_MARGIN:g} s of the rain; {UNREST}"
+            return Decision(done=True, failure=failure)
         if not (full or (rained_out and self.rests(view))):
             return Decision()
         self.course.enter("settle", view)
@@ -101,9 +103,8 @@ class PouredController(ABC, Generic[CourseT]):
 
     def _settle(self, view: WorldView) -> Decision:
         if view.time - self.course.phase_start > self.SETTLE_LIMIT:
-            return Decision(
-                done=True, failure=f"the grains poured did not come to rest within {self.SETTLE_LIMIT:g} s"
-            )
+            failure = f"the grains poured did not come to rest within {self.SETTLE_LIMIT:g} s; {UNREST}"
+            return Decision(done=True, failure=failure)
         if not self.rests(view):
             return Decision()
         above = view.alive & (view.positions[:, 2] > self.poured.brim)

@@ -35,6 +35,7 @@ WIDTH, DEPTH = 2.2, 2.5
 RAIN_SPEED, RAIN_FRACTION = 0.5, 0.07
 """Speed of the rain [m/s], and the part of its volume that is spheres."""
 
+PROBLEM = "Spheres out of a flat-bottomed hopper"
 SEEDS = {"cpu": 1, "cuda": 4}
 
 TEXT = f"""Spheres of {1e3 * DIAMETER:g} mm (standard deviation 5 %) fill a round bin with a flat bottom,
@@ -86,11 +87,10 @@ class Flow:
 
     @classmethod
     def of(cls, outlet: float, result: CaseResult) -> "Flow":
-        """Flow of a case; its rate is not a number where there was none."""
+        """Flow of a case that has a rate."""
         seen = result.observables
-        bulk_density = GLASS.density * seen.get("solid_fraction", np.nan)
-        unit = bulk_density * np.sqrt(GRAVITY) * DIAMETER**EXPONENT
-        return cls(outlet, seen.get("flow_rate", np.nan) / unit)
+        bulk_density = GLASS.density * seen["solid_fraction"]
+        return cls(outlet, seen["flow_rate"] / (bulk_density * np.sqrt(GRAVITY) * DIAMETER**EXPONENT))
 
 
 def exponent(flows: Sequence[Flow], k: float) -> float:
@@ -105,7 +105,7 @@ def rate_constant(flows: Sequence[Flow], k: float) -> float:
 
 
 def _rows(flows: Mapping[float, Sequence[Flow]]) -> list[Row]:
-    problem, law = "Spheres out of a flat-bottomed hopper", "Beverloo et al. (1961)"
+    law = "Beverloo et al. (1961)"
     middle = 0.5 * (LEAST_CONSTANT + LARGEST_CONSTANT)
     realistic, *_ = FRICTIONS
     rows, constants = [], []
@@ -116,14 +116,14 @@ def _rows(flows: Mapping[float, Sequence[Flow]]) -> list[Row]:
             bounds = (0.15, LARGEST_CONSTANT - middle if friction == realistic else None)
             power_bound, constant_bound = bounds if k == K else (None, None)
             rows.append(
-                absolute_row((problem, case, f"exponent, k = {k:.1f}", law), EXPONENT, power, power_bound)
+                absolute_row((PROBLEM, case, f"exponent, k = {k:.1f}", law), EXPONENT, power, power_bound)
             )
             rows.append(
-                absolute_row((problem, case, f"C, k = {k:.1f}", law), middle, constant, constant_bound)
+                absolute_row((PROBLEM, case, f"C, k = {k:.1f}", law), middle, constant, constant_bound)
             )
         constants.append(rate_constant(each, K))
     for (friction, name), fall in zip(list(FRICTIONS.items())[1:], -np.diff(constants), strict=True):
-        rows.append(detection_row(problem, f"{name}, friction {friction:g}", "fall of C to it", 0.01, fall))
+        rows.append(detection_row(PROBLEM, f"{name}, friction {friction:g}", "fall of C to it", 0.01, fall))
     return rows
 
 
@@ -148,5 +148,9 @@ def beverloo(device: str) -> Chapter:
     cases = [hopper_case(outlet, friction, seed) for friction, outlet, seed in settings]
     flows: dict[float, list[Flow]] = {friction: [] for friction in FRICTIONS}
     for (friction, outlet, _), result in zip(settings, finished_cases(cases, device), strict=True):
-        flows[friction].append(Flow.of(outlet, result))
-    return Chapter("Beverloo", TEXT, tuple(_rows(flows)), (_plot(flows),))
+        if "flow_rate" in result.observables:
+            flows[friction].append(Flow.of(outlet, result))
+    labels = (PROBLEM, f"all {len(cases)} hoppers", "hoppers without a rate", "none clogs")
+    lost = len(cases) - sum(len(each) for each in flows.values())
+    rows = (absolute_row(labels, 0.0, lost, 0.0), *_rows(flows))
+    return Chapter("Beverloo", TEXT, rows, (_plot(flows),))
