@@ -1,6 +1,7 @@
 """The bulk problems of the verification: their analysis on drawn truth, and the shortest of each."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -114,6 +115,7 @@ def test_a_corner_at_the_whole_rayleigh_time_is_flagged_and_stored(tmp_path, mon
     assert result.status == "diverged"
     assert ended_in_order(result)
     assert "lower time_step_fraction" in outcome(result)
+    assert not ended_in_order(replace(result, reason="diverged"))
     assert np.isnan(stored.repose_angles(study, [result])).all()
 
     def only_what_is_missing(cases, *args, **settings):
