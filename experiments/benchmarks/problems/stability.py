@@ -81,6 +81,8 @@ def stability(device: str) -> Chapter:
         each = results[k * len(runs) : (k + 1) * len(runs)]
         name = f"{100.0 * fraction:g} % of the Rayleigh time"
         rows += _rows(f"Corners of the screening, {name}", each)
-        curves.append(Curve(name, 1.0 + np.arange(len(runs)), repose_angles(study, each), "points"))
+        angles = repose_angles(study, each)
+        if np.isfinite(angles).any():
+            curves.append(Curve(name, 1.0 + np.arange(len(runs)), angles, "points"))
     plot = Plot("stability", "Corners of the screening", "run", "repose angle [deg]", tuple(curves))
     return Chapter("Stability", TEXT + words, tuple(rows), (plot,))
