@@ -52,15 +52,16 @@ def _fixed_point_spheres(precision: Precision) -> SimpleNamespace:
     def pack(position: wp.vec3d, last: real, world: World) -> sphere:
         rate = wp.float64(1.0) / wp.float64(world.unit)
         d = (position - world.origin) * rate
-        return sphere(int(wp.round(d[0])), int(wp.round(d[1])), int(wp.round(d[2])), wp.cast(last, wp.int32))
+        return sphere(int(wp.rint(d[0])), int(wp.rint(d[1])), int(wp.rint(d[2])), wp.cast(last, wp.int32))
 
     @wp.func
     def pack_offset(center: sphere, offset: vec3, last: real, world: World) -> sphere:
-        d = offset / world.unit
+        # the unit is a power of two: its inverse is exact
+        d = offset * (real(1.0) / world.unit)
         return sphere(
-            center[0] + int(wp.round(d[0])),
-            center[1] + int(wp.round(d[1])),
-            center[2] + int(wp.round(d[2])),
+            center[0] + int(wp.rint(d[0])),
+            center[1] + int(wp.rint(d[1])),
+            center[2] + int(wp.rint(d[2])),
             wp.cast(last, wp.int32),
         )
 
