@@ -49,6 +49,11 @@ class ContactCoefficients:
         names = [mechanism.name for mechanism in self.mechanisms]
         if len(set(names)) < len(names):
             raise ValueError(f"ContactCoefficients.mechanisms: must be different, got {names}")
+        for mechanism in self.mechanisms:
+            if unfit := sorted(set(mechanism.excludes) & set(names)):
+                raise ValueError(
+                    f"ContactCoefficients.mechanisms: {mechanism.name} must not stand beside {unfit}"
+                )
 
     @classmethod
     def of_pair(

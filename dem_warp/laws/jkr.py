@@ -106,6 +106,7 @@ class JKR(Mechanism):
     strength: ClassVar[str] = "work_of_adhesion"
     memory_size: ClassVar[int] = 1
     acts_apart: ClassVar[bool] = True
+    excludes: ClassVar[tuple[str, ...]] = ("hysteretic_spring",)
     attraction: ClassVar[Any] = jkr_attraction
 
     def reach(self, largest_radius: float, modulus: float) -> float:

@@ -49,6 +49,8 @@ class Mechanism:
     strength: ClassVar[str]
     """The parameter that says how strong it is: 0 is its null, whatever the others are."""
     memory_size: ClassVar[int] = 0
+    excludes: ClassVar[tuple[str, ...]] = ()
+    """Names of mechanisms that the same contact may not have, since this one builds on Hertz's force."""
     acts_apart: ClassVar[bool] = False
     """Whether it acts on surfaces that no longer touch; then `reach` says how far."""
 

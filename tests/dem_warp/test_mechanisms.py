@@ -22,6 +22,7 @@ from worlds import (
 from dem_warp.laws.capillary import CapillaryBridge
 from dem_warp.laws.contact_law import contact_law
 from dem_warp.laws.hysteretic_spring import HystereticSpring
+from dem_warp.laws.jkr import JKR
 from dem_warp.laws.library import MECHANISMS, PARAMETERS
 from dem_warp.laws.linear_cohesion import LinearCohesion
 from dem_warp.laws.mechanism import Mechanism
@@ -90,6 +91,11 @@ def test_bad_parameters_are_refused(values, message):
 def test_a_contact_takes_a_mechanism_once():
     with pytest.raises(ValueError, match=r"mechanisms: must be different"):
         pair(mechanisms=(LinearCohesion(), LinearCohesion()))
+
+
+def test_mechanisms_that_build_on_different_springs_do_not_share_a_contact():
+    with pytest.raises(ValueError, match=r"jkr must not stand beside \['hysteretic_spring'\]"):
+        pair(mechanisms=(HystereticSpring(plasticity=0.1), JKR(work_of_adhesion=0.1)))
 
 
 def test_one_batch_holds_one_set_of_mechanisms():
