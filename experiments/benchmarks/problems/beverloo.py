@@ -29,7 +29,7 @@ FRICTIONS = {0.092: "spheres of glass", 0.25: "spheres of acetate", 0.5: "rough 
 """The first two as measured (Foerster et al., 1994); the bounds of C hold for the first."""
 
 ROLLING_FRICTION = 0.01
-WIDTH, DEPTH = 2.2, 2.5
+WIDTH, DEPTH = 2.2, 3.0
 """Of the bin and of its filling, in diameters of the outlet."""
 
 RAIN_SPEED, RAIN_FRACTION = 0.5, 0.07
