@@ -1,9 +1,8 @@
 """How fast columns of grains are simulated while filling, settled and lifting, beside what the memory allows.
 
-A sphere-step is one sphere of a grain moved on by one step. Grains of the rain that have yet to be released are
-moved on too, but meet nobody: `of free grains` leaves them out.
-The columns are simulated once and kept (`--columns`); worlds beyond `--seeds` hold the same columns at other
-moments.
+A sphere-step is one sphere of a grain moved on by one step. Grains of the rain that have yet to be released
+are moved on too, but meet nobody: `of free grains` leaves them out. The columns are simulated once and kept
+(`--columns`); worlds beyond `--seeds` hold the same columns at other moments.
 
     python -m experiments.benchmarks.heap_throughput --scale soft --device cpu --peer liggghts --processes 2
     python -m experiments.benchmarks.heap_throughput --scale paper --device cuda --worlds 1,12,31,128
