@@ -65,7 +65,7 @@ def test_a_result_places_the_spheres_of_its_grains(heap):
 
 def test_the_heap_is_really_at_rest(heap):
     # The same case 0.1 and 0.2 s on. What was slow when the case ended comes no farther than a ten-thousandth
-    # of a grain (measured: 6e-8 m), and then rests: 1e-11 m, less than half a count of the fixed-point positions.
+    # of a grain (measured: 6e-8 m), and then rests: 1e-11 m, less than half a count of fixed-point positions.
     rested = heap.observables["simulated_time"]
     scenes = [replace(SMALL_TUBE, duration=rested + more) for more in (0.1, 0.2)]
     soon, later = simulate([small_case(scene=scene) for scene in scenes], device="cpu", workers=1)
