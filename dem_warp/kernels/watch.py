@@ -17,8 +17,11 @@ from dem_warp.kernels.packing import packing
 from dem_warp.kernels.walls import wall_functions
 from dem_warp.types import SPHERE_MASK, Build, WorldFlag, device_structs
 
-HEADROOM = 3.0
+HEADROOM = 4.0
 """Speed that a grain is allowed to reach, over what it has: an impact makes a falling grain spin."""
+
+STRUCK = 2.0
+"""Speed that a grain is allowed to reach when it is struck, over that of the fastest one."""
 
 EXPECTED = 1.5
 """Speed that a grain is expected to reach, over what it has."""
@@ -63,7 +66,7 @@ def watch_kernels(build: Build) -> SimpleNamespace:
         """How far a grain may come in some steps [m], at its own speed or at that of one that strikes it."""
         time = real(ahead) * world.time_step
         falling = real(HEADROOM) * wp.length(world.gravity) * time
-        reached = real(wp.max(float(HEADROOM) * speed, fastest)) + falling
+        reached = real(wp.max(float(HEADROOM) * speed, float(STRUCK) * fastest)) + falling
         return wp.clamp(reached * time, real(LEAST_PATH) * world.skin, real(0.5) * world.skin)
 
     @wp.func
