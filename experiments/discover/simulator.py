@@ -1,0 +1,66 @@
+"""What the analysis asks of a simulator: points in, observables out.
+
+The engine, an emulator bank and a table of finished runs all answer alike, so that the statistics never know
+which of them they talk to.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Point:
+    """One case: the parameters, the effects that are in the model, where it is tested, and the seed.
+
+    Attributes
+    ----------
+    theta : tuple of float
+        Values of the study's factors in natural units, in their order.
+    sizes : tuple of (str, float)
+        Mechanisms by name with their sizes in natural units, sorted by name; every other is at its null.
+    condition : str
+        Name of the condition.
+    seed : int
+        Seed of everything random in the case.
+    """
+
+    theta: tuple[float, ...]
+    sizes: tuple[tuple[str, float], ...]
+    condition: str
+    seed: int
+
+
+@dataclass(frozen=True, eq=False)
+class Outcomes:
+    """What came out at a list of points, in their order.
+
+    Attributes
+    ----------
+    values : (n, observables) array
+        Observables in their natural units; rows of cases that failed are NaN, and no one may read them.
+    reasons : tuple of str
+        Why each case failed ("the tube is clogged ..."); empty where it did not.
+    """
+
+    values: np.ndarray
+    reasons: tuple[str, ...]
+
+    @property
+    def finished(self) -> np.ndarray:
+        """Whether each case has observables, (n,)."""
+        return np.array([not reason for reason in self.reasons], dtype=bool)
+
+
+class Simulator(Protocol):
+    """Anything that answers points with observables."""
+
+    observables: tuple[str, ...]
+    """Names of the columns of the outcomes."""
+
+    def __call__(self, points: Sequence[Point]) -> Outcomes:
+        """Observables of every point; all of them at once."""
