@@ -1,0 +1,323 @@
+"""What the analysis of a disagreement found: the verdict and every number that it rests on.
+
+Arrays over the data have one row a condition and one column an observable, in the order of ``Data``; NaN stands
+where nothing was measured (or, for p values, tested). Parameters and sizes are in the natural units of the study
+and of the mechanism library.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any
+
+import numpy as np
+
+from experiments.calibrate.export import jsonable
+
+
+class Verdict(StrEnum):
+    """How an analysis ends."""
+
+    NONE = "none"
+    """The calibrated model agrees with the data: nothing is missing that they could show."""
+    NAMED = "named"
+    """One mechanism, or one pair, explains the disagreement, and no other does."""
+    TIE = "tie"
+    """Several mechanisms explain it equally well."""
+    INCOMPLETE = "incomplete"
+    """A mechanism explains part of it beyond doubt; something else is missing too."""
+    UNKNOWN = "unknown"
+    """The model disagrees with the data, and nothing in the library explains it."""
+    NOT_IDENTIFIABLE = "not_identifiable"
+    """The data have fewer independent observables than the model has free parameters."""
+
+
+@dataclass(frozen=True)
+class Interval:
+    """An estimate with the ends of its 90 % interval."""
+
+    low: float
+    value: float
+    high: float
+
+
+@dataclass(frozen=True, eq=False)
+class Data:
+    """The measured means that were compared with the model.
+
+    Attributes
+    ----------
+    conditions, observables : tuple of str
+        Rows and columns of every array of a discovery.
+    held_out : tuple of bool
+        Whether a condition took no part in any fit.
+    means, standard_errors : (conditions, observables) array
+        In natural units.
+    replicates : (conditions, observables) int array
+        Measurements that each mean is made of.
+    """
+
+    conditions: tuple[str, ...]
+    observables: tuple[str, ...]
+    held_out: tuple[bool, ...]
+    means: np.ndarray
+    standard_errors: np.ndarray
+    replicates: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A model as close to the training conditions as it comes.
+
+    Attributes
+    ----------
+    mechanisms : tuple of str
+        What was added to the base; empty for the base itself.
+    theta, theta_se : tuple of float
+        The study's factors and their standard errors.
+    sizes : tuple of Interval
+        Size of each mechanism.
+    at_bounds : tuple of str
+        Factors and mechanisms that ended at an end of their range.
+    q, degrees_of_freedom, q_limit, p_value : float
+        Sum of squares of the whitened residuals of the training conditions, its degrees of freedom, the point that
+        2.5 % of the parametric bootstrap exceeds, and the share of it above ``q``.
+    predicted, predicted_se : (conditions, observables) array
+        What the model says, held-out conditions included, and how well its means are known.
+    residuals, adjusted_p : (conditions, observables) array
+        Measured less predicted over the standard deviation of that difference, and its p value after Holm.
+    """
+
+    mechanisms: tuple[str, ...]
+    theta: tuple[float, ...]
+    theta_se: tuple[float, ...]
+    sizes: tuple[Interval, ...]
+    at_bounds: tuple[str, ...]
+    q: float
+    degrees_of_freedom: int
+    q_limit: float
+    p_value: float
+    predicted: np.ndarray
+    predicted_se: np.ndarray
+    residuals: np.ndarray
+    adjusted_p: np.ndarray
+
+    @property
+    def excess(self) -> float:
+        """What of Q the noise does not account for."""
+        return max(self.q - self.degrees_of_freedom, 0.0)
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Whether the calibrated base disagrees with the data beyond the noise.
+
+    Attributes
+    ----------
+    found : bool
+        True if ``base.q`` or the largest drop passes its limit.
+    largest_drop, drop_limit : float
+        Largest fall of Q that a mechanism of the library brings, and the point that 2.5 % of the bootstrap exceeds.
+    drop_mechanism : str
+        The mechanism of that drop.
+    """
+
+    found: bool
+    largest_drop: float
+    drop_limit: float
+    drop_mechanism: str
+
+
+@dataclass(frozen=True)
+class Drift:
+    """A factor fitted to one training condition at a time (Box and Hunter 1962): a true constant stays."""
+
+    factor: str
+    conditions: tuple[str, ...]
+    values: tuple[float, ...]
+    standard_errors: tuple[float, ...]
+    p_value: float
+    """Of the hypothesis that the values are one."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A mechanism (or a pair) of the library, as an explanation of the gap.
+
+    Attributes
+    ----------
+    mechanisms : tuple of str
+        One name, or two.
+    score : float
+        z of its signature in the residuals that calibration cannot take up.
+    visible_share : float
+        Share of its signature that calibration cannot take up, in [0, 1].
+    sizes : tuple of Interval
+        Size of each mechanism in the joint refit.
+    size_over_se : tuple of float
+        Each size over its standard error.
+    q, degrees_of_freedom, q_limit : float
+        Of the joint refit, as in ``Fit``.
+    explained : float
+        Share of the base's excess that it removes.
+    held_out_gain : Interval or None
+        What the log score of the held-out conditions gains over the base; None where none was measured.
+    simulated : bool
+        True if these are figures of fresh runs around its optimum, False if the emulator's.
+    admitted : bool
+        Whether it passes every rule.
+    objection : str
+        The first rule that it fails, as a sentence; empty if admitted.
+    """
+
+    mechanisms: tuple[str, ...]
+    score: float
+    visible_share: float
+    sizes: tuple[Interval, ...]
+    size_over_se: tuple[float, ...]
+    q: float
+    degrees_of_freedom: int
+    q_limit: float
+    explained: float
+    held_out_gain: Interval | None
+    simulated: bool
+    admitted: bool
+    objection: str
+
+
+@dataclass(frozen=True)
+class Power:
+    """The smallest size of a mechanism that these data could show."""
+
+    mechanism: str
+    gamma80: float
+    """Size found with 80 % probability at a false-alarm rate of 2.5 %; infinite if there is none."""
+    maximum: float
+    """End of its range."""
+    visible_share: float
+    resolvable: bool
+    """What is not resolvable may not be named."""
+
+
+@dataclass(frozen=True, eq=False)
+class Confounding:
+    """How much alike mechanisms look after calibration: correlations of their visible signatures."""
+
+    mechanisms: tuple[str, ...]
+    correlations: np.ndarray
+    """(mechanisms, mechanisms), in [-1, 1]."""
+
+
+@dataclass(frozen=True)
+class BeforeAfter:
+    """The gap of fresh direct runs without and with the mechanism, on one set of conditions."""
+
+    held_out: bool
+    degrees_of_freedom: int
+    before: Interval
+    """Q of the base."""
+    after: Interval
+    """Q with the mechanism."""
+    removed: Interval
+    """Share of the base's excess that is gone."""
+    runs: int
+    """Fresh runs a model and condition."""
+
+
+@dataclass(frozen=True)
+class NextExperiment:
+    """The condition that would settle the verdict best."""
+
+    condition: str
+    changes: tuple[tuple[str, str], ...]
+    """What it changes in the study: place and value."""
+    separates: tuple[str, str]
+    """Two models, each a mechanism's name or "base"."""
+    expected_q: float
+    """Q between the two, each refitted, with ``replicates`` measurements."""
+    replicates: int
+    observable: str
+    """The observable that differs most."""
+
+
+@dataclass(frozen=True)
+class Effort:
+    """What the analysis cost, and what fixed it before the data were opened."""
+
+    seed: int
+    settings_sha256: str
+    bank_cases: int
+    fresh_cases: int
+
+
+@dataclass(frozen=True, eq=False)
+class Discovery:
+    """Everything that an analysis found.
+
+    Attributes
+    ----------
+    verdict : Verdict
+    reason : str
+        The rule that gave the verdict, with its numbers, as a sentence.
+    named : tuple of str
+        The mechanisms of the verdict: one or two if named or incomplete, all of them in a tie, else none.
+    factors : tuple of str
+        Names of theta.
+    data : Data
+    base, chosen : Fit or None
+        The calibrated base, and the model with the mechanism. None where there was nothing to fit; of a tie,
+        ``chosen`` is the one of lowest Q.
+    gap : Gap or None
+    drifts : tuple of Drift
+    candidates : tuple of Candidate
+        Best first.
+    power : tuple of Power
+        One a mechanism of the library.
+    confounding : Confounding or None
+    before_after : tuple of BeforeAfter
+        Training conditions, then held-out ones if measured; empty where no model was chosen.
+    next_experiment : NextExperiment or None
+    notes : tuple of str
+        What was wrong with the data or the runs, and what was done about it.
+    effort : Effort
+    """
+
+    verdict: Verdict
+    reason: str
+    named: tuple[str, ...]
+    factors: tuple[str, ...]
+    data: Data
+    base: Fit | None
+    chosen: Fit | None
+    gap: Gap | None
+    drifts: tuple[Drift, ...]
+    candidates: tuple[Candidate, ...]
+    power: tuple[Power, ...]
+    confounding: Confounding | None
+    before_after: tuple[BeforeAfter, ...]
+    next_experiment: NextExperiment | None
+    notes: tuple[str, ...]
+    effort: Effort
+
+    def __post_init__(self) -> None:
+        shape = (len(self.data.conditions), len(self.data.observables))
+        _check("data", self.data, shape, ("means", "standard_errors", "replicates"))
+        for name, fit in (("base", self.base), ("chosen", self.chosen)):
+            if fit is not None:
+                _check(name, fit, shape, ("predicted", "predicted_se", "residuals", "adjusted_p"))
+
+    def to_dict(self) -> dict[str, Any]:
+        """The whole as plain JSON values; what is not finite becomes null."""
+        document: dict[str, Any] = jsonable(self)
+        return document
+
+
+def _check(name: str, tables: Data | Fit, shape: tuple[int, int], fields: tuple[str, ...]) -> None:
+    for field in fields:
+        if getattr(tables, field).shape != shape:
+            received = getattr(tables, field).shape
+            raise ValueError(
+                f"Discovery.{name}.{field} needs a row a condition and a column an observable, {shape}"
+                f" (received {received})"
+            )
