@@ -1,8 +1,8 @@
 """What the analysis of a disagreement found: the verdict and every number that it rests on.
 
-Arrays over the data have one row a condition and one column an observable, in the order of ``Data``; NaN stands
-where nothing was measured (or, for p values, tested). Parameters and sizes are in the natural units of the study
-and of the mechanism library.
+Arrays over the data have one row a condition and one column an observable, in the order of ``Data``; NaN
+stands where nothing was measured (or, for p values, tested). Parameters and sizes are in the natural units of
+the study and of the mechanism library.
 """
 
 from __future__ import annotations
@@ -81,8 +81,8 @@ class Fit:
     at_bounds : tuple of str
         Factors and mechanisms that ended at an end of their range.
     q, degrees_of_freedom, q_limit, p_value : float
-        Sum of squares of the whitened residuals of the training conditions, its degrees of freedom, the point that
-        2.5 % of the parametric bootstrap exceeds, and the share of it above ``q``.
+        Sum of squares of the whitened residuals of the training conditions, its degrees of freedom, the point
+        that 2.5 % of the parametric bootstrap exceeds, and the share of it above ``q``.
     predicted, predicted_se : (conditions, observables) array
         What the model says, held-out conditions included, and how well its means are known.
     residuals, adjusted_p : (conditions, observables) array
@@ -118,7 +118,8 @@ class Gap:
     found : bool
         True if ``base.q`` or the largest drop passes its limit.
     largest_drop, drop_limit : float
-        Largest fall of Q that a mechanism of the library brings, and the point that 2.5 % of the bootstrap exceeds.
+        Largest fall of Q that a mechanism of the library brings, and the point that 2.5 % of the bootstrap
+        exceeds.
     drop_mechanism : str
         The mechanism of that drop.
     """
