@@ -1,0 +1,116 @@
+"""Measured heaps: what was observed in each replicate of each condition."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from experiments.errors import InputError
+
+CLOGGED = "the tube clogged"
+"""Reason of a replicate that left no heap because the grains stayed in the tube."""
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """Heaps measured under a few conditions, all in the base units of `experiments` (SI; degrees).
+
+    Attributes
+    ----------
+    conditions : tuple of str
+        Conditions with at least one replicate, in the order of the study.
+    observables : tuple of str
+        Columns of the values: what was measured in at least one replicate.
+    values : dict of (replicates, observables) arrays
+        By condition; NaN where an observable was not measured, and everywhere in the row of a replicate that
+        left no heap.
+    reasons : dict of tuple of str
+        By condition: why each replicate left no heap, empty where it did; left out: every one did.
+    pictures : dict of tuple of Path
+        By condition: photographs that came with the data.
+    notes : tuple of str
+        What a reader must know about the data: too few replicates, values that contradict one another, ...
+    """
+
+    conditions: tuple[str, ...]
+    observables: tuple[str, ...]
+    values: Mapping[str, np.ndarray]
+    reasons: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    pictures: Mapping[str, tuple[Path, ...]] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for what, names in (("conditions", self.conditions), ("observables", self.observables)):
+            if not names or len(set(names)) < len(names):
+                raise InputError("needs at least one, each once", names, f"Measured.{what}")
+        if set(self.values) != set(self.conditions):
+            raise InputError("holds every condition and no other", sorted(self.values), "Measured.values")
+        formed = {name: tuple("" for _ in rows) for name, rows in self.values.items()}
+        object.__setattr__(self, "reasons", {**formed, **self.reasons})
+        for name, rows in self.values.items():
+            self._check(name, np.asarray(rows))
+
+    def _check(self, name: str, rows: np.ndarray) -> None:
+        place = f"Measured.values[{name!r}]"
+        if rows.ndim != 2 or len(rows) == 0 or rows.shape[1] != len(self.observables):
+            rule = f"is a row a replicate, with a column for each of {len(self.observables)} observables"
+            raise InputError(rule, f"shape {rows.shape}", place)
+        if np.isinf(rows).any():
+            raise InputError("is finite, or NaN where nothing was measured", "an infinite value", place)
+        if len(self.reasons[name]) != len(rows):
+            rule = "has one entry a replicate, empty where a heap formed"
+            raise InputError(rule, self.reasons[name], f"Measured.reasons[{name!r}]")
+        if np.isfinite(rows[[bool(reason) for reason in self.reasons[name]]]).any():
+            raise InputError("is NaN in the row of a replicate that left no heap", "a number", place)
+
+    def heap_count(self, condition: str) -> int:
+        """Replicates of a condition that left a heap."""
+        return sum(not reason for reason in self.reasons[condition])
+
+    def counts(self, condition: str) -> np.ndarray:
+        """Replicates in which each observable was measured, (observables,)."""
+        return np.isfinite(self.values[condition]).sum(axis=0)
+
+    def mean(self, condition: str) -> np.ndarray:
+        """Mean of each observable over the replicates that have it, (observables,); NaN where none has."""
+        rows, counts = self.values[condition], self.counts(condition)
+        sums = np.where(np.isfinite(rows), rows, 0.0).sum(axis=0)
+        return np.divide(sums, counts, out=np.full(len(counts), np.nan), where=counts > 0)
+
+    def covariance(self, condition: str) -> np.ndarray:
+        """Covariance of one replicate, (observables, observables), over the replicates that have both.
+
+        s_ij = sum over those of (x_i - mean_i)(x_j - mean_j), over their number less 1, the means over the
+        same replicates; NaN where fewer than two have both.
+        """
+        rows = self.values[condition]
+        size = rows.shape[1]
+        covariance = np.full((size, size), np.nan)
+        for i in range(size):
+            for j in range(i, size):
+                both = rows[np.isfinite(rows[:, i]) & np.isfinite(rows[:, j])][:, [i, j]]
+                if len(both) >= 2:
+                    deviation = both - both.mean(axis=0)
+                    covariance[i, j] = covariance[j, i] = np.prod(deviation, axis=1).sum() / (len(both) - 1)
+        return covariance
+
+    def only(self, observables: Iterable[str]) -> Measured:
+        """Keep some observables, in their order here; replicates stay, even those that have none left.
+
+        Raises
+        ------
+        InputError
+            When none of them was measured.
+        """
+        wanted = set(observables)
+        kept = [index for index, name in enumerate(self.observables) if name in wanted]
+        if not kept:
+            rule = f"must name measured observables, of {', '.join(self.observables)}"
+            raise InputError(rule, sorted(wanted), "observables")
+        names = tuple(self.observables[index] for index in kept)
+        return replace(
+            self, observables=names, values={name: rows[:, kept] for name, rows in self.values.items()}
+        )
