@@ -11,7 +11,8 @@ ROOT = Path(__file__).resolve().parents[1]
 
 # Of `experiments`, from the bottom up: a room imports itself and what is named before it.
 ROOMS = (
-    "errors", "files", "calibrate", "study", "cases", "studies", "report", "commands", "cli", "benchmarks",
+    "errors", "files", "calibrate", "study", "cases", "studies", "discover", "report", "commands", "cli",
+    "benchmarks",
 )  # fmt: skip
 
 

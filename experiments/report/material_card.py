@@ -101,7 +101,7 @@ def _factors(optimum: OptimumResult, study: Study) -> dict[str, Any]:
     parameters = {section.name: section.parameter for section in study.factor_sections}
     return {
         factor.name: {
-            "parameter": parameters[factor.name],
+            "parameter": ", ".join(parameters[factor.name]),
             "unit": factor.unit,
             "chosen": _short(optimum.point[factor.name]),
             "low": _short(region.ranges["low"][factor.name]) if found else None,

@@ -42,7 +42,9 @@ def with_material(document: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     path = folder / str(document[MATERIAL])
     sections = read_card(path)
     for factor in document.get("factor", []):
-        _drop(sections, str(factor.get("parameter", "")).split("."))
+        places = factor.get("parameter", "")
+        for place in places if isinstance(places, list) else [places]:
+            _drop(sections, str(place).split("."))
     return merge(sections, own)
 
 

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import Field, PlainValidator, ValidationInfo, field_validator, model_validator
 
 from doe.factors import Factor
 from experiments.errors import StudyError
 from experiments.study.places import KeyPath, Places, value_at
 from experiments.study.schema import (
-    Dimension,
     RawQuantity,
     Section,
     bounds,
@@ -24,6 +23,35 @@ from experiments.study.sections import Physics
 from experiments.study.units import Quantity, unit_size
 
 
+def _dimension_of(parameter: str) -> str:
+    """Dimension of the quantity at a place of a study.
+
+    Raises
+    ------
+    ValueError
+        When there is no quantity.
+    """
+    field = field_at(Physics, tuple(parameter.split(".")))
+    dimension = dimension_of(field) if field else None
+    if dimension is None:
+        raise ValueError('must lead to a quantity of the study, as "contact.grain-grain.static_friction"')
+    return dimension.name
+
+
+def _read_parameters(value: object) -> tuple[str, ...]:
+    """Read the place of a parameter, or a list of places."""
+    places = (value,) if isinstance(value, str) else tuple(value) if isinstance(value, list | tuple) else ()
+    if not places or not all(isinstance(place, str) for place in places):
+        raise ValueError("must be the place of a parameter, or a list of places")
+    for place in places:
+        _dimension_of(place)
+    return places
+
+
+Parameters = Annotated[tuple[str, ...], PlainValidator(_read_parameters)]
+"""One place of the study, or several."""
+
+
 class FactorSection(Section):
     """One factor. Its natural unit is the unit of ``low``."""
 
@@ -31,25 +59,19 @@ class FactorSection(Section):
     """Short name: a column of every table, and what ``--set`` takes."""
     label: str
     """What it is, in words."""
-    parameter: str
-    """The parameter's place in the study, as ``contact.grain-grain.static_friction``."""
+    parameter: Parameters
+    """The parameter's place in the study, as ``contact.grain-grain.static_friction``; or several places, all of
+    one value."""
     low: RawQuantity
     """Lower end of the range."""
     high: RawQuantity
     """Upper end of the range."""
 
-    @field_validator("parameter")
-    @classmethod
-    def _is_a_quantity(cls, parameter: str) -> str:
-        if _dimension_of(parameter) is None:
-            raise ValueError('must lead to a quantity of the study, as "contact.grain-grain.static_friction"')
-        return parameter
-
     @field_validator("low", "high")
     @classmethod
     def _has_the_dimension(cls, level: Quantity, info: ValidationInfo) -> Quantity:
-        if dimension := _dimension_of(info.data.get("parameter", "")):
-            level.to_base(dimension.name)
+        for parameter in info.data.get("parameter", ()):
+            level.to_base(_dimension_of(parameter))
         return level
 
     @model_validator(mode="after")
@@ -63,9 +85,9 @@ class FactorSection(Section):
         return self
 
     @property
-    def path(self) -> tuple[str, ...]:
-        """Key path of the parameter."""
-        return tuple(self.parameter.split("."))
+    def paths(self) -> tuple[tuple[str, ...], ...]:
+        """Key path of each of its places."""
+        return tuple(tuple(parameter.split(".")) for parameter in self.parameter)
 
     @property
     def unit(self) -> str:
@@ -75,16 +97,15 @@ class FactorSection(Section):
     @property
     def dimension(self) -> str:
         """Dimension of the parameter, a key of ``units.UNITS`` or ``""``."""
-        dimension = _dimension_of(self.parameter)
-        return dimension.name if dimension else ""
+        return _dimension_of(self.parameter[0])
 
     @property
     def limits(self) -> tuple[float, float]:
         """Hard physical limits in the natural unit, infinite where there is none."""
-        field = field_at(Physics, self.path)
-        least, most = bounds(field) if field else (float("-inf"), float("inf"))
+        fields = [field for path in self.paths if (field := field_at(Physics, path))]
+        least, most = zip(*map(bounds, fields), strict=True)
         size = unit_size(self.unit, self.dimension)
-        return least / size, most / size
+        return max(least) / size, min(most) / size
 
     def natural(self, value: object) -> float:
         """Read a quantity (``"34 MPa"``, 0.46) as a number in the natural unit.
@@ -110,8 +131,9 @@ class FactorTable(Section):
 
     @model_validator(mode="after")
     def _each_once(self) -> FactorTable:
-        for key in ("name", "parameter"):
-            values = [getattr(section, key) for section in self.factor]
+        names = [section.name for section in self.factor]
+        places = [place for section in self.factor for place in section.parameter]
+        for key, values in (("name", names), ("parameter", places)):
             if twice := sorted({value for value in values if values.count(value) > 1}):
                 raise ValueError(f"each factor has a {key} of its own; given twice: {', '.join(twice)}")
         return self
@@ -176,11 +198,12 @@ def with_factor_values(
     """
     values: dict[str, Any] = {}
     for section in sections:
-        table = values
-        for key in section.path[:-1]:
-            table = table.setdefault(key, {})
         value = settings.get(section.name, section.factor().center)
-        table[section.path[-1]] = str(Quantity(value, section.unit)) if section.unit else value
+        for *outer, last in section.paths:
+            table = values
+            for key in outer:
+                table = table.setdefault(key, {})
+            table[last] = str(Quantity(value, section.unit)) if section.unit else value
     return merge(document, values)
 
 
@@ -192,12 +215,8 @@ def check_one_home(document: Mapping[str, Any], sections: Iterable[FactorSection
     StudyError
         At the fixed value.
     """
-    for section in sections:
-        if (value := value_at(document, section.path)) is not None:
-            rule = f"is varied by the factor {section.name!r} and takes no fixed value: remove one of them"
-            raise StudyError(rule, value, places.of(section.path))
-
-
-def _dimension_of(parameter: str) -> Dimension | None:
-    field = field_at(Physics, tuple(parameter.split(".")))
-    return dimension_of(field) if field else None
+    homes = [(section.name, path) for section in sections for path in section.paths]
+    for name, path in homes:
+        if (value := value_at(document, path)) is not None:
+            rule = f"is varied by the factor {name!r} and takes no fixed value: remove one of them"
+            raise StudyError(rule, value, places.of(path))

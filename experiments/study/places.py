@@ -16,7 +16,7 @@ _KEY_PART = re.compile(r""""([^"]*)"|'([^']*)'|([\w-]+)""")
 
 @dataclass(frozen=True)
 class Places:
-    """Finds the line of a key of a study, also of one that the chosen scale overrides."""
+    """Finds the line of a key of a study, also of one that the chosen scale or condition overrides."""
 
     file: Path
     """The study file."""
@@ -24,6 +24,8 @@ class Places:
     """Line of each table and key, counted from 1."""
     scale: str | None = None
     """Scale whose table overrides the rest."""
+    condition: str | None = None
+    """Condition whose table overrides both."""
 
     @classmethod
     def read(cls, path: Path, text: str, scale: str | None = None) -> Places:
@@ -37,9 +39,11 @@ class Places:
 
     def of(self, path: KeyPath) -> str:
         """Name the place of a key: its own line, or that of the nearest table around it."""
-        overridden: KeyPath = ("scale", self.scale or "", *path)
-        if overridden in self.lines:
-            return self._name(self.lines[overridden], overridden)
+        scale: KeyPath = ("scale", self.scale or "")
+        condition: KeyPath = ("condition", self.condition or "")
+        for over in ((*scale, *condition), condition, scale):
+            if (*over, *path) in self.lines:
+                return self._name(self.lines[(*over, *path)], (*over, *path))
         for length in range(len(path), 0, -1):
             if path[:length] in self.lines:
                 return self._name(self.lines[path[:length]], path)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ from doe.factors import Factor
 from experiments.calibrate.settings import CampaignSettings, MeasuredTarget, TwinTarget
 from experiments.errors import StudyError
 from experiments.study.card import with_material
+from experiments.study.conditions import BASE, Condition, ConditionSections, under_condition
 from experiments.study.factor_section import (
     FactorSection,
     FactorTable,
@@ -106,11 +108,14 @@ class Study(Physics):
     """The angle to be matched."""
     factor_sections: tuple[FactorSection, ...] = Field(default=(), alias="factor")
     """The factors as written, in order."""
+    condition_sections: ConditionSections = Field(default={}, alias="condition")
+    """The conditions as written."""
     campaign: CampaignSettings = CampaignSettings()
     """Every decision of the campaign."""
 
     _document: dict[str, Any] = PrivateAttr(default_factory=dict)
     _places: Places = PrivateAttr(default_factory=lambda: Places(BUCKWHEAT, {}))
+    _fixed: frozenset[str] = PrivateAttr(default=frozenset())
 
     @property
     def file(self) -> Path:
@@ -150,6 +155,38 @@ class Study(Physics):
         """Hard physical limits of every factor in its natural unit, infinite where there is none."""
         return {section.name: section.limits for section in self.factor_sections}
 
+    @cached_property
+    def conditions(self) -> tuple[Condition, ...]:
+        """What the grain is tested under, in the order of the file; none written: the test as it is."""
+        return tuple(section.condition(name) for name, section in self.condition_sections.items()) or (BASE,)
+
+    def under(self, condition: str) -> Study:
+        """Build the study of the test under one condition; it takes settings of all factors of this one.
+
+        Raises
+        ------
+        StudyError
+            When there is no such condition, or it breaks a rule.
+        """
+        by_name = {each.name: each for each in self.conditions}
+        if condition not in by_name:
+            rule = f"must be a condition of the study, {nearest_name(condition, list(by_name))}"
+            raise StudyError(rule, condition, str(self.file))
+        document, fixed = under_condition(self._document, by_name[condition])
+        study = _build(document, replace(self._places, condition=condition))
+        study._fixed = self._fixed | fixed
+        return study
+
+    def with_document(self, document: Mapping[str, Any]) -> Study:
+        """Build the study that another document describes, as if it stood in the same file.
+
+        Raises
+        ------
+        StudyError
+            When the document breaks a rule.
+        """
+        return _build(dict(document), self._places)
+
     def natural_settings(self, settings: Mapping[str, object], source: str = "settings") -> dict[str, float]:
         """Read factor values with their units as numbers in natural units.
 
@@ -184,7 +221,7 @@ class Study(Physics):
         """
         names = [section.name for section in self.factor_sections]
         for name in settings:
-            if name not in names:
+            if name not in names and name not in self._fixed:
                 raise StudyError(f"must name a factor, {nearest_name(name, names)}", name, str(self.file))
         document = with_factor_values(self._document, self.factor_sections, settings)
         sections = {key: document[key] for key in Physics.model_fields if key in document}
@@ -224,12 +261,19 @@ def load_study(
             rule = f"the scale must be one that the study has, {nearest_name(scale, list(scales))}"
             raise StudyError(rule, scale, str(path))
         document = merge(document, scales[scale])
-    document = with_material(merge(document, changes or {}), path.parent)
+    return _build(with_material(merge(document, changes or {}), path.parent), places)
+
+
+def _build(document: dict[str, Any], places: Places) -> Study:
+    """Build a study, and each of its conditions once, so that a wrong one is named at once."""
     sections = validated(FactorTable, {"factor": document.get("factor", [])}, places).factor
     check_one_home(document, sections, places)
     plain = with_factor_values(_without_units(document, sections, places), sections, {})
     study = validated(Study, plain, places)
     study._document, study._places = document, places
+    if study.condition_sections:
+        for condition in study.conditions:
+            study.under(condition.name)
     return study
 
 
