@@ -107,6 +107,34 @@ class ClumpShape:
         principal = np.einsum("ia,ij,ja->a", axes, moments.inertia_over_mass, axes)
         return cls((centers - moments.center) @ axes, radii, moments.volume, principal)
 
+    def elongated(self, elongation: float) -> "ClumpShape":
+        """Return the shape drawn out along its longest principal axis, its volume and its spheres as many.
+
+        Parameters
+        ----------
+        elongation
+            The centres go apart by this part along the axis of the least moment of inertia, then the whole is
+            scaled to the volume it had; 0 leaves the shape as it is.
+
+        Raises
+        ------
+        ValueError
+            If the elongation is not finite or below 0, or there is one sphere only, which stays round.
+        """
+        if not (np.isfinite(elongation) and elongation >= 0.0):
+            raise ValueError(f"elongation: must be finite and 0 or more, got {elongation!r}")
+        if elongation == 0.0:
+            return self
+        if self.sphere_count == 1:
+            raise ValueError(f"elongation: must be 0 for a shape of one sphere, got {elongation!r}")
+        stretch = np.ones(3)
+        stretch[np.argmin(self.inertia_over_mass)] += elongation
+        drawn = ClumpShape.from_spheres(self.centers * stretch, self.radii)
+        scale = np.cbrt(self.volume / drawn.volume)
+        return ClumpShape(
+            drawn.centers * scale, drawn.radii * scale, self.volume, drawn.inertia_over_mass * scale**2
+        )
+
     @classmethod
     def read(cls, path: str | Path) -> "ClumpShape":
         """Read spheres, one a line: ``x y z r`` in mm; ``#`` starts a comment.

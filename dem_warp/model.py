@@ -160,6 +160,8 @@ class WorldSetup:
         Corners of the box that grains may be in [m].
     gravity : 3 floats
         [m/s2]
+    air_drag : float
+        Rate at which the air takes a grain's velocity, whatever its size [1/s].
     """
 
     grains: Grains
@@ -171,12 +173,17 @@ class WorldSetup:
     speed_limit: float
     domain: tuple[tuple[float, float, float], tuple[float, float, float]]
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
+    air_drag: float = 0.0
 
     def __post_init__(self) -> None:
         for name in ("time_step", "skin", "speed_limit"):
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0):
                 raise ValueError(f"WorldSetup.{name}: must be positive and finite, got {value!r}")
+        if not (np.isfinite(self.air_drag) and self.air_drag >= 0):
+            raise ValueError(
+                f"WorldSetup.air_drag: must be finite and 0 or more [1/s], got {self.air_drag!r}"
+            )
         if not np.all(np.subtract(self.domain[1], self.domain[0]) > 0):
             raise ValueError(f"WorldSetup.domain: lower corner must lie below the upper, got {self.domain!r}")
         for wall, pair in self.walls:

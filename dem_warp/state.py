@@ -125,6 +125,7 @@ def build_model(
             "reach": world.reach,
             "cell_rate": _cell_rate(world, precision),
             "speed_limit": world.speed_limit,
+            "kept": np.exp(-world.air_drag * world.time_step),
             "origin": world.origin,
             "half_extent": world.half_extent,
             "most_found": found,

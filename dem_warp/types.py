@@ -139,6 +139,7 @@ def device_structs(precision: Precision) -> SimpleNamespace:
         reach: real  # largest distance of two surfaces that act on each other [m]
         cell_rate: real  # cells per count of a sphere position
         speed_limit: real  # above it the world has diverged [m/s]
+        kept: real  # part of a grain's velocity that the air leaves it in a step; 1 without drag
         origin: wp.vec3d  # where sphere positions count from [m]
         half_extent: wp.vec3d  # a grain further from the origin has left the domain [m]
         most_found: int  # partners that a sphere may have; of its own, so that no other world changes it
@@ -154,6 +155,7 @@ def device_structs(precision: Precision) -> SimpleNamespace:
         length: wp.float64  # of the profile along the axis [m]
         reach: wp.float64  # from the wall's point to its farthest [m]
         start_step: int  # the motion starts with this step
+        duration: wp.float64  # and ends after this time [s]
         point: wp.vec3d  # the wall's point when the motion starts [m]
         orientation: wp.quatd  # how far it had then turned
         velocity: wp.vec3d  # [m/s]

@@ -35,12 +35,15 @@ class Motion:
         Of a vibration amplitude * sin(2 pi frequency t) on top, t from the start of the motion [m].
     frequency : float
         [Hz]
+    duration : float
+        After this time the wall stays where it then is [s]; by default the motion has no end.
     """
 
     velocity: Vector = (0.0, 0.0, 0.0)
     spin: Vector = (0.0, 0.0, 0.0)
     amplitude: Vector = (0.0, 0.0, 0.0)
     frequency: float = 0.0
+    duration: float = math.inf
 
     def __post_init__(self) -> None:
         for name in ("velocity", "spin", "amplitude"):
@@ -49,6 +52,8 @@ class Motion:
                 raise ValueError(f"Motion.{name}: must be three finite numbers, got {value!r}")
         if not (math.isfinite(self.frequency) and self.frequency >= 0):
             raise ValueError(f"Motion.frequency: must be finite and not negative, got {self.frequency!r}")
+        if not self.duration > 0:
+            raise ValueError(f"Motion.duration: must be positive [s], got {self.duration!r}")
         if any(self.amplitude) and self.frequency == 0:
             raise ValueError(f"Motion.frequency: must be positive with amplitude {self.amplitude!r}, got 0")
 

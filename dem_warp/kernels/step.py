@@ -85,6 +85,7 @@ def step_kernels(build: Build) -> SimpleNamespace:
         inertia = model.inertia[g]
         if step >= model.release_step[g]:
             velocity += (force / v4[3] + world.gravity) * dt
+            velocity *= world.kept  # last, where a factor of 1 changes no bit
             turned, spin = motion.turn(
                 turned, spin, torque, vec3(inertia[0], inertia[1], inertia[2]), rolling, dt
             )

@@ -216,16 +216,18 @@ def wall_kernels(build: Build) -> SimpleNamespace:
     @wp.func
     def moved(wall: Wall, time: wp.float64) -> Frame:
         """Frame of a wall at a time [s] since its motion started."""
+        past = wp.min(time, wall.duration)
         rate = wp.length(wall.spin)
-        turn = wp.quat_from_axis_angle(wp.normalize(wall.spin), rate * time)
+        turn = wp.quat_from_axis_angle(wp.normalize(wall.spin), rate * past)
         circular = TURN * wall.frequency
-        velocity = wall.velocity + wall.amplitude * (circular * wp.cos(circular * time))
         frame = Frame()
-        frame.origin = wall.point + wall.velocity * time + wall.amplitude * wp.sin(circular * time)
+        frame.origin = wall.point + wall.velocity * past + wall.amplitude * wp.sin(circular * past)
         frame.rotation = wp.mul(turn, wall.orientation)
         frame.axis = wp.quat_rotate(frame.rotation, wall.axis)
-        frame.velocity = vec3(real(velocity[0]), real(velocity[1]), real(velocity[2]))
-        frame.spin = vec3(real(wall.spin[0]), real(wall.spin[1]), real(wall.spin[2]))
+        if time < wall.duration:
+            velocity = wall.velocity + wall.amplitude * (circular * wp.cos(circular * past))
+            frame.velocity = vec3(real(velocity[0]), real(velocity[1]), real(velocity[2]))
+            frame.spin = vec3(real(wall.spin[0]), real(wall.spin[1]), real(wall.spin[2]))
         return frame
 
     @wp.kernel(module=module)

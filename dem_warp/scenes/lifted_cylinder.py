@@ -1,22 +1,23 @@
 """The lifted-cylinder test: fill an open tube on a plate, strike it off, lift it, wait for the heap."""
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
 
 from dem_warp.case import Case
 from dem_warp.materials import Material
-from dem_warp.model import WorldSetup
+from dem_warp.model import ContactCoefficients, WorldSetup
 from dem_warp.scenes.poured_controller import UNREST, Phase, PouredController
-from dem_warp.scenes.poured_scene import FILL_OBSERVABLES, PouredScene
+from dem_warp.scenes.poured_scene import FILL_OBSERVABLES, GRAVITY, PouredScene
 from dem_warp.scenes.rain import CrossSection
 from dem_warp.scenes.scene import Course, Decision, Observable
 from dem_warp.solver import WorldView
 from dem_warp.walls import Cylinder, Disc, Motion, Plane, Wall
 
-TUBE = 1
+PLATE, TUBE = 0, 1
 GONE = 1.5
 """Grains that have risen with the tube by this many times its height leave with it."""
 
@@ -26,7 +27,9 @@ CLOGGED = 0.02
 
 @dataclass(frozen=True)
 class LiftedCylinder(PouredScene):
-    """An open tube is filled by a rain of grains and lifted at constant speed.
+    """An open tube is filled by a rain of grains and lifted at constant speed along its axis.
+
+    Plate and tube are tilted together, if they are: z is the axis of the tube, and gravity is turned about y.
 
     Attributes
     ----------
@@ -40,6 +43,17 @@ class LiftedCylinder(PouredScene):
         Ends the case at a fixed simulated time [s] instead of at rest.
     plate_diameter : float, optional
         Of a round plate, over whose rim grains fall and are lost [m]; by default the plate has no end.
+    tilt : float
+        Of plate and tube, from the beginning on: the plate falls towards +x [rad].
+    plate_friction : float, optional
+        Static friction on a plate of known roughness; by default the plate is as the tube.
+    plate_friction_excess : float
+        Static friction that the plate has beyond the tube's; nothing on a plate of known friction.
+    vibration_amplitude, vibration_frequency : float
+        Of the plate, along the axis of the tube, while the drive of the tube runs [m], [Hz].
+    vibration_hold : float
+        The drive runs from the start of the lift until this long after the tube has risen by its height [s],
+        and on to the end of a vibration.
     """
 
     diameter: float
@@ -48,6 +62,12 @@ class LiftedCylinder(PouredScene):
     lift_speed: float = 0.05
     duration: float | None = None
     plate_diameter: float | None = None
+    tilt: float = 0.0
+    plate_friction: float | None = None
+    plate_friction_excess: float = 0.0
+    vibration_amplitude: float = 0.0
+    vibration_frequency: float = 50.0
+    vibration_hold: float = 0.5
 
     observables: ClassVar[Mapping[str, Observable]] = FILL_OBSERVABLES | {
         "time_to_rest": Observable("s", "from the start of the lift until the heap rests"),
@@ -58,7 +78,12 @@ class LiftedCylinder(PouredScene):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self._require_positive("diameter", "height", "lift_speed")
+        self._require_positive("diameter", "height", "lift_speed", "vibration_frequency")
+        self._require_not_negative("tilt", "plate_friction_excess", "vibration_amplitude", "vibration_hold")
+        if self.plate_friction is not None:
+            self._require_not_negative("plate_friction")
+        if self.tilt >= math.pi / 2:
+            raise ValueError(f"LiftedCylinder.tilt: must be below pi / 2 [rad], got {self.tilt!r}")
         if self.duration is not None and self.duration <= 0:
             raise ValueError(f"LiftedCylinder.duration: must be positive [s], got {self.duration!r}")
         if self.plate_diameter is not None and not self.diameter < self.plate_diameter < np.inf:
@@ -66,6 +91,36 @@ class LiftedCylinder(PouredScene):
                 f"LiftedCylinder.plate_diameter: must be finite and above the tube's {self.diameter!r} [m], "
                 f"got {self.plate_diameter!r}"
             )
+
+    @property
+    def gravity(self) -> tuple[float, float, float]:
+        """In the frame of plate and tube [m/s2]."""
+        return GRAVITY * math.sin(self.tilt), 0.0, -GRAVITY * math.cos(self.tilt)
+
+    @property
+    def lift_time(self) -> float:
+        """In which the tube rises by its height [s]."""
+        return self.height / self.lift_speed
+
+    @property
+    def vibration_time(self) -> float:
+        """From the start of the lift until the plate, after whole vibrations, is where it was [s]."""
+        if self.vibration_amplitude == 0:
+            return 0.0
+        vibrations = (self.lift_time + self.vibration_hold) * self.vibration_frequency
+        return math.ceil(vibrations) / self.vibration_frequency
+
+    @property
+    def lift(self) -> dict[int, Motion]:
+        """Motions of the walls that begin with the lift."""
+        motions = {TUBE: Motion(velocity=(0.0, 0.0, self.lift_speed))}
+        if self.vibration_amplitude > 0:
+            motions[PLATE] = Motion(
+                amplitude=(0.0, 0.0, self.vibration_amplitude),
+                frequency=self.vibration_frequency,
+                duration=self.vibration_time,
+            )
+        return motions
 
     @property
     def plate(self) -> Plane | Disc:
@@ -91,6 +146,18 @@ class LiftedCylinder(PouredScene):
         """The plate and the tube."""
         return self.plate, Cylinder((0.0, 0.0, 0.0), self.diameter / 2, self.height)
 
+    def contacts(self, case: Case[Any]) -> tuple[ContactCoefficients, ...]:
+        """Contacts of grains with grains, with the tube and with the plate."""
+        grains, tube = super().contacts(case)
+        friction = self.plate_friction
+        if friction is None:
+            friction = tube.static_friction + self.plate_friction_excess
+        return grains, tube, replace(tube, static_friction=friction)
+
+    def contact_of(self, wall: int) -> int:
+        """Which of the contacts holds for a wall, by its number."""
+        return 2 if wall == PLATE else 1
+
     def room(self, reach: float) -> tuple[float, float, float]:
         """Wide enough for the flattest heap."""
         half_width = 4.0 * self.diameter + 2.0 * self.height
@@ -110,22 +177,33 @@ class LiftController(PouredController[Course]):
     def __init__(self, case: Case[LiftedCylinder], setup: WorldSetup, chunk: int) -> None:
         super().__init__(case, setup, chunk, Course("fill"))
         self.scene = case.scene
-        lift = 0.5 * self.scene.diameter / self.scene.lift_speed
+        lift = max(0.5 * self.scene.diameter / self.scene.lift_speed, self.scene.vibration_time)
         self.phases["lift"] = Phase(self._lift, lift + 0.3)
 
     def begin(self, view: WorldView, kept: np.ndarray) -> Mapping[int, Motion]:
-        """Lift the tube."""
+        """Lift the tube, and let the drive shake the plate."""
         self.course.enter("lift", view)
-        return {TUBE: Motion(velocity=(0.0, 0.0, self.scene.lift_speed))}
+        return self.scene.lift
 
     def _lift(self, view: WorldView) -> Decision:
+        still: Mapping[int, Motion] = {PLATE: Motion()} if self._vibration_ends(view) else {}
+        return replace(self._lifted(view), move=still)
+
+    def _vibration_ends(self, view: WorldView) -> bool:
+        """Whether the plate, which vibrated when the world was last looked at, has come to a stop."""
+        before = (view.step - self.period) * self.setup.time_step
+        end = self.course.phase_start + self.scene.vibration_time
+        return self.course.phase_start <= before < end <= view.time
+
+    def _lifted(self, view: WorldView) -> Decision:
         elapsed = view.time - self.course.phase_start
         rise = self.scene.lift_speed * elapsed
         positions = view.positions[view.alive]
         top = positions[:, 2].max() + self.reach if len(positions) else 0.0
         if self.scene.duration is not None and view.time < self.scene.duration:
             return Decision()
-        over = self.scene.duration is not None or (rise > top and self.rests(view))
+        calm = elapsed >= self.scene.vibration_time and rise > top
+        over = self.scene.duration is not None or (calm and self.rests(view))
         if over:
             self._finish(view, elapsed)
             return Decision(done=True)
@@ -135,7 +213,7 @@ class LiftController(PouredController[Course]):
             if count > CLOGGED * self.course.observables["grain_count"]:
                 return Decision(done=True, failure=f"the tube is clogged: {count} grains rose with it")
             return Decision(remove=np.flatnonzero(riding))
-        if elapsed > self.scene.height / self.scene.lift_speed + self.LIFT_MARGIN:
+        if elapsed > max(self.scene.lift_time, self.scene.vibration_time) + self.LIFT_MARGIN:
             failure = f"the heap did not come to rest within {elapsed:.1f} s of the lift; {UNREST}"
             return Decision(done=True, failure=failure)
         return Decision()

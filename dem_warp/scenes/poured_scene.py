@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from dem_warp.case import Case
-from dem_warp.model import Grains, WorldSetup
+from dem_warp.model import ContactCoefficients, Grains, WorldSetup
 from dem_warp.scenes.rain import CrossSection, Rain, place_rain
 from dem_warp.scenes.scene import Controller, Observable
 from dem_warp.walls import Wall
@@ -39,6 +39,8 @@ class PouredScene(ABC):
     rest_speed, rest_time : float
         Grains rest when their root mean square speed has been below `rest_speed` [m/s], and none has passed
         ten times that, for `rest_time` [s].
+    air_drag : float
+        Of still air: a free grain slows down by this part of its velocity a second, whatever its size [1/s].
     """
 
     rain_rate: float = 3000.0
@@ -46,6 +48,7 @@ class PouredScene(ABC):
     grain_count: int | None = None
     rest_speed: float = 1.0e-3
     rest_time: float = 0.05
+    air_drag: float = 0.0
 
     observables: ClassVar[Mapping[str, Observable]] = FILL_OBSERVABLES
     densest_fill: ClassVar[float] = 0.64
@@ -53,6 +56,7 @@ class PouredScene(ABC):
 
     def __post_init__(self) -> None:
         self._require_positive("rain_rate", "rain_speed", "rest_speed", "rest_time")
+        self._require_not_negative("air_drag")
         if self.grain_count is not None and self.grain_count < 1:
             raise ValueError(
                 f"{type(self).__name__}.grain_count: must be at least 1, got {self.grain_count!r}"
@@ -63,6 +67,12 @@ class PouredScene(ABC):
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0):
                 raise ValueError(f"{type(self).__name__}.{name}: must be positive and finite, got {value!r}")
+
+    def _require_not_negative(self, *names: str) -> None:
+        for name in names:
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value >= 0):
+                raise ValueError(f"{type(self).__name__}.{name}: must be finite and 0 or more, got {value!r}")
 
     # ---- what a scene says of its container ----------------------------------------------------------------
 
@@ -95,6 +105,19 @@ class PouredScene(ABC):
     @abstractmethod
     def controller(self, case: Any, setup: WorldSetup, chunk: int) -> Controller[Any]:
         """Controller of one case."""
+
+    @property
+    def gravity(self) -> tuple[float, float, float]:
+        """[m/s2]"""
+        return 0.0, 0.0, -GRAVITY
+
+    def contacts(self, case: Case[Any]) -> tuple[ContactCoefficients, ...]:
+        """Contacts of grains with grains, and with each kind of wall."""
+        return case.contacts(case.scene.wall_material)
+
+    def contact_of(self, wall: int) -> int:
+        """Which of the contacts holds for a wall, by its number."""
+        return 1
 
     def release(self, reach: float) -> float:
         """Height from which grains fall freely [m]."""
@@ -147,8 +170,8 @@ def _world(case: Case[Any], rain: Rain) -> WorldSetup:
     return WorldSetup(
         grains=grains,
         shapes=rain.grains.clumps,
-        contacts=case.contacts(scene.wall_material),
-        walls=tuple((wall, 1) for wall in scene.walls(reach)),
+        contacts=scene.contacts(case),
+        walls=tuple((wall, scene.contact_of(number)) for number, wall in enumerate(scene.walls(reach))),
         time_step=case.time_step,
         skin=case.numerics.skin or default_skin(case),
         speed_limit=20 * scene.top_speed,
@@ -156,7 +179,8 @@ def _world(case: Case[Any], rain: Rain) -> WorldSetup:
             (-half_x, -half_y, bottom),
             (half_x, half_y, float(grains.positions[:, 2].max()) + 2 * reach),
         ),
-        gravity=(0.0, 0.0, -GRAVITY),
+        gravity=scene.gravity,
+        air_drag=scene.air_drag,
     )
 
 

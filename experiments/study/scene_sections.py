@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from collections.abc import Mapping
 from typing import Self
@@ -11,7 +12,7 @@ from pydantic import Field, model_validator
 from dem_warp import DrawDown, Drum, Hopper, LiftedCylinder, Material
 from dem_warp.scenes.poured_scene import PouredScene
 from dem_warp.scenes.scene import Observable
-from experiments.study.schema import Length, Number, Rate, Section, Speed, Time
+from experiments.study.schema import Angle, Frequency, Length, Number, Rate, Section, Speed, Time
 
 _ANY_WALL = Material(density=7800.0, shear_modulus=70e9, poisson_ratio=0.3)
 """To try a scene with: none of its rules is about the material of its walls."""
@@ -30,6 +31,8 @@ class PouredSection(Section):
     """The grains rest when they have been slower than this ..."""
     rest_time: Time = Field(default=0.05, gt=0.0)
     """... for this long."""
+    air_drag: Rate = Field(default=0.0, ge=0.0)
+    """Part of its velocity that still air takes from a free grain in a second."""
 
     @model_validator(mode="after")
     def _can_be(self) -> Self:
@@ -60,10 +63,23 @@ class LiftedCylinderSection(PouredSection):
     """Ends the test after this simulated time, instead of at rest."""
     plate_diameter: Length | None = Field(default=None, gt=0.0)
     """Of a round plate, over whose rim grains fall and are lost; left out: the plate has no end."""
+    tilt: Angle = Field(default=0.0, ge=0.0, lt=90.0)
+    """Of plate and tube together, from the beginning on."""
+    plate_friction: Number | None = Field(default=None, ge=0.0)
+    """Static friction on a plate of known roughness; left out: the plate is as the tube."""
+    plate_friction_excess: Number = Field(default=0.0, ge=0.0)
+    """Static friction that the plate has beyond the tube's; nothing on a plate of known friction."""
+    vibration_amplitude: Length = Field(default=0.0, ge=0.0)
+    """Of the plate, along the axis of the tube, while the drive of the tube runs."""
+    vibration_frequency: Frequency = Field(default=50.0, gt=0.0)
+    """Of the plate."""
+    vibration_hold: Time = Field(default=0.5, ge=0.0)
+    """The drive runs from the start of the lift until this long after the tube has risen by its height."""
 
     def scene(self, wall: Material) -> LiftedCylinder:
         """Build the engine's scene."""
-        return LiftedCylinder(wall_material=wall, **dict(self))
+        settings = dict(self) | {"tilt": math.radians(self.tilt)}
+        return LiftedCylinder(wall_material=wall, **settings)
 
 
 class HopperSection(PouredSection):

@@ -87,6 +87,8 @@ class GrainSection(MaterialSection, ShapeSection):
     """Mean size, as a multiple of the shape."""
     size_sd: Number = Field(default=0.05, ge=0.0)
     """Standard deviation of the size."""
+    elongation: Number = Field(default=0.0, ge=0.0)
+    """Every shape is drawn out by this part along its longest axis, at the same volume."""
 
     @model_validator(mode="after")
     def _has_its_shapes(self) -> Self:
@@ -96,10 +98,11 @@ class GrainSection(MaterialSection, ShapeSection):
     def shape(self) -> ClumpShape | ShapeMixture:
         """Build the grain's shape, or the mixture of its shapes."""
         if not self.shapes:
-            return self.one_shape()
+            return _elongated(self.one_shape(), self.elongation)
         if self.clump is not None or self.sphere is not None:
             raise ValueError("takes one shape (clump or sphere) or several ([grain.shapes.NAME]), not both")
-        return ShapeMixture(tuple(part.one_shape() for part in self.shapes.values()), self._fractions())
+        shapes = (_elongated(part.one_shape(), self.elongation) for part in self.shapes.values())
+        return ShapeMixture(tuple(shapes), self._fractions())
 
     def _fractions(self) -> tuple[float, ...]:
         parts = [part.fraction for part in self.shapes.values()]
@@ -129,6 +132,11 @@ class GrainSection(MaterialSection, ShapeSection):
 @lru_cache(maxsize=32)
 def _read_clump(path: Path, modified: int) -> ClumpShape:
     return ClumpShape.read(path)
+
+
+@lru_cache(maxsize=32)
+def _elongated(shape: ClumpShape, elongation: float) -> ClumpShape:
+    return shape.elongated(elongation)
 
 
 @lru_cache(maxsize=32)

@@ -15,6 +15,7 @@ UNITS: dict[str, dict[str, float]] = {
     "density": {"kg/m^3": 1.0, "g/cm^3": 1e3},
     "speed": {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3},
     "rate": {"1/s": 1.0, "1/min": 1.0 / 60.0},
+    "frequency": {"Hz": 1.0},
     "time": {"s": 1.0, "ms": 1e-3, "min": 60.0},
     "angle": {"deg": 1.0, "rad": math.degrees(1.0)},
 }

@@ -258,3 +258,36 @@ def test_the_callers_arrays_stay_his():
     ClumpShape.from_spheres(centers, [1.0])
     np.testing.assert_array_equal(centers, [[1.0, 0.0, 0.0]])
     assert centers.flags.writeable
+
+
+@pytest.mark.parametrize("elongation", [0.2, 1.0])
+def test_an_elongated_chain_is_longer_thinner_and_as_large(elongation):
+    chain = ClumpShape.from_spheres([[0.0, 0.0, -1e-3], [0.0, 0.0, 0.0], [0.0, 0.0, 1e-3]], [1e-3] * 3)
+    drawn = chain.elongated(elongation)
+    assert drawn.volume == chain.volume
+    assert drawn.sphere_count == 3
+    spacing = np.diff(drawn.centers[:, 2]) / drawn.radii[1:]
+    np.testing.assert_allclose(spacing, 1.0 + elongation, rtol=1e-12)
+    assert (drawn.radii < chain.radii).all()
+    # As said, its mass properties are those of the union of its spheres, scaled without another quadrature.
+    union = ClumpShape.from_spheres(drawn.centers, drawn.radii)
+    assert union.volume == pytest.approx(drawn.volume, rel=1e-9)
+    np.testing.assert_allclose(union.inertia_over_mass, drawn.inertia_over_mass, rtol=1e-9)
+
+
+def test_a_shape_is_drawn_out_along_its_longest_axis():
+    plate = ClumpShape.from_spheres(
+        1e-3 * np.array([[0, -2, 0], [0, 2, 0], [1, 0, 0], [-1, 0, 0]]), [1e-3] * 4
+    )
+    drawn = plate.elongated(0.5)
+    scale = drawn.radii / plate.radii
+    np.testing.assert_allclose(drawn.centers, plate.centers * [1.0, 1.5, 1.0] * scale[:, None], atol=1e-12)
+
+
+def test_an_elongation_of_0_is_the_shape_itself_and_wrong_ones_are_refused():
+    ball = ClumpShape.sphere(1e-3)
+    assert ball.elongated(0.0) is ball
+    with pytest.raises(ValueError, match=r"elongation: must be 0 for a shape of one sphere, got 0.1"):
+        ball.elongated(0.1)
+    with pytest.raises(ValueError, match=r"elongation: must be finite and 0 or more, got -0.1"):
+        ball.elongated(-0.1)

@@ -314,3 +314,31 @@ def test_an_order_to_stay_where_it_is_changes_nothing():
 def test_a_motion_refuses_bad_values(build, message):
     with pytest.raises(ValueError, match=message):
         build()
+
+
+def test_a_motion_of_some_duration_leaves_the_wall_where_it_then_is():
+    amplitude, frequency, step = 2e-3, 50.0, TIME_STEP
+    solver = solve(
+        world(grains([0.0, 0.0, RADIUS - OVERLAP]), CONTACT, step, walls=(Plane(),), gravity=downhill(0.0))
+    )
+    shake = Motion(amplitude=(0.0, 0.0, amplitude), frequency=frequency, duration=3.25 / frequency)
+    solver.move_wall(0, 0, shake)
+    heights = []
+    for chunk in range(1, 41):
+        solver.advance()
+        time = min(chunk * CHUNK_TIME, shake.duration)
+        heights.append(amplitude * math.sin(2.0 * math.pi * frequency * time))
+        # The same closed form in float64.
+        assert solver.wall_pose(0, 0)[0][2] == pytest.approx(heights[-1], abs=1e-12 * amplitude)
+    assert 2.0 * shake.duration < 40 * CHUNK_TIME
+    # After three vibrations and a quarter the plane stays at its highest point, where the ball comes to rest.
+    assert heights[-1] == pytest.approx(amplitude, rel=1e-12)
+    run_for(solver, 0.5)
+    end = state(solver)
+    assert end["positions"][0, 2] == pytest.approx(amplitude + RADIUS - OVERLAP, abs=1e-6 * OVERLAP)
+    assert np.abs(end["velocities"]).max() < 1e-9
+
+
+def test_a_motion_takes_some_time():
+    with pytest.raises(ValueError, match=r"Motion.duration: must be positive \[s\], got 0"):
+        Motion(duration=0.0)

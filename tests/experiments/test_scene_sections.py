@@ -11,6 +11,7 @@ import pytest
 from dem_warp import DrawDown, Drum, Hopper
 from experiments.errors import StudyError
 from experiments.study import load_study
+from experiments.study.study import BUCKWHEAT
 
 WriteStudy = Callable[..., Path]
 
@@ -84,3 +85,48 @@ def test_a_test_that_cannot_be_is_named_with_its_place(
     assert rule in problem.rule
     assert problem.place.startswith(f"{path}")
     assert problem.place.endswith(f": {key}")
+
+
+def test_the_options_of_a_lifted_cylinder_come_with_their_units(write_study: WriteStudy) -> None:
+    options = """tilt = "3 deg"
+plate_friction_excess = 0.2
+vibration_amplitude = "50 um"
+vibration_frequency = "60 Hz"
+vibration_hold = "200 ms"
+air_drag = "2 1/s"
+"""
+    scene = load_study(write_study((TUBE, TUBE + options))).case({}, seed=1).scene
+    assert scene.tilt == pytest.approx(math.radians(3.0), rel=1e-15)
+    assert (scene.plate_friction, scene.plate_friction_excess, scene.air_drag) == (None, 0.2, 2.0)
+    vibration = (scene.vibration_amplitude, scene.vibration_frequency, scene.vibration_hold)
+    assert vibration == (5e-5, 60.0, 0.2)
+
+
+@pytest.mark.parametrize(
+    ("line", "key", "rule"),
+    [
+        ('tilt = "90 deg"', "tilt", "must be less than 90"),
+        ("tilt = 3", "tilt", "unit of angle"),
+        ('vibration_frequency = "60 1/min"', "vibration_frequency", "unit of frequency (Hz)"),
+        ("plate_friction = -0.1", "plate_friction", "must be greater than or equal to 0"),
+        ('air_drag = "-1 1/s"', "air_drag", "must be greater than or equal to 0"),
+    ],
+)
+def test_an_option_that_cannot_be_is_named_with_its_place(
+    write_study: WriteStudy, line: str, key: str, rule: str
+) -> None:
+    path = write_study((TUBE, TUBE + line + "\n"))
+    with pytest.raises(StudyError) as caught:
+        load_study(path)
+    problem = caught.value.problems[0]
+    assert rule in problem.rule
+    assert problem.place.endswith(f": scene.lifted-cylinder.{key}")
+
+
+def test_a_grain_of_several_spheres_can_be_drawn_out(write_study: WriteStudy) -> None:
+    sphere, clump = 'sphere = "2 mm"', f'clump = "{BUCKWHEAT.parent / "clump.txt"}"'
+    base = load_study(write_study((sphere, clump))).case({}, seed=1).grains.shape
+    longer = load_study(write_study((sphere, f"{clump}\nelongation = 0.3"))).case({}, seed=1).grains.shape
+    assert longer == base.elongated(0.3) != base
+    with pytest.raises(StudyError, match=r"grain: elongation: must be 0 for a shape of one sphere, got 0.3"):
+        load_study(write_study((sphere, f"{sphere}\nelongation = 0.3")))
