@@ -12,6 +12,7 @@ from typing import Any
 
 from experiments.errors import StudyError
 from experiments.study.factor_section import merge
+from experiments.study.places import drop
 from experiments.study.toml_files import read_toml
 
 MATERIAL = "material"
@@ -44,7 +45,7 @@ def with_material(document: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     for factor in document.get("factor", []):
         places = factor.get("parameter", "")
         for place in places if isinstance(places, list) else [places]:
-            _drop(sections, str(place).split("."))
+            drop(sections, str(place).split("."))
     return merge(sections, own)
 
 
@@ -70,11 +71,3 @@ def shapes_of(sections: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Tables of a document that name a clump file."""
     grain = sections.get("grain", {})
     return [table for table in (grain, *grain.get("shapes", {}).values()) if "clump" in table]
-
-
-def _drop(table: dict[str, Any], path: list[str]) -> None:
-    """Take the value at a key path out, where there is one."""
-    *outer, last = path
-    for key in outer:
-        table = table.get(key, {})
-    table.pop(last, None)

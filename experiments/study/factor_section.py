@@ -10,7 +10,7 @@ from pydantic import Field, PlainValidator, ValidationInfo, field_validator, mod
 
 from doe.factors import Factor
 from experiments.errors import StudyError
-from experiments.study.places import KeyPath, Places, value_at
+from experiments.study.places import KeyPath, Places, nested, value_at
 from experiments.study.schema import (
     RawQuantity,
     Section,
@@ -23,7 +23,7 @@ from experiments.study.sections import Physics
 from experiments.study.units import Quantity, unit_size
 
 
-def _dimension_of(parameter: str) -> str:
+def dimension_at(parameter: str) -> str:
     """Dimension of the quantity at a place of a study.
 
     Raises
@@ -44,7 +44,7 @@ def _read_parameters(value: object) -> tuple[str, ...]:
     if not places or not all(isinstance(place, str) for place in places):
         raise ValueError("must be the place of a parameter, or a list of places")
     for place in places:
-        _dimension_of(place)
+        dimension_at(place)
     return places
 
 
@@ -60,7 +60,7 @@ class FactorSection(Section):
     label: str
     """What it is, in words."""
     parameter: Parameters
-    """The parameter's place in the study, as ``contact.grain-grain.static_friction``; or several places, all of
+    """The parameter's place in the study, as ``contact.grain-grain.static_friction``; or several places of
     one value."""
     low: RawQuantity
     """Lower end of the range."""
@@ -71,7 +71,7 @@ class FactorSection(Section):
     @classmethod
     def _has_the_dimension(cls, level: Quantity, info: ValidationInfo) -> Quantity:
         for parameter in info.data.get("parameter", ()):
-            level.to_base(_dimension_of(parameter))
+            level.to_base(dimension_at(parameter))
         return level
 
     @model_validator(mode="after")
@@ -97,7 +97,7 @@ class FactorSection(Section):
     @property
     def dimension(self) -> str:
         """Dimension of the parameter, a key of ``units.UNITS`` or ``""``."""
-        return _dimension_of(self.parameter[0])
+        return dimension_at(self.parameter[0])
 
     @property
     def limits(self) -> tuple[float, float]:
@@ -199,11 +199,9 @@ def with_factor_values(
     values: dict[str, Any] = {}
     for section in sections:
         value = settings.get(section.name, section.factor().center)
-        for *outer, last in section.paths:
-            table = values
-            for key in outer:
-                table = table.setdefault(key, {})
-            table[last] = str(Quantity(value, section.unit)) if section.unit else value
+        written = str(Quantity(value, section.unit)) if section.unit else value
+        for path in section.paths:
+            values = merge(values, nested(path, written))
     return merge(document, values)
 
 

@@ -18,7 +18,7 @@ def _section(kind: type[Mechanism]) -> Any:
     parameters: dict[str, Any] = {
         name: (Number, Field(default=defaults[name], ge=0.0)) for name in kind.parameter_names()
     }
-    between: Any = (Literal["all", "grains", "walls"], "all")
+    between: Any = (Literal["all", "grains", "walls"], defaults["between"])
     return create_model(f"{kind.__name__}Section", __base__=Section, between=between, **parameters)
 
 

@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 KeyPath = tuple[str | int, ...]
 
@@ -74,6 +75,20 @@ def value_at(document: object, path: Sequence[str | int]) -> object:
         except (KeyError, IndexError, TypeError):
             return None
     return document
+
+
+def nested(path: Sequence[str], value: object) -> dict[str, Any]:
+    """Put a value at a key path of a new document."""
+    first, *rest = path
+    return {first: nested(rest, value) if rest else value}
+
+
+def drop(table: dict[str, Any], path: Sequence[str]) -> None:
+    """Take the value at a key path out of a document, where there is one."""
+    *outer, last = path
+    for key in outer:
+        table = table.get(key, {})
+    table.pop(last, None)
 
 
 def _index_lines(text: str) -> dict[KeyPath, int]:

@@ -1,0 +1,221 @@
+"""The library of mechanisms: physical effects that a study may lack.
+
+A mechanism is one more parameter of a study, which the study leaves where it has no effect. Each is one file
+in ``mechanisms/``, named after it; to add one is to add a file. A range may be given in a scale of the grain,
+so that it fits any; `library_for` turns it into the units of a study.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from dem_warp.case import Case
+from dem_warp.materials import effective_moduli
+from dem_warp.scenes.poured_scene import GRAVITY
+from experiments.study import Study
+from experiments.study.factor_section import Parameters, dimension_at, merge
+from experiments.study.places import Places, drop, nested, value_at
+from experiments.study.schema import Section, field_at, validated
+from experiments.study.sections import Physics
+from experiments.study.toml_files import read_toml
+from experiments.study.units import Quantity
+
+FOLDER = Path(__file__).parent / "mechanisms"
+"""The files of the library."""
+
+ScaleName = Literal["grain weight / radius", "grain volume", "grain stiffness"]
+
+
+class Scaled(Section):
+    """A value as a multiple of a scale of the grain."""
+
+    times: float = Field(gt=0.0)
+    """The multiple."""
+    of: ScaleName
+    """The scale."""
+
+    def value(self, scales: Mapping[str, float]) -> float:
+        """[SI]"""
+        return self.times * scales[self.of]
+
+
+class MechanismFile(Section):
+    """What a file of the library says."""
+
+    title: str
+    """Its name in physics."""
+    sentence: str
+    """What it is, in plain language."""
+    kind: Literal["law", "scene", "population"]
+    """Whether it acts in the contacts, in the test, or is a property of the grains."""
+    parameters: Parameters
+    """Place of the parameter in a study; of one value, where there are several."""
+    unit: str
+    """Unit of its size, ``1`` for none."""
+    null: float = Field(ge=0.0)
+    """Size at which it has no effect; a study may start from more."""
+    maximum: Scaled | Annotated[float, Field(gt=0.0)]
+    """Largest size that is searched."""
+    source: str
+    """Where law and range come from."""
+    confirm: str
+    """The further experiment that would show it."""
+    companions: dict[str, Scaled | float | str] = Field(default_factory=dict)
+    """What else it needs in a study, by place; without effect while it is at its null."""
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """A physical effect that a study may lack, in the units of that study.
+
+    Attributes
+    ----------
+    name : str
+        Name in every table; that of the factor too which the study has with it.
+    title, sentence : str
+        Its name in physics, and what it is in plain language.
+    kind : {"law", "scene", "population"}
+        Whether it acts in the contacts, in the test, or is a property of the grains.
+    parameters : tuple of str
+        Place, or places of one value, in the study.
+    unit : str
+        Unit of the sizes, ``1`` for none.
+    null, maximum : float
+        Size that the study has without it, and the largest that is searched.
+    source, confirm : str
+        Where law and range come from, and the further experiment that would show it.
+    companions : tuple of (str, float or str)
+        What else it needs in the study, by place.
+    """
+
+    name: str
+    title: str
+    sentence: str
+    kind: str
+    parameters: tuple[str, ...]
+    unit: str
+    null: float
+    maximum: float
+    source: str
+    confirm: str
+    companions: tuple[tuple[str, float | str], ...] = ()
+
+    def factor(self, low: float | None = None, high: float | None = None) -> dict[str, Any]:
+        """Write it as a ``[[factor]]`` of a study, its range this one or the whole."""
+        ends = (self.null if low is None else low, self.maximum if high is None else high)
+        dimension = dimension_at(self.parameters[0])
+        written = [str(Quantity(end, self.unit)) if dimension else end for end in ends]
+        return {
+            "name": self.name,
+            "label": self.title,
+            "parameter": list(self.parameters),
+            "low": written[0],
+            "high": written[1],
+        }
+
+
+def library_for(study: Study, folder: Path = FOLDER) -> tuple[Mechanism, ...]:
+    """Read the mechanisms that a study may lack, in alphabetical order.
+
+    One that the study cannot have is left out: its test has no such setting, a factor varies it already, or
+    it stands at the maximum.
+
+    Parameters
+    ----------
+    study
+        The study; it says where each mechanism starts from, and how large its grains are.
+    folder
+        The library.
+
+    Raises
+    ------
+    StudyError
+        When a file breaks a rule.
+    """
+    scales = grain_scales(study.case({}, seed=0))
+    found = (_mechanism(path, study, scales) for path in sorted(folder.glob("*.toml")))
+    return tuple(mechanism for mechanism in found if mechanism is not None)
+
+
+def grain_scales(case: Case) -> dict[str, float]:
+    """Scales of the grains of a case: weight over radius [N/m], volume [m3], stiffness as simulated [Pa].
+
+    The radius is that of a sphere of the mean volume; the stiffness is the effective Young's modulus of two
+    grains.
+    """
+    volume = case.grains.mean(lambda shape: shape.volume)
+    radius = (3.0 * volume / (4.0 * math.pi)) ** (1.0 / 3.0)
+    weight = volume * case.grain_material.density * GRAVITY
+    stiffness, _ = effective_moduli(case.grain_material, case.grain_material)
+    return {"grain weight / radius": weight / radius, "grain volume": volume, "grain stiffness": stiffness}
+
+
+def with_mechanisms(
+    study: Study,
+    mechanisms: Sequence[Mechanism],
+    ranges: Mapping[str, tuple[float, float]] | None = None,
+) -> Study:
+    """Add mechanisms to a study, each as one more factor.
+
+    Parameters
+    ----------
+    study
+        The study.
+    mechanisms
+        Some of its `library_for`.
+    ranges
+        Ends of the factor's range by mechanism; left out: from its null to its maximum.
+
+    Raises
+    ------
+    StudyError
+        When two of them exclude each other.
+    """
+    document = study.document
+    for mechanism in mechanisms:
+        for place in mechanism.parameters:
+            drop(document, place.split("."))
+        for place, value in mechanism.companions:
+            document = merge(nested(place.split("."), value), document)
+        factor = mechanism.factor(*(ranges or {}).get(mechanism.name, ()))
+        document["factor"] = [*document.get("factor", []), factor]
+    return study.with_document(document)
+
+
+def _mechanism(path: Path, study: Study, scales: Mapping[str, float]) -> Mechanism | None:
+    """Read a file for a study; None where the study cannot have the mechanism."""
+    text, document = read_toml(path, "a mechanism of the library")
+    file = validated(MechanismFile, document, Places.read(path, text))
+    null, *others = (_start(study, tuple(place.split(".")), file) for place in file.parameters)
+    maximum = _number(file.maximum, scales)
+    if null is None or any(other != null for other in others) or null >= maximum:
+        return None
+    companions = tuple((place, _number(value, scales)) for place, value in file.companions.items())
+    shared = file.model_dump(include={"title", "sentence", "kind", "parameters", "unit", "source", "confirm"})
+    return Mechanism(path.stem, **shared, null=null, maximum=maximum, companions=companions)
+
+
+def _start(study: Study, path: tuple[str, ...], file: MechanismFile) -> float | None:
+    """Value that a study has at a place, in the mechanism's unit; None where it cannot have the mechanism."""
+    varied = any(path in section.paths for section in study.factor_sections)
+    other_test = path[0] == "scene" and value_at(study.document, path[:2]) is None
+    if varied or other_test:
+        return None
+    written = value_at(study.document, path)
+    if written is None:
+        field = field_at(Physics, path)
+        default = field.default if field else None
+        return float(default) if isinstance(default, float) else file.null
+    dimension = dimension_at(".".join(path))
+    quantity = Quantity.parse(written)
+    return quantity.to_unit(file.unit, dimension) if dimension else quantity.to_base("")
+
+
+def _number(value: Any, scales: Mapping[str, float]) -> Any:
+    return value.value(scales) if isinstance(value, Scaled) else value
