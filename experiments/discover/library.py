@@ -18,7 +18,7 @@ from pydantic import Field
 from dem_warp.case import Case
 from dem_warp.materials import effective_moduli
 from dem_warp.scenes.poured_scene import GRAVITY
-from experiments.study import Study
+from experiments.study import Study, StudyError
 from experiments.study.factor_section import Parameters, dimension_at, merge
 from experiments.study.places import Places, drop, nested, value_at
 from experiments.study.schema import Section, field_at, validated
@@ -123,8 +123,8 @@ class Mechanism:
 def library_for(study: Study, folder: Path = FOLDER) -> tuple[Mechanism, ...]:
     """Read the mechanisms that a study may lack, in alphabetical order.
 
-    One that the study cannot have is left out: its test has no such setting, a factor varies it already, or
-    it stands at the maximum.
+    One that the study cannot have is left out: its test has no such setting, a factor varies it already, it
+    stands at the maximum, or something else in the study excludes it.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def library_for(study: Study, folder: Path = FOLDER) -> tuple[Mechanism, ...]:
     """
     scales = grain_scales(study.case({}, seed=0))
     found = (_mechanism(path, study, scales) for path in sorted(folder.glob("*.toml")))
-    return tuple(mechanism for mechanism in found if mechanism is not None)
+    return tuple(mechanism for mechanism in found if mechanism is not None and _can_have(study, mechanism))
 
 
 def grain_scales(case: Case) -> dict[str, float]:
@@ -199,6 +199,14 @@ def _mechanism(path: Path, study: Study, scales: Mapping[str, float]) -> Mechani
     companions = tuple((place, _number(value, scales)) for place, value in file.companions.items())
     shared = file.model_dump(include={"title", "sentence", "kind", "parameters", "unit", "source", "confirm"})
     return Mechanism(path.stem, **shared, null=null, maximum=maximum, companions=companions)
+
+
+def _can_have(study: Study, mechanism: Mechanism) -> bool:
+    try:
+        with_mechanisms(study, [mechanism])
+    except StudyError:
+        return False
+    return True
 
 
 def _start(study: Study, path: tuple[str, ...], file: MechanismFile) -> float | None:
