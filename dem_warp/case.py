@@ -31,6 +31,9 @@ class Numerics:
         Keep the damping from attracting at the end of an impact.
     tangential_damping : bool
         Damp the tangential spring of a contact; not every code does.
+    rolling_holds : bool
+        Let rolling resistance stop a spin at most. Codes that apply its torque for a whole step, whatever the
+        spin, reverse slow ones each step, and grains that ought to stick creep.
     """
 
     time_step_fraction: float = 0.25
@@ -39,6 +42,7 @@ class Numerics:
     modulus_scale: float = 1.0
     clamp_attraction: bool = False
     tangential_damping: bool = True
+    rolling_holds: bool = True
 
     def __post_init__(self) -> None:
         _require(

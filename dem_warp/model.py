@@ -162,6 +162,8 @@ class WorldSetup:
         [m/s2]
     air_drag : float
         Rate at which the air takes a grain's velocity, whatever its size [1/s].
+    rolling_holds : bool
+        Whether rolling resistance stops a spin at most, and never reverses it.
     """
 
     grains: Grains
@@ -174,6 +176,7 @@ class WorldSetup:
     domain: tuple[tuple[float, float, float], tuple[float, float, float]]
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
     air_drag: float = 0.0
+    rolling_holds: bool = True
 
     def __post_init__(self) -> None:
         for name in ("time_step", "skin", "speed_limit"):

@@ -120,6 +120,7 @@ def build_model(
         {
             "time_step": world.time_step,
             "gravity": world.gravity,
+            "rolling_holds": float(world.rolling_holds),
             "unit": world.length_unit if precision.is_fixed_point else 1.0,
             "skin": world.skin,
             "reach": world.reach,

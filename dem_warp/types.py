@@ -134,6 +134,7 @@ def device_structs(precision: Precision) -> SimpleNamespace:
     class World:
         time_step: real  # [s]
         gravity: vec3  # [m/s2]
+        rolling_holds: real  # 1: rolling resistance stops a spin at most; 0: it may reverse it
         unit: real  # length of one count of a sphere position [m]
         skin: real  # [m]
         reach: real  # largest distance of two surfaces that act on each other [m]

@@ -11,7 +11,7 @@ from dem_warp.types import Precision
 
 @functools.cache
 def integration_functions(precision: Precision) -> SimpleNamespace:
-    """`turn(orientation, spin, torque, inertia, rolling, time_step)` in one precision."""
+    """`turn(orientation, spin, torque, inertia, rolling, time_step, holds)` in one precision."""
     real, vec3, quat = precision.real, precision.vec3, precision.quat
 
     @wp.func
@@ -27,8 +27,16 @@ def integration_functions(precision: Precision) -> SimpleNamespace:
         return wp.float64(1.0) / wp.sqrt(x)
 
     @wp.func
-    def turn(orientation: wp.quatd, spin: vec3, torque: vec3, inertia: vec3, rolling: real, time_step: real):
-        """Orientation and spin [rad/s] after a step under `torque` and rolling resistance `rolling` [N m].
+    def turn(
+        orientation: wp.quatd,
+        spin: vec3,
+        torque: vec3,
+        inertia: vec3,
+        rolling: real,
+        time_step: real,
+        holds: real,
+    ):
+        """Orientation and spin [rad/s] after a step under `torque` and rolling resistance `rolling` [N m] (see `resist_spin`).
 
         The angular momentum takes the torque and is then carried unchanged, while the body turns about the
         spin that it has half a step on (an explicit midpoint rule): free of torque, the momentum is conserved
@@ -38,7 +46,7 @@ def integration_functions(precision: Precision) -> SimpleNamespace:
         q = rounded(orientation)
         body_spin = wp.quat_rotate_inv(q, spin)
         momentum = wp.cw_mul(inertia, body_spin) + wp.quat_rotate_inv(q, torque) * time_step
-        body_spin = resist_spin(wp.cw_div(momentum, inertia), inertia, rolling, time_step)
+        body_spin = resist_spin(wp.cw_div(momentum, inertia), inertia, rolling, time_step, holds)
         momentum = wp.cw_mul(inertia, body_spin)
         half = real(0.5) * time_step
         midpoint = wp.cw_div(momentum - wp.cross(body_spin, momentum) * half, inertia)

@@ -87,7 +87,13 @@ def step_kernels(build: Build) -> SimpleNamespace:
             velocity += (force / v4[3] + world.gravity) * dt
             velocity *= world.kept  # last, where a factor of 1 changes no bit
             turned, spin = motion.turn(
-                turned, spin, torque, vec3(inertia[0], inertia[1], inertia[2]), rolling, dt
+                turned,
+                spin,
+                torque,
+                vec3(inertia[0], inertia[1], inertia[2]),
+                rolling,
+                dt,
+                world.rolling_holds,
             )
         position = grains.position[g] + wp.vec3d(
             wp.float64(velocity[0] * dt), wp.float64(velocity[1] * dt), wp.float64(velocity[2] * dt)

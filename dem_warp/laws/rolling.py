@@ -15,15 +15,16 @@ def rolling_torque(rolling_friction: Any, support: Any, lever: Any):
 
 
 @wp.func
-def resist_spin(spin: Any, inertia: Any, torque: Any, time_step: Any):
+def resist_spin(spin: Any, inertia: Any, torque: Any, time_step: Any, holds: Any):
     """Body-frame spin [rad/s] after `torque` [N m] acted against it for a step: at most it stops.
 
-    An explicit torque of constant size would reverse a slow spin each step, and no heap would come to rest.
+    Where `holds` is 0 instead of 1, the torque acts for the whole step: it reverses a slow spin each step, so
+    that a grain that ought to stick creeps. Codes that take the formula at its word do so.
     """
     speed = wp.length(spin)
     if torque > type(torque)(0.0) and speed > type(torque)(0.0):
         loss = wp.cw_div(spin, inertia) * (torque * time_step / speed)
-        if wp.dot(loss, spin) >= speed * speed:
+        if holds * wp.dot(loss, spin) >= speed * speed:
             spin = spin * type(torque)(0.0)
         else:
             spin = spin - loss

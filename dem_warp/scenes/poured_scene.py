@@ -181,6 +181,7 @@ def _world(case: Case[Any], rain: Rain) -> WorldSetup:
         ),
         gravity=scene.gravity,
         air_drag=scene.air_drag,
+        rolling_holds=case.numerics.rolling_holds,
     )
 
 

@@ -187,6 +187,8 @@ class NumericsSection(Section):
     """Keep the damping from attracting at the end of an impact."""
     tangential_damping: bool = True
     """Damp the tangential spring of a contact."""
+    rolling_holds: bool = True
+    """Let rolling resistance stop a spin at most, and never reverse it."""
 
     def numerics(self) -> Numerics:
         """Build the engine's numerics."""
