@@ -36,7 +36,7 @@ def integration_functions(precision: Precision) -> SimpleNamespace:
         time_step: real,
         holds: real,
     ):
-        """Orientation and spin [rad/s] after a step under `torque` and rolling resistance `rolling` [N m] (see `resist_spin`).
+        """Orientation and spin [rad/s] after a step under `torque` and rolling resistance `rolling` [N m].
 
         The angular momentum takes the torque and is then carried unchanged, while the body turns about the
         spin that it has half a step on (an explicit midpoint rule): free of torque, the momentum is conserved

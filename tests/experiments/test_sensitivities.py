@@ -59,6 +59,7 @@ def test_a_softened_modulus_is_for_all_but_those_that_vary_it() -> None:
     }
     assert {name: scale for name, scale in scales.items() if scale != 10.0} == {
         "modulus-1": 1.0,
+        "rolling-explicit": 1.0,
         "modulus-100": 100.0,
     }
 
