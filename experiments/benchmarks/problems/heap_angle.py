@@ -49,7 +49,7 @@ TRIALS = {
         "bench", 120, "Here at bench scale: 400 grains, shear modulus / 400, {} heaps of each kind."
     ),
     "cuda": Trial(
-        "soft", 48, "Here at the paper's size with its shear modulus / 100, {} heaps of each kind."
+        "soft", 20, "Here at the paper's size with its shear modulus / 100, {} heaps of each kind."
     ),
 }
 
