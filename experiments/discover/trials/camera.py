@@ -1,0 +1,67 @@
+"""The camera of the trials: what a real photograph adds to a heap, beside what the analysis reckons with."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from experiments.discover.observables import OBSERVABLES, PHOTOGRAPHED
+
+SCALE_ERROR = 0.002
+"""Relative standard deviation of the scale, one for all pictures of a trial: a millimetre on half a metre."""
+ROLL = math.radians(0.3)
+"""Standard deviation of the camera's roll that levelling leaves, one for all pictures of a trial [rad]."""
+READING = {"deg": 0.1, "m": 5.0e-5, "1": 0.002}
+"""Standard deviations of reading one picture by unit: half a pixel or so."""
+
+
+@dataclass(frozen=True)
+class Camera:
+    """One set-up of a camera.
+
+    Attributes
+    ----------
+    scale : float
+        Its lengths over the true ones.
+    roll : float
+        Turn about the line of sight, clockwise in the picture [rad].
+    """
+
+    scale: float
+    roll: float
+
+    @classmethod
+    def drawn(cls, rng: np.random.Generator) -> Camera:
+        """Set up a camera as well as people do."""
+        return cls(scale=1.0 + SCALE_ERROR * rng.standard_normal(), roll=ROLL * rng.standard_normal())
+
+    def read(self, heaps: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        """Read pictures of heaps; what no photograph shows stays.
+
+        A roll by a small angle w moves the apex of a heap of height h by w h and leaves its base, so that the
+        area right of the apex less that left of it changes by w h^2, the lean by w tan(flank angle); the mean
+        of both flanks changes in second order only.
+
+        Parameters
+        ----------
+        heaps : (n, observables) array
+            True values in the order of `OBSERVABLES`; NaN stays.
+        rng
+            Draws the errors of reading.
+
+        Returns
+        -------
+        (n, observables) array
+        """
+        seen = heaps.copy()
+        names = [observable.name for observable in OBSERVABLES]
+        lean, angle = names.index("asymmetry"), names.index("flank_angle")
+        seen[:, lean] -= self.roll * np.tan(np.radians(heaps[:, angle]))
+        for column, observable in enumerate(OBSERVABLES):
+            if observable.name in PHOTOGRAPHED:
+                scale = self.scale if observable.unit == "m" else 1.0
+                errors = READING[observable.unit] * rng.standard_normal(len(heaps))
+                seen[:, column] = scale * seen[:, column] + errors
+        return seen

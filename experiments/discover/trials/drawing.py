@@ -1,0 +1,227 @@
+"""Drawing the hidden truths of the trials."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from doe.factors import Factor
+from experiments.discover.trials.truth import Kind, Label, Sealed
+from experiments.errors import InputError
+
+STRONG = 1.5
+"""Effects above this many gamma80 are to be named."""
+
+WEAK = 0.3
+"""Least effect of a weak trial, in gamma80."""
+
+UPPER = 0.5
+"""Strangers, and mechanisms whose gamma80 nobody stated, have at least this part of their range."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How many trials of each kind, and how many heaps each has.
+
+    Attributes
+    ----------
+    nulls : int
+        With nothing hidden.
+    strong, weak : int
+        A resolvable mechanism: with an effect above 1.5 gamma80, and between 0.3 and 1.5.
+    unresolved : int
+        A mechanism that was declared not resolvable, anywhere in its range.
+    withheld : int
+        A resolvable mechanism, strong, which the analysis must do without.
+    strangers : int
+        An effect that the library never has.
+    pairs : int
+        Of two resolvable mechanisms, both strong.
+    replicates : int
+        Heaps a condition.
+    """
+
+    nulls: int = 100
+    strong: int = 15
+    weak: int = 4
+    unresolved: int = 3
+    withheld: int = 5
+    strangers: int = 7
+    pairs: int = 30
+    replicates: int = 8
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            least = 2 if field.name == "replicates" else 0
+            if (count := getattr(self, field.name)) < least:
+                raise InputError(f"is at least {least}", count, f"Plan.{field.name}")
+
+
+@dataclass(frozen=True)
+class Effect:
+    """What the drawing knows of a mechanism.
+
+    Attributes
+    ----------
+    name : str
+    null, maximum : float
+        Its range.
+    gamma80 : float
+        Distance from the null that is found with 80 % probability; infinite where it was declared that the
+        mechanism is not resolvable.
+    kin : tuple of str
+        Mechanisms that no data of these conditions could tell from it.
+    """
+
+    name: str
+    null: float
+    maximum: float
+    gamma80: float = math.inf
+    kin: tuple[str, ...] = ()
+
+    @property
+    def strongest(self) -> float:
+        """Effect at the end of the range, in gamma80."""
+        return abs(self.maximum - self.null) / self.gamma80
+
+    @property
+    def resolvable(self) -> bool:
+        """Whether strong trials of it can be drawn."""
+        return self.strongest > STRONG
+
+    def size(self, strength: float) -> float:
+        """Size with an effect of so many gamma80."""
+        return self.null + math.copysign(strength * self.gamma80, self.maximum - self.null)
+
+    def size_at(self, share: float) -> float:
+        """Size at a part of the range."""
+        return self.null + share * (self.maximum - self.null)
+
+
+@dataclass(frozen=True)
+class _Draft:
+    """A truth before it has a place among the others."""
+
+    part: str
+    kind: Kind
+    sizes: tuple[tuple[str, float], ...] = ()
+    strengths: tuple[float, ...] = ()
+    withheld: tuple[str, ...] = ()
+
+
+def draw(
+    plan: Plan,
+    factors: Sequence[Factor],
+    library: Sequence[Effect],
+    strangers: Sequence[Effect],
+    rng: np.random.Generator,
+    salt: Callable[[], str],
+) -> tuple[tuple[Label, Sealed], ...]:
+    """Draw every trial.
+
+    Theta is uniform in the ranges of the factors, the size of a mechanism in its own part of its range.
+    Within each part ("alone", "outside", "pairs") the trials are shuffled, so that a name says nothing.
+
+    Parameters
+    ----------
+    plan
+        How many of each.
+    factors
+        Factors of the study.
+    library, strangers
+        Mechanisms that the analysis knows, and those that it never does.
+    rng
+        Draws truths and seeds.
+    salt
+        Gives the salt of a seal.
+
+    Returns
+    -------
+    tuple of (Label, Sealed)
+        By part.
+
+    Raises
+    ------
+    InputError
+        When pairs are asked for and fewer than two mechanisms are resolvable.
+    """
+    drafts = [*_alone(plan, library, rng), *_outside(plan, library, strangers, rng)]
+    drafts += _pairs(plan, [effect for effect in library if effect.resolvable], rng)
+    trials = []
+    for part in dict.fromkeys(draft.part for draft in drafts):
+        members = [draft for draft in drafts if draft.part == part]
+        for number, index in enumerate(rng.permutation(len(members)), start=1):
+            name = f"{part}-{number:03d}"
+            trials.append(_sealed(name, members[index], factors, rng, salt()))
+    return tuple(trials)
+
+
+def _sealed(
+    name: str, draft: _Draft, factors: Sequence[Factor], rng: np.random.Generator, salt: str
+) -> tuple[Label, Sealed]:
+    theta = tuple(float(rng.uniform(factor.low, factor.high)) for factor in factors)
+    seed = int(rng.integers(2**31))
+    label = Label(name, draft.kind, theta, draft.sizes, draft.strengths, seed, salt)
+    return label, Sealed(name, draft.part, draft.withheld, label.hash)
+
+
+def _alone(plan: Plan, library: Sequence[Effect], rng: np.random.Generator) -> Iterator[_Draft]:
+    """Nothing hidden, or one mechanism of the library."""
+    yield from (_Draft("alone", Kind.NULL) for _ in range(plan.nulls))
+    for effect in library:
+        if effect.resolvable:
+            yield from (_strong("alone", Kind.SINGLE, effect, rng) for _ in range(plan.strong))
+            yield from (
+                _of("alone", Kind.SINGLE, effect, rng.uniform(WEAK, STRONG)) for _ in range(plan.weak)
+            )
+        else:
+            yield from (_somewhere("alone", Kind.SINGLE, effect, rng, 0.0) for _ in range(plan.unresolved))
+
+
+def _outside(
+    plan: Plan, library: Sequence[Effect], strangers: Sequence[Effect], rng: np.random.Generator
+) -> Iterator[_Draft]:
+    """What the analysis does not have in its library."""
+    for effect in library:
+        if effect.resolvable:
+            for _ in range(plan.withheld):
+                draft = _strong("outside", Kind.WITHHELD, effect, rng)
+                yield replace(draft, withheld=tuple(sorted({effect.name, *effect.kin})))
+    for effect in strangers:
+        yield from (_somewhere("outside", Kind.STRANGER, effect, rng, UPPER) for _ in range(plan.strangers))
+
+
+def _pairs(plan: Plan, resolvable: Sequence[Effect], rng: np.random.Generator) -> Iterator[_Draft]:
+    """Two mechanisms that can be told apart."""
+    partners = [
+        (first, second)
+        for i, first in enumerate(resolvable)
+        for second in resolvable[i + 1 :]
+        if second.name not in first.kin
+    ]
+    if plan.pairs and not partners:
+        raise InputError("pairs need two resolvable mechanisms", [e.name for e in resolvable], "Plan.pairs")
+    for _ in range(plan.pairs):
+        halves = [
+            _strong("pairs", Kind.PAIR, effect, rng) for effect in partners[rng.integers(len(partners))]
+        ]
+        drawn = sorted((half.sizes[0], half.strengths[0]) for half in halves)
+        yield _Draft("pairs", Kind.PAIR, tuple(size for size, _ in drawn), tuple(s for _, s in drawn))
+
+
+def _strong(part: str, kind: Kind, effect: Effect, rng: np.random.Generator) -> _Draft:
+    return _of(part, kind, effect, rng.uniform(STRONG, effect.strongest))
+
+
+def _somewhere(part: str, kind: Kind, effect: Effect, rng: np.random.Generator, least: float) -> _Draft:
+    size = effect.size_at(rng.uniform(least, 1.0))
+    return _Draft(
+        part, kind, ((effect.name, float(size)),), (float(abs(size - effect.null) / effect.gamma80),)
+    )
+
+
+def _of(part: str, kind: Kind, effect: Effect, strength: float) -> _Draft:
+    return _Draft(part, kind, ((effect.name, float(effect.size(strength))),), (float(strength),))

@@ -1,0 +1,171 @@
+"""The record of the trials: tables, pictures and one page, written from its own files."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+
+from experiments.benchmarks.tables import markdown_table
+from experiments.discover.trials.findings import EVERYTHING, PHOTOGRAPHS, read_findings
+from experiments.discover.trials.score import (
+    Aim,
+    aims,
+    by_mechanism,
+    by_outsider,
+    confusion,
+    power_curve,
+    scored,
+)
+from experiments.discover.trials.truth import read_labels, read_sealed, revealed
+from experiments.files import write_text
+
+SEALED, LABELS, FINDINGS, DECLARED, RUNS, PAGE = (
+    "sealed.csv",
+    "labels.json",
+    "findings.csv",
+    "declared.json",
+    "runs.csv",
+    "README.md",
+)
+"""Files of a record: the seals and what was declared beforehand, then the labels, findings and runs."""
+
+RECORD = Path(__file__).parents[1] / "record" / "trials"
+"""Where the record of the full trials lies."""
+
+TITLES = {EVERYTHING: "With every observable", PHOTOGRAPHS: "With photographs only"}
+
+_VERDICTS = {True: "pass", False: "**FAIL**", None: "too few"}
+
+_INTRODUCTION = """# Blind trials of the search for a missing mechanism
+
+Heaps of the real engine with a hidden effect: drawn and simulated by a generator that runs apart from the
+analysis, with seeds, time step and camera of its own. The truths were sealed by salted hashes (`sealed.csv`)
+before anything was simulated, and revealed (`labels.json`) when the last verdict was in. What was declared
+beforehand, the settings of the analysis by their hash and the smallest effect that it should see of each
+mechanism (gamma80), stands in `declared.json`. An effect is the distance of a size from the mechanism's null,
+counted in gamma80; *strong* is above 1.5. A verdict is right that names the hidden mechanism (or both) and
+nothing else; it is wrong as soon as it names one that is not there. Intervals of shares are 95 % (Clopper and
+Pearson).
+"""
+
+
+def write_page(folder: Path) -> Path:
+    """Write the page and the pictures of a record from its files.
+
+    Parameters
+    ----------
+    folder
+        The record.
+
+    Returns
+    -------
+    Path
+        The page.
+
+    Raises
+    ------
+    InputError
+        When a label does not fit its seal.
+    """
+    sealed = read_sealed(folder / SEALED)
+    labels = revealed(read_labels(folder / LABELS), sealed)
+    declared = json.loads((folder / DECLARED).read_text(encoding="utf-8"))
+    table = scored(read_findings([folder / FINDINGS]), labels, sealed)
+    parts = [_INTRODUCTION, _runs(folder / RUNS), _declared(declared)]
+    for view, title in TITLES.items():
+        if len(rows := table[table["view"] == view]):
+            parts.append(_view(rows, view, title, declared, folder))
+    page = folder / PAGE
+    write_text(page, "\n".join(parts))
+    return page
+
+
+def _runs(path: Path) -> str:
+    runs = pd.read_csv(path)
+    cases, hours = int(runs["cases"].sum()), runs["seconds"].sum() / 3600
+    text = f"{cases} cases in {hours:.2f} h of wall time with the statistics (`{path.name}`)."
+    totals = runs.groupby(["what", "machine", "date"], sort=False)[["cases", "seconds"]].sum().reset_index()
+    return f"## Runs\n\n{text}\n\n{markdown_table(totals)}"
+
+
+def _declared(declared: Mapping[str, Any]) -> str:
+    table = pd.DataFrame(
+        {
+            "mechanism": effect["name"],
+            "null": effect["null"],
+            "maximum": effect["maximum"],
+            "gamma80": effect["gamma80"] or np.nan,
+            "resolvable": "yes" if effect["resolvable"] else "no",
+            "not told from": ", ".join(effect["kin"]),
+        }
+        for effect in declared["library"]
+    )
+    facts = {key: declared[key] for key in ("study", "scale", "seed", "settings_sha256", "sealed_on")}
+    stated = "; ".join(f"{key.replace('_', ' ')} {value}" for key, value in facts.items())
+    return f"## Declared beforehand\n\n{stated}.\n\n{markdown_table(table)}"
+
+
+def _view(rows: pd.DataFrame, view: str, title: str, declared: Mapping[str, Any], folder: Path) -> str:
+    unresolvable = [effect["name"] for effect in declared["library"] if not effect["resolvable"]]
+    _draw_power(power_curve(rows), folder / f"power-{view}.png")
+    _draw_confusion(confusion(rows), folder / f"confusion-{view}.png")
+    parts = [
+        f"## {title}\n",
+        f"{len(rows)} trials.\n",
+        _aims(aims(rows, unresolvable)),
+        f"![shares of alarms and names by effect](power-{view}.png)\n",
+        f"![answers by truth](confusion-{view}.png)\n",
+        "### Strong effects, by mechanism\n",
+        markdown_table(by_mechanism(rows).reset_index()),
+        "### Outside the library\n",
+        markdown_table(by_outsider(rows).reset_index()),
+    ]
+    return "\n".join(parts)
+
+
+def _aims(found: Sequence[Aim]) -> str:
+    lines = ["| question | wanted | found | verdict |", "|---|---|---|---|"]
+    lines += [f"| {aim.question} | {aim.wanted} | {aim.found} | {_VERDICTS[aim.passed]} |" for aim in found]
+    return "\n".join(lines) + "\n"
+
+
+def _draw_power(curve: pd.DataFrame, path: Path) -> None:
+    mpl.use("agg")
+    figure, axes = plt.subplots(figsize=(7.2, 3.8), layout="constrained")
+    for name, label, colour in (("alarm", "gap found", "#0072B2"), ("right", "named right", "#D55E00")):
+        if len(curve):
+            value = curve[name].to_numpy()
+            spread = np.abs(curve[[f"{name}_low", f"{name}_high"]].to_numpy().T - value)
+            axes.errorbar(
+                curve["strength"], value, yerr=spread, fmt="o-", color=colour, capsize=3, label=label
+            )
+    axes.axvline(1.5, color="#5d6673", linestyle=":", linewidth=1.0)
+    axes.set(xlabel="effect [gamma80]", ylabel="share of trials", ylim=(-0.03, 1.03))
+    axes.grid(color="#eceff3")
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.legend(frameon=False, loc="lower right")
+    figure.savefig(path, dpi=110, metadata={"Software": None})
+    plt.close(figure)
+
+
+def _draw_confusion(counts: pd.DataFrame, path: Path) -> None:
+    mpl.use("agg")
+    shares = counts.div(counts.sum(axis=1), axis=0).to_numpy()
+    size = (2.6 + 0.42 * counts.shape[1], 2.0 + 0.27 * counts.shape[0])
+    figure, axes = plt.subplots(figsize=size, layout="constrained")
+    axes.imshow(shares, cmap="Blues", vmin=0.0, vmax=1.2, aspect="auto")
+    for (row, column), count in np.ndenumerate(counts.to_numpy()):
+        if count:
+            axes.text(column, row, str(count), ha="center", va="center", fontsize=8)
+    axes.set_xticks(range(counts.shape[1]), [str(name) for name in counts.columns], rotation=90, fontsize=8)
+    axes.set_yticks(range(counts.shape[0]), [str(name) for name in counts.index], fontsize=8)
+    axes.set(xlabel="verdict", ylabel="truth")
+    figure.savefig(path, dpi=110, metadata={"Software": None})
+    plt.close(figure)

@@ -1,0 +1,334 @@
+"""Blind trials: what is hidden stays hidden, waves find their way home, and the score counts what it says."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from doe.factors import Factor
+from experiments.discover.discovery import Data, Discovery, Effort, Verdict
+from experiments.discover.observables import OBSERVABLES, PHOTOGRAPHED
+from experiments.discover.simulator import Outcomes, Point
+from experiments.discover.trials.camera import Camera
+from experiments.discover.trials.drawing import STRONG, Effect, Plan, draw
+from experiments.discover.trials.findings import EVERYTHING, Finding, findings_table
+from experiments.discover.trials.heaps import cases_of
+from experiments.discover.trials.lockstep import Analysis, Crash, LocalCrew, in_step, process_crew
+from experiments.discover.trials.score import Share, aims, confusion, covered, power_curve, removed, scored
+from experiments.discover.trials.truth import (
+    Kind,
+    Label,
+    Sealed,
+    read_labels,
+    read_sealed,
+    revealed,
+    write_labels,
+    write_sealed,
+)
+from experiments.errors import InputError
+
+FACTORS = (Factor("mu", 0.2, 0.6), Factor("e", 0.1, 0.5))
+LIBRARY = (
+    Effect("cohesion", null=0.0, maximum=10.0, gamma80=2.0, kin=("bridges",)),
+    Effect("bridges", null=0.0, maximum=4.0, gamma80=1.0, kin=("cohesion",)),
+    Effect("spread", null=0.05, maximum=0.3, gamma80=0.05),
+    Effect("drag", null=0.0, maximum=1.0, gamma80=0.9),
+    Effect("twist", null=0.0, maximum=1.0),
+)
+STRANGERS = (Effect("swollen", null=1.0, maximum=1.3),)
+PLAN = Plan(nulls=3, strong=2, weak=2, unresolved=2, withheld=2, strangers=2, pairs=6)
+
+
+def draw_trials(seed: int = 1, plan: Plan = PLAN) -> tuple[tuple[Label, Sealed], ...]:
+    return draw(plan, FACTORS, LIBRARY, STRANGERS, np.random.default_rng(seed), lambda: "salt")
+
+
+def test_every_kind_of_trial_is_drawn_as_planned() -> None:
+    kinds = [label.kind for label, _ in draw_trials()]
+    # Three mechanisms are resolvable (cohesion, bridges, spread), two are not.
+    expected = {
+        Kind.NULL: 3,
+        Kind.SINGLE: 3 * 4 + 2 * 2,
+        Kind.WITHHELD: 3 * 2,
+        Kind.STRANGER: 2,
+        Kind.PAIR: 6,
+    }
+    assert {kind: kinds.count(kind) for kind in Kind} == expected
+
+
+def test_truths_lie_in_their_ranges() -> None:
+    effects = {effect.name: effect for effect in (*LIBRARY, *STRANGERS)}
+    for label, _ in draw_trials():
+        assert all(f.low <= value <= f.high for f, value in zip(FACTORS, label.theta, strict=True))
+        for name, size in label.sizes:
+            low, high = sorted((effects[name].null, effects[name].maximum))
+            assert low <= size <= high
+
+
+def test_strength_is_the_distance_from_the_null() -> None:
+    strengths = [label for label, _ in draw_trials() if label.mechanisms == ("spread",)]
+    for label in strengths:
+        assert label.strengths[0] == pytest.approx((label.sizes[0][1] - 0.05) / 0.05)
+    assert sum(label.strengths[0] > STRONG for label in strengths) == 2 + 2
+
+
+def test_a_withheld_mechanism_goes_with_its_like_and_pairs_are_never_alike() -> None:
+    for label, sealed in draw_trials():
+        if label.kind is Kind.WITHHELD:
+            assert set(label.mechanisms) <= set(sealed.withheld)
+            assert ("bridges" in sealed.withheld) == (label.mechanisms[0] in ("cohesion", "bridges"))
+        else:
+            assert sealed.withheld == ()
+        assert set(label.mechanisms) != {"cohesion", "bridges"}
+
+
+def test_the_name_of_a_trial_says_nothing_of_its_kind() -> None:
+    # Over many draws the first trial of the part is a null as often as nulls are in the part: 3 of 19. With
+    # 200 draws the count has a standard deviation of 5, and four of these are allowed.
+    first = [draw_trials(seed)[0][0].kind is Kind.NULL for seed in range(200)]
+    assert abs(sum(first) - 200 * 3 / 19) < 21
+
+
+def test_labels_are_held_to_their_seals(tmp_path) -> None:
+    labels, sealed = zip(*draw_trials(), strict=True)
+    write_labels(tmp_path / "labels.json", labels)
+    write_sealed(tmp_path / "sealed.csv", sealed)
+    opened = revealed(read_labels(tmp_path / "labels.json"), read_sealed(tmp_path / "sealed.csv"))
+    assert tuple(opened.values()) == labels
+
+    bent = [replace(labels[0], theta=(0.3, 0.3)), *labels[1:]]
+    with pytest.raises(InputError, match=rf"{labels[0].trial}: a label must have the hash"):
+        revealed(bent, sealed)
+    with pytest.raises(InputError, match="every sealed trial has a label"):
+        revealed(labels[1:], sealed)
+
+
+def test_a_seal_depends_on_its_salt() -> None:
+    label = draw_trials()[0][0]
+    assert replace(label, salt="other").hash != label.hash
+
+
+def test_pairs_need_partners() -> None:
+    with pytest.raises(InputError, match=r"Plan.pairs: pairs need two resolvable mechanisms"):
+        draw(PLAN, FACTORS, LIBRARY[:2], (), np.random.default_rng(1), str)
+    with pytest.raises(InputError, match=r"Plan.replicates: is at least 2"):
+        Plan(replicates=1)
+
+
+def test_cases_of_a_trial_have_seeds_of_their_own() -> None:
+    label = draw_trials()[0][0]
+    points = cases_of(label, ("base", "fast"), replicates=8)
+    assert [point.condition for point in points] == ["base"] * 8 + ["fast"] * 8
+    assert len({point.seed for point in points}) == 16
+    assert points == cases_of(label, ("base", "fast"), replicates=8)
+
+
+class Steady(np.random.Generator):
+    """Draws no errors."""
+
+    def __init__(self) -> None:
+        super().__init__(np.random.PCG64(0))
+
+    def standard_normal(self, size: int) -> np.ndarray:  # type: ignore[override]
+        return np.zeros(size)
+
+
+def test_a_rolled_camera_leans_a_straight_heap() -> None:
+    """A drawn triangle, rolled, against the closed form of the camera."""
+    angle, roll = np.radians(25.0), 0.01
+    apex = np.tan(angle)  # of a heap of half width 1
+    left, right = 1.0 + roll * apex, 1.0 - roll * apex
+    heap = np.ones((1, len(OBSERVABLES)))
+    names = [observable.name for observable in OBSERVABLES]
+    heap[0, [names.index("flank_angle"), names.index("asymmetry")]] = 25.0, 0.0
+    seen = Camera(scale=1.02, roll=roll).read(heap, Steady())
+    assert seen[0, names.index("asymmetry")] == pytest.approx((right - left) / (right + left))
+    for column, observable in enumerate(OBSERVABLES):
+        if observable.unit == "m":
+            assert seen[0, column] == pytest.approx(1.02 if observable.name in PHOTOGRAPHED else 1.0)
+        elif observable.name != "asymmetry":
+            assert seen[0, column] == heap[0, column]
+
+
+@dataclass
+class Echo:
+    """A simulator that gives back the parameters of a point, and counts its calls."""
+
+    observables: tuple[str, ...] = ("first", "seed")
+    calls: int = 0
+
+    def __call__(self, points: Sequence[Point]) -> Outcomes:
+        self.calls += 1
+        values = np.array([[point.theta[0], point.seed] for point in points], dtype=float)
+        return Outcomes(values, ("",) * len(points))
+
+
+def counting(name: str) -> Analysis:
+    """An analysis of as many waves as its name says; its reason is what it was sent."""
+    number = int(name)
+    if number == 0:
+        raise ValueError("no waves")
+    received = []
+    for wave in range(number):
+        outcomes = yield [Point((float(number),), (), "base", seed) for seed in range(wave + 1)]
+        received.append(np.asarray(outcomes.values).tolist())
+    return ended(str(received))
+
+
+def ended(reason: str) -> Discovery:
+    empty = np.zeros((1, 1))
+    data = Data(("base",), ("first",), (False,), empty, empty, empty.astype(int))
+    return Discovery(
+        verdict=Verdict.NONE,
+        reason=reason,
+        named=(),
+        factors=("mu",),
+        data=data,
+        base=None,
+        chosen=None,
+        gap=None,
+        drifts=(),
+        candidates=(),
+        power=(),
+        confounding=None,
+        before_after=(),
+        next_experiment=None,
+        notes=(),
+        effort=Effort(1, "", 0, 0),
+    )
+
+
+def expected_reason(number: int) -> str:
+    return str([[[float(number), float(seed)] for seed in range(wave + 1)] for wave in range(number)])
+
+
+@pytest.mark.parametrize("crew", ["local", "processes"])
+def test_waves_of_many_analyses_run_in_one_call_and_come_home(crew: str) -> None:
+    simulator, names = Echo(), ["3", "1", "0", "2"]
+    if crew == "local":
+        rounds = list(in_step(names, LocalCrew(counting), simulator))
+    else:
+        with process_crew(counting, workers=2) as processes:
+            rounds = list(in_step(names, processes, simulator))
+    assert simulator.calls == 3
+    assert [(turn.running, turn.cases) for turn in rounds] == [(3, 3), (2, 4), (1, 3), (0, 0)]
+    found = {name: end for turn in rounds for name, end in turn.ended.items()}
+    assert isinstance(found["0"], Crash)
+    assert found["0"].traceback.endswith("ValueError: no waves\n")
+    for name in ("1", "2", "3"):
+        assert isinstance(found[name], Discovery)
+        assert found[name].reason == expected_reason(int(name))
+
+
+def label_of(kind: Kind, *names: str, strength: float = 2.0) -> Label:
+    sizes = tuple((name, 1.0) for name in names)
+    return Label("", kind, (0.3, 0.3), sizes, (strength,) * len(names), seed=1, salt="")
+
+
+@pytest.mark.parametrize(
+    ("label", "verdict", "named", "judgement"),
+    [
+        (label_of(Kind.NULL), Verdict.NONE, "", ""),
+        (label_of(Kind.NULL), Verdict.NAMED, "drag", "wrong"),
+        (label_of(Kind.SINGLE, "drag"), Verdict.NAMED, "drag", "right"),
+        (label_of(Kind.SINGLE, "drag"), Verdict.NAMED, "twist", "wrong"),
+        (label_of(Kind.SINGLE, "drag"), Verdict.NAMED, "drag twist", "wrong"),
+        (label_of(Kind.SINGLE, "drag"), Verdict.INCOMPLETE, "twist", "wrong"),
+        (label_of(Kind.SINGLE, "drag"), Verdict.TIE, "drag twist", "tied"),
+        (label_of(Kind.SINGLE, "drag"), Verdict.TIE, "spread twist", ""),
+        (label_of(Kind.SINGLE, "drag"), Verdict.UNKNOWN, "", ""),
+        (label_of(Kind.PAIR, "drag", "twist"), Verdict.NAMED, "drag twist", "right"),
+        (label_of(Kind.PAIR, "drag", "twist"), Verdict.INCOMPLETE, "drag", ""),
+        (label_of(Kind.PAIR, "drag", "twist"), Verdict.NAMED, "drag spread", "wrong"),
+        (label_of(Kind.WITHHELD, "drag"), Verdict.UNKNOWN, "", ""),
+        (label_of(Kind.WITHHELD, "drag"), Verdict.NAMED, "twist", "wrong"),
+        (label_of(Kind.STRANGER, "swollen"), Verdict.INCOMPLETE, "drag", "wrong"),
+    ],
+)
+def test_a_verdict_is_judged_by_what_it_names(
+    label: Label, verdict: Verdict, named: str, judgement: str
+) -> None:
+    table = findings_table([Finding("t", EVERYTHING, str(verdict), named)])
+    [row] = scored(table, {"t": label}, [Sealed("t", "alone", (), "")]).to_dict("records")
+    assert [name for name in ("right", "tied", "wrong") if row[name]] == ([judgement] if judgement else [])
+
+
+def test_shares_have_the_intervals_of_clopper_and_pearson() -> None:
+    # 0 of n: 1 - (0.05 / 2)^(1/n).
+    assert Share(0, 42).interval == pytest.approx((0.0, 1.0 - 0.025 ** (1 / 42)))
+    assert Share(42, 42).interval == pytest.approx((0.025 ** (1 / 42), 1.0))
+    assert str(Share(0, 0)) == "no trials"
+
+
+def ideal_trials() -> tuple[pd.DataFrame, dict[str, Label]]:
+    """Findings of an analysis that is right wherever it can be."""
+    labels: dict[str, Label] = {f"null-{i}": label_of(Kind.NULL) for i in range(100)}
+    labels |= {
+        f"{name}-{i}": label_of(Kind.SINGLE, name, strength=1.6 + i / 10)
+        for name in "abcdefgh"
+        for i in range(15)
+    }
+    labels |= {f"outside-{i}": label_of(Kind.STRANGER, "swollen") for i in range(60)}
+    labels |= {f"pair-{i}": label_of(Kind.PAIR, "a", "b") for i in range(30)}
+    return findings_table(ideal(name, label) for name, label in labels.items()), labels
+
+
+def ideal(trial: str, label: Label) -> Finding:
+    if label.kind is Kind.NULL:
+        return Finding(trial, EVERYTHING, "none")
+    if label.kind is Kind.STRANGER:
+        return Finding(trial, EVERYTHING, "unknown", alarm=True)
+    held_out = {"held_out_before": 112.0, "held_out_after": 22.0, "held_out_degrees": 12.0}
+    missed = int(trial.rpartition("-")[2]) % 10 == 0  # a 90 % interval misses one in ten
+    low, high = (1.1, 1.2) if missed else (0.9, 1.1)
+    return Finding(trial, EVERYTHING, "named", " ".join(label.mechanisms), True, 1.0, low, high, **held_out)
+
+
+def test_an_analysis_that_is_right_passes_every_aim() -> None:
+    findings, labels = ideal_trials()
+    table = scored(findings, labels, [Sealed(name, "all", (), "") for name in labels])
+    found = aims(table, unresolvable=["twist"])
+    assert [aim.question for aim in found if aim.passed is not True] == []
+    assert removed(table) == pytest.approx(0.9)
+    assert covered(table).value == pytest.approx(1.0 - 2 / 15)
+    assert confusion(table).to_numpy().sum() == len(labels)
+    curve = power_curve(table)
+    assert curve["trials"].sum() == 120
+    assert (curve["right"] == 1.0).all()
+
+
+@pytest.mark.parametrize(
+    ("of", "verdict", "named", "failed"),
+    [
+        (Kind.NULL, "named", "a", {"nothing hidden: alarms", "nothing hidden: wrong names"}),
+        (
+            Kind.STRANGER,
+            "named",
+            "twist",
+            {"outside the library: unknown", "names that were declared not resolvable"},
+        ),
+        (Kind.PAIR, "named", "a c", {"two mechanisms: both named", "two mechanisms: no wrong name"}),
+        (Kind.PAIR, "crash", "", {"two mechanisms: both named", "analyses that crashed"}),
+    ],
+)
+def test_an_analysis_that_is_wrong_fails_the_aims_that_it_misses(
+    of: Kind, verdict: str, named: str, failed: set[str]
+) -> None:
+    findings, labels = ideal_trials()
+    hit = findings["trial"].map(lambda name: labels[name].kind is of)
+    findings = findings.assign(
+        verdict=findings["verdict"].mask(hit, verdict),
+        named=findings["named"].mask(hit, named),
+        alarm=findings["alarm"] | hit,
+    )
+    table = scored(findings, labels, [Sealed(name, "all", (), "") for name in labels])
+    assert {aim.question for aim in aims(table, ["twist"]) if aim.passed is False} == failed
+
+
+def test_without_trials_nothing_passes() -> None:
+    table = scored(findings_table([]), {}, [])
+    assert [aim.question for aim in aims(table, []) if aim.passed] == []
