@@ -7,6 +7,7 @@ from doe.compare import Comparison, Sample, compare_means
 from doe.design import Design
 from doe.errors import DesignError, TargetError
 from doe.factors import Factor
+from doe.joint import Goal, JointFit, joint_fit
 from doe.noise import (
     NoiseFloor,
     VarianceRatio,
@@ -32,6 +33,8 @@ __all__ = [
     "ErrorTerm",
     "Estimate",
     "Factor",
+    "Goal",
+    "JointFit",
     "NoiseFloor",
     "Region",
     "Sample",
@@ -49,6 +52,7 @@ __all__ = [
     "detectable_effect",
     "effect_power",
     "fit_surface",
+    "joint_fit",
     "noise_floor",
     "plackett_burman",
     "pure_error",

@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 
 from doe.compare import Sample
@@ -32,6 +32,8 @@ class Region:
     resolution: int
     """Cells along each factor."""
     extent: float
+    explored: NDArray[np.bool_] | None = None
+    """Which cells were in question; None: the whole box."""
 
     @cached_property
     def natural(self) -> pd.DataFrame:
@@ -40,8 +42,9 @@ class Region:
 
     @property
     def fraction(self) -> float:
-        """Share of the box that belongs."""
-        return float(self.mask.mean())
+        """Share of the cells in question that belongs."""
+        explored = self.mask.size if self.explored is None else np.count_nonzero(self.explored)
+        return float(np.count_nonzero(self.mask) / explored)
 
     def projection(self, x: str, y: str) -> NDArray[np.bool_]:
         """Return the region's shadow on the plane of two factors, shape (cells of x, cells of y).
@@ -104,12 +107,23 @@ def compatible_region(
     if not (np.isfinite(goal_se) and goal_se >= 0.0):
         raise DesignError(f"target_se must be finite and not negative, received {goal_se}")
     points, count = box_cells(len(surface.design.factors), extent, resolution)
-    mean, se = surface.evaluate(points)
+    difference, error, df = misfit(surface, points, goal, goal_se, goal_df)
+    mask = np.abs(difference) <= stats.t.isf(0.5 * alpha, df) * error
+    return _region(surface, points, mask, count, extent)
+
+
+def misfit(
+    surface: FittedSurface, coded: ArrayLike, goal: float, goal_se: float, goal_df: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return fitted mean less target at coded points, its standard error, and the degrees of freedom of both.
+
+    These are Welch and Satterthwaite's, of the fit's error and the target's together.
+    """
+    mean, se = surface.evaluate(coded)
     total = se**2 + goal_se**2
     spread = se**4 / surface.residual_df + goal_se**4 / goal_df
     df = total**2 / np.maximum(spread, np.finfo(float).tiny)
-    mask = np.abs(mean - goal) <= stats.t.isf(0.5 * alpha, df) * np.sqrt(total)
-    return _region(surface, points, mask, count, extent)
+    return mean - goal, np.sqrt(total), df
 
 
 def band(

@@ -45,10 +45,10 @@ def calibrate(study: CampaignStudy, runner: Runner, on_stage: StageHook | None =
     study
         Factors, limits, target and decisions.
     runner
-        Simulates all rows of a table at once and returns them with ``status``, ``reason`` and ``angle`` [deg]
-        (NaN where there is none); a case that fails is a row, never an exception. Called once for the target,
-        the noise floor and the screening together, then once for each batch of the climb, for the surface and
-        for the verification.
+        Simulates all rows of a table at once, each in its ``scene``, and returns them with ``status``,
+        ``reason``, ``angle`` [deg] (NaN where there is none) and observables; a case that fails is a row,
+        never an exception. Called once for the target, the noise floor and the screening together, then once
+        for each batch of the climb, for the surface and for the verification.
     on_stage
         Called with the name and the result of every finished stage.
 
@@ -107,7 +107,7 @@ def _run(study: CampaignStudy, record: _Record) -> tuple[Outcome, str]:
     surface = record.keep("surface", explore_surface(study, path, record.run))
     require_slope(surface)
     optimum = record.keep("optimum", find_optimum(study, surface, target))
-    verification = record.keep("verification", verify(study, optimum, target.sample, record.run))
+    verification = record.keep("verification", verify(study, optimum, target, record.run))
     return _verdict(optimum, verification, target.sample)
 
 
@@ -116,8 +116,8 @@ def _open(study: CampaignStudy, record: _Record) -> tuple[TargetResult, NoiseFlo
     factors, settings, target = study.factors, study.campaign, study.target
     design = screening_design(factors, settings.screening)
     plans = [
-        plan_noise_floor(factors, settings.noise_floor, settings.seeds),
-        plan_screening(factors, design, settings.screening, settings.seeds),
+        plan_noise_floor(factors, settings.noise_floor, settings.seeds, target.responses),
+        plan_screening(factors, design, settings.screening, settings.seeds, target.responses),
     ]
     if isinstance(target, MeasuredTarget):
         noise_cases, screening_cases = simulate(record.run, *plans)
@@ -129,8 +129,8 @@ def _open(study: CampaignStudy, record: _Record) -> tuple[TargetResult, NoiseFlo
         aim = twin_target(study, target, heaps)
     return (
         record.keep("target", aim),
-        record.keep("noise_floor", analyse_noise_floor(settings.noise_floor, noise_cases)),
-        record.keep("screening", analyse_screening(design, screening_cases)),
+        record.keep("noise_floor", analyse_noise_floor(settings.noise_floor, noise_cases, target.responses)),
+        record.keep("screening", analyse_screening(design, screening_cases, target.responses)),
     )
 
 
@@ -143,8 +143,16 @@ def _verdict(optimum: OptimumResult, verification: VerificationResult, target: S
     )
     if comparison.different:
         return Outcome.NOT_VERIFIED, f"{found}: the chosen point does not give the target."
+    if missed := [name for name, test in verification.responses.items() if test.different]:
+        return Outcome.NOT_VERIFIED, f"{found}, but it does not give the target of {', '.join(missed)}."
     within = "shown" if comparison.equivalent else "not shown"
     equivalence = f"equivalence within {verification.margin:.2f} deg is {within}"
+    others = (
+        f"; no difference in {', '.join(verification.responses)} either" if verification.responses else ""
+    )
     if verification.verified:
-        return Outcome.CALIBRATED, f"{found}; {equivalence}."
+        return Outcome.CALIBRATED, f"{found}; {equivalence}{others}."
+    unproven = [name for name, test in verification.responses.items() if not test.equivalent]
+    if comparison.equivalent:
+        equivalence = f"equivalence is not shown for {', '.join(unproven)}"
     return Outcome.NOT_VERIFIED, f"{found}, but {equivalence}, which the study requires: add replicates."

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -9,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from experiments.calibrate.results import STAGES, Outcome
+from experiments.calibrate.settings import ANGLE, TARGET_SCENE
 
 if TYPE_CHECKING:
     from doe import Factor
@@ -32,15 +34,17 @@ class StageEnd(Exception):  # noqa: N818  (an ending that is foreseen, not an er
         self.reason = reason
 
 
-def case_seed(root: int, stage: str, run: int, replicate: int) -> int:
-    """Derive the seed of one case; it depends on nothing but these four.
+def case_seed(root: int, stage: str, run: int, replicate: int, scene: str = TARGET_SCENE) -> int:
+    """Derive the seed of one case; it depends on nothing but these five.
 
-    So a further run or replicate leaves every other case as it was. 31 bits: any generator takes it.
+    So a further run, replicate or scene leaves every other case as it was. 31 bits: any generator takes it.
     """
     unsigned_run = (
         2 * run if run >= 0 else -2 * run - 1
     )  # a climb that is extended downward counts below zero
-    sequence = np.random.SeedSequence(root, spawn_key=(STAGES.index(stage), unsigned_run, replicate))
+    other_scene = () if scene == TARGET_SCENE else tuple(scene.encode())
+    key = (STAGES.index(stage), unsigned_run, replicate, *other_scene)
+    sequence = np.random.SeedSequence(root, spawn_key=key)
     return int(sequence.generate_state(1, np.uint32)[0] >> 1)
 
 
@@ -56,6 +60,7 @@ def plan_cases(
     points: pd.DataFrame,
     replicates: int | Mapping[int, int],
     seed: int,
+    scenes: Sequence[str] = (TARGET_SCENE,),
 ) -> pd.DataFrame:
     """Lay out the cases of a stage, one row each.
 
@@ -71,19 +76,22 @@ def plan_cases(
         Cases of each run, or of each run by its label.
     seed
         Root of the seeds.
+    scenes
+        Names of the scenes that every case is simulated in.
 
     Returns
     -------
     DataFrame
-        Columns: stage, run, replicate, every factor (natural unit), seed.
+        Columns: stage, scene, run, replicate, every factor (natural unit), seed.
     """
     rows = []
-    for run, point in zip(points.index.tolist(), points.to_dict("records"), strict=True):
+    labelled = zip(points.index.tolist(), points.to_dict("records"), strict=True)
+    for scene, (run, point) in itertools.product(scenes, labelled):
         count = replicates if isinstance(replicates, int) else replicates[run]
         settings = middle(factors, {str(name): value for name, value in point.items()})
         for replicate in range(1, count + 1):
-            label = {"stage": stage, "run": run, "replicate": replicate}
-            rows.append(label | settings | {"seed": case_seed(seed, stage, run, replicate)})
+            label = {"stage": stage, "scene": scene, "run": run, "replicate": replicate}
+            rows.append(label | settings | {"seed": case_seed(seed, stage, run, replicate, scene)})
     return pd.DataFrame(rows)
 
 
@@ -97,48 +105,59 @@ def simulate(runner: Runner, *plans: pd.DataFrame) -> list[pd.DataFrame]:
     ]
 
 
-def measured(cases: pd.DataFrame) -> pd.DataFrame:
-    """Return the cases that gave an angle."""
-    return cases[(cases["status"] == "finished") & cases["angle"].notna()]
+def scene_cases(cases: pd.DataFrame, scene: str = TARGET_SCENE) -> pd.DataFrame:
+    """Return the cases of one scene; a table without the column ``scene`` has those of the target's alone."""
+    if "scene" not in cases.columns:
+        return cases
+    return cases[cases["scene"] == scene].reset_index(drop=True)
 
 
-def angles_of(cases: pd.DataFrame, stage: str, least: int = 2) -> np.ndarray:
-    """Return the angles [deg] of replicated cases.
+def measured(cases: pd.DataFrame, observable: str = ANGLE) -> pd.DataFrame:
+    """Return the cases of a scene that gave an observable."""
+    if observable not in cases.columns:  # where every case failed before it could be measured
+        return cases.iloc[:0].assign(**{observable: np.nan})
+    return cases[(cases["status"] == "finished") & cases[observable].notna()]
+
+
+def values_of(cases: pd.DataFrame, stage: str, observable: str = ANGLE, least: int = 2) -> np.ndarray:
+    """Return an observable of replicated cases of a scene.
 
     Raises
     ------
     StageEnd
         When fewer than ``least`` cases gave one.
     """
-    angles = measured(cases)["angle"].to_numpy(dtype=np.float64)
-    if len(angles) < least:
-        raise too_many_failed(cases, stage, f"needs at least {least} measured cases")
-    return angles
+    values = measured(cases, observable)[observable].to_numpy(dtype=np.float64)
+    if len(values) < least:
+        raise too_many_failed(cases, stage, f"needs at least {least} measured cases", observable)
+    return values
 
 
 def response_table(cases: pd.DataFrame, runs: Sequence[int]) -> np.ndarray:
     """Return angles [deg] by run and replicate, shape (runs, replicates); NaN where there is none."""
-    angles = measured(cases).pivot_table(index="run", columns="replicate", values="angle")
+    angles = measured(cases).pivot_table(index="run", columns="replicate", values=ANGLE)
     columns = range(1, int(cases["replicate"].max()) + 1)
     return angles.reindex(index=list(runs), columns=columns).to_numpy(dtype=np.float64)
 
 
-def failure_summary(cases: pd.DataFrame) -> str:
-    """Say how many cases failed, and of what; empty when none did."""
-    failed = cases.drop(measured(cases).index)
+def failure_summary(cases: pd.DataFrame, observable: str = ANGLE) -> str:
+    """Say how many cases of a scene failed, and of what; empty when none did."""
+    failed = cases.drop(measured(cases, observable).index)
     if failed.empty:
         return ""
     # A finished case without an angle had no heap to measure.
-    kinds = failed["status"].replace("finished", "no measurable heap").value_counts()
+    missing = "no measurable heap" if observable == ANGLE else f"no {observable}"
+    kinds = failed["status"].replace("finished", missing).value_counts()
     listed = ", ".join(f"{count} {kind}" for kind, count in kinds.items())
     return f"{len(failed)} of {len(cases)} cases failed ({listed})"
 
 
-def too_many_failed(cases: pd.DataFrame, stage: str, need: str) -> StageEnd:
+def too_many_failed(cases: pd.DataFrame, stage: str, need: str, observable: str = ANGLE) -> StageEnd:
     """Return the end of a campaign whose stage cannot be analysed."""
-    failures = failure_summary(cases) or "no case failed"
+    failures = failure_summary(cases, observable) or "no case failed"
+    of = "" if observable == ANGLE else f" for {observable}"
     reason = (
-        f"The stage {stage.replace('_', ' ')} {need}; {failures}. See the reasons in the table of cases, "
+        f"The stage {stage.replace('_', ' ')}{of} {need}; {failures}. See the reasons in the table of cases, "
         "then widen the time limit or narrow the factors' ranges."
     )
     return StageEnd(Outcome.TOO_MANY_FAILED_RUNS, reason)

@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 from pydantic import BaseModel
 
-from doe import Comparison, Design, NoiseFloor, Region, Sample, ScreenResult, Surface
+from doe import Comparison, Design, JointFit, NoiseFloor, Region, Sample, ScreenResult, Surface
 
 _COMPARISON = (
     "difference",
@@ -136,6 +136,13 @@ def _surface(value: Surface) -> dict[str, Any]:
 @jsonable.register
 def _region(value: Region) -> dict[str, Any]:
     return _properties(value, "fraction", "ranges", "extent", "resolution")
+
+
+@jsonable.register
+def _joint(value: JointFit) -> dict[str, Any]:
+    return _properties(value, "point", "alpha", "extent", "shrinkage", "directions") | {
+        "responses": jsonable(value.tests())
+    }
 
 
 def _properties(value: Any, *names: str) -> dict[str, Any]:

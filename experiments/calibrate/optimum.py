@@ -8,8 +8,9 @@ from collections.abc import Mapping
 import numpy as np
 import pandas as pd
 
-from doe import Region, Sample, Surface, TargetError, compare_means
+from doe import JointFit, Region, Sample, Surface, TargetError, compare_means
 from experiments.calibrate.cases import StageEnd, middle
+from experiments.calibrate.joint import choose_jointly, fit_jointly, joint_decisions
 from experiments.calibrate.results import (
     Decision,
     OptimumResult,
@@ -30,18 +31,21 @@ def find_optimum(study: CampaignStudy, surface: SurfaceResult, target: TargetRes
     Raises
     ------
     StageEnd
-        When the fitted surface does not reach the target where the design explored it.
+        When the fitted surface of the angle, which is alone, does not reach the target where the design
+        explored it.
     """
     settings, fit, sample = study.campaign.optimum, surface.reduced, target.sample
     reach = float(surface.design.coded.abs().to_numpy().max())
-    # The box of the two-level part first: inside it the fit is at its best. The axial points reach further.
-    point, rule, extent = _choose(settings, surface, sample.mean, sorted({1.0, reach}))
-    region = fit.compatible_region(sample, alpha=1.0 - settings.confidence, extent=extent)
+    joint = fit_jointly(surface, target, settings) if target.responses else None
+    if joint is None:
+        # The box of the two-level part first: inside it the fit is at its best. Axial points reach further.
+        point, rule, extent = _choose(settings, surface, sample.mean, sorted({1.0, reach}))
+        region = fit.compatible_region(sample, alpha=1.0 - settings.confidence, extent=extent)
+    else:
+        (point, rule), extent, region = choose_jointly(joint, settings), joint.extent, joint.region()
     prediction = fit.predict(point, alpha=1.0 - settings.confidence).iloc[0]
     unidentified = _unidentified(settings, region)
-    truth = (
-        None if target.truth is None else _check_truth(fit, target.truth, sample, settings.confidence, reach)
-    )
+    truth = None if target.truth is None else _check_truth(fit, target, settings.confidence, reach, joint)
     decisions = [
         Decision(
             STAGE,
@@ -51,8 +55,10 @@ def find_optimum(study: CampaignStudy, surface: SurfaceResult, target: TargetRes
             f"Chosen: {listed(point)}; the surface predicts {prediction['mean']:.2f} deg "
             f"({prediction['confidence_low']:.2f} to {prediction['confidence_high']:.2f}).",
         ),
-        _region_decision(settings, region, unidentified),
+        _region_decision(settings, region, unidentified, joint),
     ]
+    if joint is not None:
+        decisions += joint_decisions(joint, point, settings)
     if truth is not None:
         decisions.append(_truth_decision(truth, sample.mean))
     return OptimumResult(
@@ -65,6 +71,7 @@ def find_optimum(study: CampaignStudy, surface: SurfaceResult, target: TargetRes
         unidentified=unidentified,
         truth=truth,
         decisions=tuple(decisions),
+        joint=joint,
     )
 
 
@@ -114,20 +121,22 @@ def _unidentified(settings: OptimumSettings, region: Region) -> tuple[str, ...]:
 
 
 def _check_truth(
-    fit: Surface, truth: Mapping[str, float], target: Sample, confidence: float, reach: float
+    fit: Surface, target: TargetResult, confidence: float, reach: float, joint: JointFit | None
 ) -> TruthCheck:
     """Say where the hidden settings lie; factors that were not kept are at their middle in the fit."""
+    truth, sample = target.truth or {}, target.sample
     values = {name: truth[name] for name in fit.design.names}
     coded, far = _coded(fit, values), _reach(fit, values)
     try:
-        nearest = fit.nearest(target.mean, to=values, extent=max(reach, far))
+        nearest = fit.nearest(sample.mean, to=values, extent=max(reach, far))
     except TargetError:  # a point fixed in the study needs no contour
         distance = None
     else:
         distance = float(np.linalg.norm(_coded(fit, dict(nearest)) - coded))
     predicted = fit.predict(values).iloc[0]
     inside = far <= reach
-    compatible = _agrees(fit, predicted, target, confidence) if inside else None
+    agrees = joint.agrees(values) if joint else _agrees(fit, predicted, sample, confidence)
+    compatible = agrees if inside else None
     return TruthCheck(values, inside, compatible, distance, float(predicted["mean"]))
 
 
@@ -141,22 +150,26 @@ def _agrees(fit: Surface, predicted: pd.Series, target: Sample, confidence: floa
     return not compare_means(at_point, target, method="welch", alpha=1.0 - confidence).different
 
 
-def _region_decision(settings: OptimumSettings, region: Region, unidentified: tuple[str, ...]) -> Decision:
+def _region_decision(
+    settings: OptimumSettings, region: Region, unidentified: tuple[str, ...], joint: JointFit | None
+) -> Decision:
     ranges = region.ranges
     numbers = {"share of the region": region.fraction, "extent, coded": region.extent}
     numbers |= {
         f"{bound} of {name}": ranges[bound][name] for name in ranges.index for bound in ("low", "high")
     }
     outcome = f"{region.fraction:.0%} of the design region is compatible with the target."
-    if len(region.factors) > 1:
+    if len(region.factors) > 1 and joint is None:
         outcome += " The target is one equation: the factors trade off along its contour."
     if unidentified:
-        outcome += f" Not pinned down by this target alone: {', '.join(unidentified)}."
+        alone = "by this target alone" if joint is None else "by these responses"
+        outcome += f" Not pinned down {alone}: {', '.join(unidentified)}."
+    of_each = "" if joint is None else " for each of the responses, the level shared among them"
     return Decision(
         STAGE,
         f"A setting is compatible when fit and target differ by no more than their errors together explain "
-        f"({settings.confidence:.0%}); a factor is pinned down when its compatible values span at most "
-        f"{settings.unidentified_span:.0%} of the region.",
+        f"({settings.confidence:.0%}){of_each}; a factor is pinned down when its compatible values span at "
+        f"most {settings.unidentified_span:.0%} of the region.",
         numbers,
         outcome,
     )

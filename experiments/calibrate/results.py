@@ -1,13 +1,16 @@
 """What each stage of a campaign found, and the decisions that it took.
 
-A stage that simulates keeps its cases as ``cases``: one row a case as the runner returned it (every factor in
-its natural unit, ``seed``, ``stage``, ``run``, ``replicate``, ``status``, ``reason``, ``angle``, ``angle_se``
-[deg], observables, ``case_key``). Failed cases stay in it. Runs and replicates count from 1.
+A stage that simulates keeps its heaps as ``cases``: one row a case as the runner returned it (every factor in
+its natural unit, ``seed``, ``stage``, ``scene``, ``run``, ``replicate``, ``status``, ``reason``, ``angle``,
+``angle_se`` [deg], observables, ``case_key``). Failed cases stay in it. Runs and replicates count from 1.
+
+What a stage says of the responses beside the angle stands in its ``responses``, by the name of the response
+and in its unit.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
@@ -15,9 +18,10 @@ import numpy as np
 import pandas as pd
 
 from experiments.calibrate.export import indexed, jsonable
+from experiments.calibrate.settings import TARGET_SCENE
 
 if TYPE_CHECKING:
-    from doe import Comparison, Design, Factor, NoiseFloor, Region, Sample, ScreenResult, Surface
+    from doe import Comparison, Design, Factor, JointFit, NoiseFloor, Region, Sample, ScreenResult, Surface
     from experiments.calibrate.settings import CampaignSettings
 
 
@@ -75,6 +79,7 @@ class TargetResult(_Tabled):
     cases: pd.DataFrame | None
     """Twin study: the heaps of the target; None for a physical target."""
     decisions: tuple[Decision, ...]
+    responses: dict[str, Sample] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -85,6 +90,7 @@ class NoiseFloorResult(_Tabled):
     floor: NoiseFloor
     """Mean, standard deviation and its interval [deg]."""
     decisions: tuple[Decision, ...]
+    responses: dict[str, NoiseFloor] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -98,6 +104,7 @@ class ScreeningResult(_Tabled):
     """Repose angles [deg] of the plan, shape (runs, replicates); a failed case is NaN."""
     screen: ScreenResult
     decisions: tuple[Decision, ...]
+    responses: dict[str, ScreenResult] = field(default_factory=dict)
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """The coded design with an angle for each replicate, the effects, the analysis of variance."""
@@ -106,7 +113,7 @@ class ScreeningResult(_Tabled):
             "screening_design": self.design.coded.assign(**angles),
             "screening_effects": self.screen.table,
             "screening_anova": self.screen.anova,
-        }
+        } | {f"screening_effects_{name}": screen.table for name, screen in self.responses.items()}
 
 
 @dataclass(frozen=True)
@@ -117,7 +124,7 @@ class SelectionResult(_Tabled):
     """Names, in the study's order (``table`` ranks them)."""
     table: pd.DataFrame
     """By factor, strongest first: effect [deg], p, percent, rank, visible (larger than noise alone explains),
-    kept, reason."""
+    p_NAME of every further response, kept, reason."""
     visible_effect: float
     """Smallest effect [deg] that the noise floor lets this design see (at the power of the settings)."""
     decisions: tuple[Decision, ...]
@@ -159,6 +166,14 @@ class ClimbResult(_Tabled):
 
 
 @dataclass(frozen=True)
+class ResponseSurface:
+    """The surfaces of a response beside the angle, over the same design."""
+
+    full: Surface
+    reduced: Surface
+
+
+@dataclass(frozen=True)
 class SurfaceResult(_Tabled):
     """The composite design and the fitted surfaces (coded in the design's own half-ranges)."""
 
@@ -175,16 +190,17 @@ class SurfaceResult(_Tabled):
     outside: pd.DataFrame
     """Runs outside the stated factor ranges: run, factor, value, low, high."""
     decisions: tuple[Decision, ...]
+    responses: dict[str, ResponseSurface] = field(default_factory=dict)
 
     def tables(self) -> dict[str, pd.DataFrame]:
-        """The design in both units with its angles, both analyses of variance, runs outside the ranges."""
+        """The design in both units with its angles, the analyses of variance, runs outside the ranges."""
         coded = self.design.coded.add_suffix("_coded")
         return {
             "surface_design": pd.concat([self.design.natural, coded], axis=1).assign(angle=self.response),
             "surface_anova_full": self.full.anova,
             "surface_anova_reduced": self.reduced.anova,
             "surface_outside_ranges": self.outside,
-        }
+        } | {f"surface_anova_{name}": fits.full.anova for name, fits in self.responses.items()}
 
 
 @dataclass(frozen=True)
@@ -216,18 +232,25 @@ class OptimumResult(_Tabled):
     extent: float
     """Coded half width of the box that contour and region are drawn in: the reach of the axial points."""
     contour: pd.DataFrame
-    """Points of the target contour in that box, one column a kept factor, natural unit (index: piece)."""
+    """Points of the angle's contour in that box, one column a kept factor, natural unit (index: piece)."""
     region: Region
-    """Where the fit and the target agree within their uncertainties."""
+    """Where the fit and the target agree within their uncertainties, for all responses."""
     unidentified: tuple[str, ...]
     """Kept factors that the target does not pin down."""
     truth: TruthCheck | None
     """Twin study: where the hidden truth lies; None for a physical target."""
     decisions: tuple[Decision, ...]
+    joint: JointFit | None = None
+    """The angle and the further responses together; None where there are none."""
 
     def tables(self) -> dict[str, pd.DataFrame]:
-        """The target contour, and the range of each factor over the compatible region."""
-        return {"contour": self.contour, "compatible_ranges": self.region.ranges}
+        """The angle's contour, the range of each factor over the compatible region, the joint fit."""
+        tables = {"contour": self.contour, "compatible_ranges": self.region.ranges}
+        if self.joint is not None:
+            tables["joint_responses"] = self.joint.tests(self.point)
+            tables["joint_shrinkage"] = self.joint.shrinkage
+            tables["joint_directions"] = self.joint.directions
+        return tables
 
 
 @dataclass(frozen=True)
@@ -242,6 +265,7 @@ class VerificationResult(_Tabled):
     """Equivalence margin [deg]."""
     verified: bool
     decisions: tuple[Decision, ...]
+    responses: dict[str, Comparison] = field(default_factory=dict)
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """The fresh cases."""
@@ -294,8 +318,20 @@ class Campaign:
 
     @property
     def failed_cases(self) -> pd.DataFrame:
-        """Cases that gave no angle."""
-        return self.cases[self.cases["angle"].isna()]
+        """Cases that failed, and heaps that gave no angle."""
+        heaps = self.cases["scene"] == TARGET_SCENE
+        return self.cases[(self.cases["status"] != "finished") | (heaps & self.cases["angle"].isna())]
+
+    @property
+    def scene_costs(self) -> pd.DataFrame:
+        """What every scene took (index ``scene``): cases, simulated_time [s], grain_time [s].
+
+        The last is the simulated time of every grain together, to which the work is nearly proportional.
+        """
+        known = self.cases.reindex(columns=["scene", "simulated_time", "grain_count"])
+        known = known.assign(grain_time=known["simulated_time"] * known["grain_count"])
+        groups = known.groupby("scene", sort=False)
+        return groups[["simulated_time", "grain_time"]].sum().assign(cases=groups.size())
 
     def to_dict(self) -> dict[str, Any]:
         """Everything as plain JSON data: text, finite numbers, lists and dicts; other numbers are null."""
@@ -306,6 +342,8 @@ class Campaign:
         tables = {"cases": self.cases, "factors": pd.DataFrame([jsonable(f) for f in self.factors])}
         for result in self.stages.values():
             tables |= result.tables()
+        if len(self.scene_costs) > 1:
+            tables["scene_costs"] = self.scene_costs
         tables["decisions"] = self._decision_table()
         return {name: indexed(table) for name, table in tables.items()}
 

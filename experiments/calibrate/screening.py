@@ -7,9 +7,17 @@ from collections.abc import Sequence
 import pandas as pd
 
 from doe import Design, DesignError, Factor, ScreenResult, plackett_burman, screen
-from experiments.calibrate.cases import failure_summary, measured, plan_cases, response_table, too_many_failed
+from experiments.calibrate.cases import (
+    failure_summary,
+    measured,
+    plan_cases,
+    response_table,
+    scene_cases,
+    too_many_failed,
+)
+from experiments.calibrate.responses import each_response, scenes_of
 from experiments.calibrate.results import Decision, ScreeningResult
-from experiments.calibrate.settings import ScreeningSettings, SeedSettings
+from experiments.calibrate.settings import ANGLE, Response, ScreeningSettings, SeedSettings
 from experiments.calibrate.values import p_text
 
 STAGE = "screening"
@@ -27,33 +35,63 @@ def screening_design(factors: Sequence[Factor], settings: ScreeningSettings) -> 
 
 
 def plan_screening(
-    factors: Sequence[Factor], design: Design, settings: ScreeningSettings, seeds: SeedSettings
+    factors: Sequence[Factor],
+    design: Design,
+    settings: ScreeningSettings,
+    seeds: SeedSettings,
+    responses: Sequence[Response] = (),
 ) -> pd.DataFrame:
     """Lay out every run and replicate of the design."""
-    return plan_cases(factors, STAGE, design.natural, settings.replicates, seeds.campaign)
+    scenes = scenes_of(responses)
+    return plan_cases(factors, STAGE, design.natural, settings.replicates, seeds.campaign, scenes)
 
 
-def analyse_screening(design: Design, cases: pd.DataFrame) -> ScreeningResult:
-    """Estimate and test the effects from the cases that gave an angle.
+def analyse_screening(
+    design: Design, cases: pd.DataFrame, responses: Sequence[Response] = ()
+) -> ScreeningResult:
+    """Estimate and test the effects on every response from the cases that gave it.
 
     Raises
     ------
     StageEnd
         When too few runs are left to tell the factors apart.
     """
-    used = measured(cases)
-    try:
-        result = _screen(design.select(used["run"].tolist()), used["angle"])
-    except DesignError as error:
-        raise too_many_failed(cases, STAGE, f"cannot be analysed any more ({error})") from error
-    response = response_table(cases, design.coded.index.tolist())
-    return ScreeningResult(cases, design, response, result, (_decision(design, cases, result),))
+    heaps = scene_cases(cases)
+    result = _screen(design, heaps, ANGLE)
+    others = each_response(responses, cases, lambda found, column: _screen(design, found, column))
+    response = response_table(heaps, design.coded.index.tolist())
+    decisions = [_decision(design, heaps, result)]
+    if others:
+        decisions.append(_responses(others))
+    return ScreeningResult(heaps, design, response, result, tuple(decisions), others)
 
 
-def _screen(design: Design, angles: pd.Series) -> ScreenResult:
+def _screen(design: Design, cases: pd.DataFrame, observable: str) -> ScreenResult:
     """Test against dummies and replicates together; where there is neither, against Lenth's pseudo error."""
-    spare = len(design.coded) - len(design.factors) - 1
-    return screen(design, angles.to_numpy(), error="pooled" if spare > 0 else "lenth")
+    used = measured(cases, observable)
+    try:
+        run = design.select(used["run"].tolist())
+        spare = len(run.coded) - len(run.factors) - 1
+        return screen(run, used[observable].to_numpy(), error="pooled" if spare > 0 else "lenth")
+    except DesignError as error:
+        need = f"cannot be analysed any more ({error})"
+        raise too_many_failed(cases, STAGE, need, observable) from error
+
+
+def _responses(screens: dict[str, ScreenResult]) -> Decision:
+    """Say what moves every further response most."""
+    strongest = []
+    for name, result in screens.items():
+        first = result.table.sort_values("rank").iloc[0]
+        strongest.append(
+            f"{name}: {first.name} ({first['effect']:+.4g} from low to high, {p_text(first['p'])})"
+        )
+    return Decision(
+        STAGE,
+        "The effects on every further response are tested on the same design, each against its own error.",
+        {f"error sd of {name}": result.error_ms**0.5 for name, result in screens.items()},
+        f"What moves them most: {'; '.join(strongest)}.",
+    )
 
 
 def _decision(design: Design, cases: pd.DataFrame, result: ScreenResult) -> Decision:

@@ -16,7 +16,7 @@ from experiments.calibrate.results import (
     ScreeningResult,
     SelectionResult,
 )
-from experiments.calibrate.settings import SelectionSettings
+from experiments.calibrate.settings import ANGLE, SelectionSettings
 from experiments.calibrate.values import p_text
 
 STAGE = "selection"
@@ -25,19 +25,22 @@ STAGE = "selection"
 def select_factors(
     settings: SelectionSettings, screening: ScreeningResult, noise: NoiseFloorResult
 ) -> SelectionResult:
-    """Keep the factors that the study names, or those that the rule finds significant."""
+    """Keep the factors that the study names, or those that the rule finds significant for any response."""
     ranked = screening.screen.table.sort_values("rank")
-    significant = [str(name) for name in ranked.index[ranked["p"] < settings.alpha]]
-    chosen = _chosen(settings, [str(name) for name in ranked.index], significant)
+    p = _p_values(screening, ranked.index)
+    significant = [str(name) for name in ranked.index if (p.loc[name] < settings.alpha).any()]
+    chosen = _chosen(settings, _by_strength(p, settings.alpha), significant)
     kept = tuple(name for name in screening.design.names if name in chosen)
     cases = len(screening.screen.response)
     table = ranked[["effect", "p", "percent", "rank"]].copy()
     table["visible"] = table["effect"].abs() > _noise_effect(noise.floor, cases, settings.alpha)
+    for name in screening.responses:
+        table[f"p_{name}"] = p[name]
     table["kept"] = table.index.isin(kept)
-    table["reason"] = [_reason(settings, str(name), kept, significant) for name in table.index]
+    table["reason"] = [_reason(settings, str(name), kept, p.loc[name]) for name in table.index]
     visible = _visible_effect(settings, noise.floor, cases, screening.screen.error_df)
     decisions = (
-        _kept_decision(settings, table, kept, significant),
+        _kept_decision(settings, p, kept, significant),
         _noise_decision(settings, table, visible, noise),
     )
     return SelectionResult(kept, table, visible, decisions)
@@ -63,6 +66,26 @@ def require_kept(settings: SelectionSettings, selection: SelectionResult) -> Non
     )
 
 
+def _p_values(screening: ScreeningResult, names: pd.Index) -> pd.DataFrame:
+    """Return the p values of every factor (rows) for the angle and every further response (columns)."""
+    screens = {ANGLE: screening.screen, **screening.responses}
+    return pd.DataFrame({name: screen.table["p"].reindex(names) for name, screen in screens.items()})
+
+
+def _by_strength(p: pd.DataFrame, alpha: float) -> list[str]:
+    """Order the factors: those that move the angle, which the climb needs, then by their smallest p.
+
+    The rows stand in the order of the effects on the angle.
+    """
+
+    def order(name: str) -> tuple[bool, float]:
+        moves_angle = bool(p.loc[name, ANGLE] < alpha)
+        others = p.loc[name].drop(ANGLE)
+        return not moves_angle, 0.0 if moves_angle or others.empty else float(others.min())
+
+    return sorted(map(str, p.index), key=order)
+
+
 def _chosen(settings: SelectionSettings, ranked: list[str], significant: list[str]) -> set[str]:
     if settings.keep is not None:
         return set(settings.keep)
@@ -70,12 +93,15 @@ def _chosen(settings: SelectionSettings, ranked: list[str], significant: list[st
     return set(ranked[:count])
 
 
-def _reason(settings: SelectionSettings, name: str, kept: tuple[str, ...], significant: list[str]) -> str:
+def _reason(settings: SelectionSettings, name: str, kept: tuple[str, ...], p: pd.Series) -> str:
     if settings.keep is not None:
         return "named in the study" if name in kept else "not named in the study"
-    if name in kept:
-        return "significant" if name in significant else f"strongest of at least {settings.at_least}"
-    return f"beyond the strongest {settings.at_most}" if name in significant else "not significant"
+    moved = [str(response) for response in p.index[p < settings.alpha]]
+    if name not in kept:
+        return f"beyond the strongest {settings.at_most}" if moved else "not significant"
+    if not moved:
+        return f"strongest of at least {settings.at_least}"
+    return "significant" if len(p) == 1 else f"significant for {', '.join(moved)}"
 
 
 def _noise_effect(floor: NoiseFloor, cases: int, alpha: float) -> float:
@@ -90,21 +116,26 @@ def _visible_effect(settings: SelectionSettings, floor: NoiseFloor, cases: int, 
 
 
 def _kept_decision(
-    settings: SelectionSettings, table: pd.DataFrame, kept: tuple[str, ...], significant: list[str]
+    settings: SelectionSettings, p: pd.DataFrame, kept: tuple[str, ...], significant: list[str]
 ) -> Decision:
     if settings.keep is not None:
         rule = "The study names the factors to keep."
     else:
+        several = len(p.columns) > 1
+        whose = " for any of the responses" if several else ""
+        first = ", those that move the angle before the others" if several else ""
         rule = (
-            f"A factor is kept when p < {settings.alpha:g} in the screening; at least {settings.at_least}, "
-            f"at most {settings.at_most}, strongest first."
+            f"A factor is kept when p < {settings.alpha:g} in the screening{whose}; at least "
+            f"{settings.at_least}, at most {settings.at_most}, strongest first{first}."
         )
     outcome = f"Kept: {', '.join(kept)}." if kept else "No factor is kept."
-    if settings.keep is None and len(significant) == len(table) > 1:
+    if settings.keep is None and len(significant) == len(p) > 1:
         outcome += " Every factor is significant."
     if settings.keep is None and len(significant) > len(kept):
         outcome += f" Of {len(significant)} significant ones the weaker stay at their middle."
-    numbers = {f"p of {name}": float(p) for name, p in table["p"].items()}
+    numbers = {f"p of {name}": float(value) for name, value in p[ANGLE].items()}
+    for response in p.columns.drop(ANGLE):
+        numbers |= {f"p of {name} for {response}": float(value) for name, value in p[response].items()}
     return Decision(STAGE, rule, numbers, outcome)
 
 

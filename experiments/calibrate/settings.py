@@ -176,8 +176,39 @@ class CampaignSettings(_Settings):
     verification: VerificationSettings = VerificationSettings()
 
 
+ANGLE = "angle"
+"""Name of the first response of every campaign, the repose angle, and its column in a table of cases."""
+
+TARGET_SCENE = "target"
+"""Name of the scene whose heaps have the angle."""
+
+
+class Response(_Settings):
+    """A number beside the angle that the cases must match."""
+
+    name: str
+    """What it is called; other than the angle, and than every other response."""
+    observable: str
+    """Column of the cases that holds it."""
+    unit: str = "1"
+    """Its unit; ``"1"``: a plain number."""
+    scene: str = TARGET_SCENE
+    """Name of the scene that measures it."""
+
+
+class MeasuredResponse(Response):
+    """A response and what the physical test gave of it, in its unit."""
+
+    mean: float
+    """Mean of the measurements."""
+    sd: float = Field(gt=0.0)
+    """Standard deviation of one measurement."""
+    n: int = Field(ge=2)
+    """Measurements."""
+
+
 class MeasuredTarget(_Settings):
-    """The ``[target]`` section: what the physical test gave."""
+    """What the physical tests gave."""
 
     mean: float = Field(gt=0.0, lt=90.0)
     """Mean repose angle [deg]."""
@@ -185,15 +216,19 @@ class MeasuredTarget(_Settings):
     """Standard deviation of one measurement [deg]."""
     n: int = Field(ge=2)
     """Measurements."""
+    responses: tuple[MeasuredResponse, ...] = ()
+    """Further responses."""
 
 
 class TwinTarget(_Settings):
-    """The ``[target.twin]`` section: the target is simulated with settings that the campaign does not see."""
+    """A target that is simulated with settings that the campaign does not see."""
 
     truth: FactorValues = Field(min_length=1)
     """Hidden factor values; the factors not named are at their middle."""
     replicates: int = Field(default=5, ge=2)
-    """Heaps of the target."""
+    """Cases of the target in every scene."""
+    responses: tuple[Response, ...] = ()
+    """Further responses."""
 
 
 class CampaignStudy(Protocol):
@@ -209,7 +244,7 @@ class CampaignStudy(Protocol):
 
     @property
     def target(self) -> MeasuredTarget | TwinTarget:
-        """What the heaps must match."""
+        """What the heaps, and the cases of further scenes, must match."""
 
     @property
     def limits(self) -> Mapping[str, tuple[float, float]]:

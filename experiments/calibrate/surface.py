@@ -16,11 +16,13 @@ from experiments.calibrate.cases import (
     measured,
     plan_cases,
     response_table,
+    scene_cases,
     simulate,
     too_many_failed,
 )
-from experiments.calibrate.results import ClimbResult, Decision, Outcome, SurfaceResult
-from experiments.calibrate.settings import CampaignStudy, SurfaceSettings
+from experiments.calibrate.responses import each_response, scenes_of
+from experiments.calibrate.results import ClimbResult, Decision, Outcome, ResponseSurface, SurfaceResult
+from experiments.calibrate.settings import ANGLE, CampaignStudy, SurfaceSettings
 from experiments.calibrate.values import (
     UNLIMITED,
     fixed_values,
@@ -52,7 +54,7 @@ class _Placement:
 
 
 def explore_surface(study: CampaignStudy, climb: ClimbResult, runner: Runner) -> SurfaceResult:
-    """Simulate the composite design and fit the surfaces.
+    """Simulate the composite design and fit the surfaces of every response.
 
     Raises
     ------
@@ -62,23 +64,33 @@ def explore_surface(study: CampaignStudy, climb: ClimbResult, runner: Runner) ->
     settings = study.campaign.surface
     placement = _place(study, climb)
     design = _composite(placement.factors(kept_factors(study, climb.kept)), settings)
-    cases = simulate(runner, _plan(study, design))[0]
-    used = measured(cases)
-    try:
-        full = fit_surface(design.select(used["run"].tolist()), used["angle"].to_numpy(dtype=np.float64))
-    except DesignError as error:
-        raise too_many_failed(cases, STAGE, f"cannot be fitted any more ({error})") from error
+    finished = simulate(runner, _plan(study, design))[0]
+    cases = scene_cases(finished)
+    full = _fit(design, cases, ANGLE)
     reduced, reduction = _reduce(full, settings)
+    others = each_response(
+        study.target.responses, finished, lambda found, column: _fits(design, found, column, settings)
+    )
     outside = _outside_ranges(study, design)
     decisions = (
         *placement.decisions,
         _design_decision(design, settings, outside, cases),
         _full_decision(full, settings),
         reduction,
+        *([_responses_decision(others, settings)] if others else []),
     )
     response = _run_means(response_table(cases, design.coded.index.tolist()))
     return SurfaceResult(
-        cases, design, response, placement.center, placement.half_range, full, reduced, outside, decisions
+        cases,
+        design,
+        response,
+        placement.center,
+        placement.half_range,
+        full,
+        reduced,
+        outside,
+        decisions,
+        others,
     )
 
 
@@ -189,7 +201,40 @@ def _plan(study: CampaignStudy, design: Design) -> pd.DataFrame:
     settings = study.campaign
     at_center = (design.coded == 0.0).all(axis=1)
     replicates = {int(run): 1 if center else settings.surface.replicates for run, center in at_center.items()}
-    return plan_cases(study.factors, STAGE, design.natural, replicates, settings.seeds.campaign)
+    scenes = scenes_of(study.target.responses)
+    return plan_cases(study.factors, STAGE, design.natural, replicates, settings.seeds.campaign, scenes)
+
+
+def _fit(design: Design, cases: pd.DataFrame, observable: str) -> Surface:
+    """Fit the full quadratic to an observable of the cases of its scene."""
+    used = measured(cases, observable)
+    try:
+        return fit_surface(design.select(used["run"].tolist()), used[observable].to_numpy(dtype=np.float64))
+    except DesignError as error:
+        need = f"cannot be fitted any more ({error})"
+        raise too_many_failed(cases, STAGE, need, observable) from error
+
+
+def _fits(design: Design, cases: pd.DataFrame, observable: str, settings: SurfaceSettings) -> ResponseSurface:
+    """Fit and reduce the surface of a further response; terms that the study names are the angle's."""
+    full = _fit(design, cases, observable)
+    return ResponseSurface(full, full.reduce(settings.reduce_alpha))
+
+
+def _responses_decision(fits: dict[str, ResponseSurface], settings: SurfaceSettings) -> Decision:
+    """Say what the further responses depend on, and how well a quadratic describes them."""
+    said = []
+    for name, fit in fits.items():
+        terms = ", ".join(fit.reduced.coded_coefficients.index[1:]) or "nothing here"
+        p_lack = fit.full.anova["p"]["lack of fit"]
+        lack = ", with significant lack of fit" if p_lack < settings.lack_of_fit_alpha else ""
+        said.append(f"{name} on {terms} (predicted R2 {fit.reduced.r2_predicted:.2f}{lack})")
+    return Decision(
+        STAGE,
+        "Every further response has a surface of its own over the same design, reduced by the same rule.",
+        {f"p of the model of {name}": fit.full.anova["p"]["model"] for name, fit in fits.items()},
+        f"They depend on: {'; '.join(said)}.",
+    )
 
 
 def _run_means(response: np.ndarray) -> np.ndarray:

@@ -38,6 +38,11 @@ def numbered_values(prefix: str, values: Mapping[str, float]) -> dict[str, float
     return {f"{prefix} {name}": float(value) for name, value in values.items()}
 
 
+def quantity(value: float, unit: str) -> str:
+    """Write a value of a response with its unit; ``"1"`` is not written."""
+    return f"{value:.4g}" if unit == "1" else f"{value:.4g} {unit}"
+
+
 def kept_factors(study: CampaignStudy, kept: Iterable[str]) -> tuple[Factor, ...]:
     """Return the study's factors of these names, in the order of the names."""
     by_name = {factor.name: factor for factor in study.factors}

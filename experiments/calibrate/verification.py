@@ -2,37 +2,86 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import pandas as pd
 
 from doe import Comparison, Sample, compare_means
-from experiments.calibrate.cases import Runner, angles_of, failure_summary, plan_cases, simulate
-from experiments.calibrate.results import Decision, OptimumResult, VerificationResult
-from experiments.calibrate.settings import CampaignStudy, VerificationSettings
-from experiments.calibrate.values import p_text
+from experiments.calibrate.cases import (
+    Runner,
+    failure_summary,
+    plan_cases,
+    scene_cases,
+    simulate,
+    values_of,
+)
+from experiments.calibrate.responses import scenes_of
+from experiments.calibrate.results import Decision, OptimumResult, TargetResult, VerificationResult
+from experiments.calibrate.settings import CampaignStudy, Response, VerificationSettings
+from experiments.calibrate.values import p_text, quantity
 
 STAGE = "verification"
 
 
 def verify(
-    study: CampaignStudy, optimum: OptimumResult, target: Sample, runner: Runner
+    study: CampaignStudy, optimum: OptimumResult, target: TargetResult, runner: Runner
 ) -> VerificationResult:
-    """Simulate the chosen point with fresh seeds; test for a difference and for equivalence.
+    """Simulate the chosen point with fresh seeds; test every response for a difference and for equivalence.
+
+    The level of the tests is shared among the responses (Bonferroni).
 
     Raises
     ------
     StageEnd
-        When fewer than two cases gave an angle.
+        When fewer than two cases gave a response.
     """
-    settings = study.campaign.verification
-    point = pd.DataFrame([optimum.settings], index=[1])
-    plan = plan_cases(study.factors, STAGE, point, settings.replicates, study.campaign.seeds.campaign)
-    cases = simulate(runner, plan)[0]
-    angles = angles_of(cases, STAGE)
-    margin = settings.margin if settings.margin is not None else settings.margin_sds * target.sd
-    comparison = compare_means(angles, target, margin=margin, alpha=settings.alpha)
-    verified = not comparison.different and (bool(comparison.equivalent) or not settings.require_equivalence)
-    decisions = (_difference(comparison, target, cases), _equivalence(comparison, settings))
-    return VerificationResult(cases, angles, comparison, margin, verified, decisions)
+    settings, responses = study.campaign.verification, study.target.responses
+    point, seed = pd.DataFrame([optimum.settings], index=[1]), study.campaign.seeds.campaign
+    plan = plan_cases(study.factors, STAGE, point, settings.replicates, seed, scenes_of(responses))
+    finished = simulate(runner, plan)[0]
+    cases, sample = scene_cases(finished), target.sample
+    angles = values_of(cases, STAGE)
+    margin = settings.margin if settings.margin is not None else settings.margin_sds * sample.sd
+    alpha = settings.alpha / (1 + len(responses))
+    comparison = compare_means(angles, sample, margin=margin, alpha=alpha)
+    others = {}
+    for response in responses:
+        values = values_of(scene_cases(finished, response.scene), STAGE, response.observable)
+        aim = target.responses[response.name]
+        others[response.name] = compare_means(values, aim, margin=settings.margin_sds * aim.sd, alpha=alpha)
+    decisions = [_difference(comparison, sample, cases), _equivalence(comparison, settings)]
+    if others:
+        decisions.append(_responses(responses, others))
+    verified = all(_verified(test, settings) for test in (comparison, *others.values()))
+    return VerificationResult(cases, angles, comparison, margin, verified, tuple(decisions), others)
+
+
+def _verified(test: Comparison, settings: VerificationSettings) -> bool:
+    """Whether fresh cases show no difference and, where the study asks for it, equivalence."""
+    return not test.different and (bool(test.equivalent) or not settings.require_equivalence)
+
+
+def _responses(responses: Sequence[Response], tests: dict[str, Comparison]) -> Decision:
+    """Say how the further responses compare with their targets."""
+    said: list[str] = []
+    numbers: dict[str, float | None] = {}
+    for response in responses:
+        test, name = tests[response.name], response.name
+        found = "differs" if test.different else "does not differ"
+        aim = test.b.mean if isinstance(test.b, Sample) else test.b
+        said.append(
+            f"{name} {found} ({quantity(test.a.mean, response.unit)} against "
+            f"{quantity(aim, response.unit)}, {p_text(test.p)})"
+        )
+        numbers |= {f"p of {name}": test.p, f"p of equivalence of {name}": test.equivalence_p}
+    level = next(iter(tests.values())).alpha
+    return Decision(
+        STAGE,
+        f"Fresh cases of every scene against the other responses' targets, each test at {level:.3g}: the "
+        "level is shared among all responses.",
+        numbers,
+        f"At the chosen point {'; '.join(said)}.",
+    )
 
 
 def _difference(comparison: Comparison, target: Sample, cases: pd.DataFrame) -> Decision:

@@ -13,6 +13,7 @@ from typing import Any
 import pandas as pd
 
 from dem_warp import Case, CaseResult, Progress, simulate
+from experiments.calibrate.settings import TARGET_SCENE
 from experiments.cases.store import Store
 from experiments.errors import StudyError
 from experiments.study import Study
@@ -42,8 +43,9 @@ def run_cases(
     study
         What the cases are made from, and how their angle is read.
     table
-        One row a case: factors by name in natural units (one that is missing is at its middle), ``seed``, and
-        any further columns, which are carried over.
+        One row a case: factors by name in natural units (one that is missing is at its middle), ``seed``,
+        the name of its ``scene`` (without that column, all are of the study's own), and any further columns,
+        which are carried over.
     store
         Where results are kept; each is saved as it finishes. Checkpoints of the running cases are kept there
         too: what an interrupted run had begun goes on where it was.
@@ -70,10 +72,15 @@ def run_cases(
     cases, refused = _build_cases(study, table)
     keys = [store.key(case) if case else "" for case in cases]
     by_key = {key: case for key, case in zip(keys, cases, strict=True) if case}
+    scenes = dict(zip(keys, _scene_names(table), strict=True))
+
+    def measure(key: str, result: CaseResult) -> dict[str, Any]:
+        return _outcome_of(study, result, scenes[key])
+
     with ThreadPoolExecutor(max_workers=workers or os.cpu_count()) as pool:
-        outcomes = _simulate_missing(study, by_key, store, pool, device, workers, progress)
+        outcomes = _simulate_missing(by_key, store, pool, measure, device, workers, progress)
         for key in by_key.keys() - outcomes.keys():
-            outcomes[key] = pool.submit(_stored_outcome, study, store, key)
+            outcomes[key] = pool.submit(lambda key: measure(key, store.load(key)), key)
         rows = [
             outcomes[key].result() if key else _outcome("refused", reason)
             for key, reason in zip(keys, refused, strict=True)
@@ -101,12 +108,14 @@ def measure_heap(study: Study, result: CaseResult) -> HeapAngle:
     )
 
 
-def heap_angle_or_reason(study: Study, result: CaseResult) -> tuple[HeapAngle | None, str]:
+def heap_angle_or_reason(
+    study: Study, result: CaseResult, scene: str = TARGET_SCENE
+) -> tuple[HeapAngle | None, str]:
     """Angle of a case's heap; or None, and why: the case failed, or there is no measurable heap.
 
     A test that leaves no heap, as a hopper, has no angle and no reason.
     """
-    if result.status != "finished" or not study.scene.leaves_a_heap:
+    if result.status != "finished" or not study.scenes[scene].leaves_a_heap:
         return None, result.reason
     try:
         return measure_heap(study, result), ""
@@ -126,11 +135,13 @@ def _check_columns(table: pd.DataFrame) -> None:
 def _build_cases(study: Study, table: pd.DataFrame) -> tuple[list[Case | None], list[str]]:
     """Build every row's case; a row that breaks a physical rule has none, and the reason instead."""
     names = [factor.name for factor in study.factors if factor.name in table.columns]
+    rows = zip(table[names].to_dict("records"), table["seed"], _scene_names(table), strict=True)
     cases: list[Case | None] = []
     refused = []
-    for settings, seed in zip(table[names].to_dict("records"), table["seed"], strict=True):
+    for settings, seed, scene in rows:
+        values = {str(name): float(value) for name, value in settings.items()}
         try:
-            cases.append(study.case({str(name): float(value) for name, value in settings.items()}, int(seed)))
+            cases.append(study.case(values, int(seed), scene))
             refused.append("")
         except StudyError as error:
             cases.append(None)
@@ -138,11 +149,16 @@ def _build_cases(study: Study, table: pd.DataFrame) -> tuple[list[Case | None], 
     return cases, refused
 
 
+def _scene_names(table: pd.DataFrame) -> list[str]:
+    """Names of the scene of every row."""
+    return table["scene"].tolist() if "scene" in table.columns else [TARGET_SCENE] * len(table)
+
+
 def _simulate_missing(
-    study: Study,
     cases: dict[str, Case],
     store: Store,
     pool: ThreadPoolExecutor,
+    measure: Callable[[str, CaseResult], dict[str, Any]],
     device: str | None,
     workers: int | None,
     progress: Callable[[Progress], None] | None,
@@ -161,7 +177,7 @@ def _simulate_missing(
         key = missing[index]
         if result.status in REPEATABLE_STATUSES:
             store.save(key, result)
-        outcomes[key] = pool.submit(_outcome_of, study, result)
+        outcomes[key] = pool.submit(measure, key, result)
 
     if missing:
         simulate(
@@ -176,12 +192,8 @@ def _simulate_missing(
     return outcomes
 
 
-def _stored_outcome(study: Study, store: Store, key: str) -> dict[str, Any]:
-    return _outcome_of(study, store.load(key))
-
-
-def _outcome_of(study: Study, result: CaseResult) -> dict[str, Any]:
-    angle, reason = heap_angle_or_reason(study, result)
+def _outcome_of(study: Study, result: CaseResult, scene: str) -> dict[str, Any]:
+    angle, reason = heap_angle_or_reason(study, result, scene)
     if angle is None:
         return _outcome(result.status, reason, **result.observables)
     return _outcome(result.status, reason, angle.mean, angle.se, **result.observables)

@@ -13,11 +13,17 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from pydantic import Field, PrivateAttr, field_validator, model_validator
+from pydantic import Field, PrivateAttr, field_validator
 
 from dem_warp.case import Case
 from doe.factors import Factor
-from experiments.calibrate.settings import CampaignSettings, MeasuredTarget, TwinTarget
+from experiments.calibrate.settings import (
+    TARGET_SCENE,
+    CampaignSettings,
+    MeasuredTarget,
+    Response,
+    TwinTarget,
+)
 from experiments.errors import StudyError
 from experiments.study.card import with_material
 from experiments.study.conditions import BASE, Condition, ConditionSections, under_condition
@@ -30,8 +36,10 @@ from experiments.study.factor_section import (
     with_factor_values,
 )
 from experiments.study.places import Places, value_at
-from experiments.study.schema import Angle, Dimension, Section, nearest_name, validated
+from experiments.study.scene_sections import SceneSection
+from experiments.study.schema import Dimension, Section, nearest_name, validated
 from experiments.study.sections import Physics
+from experiments.study.target_section import ResponseSection, TargetSection, build_responses
 from experiments.study.toml_files import read_toml
 from imaging import FITS
 
@@ -47,32 +55,6 @@ _FACTOR_VALUE_TABLES = (
     ("target", "twin", "truth"),
 )
 """Tables of a study that hold quantities by factor name."""
-
-
-class TargetSection(Section):
-    """``[target]``: the repose angle to be matched; with a twin, the measured values are for reading only."""
-
-    mean: Angle | None = Field(default=None, gt=0.0, lt=90.0)
-    """Mean of the measurements."""
-    sd: Angle | None = Field(default=None, gt=0.0)
-    """Standard deviation of one measurement."""
-    n: int | None = Field(default=None, ge=2)
-    """Number of measurements."""
-    twin: TwinTarget | None = None
-    """The target comes from heaps simulated with settings that the campaign does not see."""
-
-    @model_validator(mode="after")
-    def _complete(self) -> TargetSection:
-        missing = [name for name in ("mean", "sd", "n") if getattr(self, name) is None]
-        if self.twin is None and missing:
-            raise ValueError(f"needs mean, sd and n of the measured angle; missing: {', '.join(missing)}")
-        return self
-
-    def target(self) -> MeasuredTarget | TwinTarget:
-        """Build the target of the campaign."""
-        if self.twin is not None:
-            return self.twin
-        return MeasuredTarget.model_validate({"mean": self.mean, "sd": self.sd, "n": self.n})
 
 
 class MeasurementSection(Section):
@@ -106,6 +88,10 @@ class Study(Physics):
     """How the angle is read."""
     target_section: TargetSection | None = Field(default=None, alias="target")
     """The angle to be matched."""
+    response_sections: tuple[ResponseSection, ...] = Field(default=(), alias="response")
+    """What else is to be matched."""
+    response_scenes: dict[str, SceneSection] = Field(default_factory=dict, alias="response-scene")
+    """Further scenes, by the names that responses call them by."""
     factor_sections: tuple[FactorSection, ...] = Field(default=(), alias="factor")
     """The factors as written, in order."""
     condition_sections: ConditionSections = Field(default={}, alias="condition")
@@ -143,7 +129,24 @@ class Study(Physics):
         """
         if self.target_section is None:
             raise StudyError("a calibration needs a [target] section", "none", str(self.file))
-        return self.target_section.target()
+        return self.target_section.target(self.responses)
+
+    @property
+    def scenes(self) -> dict[str, SceneSection]:
+        """Every scene by its name, the study's own first."""
+        return {TARGET_SCENE: self.scene, **self.response_scenes}
+
+    @cached_property
+    def responses(self) -> tuple[Response, ...]:
+        """What is to be matched beside the angle.
+
+        Raises
+        ------
+        StudyError
+            When two have one name, there is no such scene or observable, or a measurement is wrong.
+        """
+        measured = self.target_section is not None and self.target_section.twin is None
+        return build_responses(self.response_sections, self.scenes, measured, self._places)
 
     @cached_property
     def factors(self) -> tuple[Factor, ...]:
@@ -204,7 +207,7 @@ class Study(Physics):
         """
         return natural_settings(self.factor_sections, settings, Places(Path(source), {}))
 
-    def case(self, settings: Mapping[str, float], seed: int) -> Case:
+    def case(self, settings: Mapping[str, float], seed: int, scene: str = TARGET_SCENE) -> Case:
         """Build one case.
 
         Parameters
@@ -213,11 +216,13 @@ class Study(Physics):
             Values by factor name in natural units; a factor that is not named is at its middle.
         seed
             Seed of everything random in the case.
+        scene
+            Name of the scene.
 
         Raises
         ------
         StudyError
-            When there is no such factor, or a value leaves what is physical.
+            When there is no such factor or scene, or a value leaves what is physical.
         """
         names = [section.name for section in self.factor_sections]
         for name in settings:
@@ -225,6 +230,11 @@ class Study(Physics):
                 raise StudyError(f"must name a factor, {nearest_name(name, names)}", name, str(self.file))
         document = with_factor_values(self._document, self.factor_sections, settings)
         sections = {key: document[key] for key in Physics.model_fields if key in document}
+        if scene not in self.scenes:
+            rule = f"must name a scene of the study, {nearest_name(scene, list(self.scenes))}"
+            raise StudyError(rule, scene, str(self.file))
+        if scene != TARGET_SCENE:
+            sections["scene"] = document["response-scene"][scene]
         physics = validated(Physics, sections, self._places)
         try:
             return physics.build_case(seed)
@@ -271,6 +281,10 @@ def _build(document: dict[str, Any], places: Places) -> Study:
     plain = with_factor_values(_without_units(document, sections, places), sections, {})
     study = validated(Study, plain, places)
     study._document, study._places = document, places
+    if TARGET_SCENE in study.response_scenes:
+        rule = f"a further scene has a name of its own: {TARGET_SCENE!r} is the study's own"
+        raise StudyError(rule, TARGET_SCENE, places.of(("response-scene", TARGET_SCENE)))
+    study.responses  # noqa: B018  (a wrong response is an error now, not when a campaign begins)
     if study.condition_sections:
         for condition in study.conditions:
             study.under(condition.name)

@@ -17,6 +17,8 @@ UNITS: dict[str, dict[str, float]] = {
     "rate": {"1/s": 1.0, "1/min": 1.0 / 60.0},
     "frequency": {"Hz": 1.0},
     "time": {"s": 1.0, "ms": 1e-3, "min": 60.0},
+    "mass": {"kg": 1.0, "g": 1e-3, "mg": 1e-6},
+    "mass flow": {"kg/s": 1.0, "g/s": 1e-3},
     "angle": {"deg": 1.0, "rad": math.degrees(1.0)},
 }
 """Size of each unit in the base unit of its dimension (SI; degrees for angles)."""

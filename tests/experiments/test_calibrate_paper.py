@@ -192,7 +192,7 @@ def test_the_optimum_is_the_contours_point_nearest_to_the_centre(
 def test_the_verification_is_the_printed_t_test(
     study: PaperStudy, surface: SurfaceResult, target: TargetResult
 ) -> None:
-    result = verify(study, find_optimum(study, surface, target), target.sample, verification_runner)
+    result = verify(study, find_optimum(study, surface, target), target, verification_runner)
     assert result.comparison.p == pytest.approx(0.768591, rel=1e-5)
     assert result.margin == pytest.approx(2.0 * 0.518)
     assert result.verified

@@ -1,0 +1,134 @@
+"""The optimum of several responses: where they agree, what each of them buys, and what they leave open."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pandas as pd
+
+from doe import Goal, JointFit, joint_fit
+from experiments.calibrate.results import Decision, SurfaceResult, TargetResult
+from experiments.calibrate.settings import ANGLE, OptimumSettings
+from experiments.calibrate.values import fixed_values, p_text
+
+STAGE = "optimum"
+
+SMALL_COMPONENT = 0.2
+"""A factor whose part in a direction is smaller is not named."""
+
+NO_HELP = 0.95
+"""A response that leaves more than this share of the region buys nothing worth the name."""
+
+
+def fit_jointly(surface: SurfaceResult, target: TargetResult, settings: OptimumSettings) -> JointFit:
+    """Fit the angle and the further responses together, by their reduced surfaces."""
+    goals = {ANGLE: Goal(surface.reduced, target.sample)}
+    goals |= {name: Goal(fit.reduced, target.responses[name]) for name, fit in surface.responses.items()}
+    return joint_fit(goals, alpha=1.0 - settings.confidence)
+
+
+def choose_jointly(joint: JointFit, settings: OptimumSettings) -> tuple[dict[str, float], str]:
+    """Return the chosen point and the rule that chose it."""
+    fixed = fixed_values(settings.point, [factor.name for factor in joint.factors])
+    if fixed is not None:
+        return fixed, "The study fixes the chosen point."
+    rule = (
+        "The chosen point has the smallest chi2 over all responses, each weighed by the errors of its fit "
+        "and of its target; among points as good, it is the one nearest to the design's centre, in coded "
+        "units."
+    )
+    return joint.point, rule
+
+
+def joint_decisions(
+    joint: JointFit, point: Mapping[str, float], settings: OptimumSettings
+) -> tuple[Decision, ...]:
+    """Say whether the responses agree, what each of them buys, and which directions they leave open."""
+    return _agreement(joint, point), _purchase(joint), _directions(joint, settings)
+
+
+def open_directions(joint: JointFit, settings: OptimumSettings) -> pd.DataFrame:
+    """Return the directions along which the compatible values span too much of the region, the worst last."""
+    directions = joint.directions
+    return directions[directions["half_width"] / joint.extent > settings.unidentified_span]
+
+
+def direction_text(direction: pd.Series) -> str:
+    """Write a direction by what it moves, as ``E up, F down (1 : 0.6)``."""
+    parts = direction.drop("half_width")
+    named = parts[parts.abs() >= SMALL_COMPONENT].sort_values(key=np.abs, ascending=False)
+    moves = ", ".join(f"{name} {'up' if part > 0.0 else 'down'}" for name, part in named.items())
+    if len(named) == 1:
+        return f"{moves} alone"
+    shares = " : ".join(f"{abs(part) / abs(named.iloc[0]):.2g}" for part in named)
+    return f"{moves} ({shares} in coded units)"
+
+
+def _agreement(joint: JointFit, point: Mapping[str, float]) -> Decision:
+    tests = joint.tests(point)
+    numbers = {f"{name}, standard errors off": t for name, t in tests["t"].items()}
+    numbers |= {f"p of {name}": p for name, p in tests["p"].items()}
+    apart = tests[~tests["agrees"]]
+    if apart.empty:
+        outcome = "All responses agree with their targets at the chosen point."
+    else:
+        missed = ", ".join(
+            f"{row.Index} ({row.t:+.1f} errors, {p_text(row.p)})" for row in apart.itertuples()
+        )
+        outcome = f"At the chosen point these differ from their targets: {missed}."
+        if not joint.region().mask.any():
+            outcome += (
+                " No setting that the design explored agrees with all: fix surface.center nearer to where "
+                "they might, widen surface.half_range, or look for a mechanism that the model lacks."
+            )
+    level = joint.alpha / len(joint.goals)
+    rule = (
+        f"A response agrees when its fit at the chosen point differs from its target with p >= {level:.3g}."
+    )
+    return Decision(STAGE, rule, numbers, outcome)
+
+
+def _purchase(joint: JointFit) -> Decision:
+    table = joint.shrinkage
+    alone = float(table["share"].iloc[0])
+    numbers = {f"share with {name} added": share for name, share in table["share"].items()}
+    numbers |= {f"share of {name} alone": share for name, share in table["alone"].items()}
+    with_first = table["with_first"].iloc[1:]
+    best = str(with_first.idxmin())
+    if not alone > 0.0:
+        outcome = f"No setting explored agrees with the {ANGLE} alone."
+    elif with_first[best] > NO_HELP * alone:
+        outcome = f"No response makes the {ANGLE}'s region smaller by more than {1.0 - NO_HELP:.0%}."
+    else:
+        outcome = (
+            f"{best} buys most: with it {with_first[best] / alone:.0%} of the {ANGLE}'s region are left. All "
+            f"together leave {table['share'].iloc[-1] / alone:.0%} of it."
+        )
+    return Decision(
+        STAGE,
+        "The region of the angle alone, then with the response that makes it smallest, and so on: shares of "
+        "the region that the design explored.",
+        numbers,
+        outcome,
+    )
+
+
+def _directions(joint: JointFit, settings: OptimumSettings) -> Decision:
+    numbers = {
+        f"half width along {direction_text(row)}": float(row["half_width"])
+        for _, row in joint.directions.iterrows()
+    }
+    left = open_directions(joint, settings)
+    if left.empty:
+        outcome = "The responses pin every direction down."
+    else:
+        texts = "; ".join(direction_text(row) for _, row in left.iterrows())
+        outcome = f"Along these the responses do not change enough to tell settings apart: {texts}."
+    return Decision(
+        STAGE,
+        "Eigenvectors of the joint Fisher information: a direction is open when its interval spans more than "
+        f"{settings.unidentified_span:.0%} of the design's range.",
+        numbers,
+        outcome,
+    )
