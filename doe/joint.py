@@ -29,10 +29,12 @@ class Goal:
     surface: FittedSurface
     target: Sample
 
+    def __post_init__(self) -> None:
+        if not self.target.sd > 0.0:
+            raise DesignError(f"a response is weighed by its target's spread, received {self.target}")
+
     def misfit(self, coded: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
         """Return fit less target at coded points, its standard error and the degrees of freedom."""
-        if not self.target.se > 0.0:
-            raise DesignError(f"a response's target needs a spread to be weighed by: {self.target}")
         return misfit(self.surface, coded, self.target.mean, self.target.se, float(self.target.df))
 
 

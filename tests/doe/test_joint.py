@@ -1,0 +1,153 @@
+"""Several responses together: joint regions of planes with closed forms."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from doe import Design, DesignError, Factor, Goal, Sample, central_composite, joint_fit
+from doe.quadratic import QuadraticForm
+from doe.region import compatible_region
+
+FACTORS = (Factor("E", 0.3, 0.5), Factor("F", 0.2, 0.6))
+DESIGN = central_composite(FACTORS, "rotatable", 5)
+EXPLORED = np.pi * 2.0
+"""Area of the disc out to the farthest runs, at a coded distance of sqrt(2)."""
+
+LARGE = 10**6
+"""Measurements, so many that t is normal."""
+
+SLOPES = ((1.0, 0.5), (0.2, -1.0), (0.7, 0.7))
+"""Three planes no two of which are parallel."""
+
+
+@dataclass(frozen=True)
+class Plane:
+    """An exact plane, whose fitted mean has the same standard error everywhere."""
+
+    slopes: tuple[float, ...]
+    se: float = 0.0
+    design: Design = DESIGN
+    residual_df: float = np.inf
+
+    @property
+    def quadratic_form(self) -> QuadraticForm:
+        count = len(self.slopes)
+        return QuadraticForm(0.0, np.array(self.slopes), np.zeros((count, count)))
+
+    def evaluate(self, coded):
+        points = np.atleast_2d(coded)
+        return points @ np.array(self.slopes), np.full(len(points), self.se)
+
+
+def goal(*slopes: float, target: float = 0.0, se: float = 0.1) -> Goal:
+    """A plane through the centre, and a target of a known standard error."""
+    return Goal(Plane(slopes), Sample(target, se * np.sqrt(LARGE), LARGE))
+
+
+def half_width(se: float, responses: int) -> float:
+    """Half width of the band of one among so many responses at 95 %."""
+    return float(stats.norm.isf(0.025 / responses)) * se
+
+
+def test_two_bands_that_cross_leave_their_parallelogram() -> None:
+    fit = joint_fit({"a": goal(1.0, 1.0), "b": goal(1.0, -1.0, se=0.05)})
+    # |x + y| <= w and |x - y| <= v enclose a rectangle of sides w sqrt(2) and v sqrt(2): area 2 w v.
+    area = 2.0 * half_width(0.1, 2) * half_width(0.05, 2)
+    # Of 160,000 cells over the box of side 2 sqrt(2), a perimeter of less than 1.2 passes some 170 of area
+    # 5e-5; each may fall on either side.
+    assert fit.share() * EXPLORED == pytest.approx(area, abs=2e-3)
+    assert fit.coded_point == pytest.approx([0.0, 0.0], abs=1e-6)
+    assert fit.agrees()
+
+
+def test_one_response_leaves_a_band_and_the_second_cuts_it() -> None:
+    fit = joint_fit({"a": goal(1.0, 1.0), "b": goal(1.0, -1.0, se=0.05)})
+    alone, both = fit.shrinkage["share"]
+    # Chord of the disc times the width of the band, which is thin: 2 sqrt(2) by sqrt(2) w.
+    chord = 2.0 * np.sqrt(2.0) * np.sqrt(2.0) * half_width(0.1, 1)
+    assert alone * EXPLORED == pytest.approx(chord, rel=0.01)
+    assert both < 0.25 * alone
+    assert fit.shrinkage["ratio"]["b"] == both / alone
+
+
+def test_the_point_solves_crossing_planes() -> None:
+    fit = joint_fit({"a": goal(2.0, 1.0, target=0.5), "b": goal(1.0, -1.0, target=0.4)})
+    solved = np.linalg.solve([[2.0, 1.0], [1.0, -1.0]], [0.5, 0.4])
+    # The pull toward the centre moves it by less than PULL times the covariance, 1e-3 * 0.1^2.
+    np.testing.assert_allclose(fit.coded_point, solved, atol=1e-4)
+    natural = [f.to_natural(x) for f, x in zip(FACTORS, fit.coded_point, strict=True)]
+    assert list(fit.point.values()) == pytest.approx(natural)
+
+
+def test_parallel_planes_leave_the_same_direction_open() -> None:
+    fit = joint_fit({"a": goal(1.0, 1.0, target=0.6), "b": goal(2.0, 2.0, target=1.2)})
+    pinned, free = (row for _, row in fit.directions.iterrows())
+    np.testing.assert_allclose(np.abs(pinned[["E", "F"]]), np.sqrt(0.5), rtol=1e-9)
+    assert free["E"] == pytest.approx(-free["F"])
+    assert np.isinf(free["half_width"])
+    # Information along (1, 1) / sqrt(2): (sqrt 2)^2 + (2 sqrt 2)^2 over 0.1^2.
+    assert pinned["half_width"] == pytest.approx(half_width(0.1, 1) / np.sqrt(10.0))
+    # Of the line x + y = 0.6 the point is the one nearest to the centre.
+    np.testing.assert_allclose(fit.coded_point, [0.3, 0.3], atol=1e-3)
+
+
+def test_a_response_that_tells_nothing_costs_a_little_and_comes_last() -> None:
+    goals = {"a": goal(1.0, 1.0), "flat": goal(0.0, 0.0), "b": goal(1.0, -1.0)}
+    table = joint_fit(goals).shrinkage
+    assert list(table.index) == ["a", "b", "flat"]
+    # With a third response each is held to 0.05 / 3 instead of 0.05 / 2: bands as much wider, squared.
+    wider = (half_width(1.0, 3) / half_width(1.0, 2)) ** 2
+    assert table["ratio"]["flat"] == pytest.approx(wider, rel=0.02)  # cells on the edge, as above
+    assert table["alone"]["flat"] == 1.0
+
+
+def test_contradicting_responses_agree_nowhere() -> None:
+    fit = joint_fit({"a": goal(1.0, 1.0, target=0.5), "b": goal(1.0, 1.0, target=-0.5)})
+    assert fit.share() == 0.0
+    assert not fit.agrees()
+    tests = fit.tests()
+    # Between them, five standard errors from each.
+    np.testing.assert_allclose(tests["t"], [-5.0, 5.0], atol=0.01)
+    assert not tests["agrees"].any()
+
+
+def test_one_response_alone_is_its_own_compatible_region() -> None:
+    design = central_composite(FACTORS, 1.0, 5)  # face-centred: the disc of the runs holds the whole box
+    plane, aim = Plane((3.0, 2.0), se=0.2, design=design, residual_df=7.0), Sample(0.4, 0.5, 5)
+    np.testing.assert_array_equal(
+        joint_fit({"a": Goal(plane, aim)}).region().mask, compatible_region(plane, aim).mask
+    )
+
+
+def test_nothing_beyond_the_farthest_run_is_compatible() -> None:
+    fit = joint_fit({"flat": goal(0.0, 0.0)})
+    far = np.linalg.norm(fit.cells, axis=1) > np.sqrt(2.0) * (1.0 + 1e-9)
+    assert far.any()
+    assert not fit.region().mask[far].any()
+    assert fit.share() == 1.0
+    outward = joint_fit({"a": goal(1.0, 0.0, target=9.0)})
+    np.testing.assert_allclose(outward.coded_point, [np.sqrt(2.0), 0.0], atol=1e-4)
+
+
+def test_the_true_setting_is_compatible_as_often_as_promised() -> None:
+    rng = np.random.default_rng(5)
+    count, inside = 200, 0
+    for _ in range(count):
+        aims = (Sample.of(rng.normal(0.0, 1.0, 5)) for _ in range(3))
+        goals = {str(i): Goal(Plane(s), aim) for i, (s, aim) in enumerate(zip(SLOPES, aims, strict=True))}
+        inside += joint_fit(goals, resolution=3).agrees({"E": 0.4, "F": 0.4})
+    # Each response misses with 0.05 / 3, independent of the others; three standard errors of the count.
+    expected = (1.0 - 0.05 / 3.0) ** 3
+    assert abs(inside / count - expected) < 3.0 * np.sqrt(expected * (1.0 - expected) / count)
+
+
+def test_what_cannot_be_fitted_together_is_refused() -> None:
+    with pytest.raises(DesignError, match="at least one response"):
+        joint_fit({})
+    other = central_composite((Factor("E", 0.3, 0.6), FACTORS[1]), "rotatable", 5)
+    with pytest.raises(DesignError, match=r"same factors: 'a' has .* 'b' has"):
+        joint_fit({"a": goal(1.0, 1.0), "b": Goal(Plane((1.0, 1.0), design=other), Sample(0.0, 1.0, 5))})
+    with pytest.raises(DesignError, match="target's spread"):
+        joint_fit({"a": Goal(Plane((1.0, 1.0)), Sample(0.0, 0.0, 5))})

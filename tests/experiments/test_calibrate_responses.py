@@ -1,0 +1,217 @@
+"""Campaigns on several responses: analytic cases of two scenes, with known answers."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from doe import Factor
+from experiments.calibrate import CampaignSettings, MeasuredTarget, Outcome, TwinTarget, calibrate
+from experiments.calibrate.settings import MeasuredResponse, Response
+
+FACTORS = (Factor("A", 0.1, 0.3), Factor("E", 0.3, 0.6), Factor("F", 0.2, 0.6), Factor("G", 0.02, 0.08))
+
+DENSITY = Response(name="density", observable="solid_fraction")
+LEFT = Response(name="left", observable="mass_left", unit="kg", scene="bin")
+
+NOISE = {"angle": 0.3, "solid_fraction": 0.001, "mass_left": 0.0005}
+"""Standard deviation of one case."""
+
+TRUTH = {"E": 0.47, "F": 0.42}
+
+
+def coded(row: Mapping[str, float], name: str) -> float:
+    return float(next(f for f in FACTORS if f.name == name).to_coded(row[name]))
+
+
+def angle(row: Mapping[str, float]) -> float:
+    return 25.0 + 3.0 * coded(row, "E") + 5.0 * coded(row, "F")
+
+
+def solid_fraction(row: Mapping[str, float]) -> float:
+    return 0.55 - 0.02 * coded(row, "E") + 0.005 * coded(row, "F")
+
+
+def mass_left(row: Mapping[str, float]) -> float:
+    return 0.02 + 0.006 * coded(row, "E") + 0.001 * coded(row, "F")
+
+
+MEASURED = {"target": {"angle": angle, "solid_fraction": solid_fraction}, "bin": {"mass_left": mass_left}}
+"""What every scene measures."""
+
+
+@dataclass(frozen=True)
+class TwoScenes:
+    """A study on the angle, the density of the same heaps, and what stays in a bin."""
+
+    target: MeasuredTarget | TwinTarget
+    campaign: CampaignSettings = field(default_factory=CampaignSettings)
+    factors: tuple[Factor, ...] = FACTORS
+    limits: Mapping[str, tuple[float, float]] = field(
+        default_factory=lambda: {name: (0.0, float("inf")) for name in "AEFG"}
+    )
+
+
+class Cases:
+    """A runner: every scene measures functions of the settings, plus noise from the case's seed."""
+
+    def __init__(self, fails=lambda row: False, **functions) -> None:
+        self.fails, self.functions = fails, functions
+        self.tables: list[pd.DataFrame] = []
+
+    def __call__(self, table: pd.DataFrame) -> pd.DataFrame:
+        self.tables.append(table)
+        rows = [self.case(row) for row in table.to_dict("records")]
+        return table.assign(angle=np.nan, angle_se=0.1, grain_count=100.0).assign(
+            **pd.DataFrame(rows, index=table.index)
+        )
+
+    def case(self, row: Mapping[str, float]) -> dict:
+        if self.fails(row):
+            return {"status": "failed", "reason": "the outlet is clogged"}
+        rng, found = np.random.default_rng(int(row["seed"])), {}
+        for name, function in MEASURED[row["scene"]].items():
+            found[name] = self.functions.get(name, function)(row) + NOISE[name] * rng.standard_normal()
+        return {"status": "finished", "reason": "", "simulated_time": 2.0} | found
+
+
+def twin(*responses: Response) -> TwoScenes:
+    return TwoScenes(TwinTarget(truth=TRUTH, replicates=5, responses=responses))
+
+
+def test_every_further_response_takes_the_region_nearer_to_the_point() -> None:
+    shares, widths = [], []
+    for responses in ((), (DENSITY,), (DENSITY, LEFT)):
+        campaign = calibrate(twin(*responses), Cases())
+        assert campaign.outcome is Outcome.CALIBRATED
+        assert set(campaign.selection.kept) == {"E", "F"}
+        assert campaign.optimum.truth.compatible
+        shares.append(campaign.optimum.region.fraction)
+        widths.append(campaign.optimum.region.ranges.diff(axis=1)["high"])
+    assert shares[0] > 2.0 * shares[1]
+    # One angle leaves E and F to trade off; with the density nothing is open any more.
+    assert (widths[1] < 0.6 * widths[0]).all()
+    assert campaign.optimum.unidentified == ()
+    # Errors of five cases each, through the inverse of the slopes: 0.004 of E and 0.007 of F.
+    assert campaign.optimum.point == pytest.approx(TRUTH, abs=0.02)
+
+
+def test_the_best_buy_is_the_response_whose_slopes_cross_the_angles() -> None:
+    campaign = calibrate(twin(DENSITY, LEFT), Cases(mass_left=lambda row: angle(row) / 1000.0))
+    joint = campaign.optimum.joint
+    # What stays in the bin repeats the angle: the density alone cuts across.
+    assert list(joint.shrinkage.index) == ["angle", "density", "left"]
+    bought = next(d for d in campaign.decisions if "buys most" in d.outcome)
+    assert bought.outcome.startswith("density buys most")
+
+
+def test_responses_that_repeat_the_angle_leave_its_direction_open_and_say_so() -> None:
+    cases = Cases(
+        solid_fraction=lambda row: angle(row) / 100.0,
+        mass_left=lambda row: angle(row) / 1000.0,
+    )
+    campaign = calibrate(twin(DENSITY, LEFT), cases)
+    assert set(campaign.optimum.unidentified) == {"E", "F"}
+    said = next(d.outcome for d in campaign.decisions if "tell settings apart" in d.outcome)
+    assert ("E up, F down" in said) or ("F up, E down" in said) or ("E down, F up" in said)
+
+
+def test_a_factor_that_moves_another_response_only_is_kept() -> None:
+    def density(row: Mapping[str, float]) -> float:
+        return solid_fraction(row) - 0.02 * coded(row, "G")
+
+    alone, both = (calibrate(twin(*r), Cases(solid_fraction=density)).selection for r in ((), (DENSITY,)))
+    assert "G" not in alone.kept
+    assert both.kept == ("E", "F", "G")
+    assert both.table.loc["G", "reason"] == "significant for density"
+    assert both.table.loc["F", "reason"].startswith("significant for angle")
+
+
+def test_the_angles_factors_are_kept_before_those_of_other_responses() -> None:
+    def density(row: Mapping[str, float]) -> float:
+        return 0.55 + 0.05 * coded(row, "G") + 0.04 * coded(row, "A")
+
+    study = TwoScenes(
+        TwinTarget(truth=TRUTH, responses=(DENSITY,)),
+        CampaignSettings.model_validate({"selection": {"at_most": 3}}),
+    )
+    selection = calibrate(study, Cases(solid_fraction=density)).selection
+    assert selection.kept == ("E", "F", "G")
+    assert selection.table.loc["A", "reason"] == "beyond the strongest 3"
+
+
+def test_all_scenes_of_a_stage_are_one_batch_and_the_climb_is_the_angles() -> None:
+    cases = Cases()
+    campaign = calibrate(twin(DENSITY, LEFT), cases)
+    scenes = [(sorted(set(table["stage"])), set(table["scene"])) for table in cases.tables]
+    assert scenes == [
+        (["noise_floor", "screening", "target"], {"target", "bin"}),
+        (["climb"], {"target"}),
+        (["surface"], {"target", "bin"}),
+        (["verification"], {"target", "bin"}),
+    ]
+    assert campaign.cases["seed"].is_unique
+    cost = campaign.scene_costs
+    assert cost["cases"].sum() == len(campaign.cases)
+    assert cost["simulated_time"].to_dict() == {name: 2.0 * n for name, n in cost["cases"].items()}
+
+
+def test_a_further_scene_leaves_the_heaps_as_they_were() -> None:
+    alone, beside = (calibrate(twin(*responses), Cases()) for responses in ((), (LEFT,)))
+    heaps = beside.cases[beside.cases["scene"] == "target"]
+    shared = ["stage", "run", "replicate", "seed", "angle"]
+    count = (alone.cases["stage"] != "verification").sum()  # which is at a point of its own
+    pd.testing.assert_frame_equal(
+        heaps[shared].iloc[:count].reset_index(drop=True), alone.cases[shared].iloc[:count]
+    )
+
+
+def test_measured_responses_are_matched_and_a_wrong_one_is_named() -> None:
+    def study(density: float) -> TwoScenes:
+        aim = MeasuredResponse(**DENSITY.model_dump(), mean=density, sd=0.001, n=5)
+        return TwoScenes(MeasuredTarget(mean=angle(TRUTH), sd=0.3, n=5, responses=(aim,)))
+
+    right, wrong = (calibrate(study(value), Cases()) for value in (solid_fraction(TRUTH), 0.62))
+    assert right.outcome is Outcome.CALIBRATED
+    assert "no difference in density either" in right.reason
+    assert right.optimum.point == pytest.approx(TRUTH, abs=0.02)
+    assert wrong.outcome is Outcome.NOT_VERIFIED
+    assert wrong.optimum.region.fraction == 0.0
+    assert any("No setting that the design explored agrees with all" in d.outcome for d in wrong.decisions)
+
+
+def test_clogged_bins_cost_their_own_response_only() -> None:
+    def clogs(row: Mapping[str, float]) -> bool:
+        return row["scene"] == "bin" and row["stage"] == "surface" and row["run"] in (1, 2)
+
+    campaign = calibrate(twin(LEFT), Cases(clogs))
+    assert campaign.outcome is Outcome.CALIBRATED
+    assert len(campaign.surface.full.response) == len(campaign.surface.responses["left"].full.response) + 2
+    assert len(campaign.failed_cases) == 2
+
+
+@pytest.mark.parametrize("stage", ["target", "noise_floor", "screening", "surface", "verification"])
+def test_a_response_whose_cases_all_fail_ends_the_campaign(stage: str) -> None:
+    fails = Cases(lambda row: row["scene"] == "bin" and row["stage"] == stage)
+    campaign = calibrate(twin(DENSITY, LEFT), fails)
+    assert campaign.outcome is Outcome.TOO_MANY_FAILED_RUNS
+    assert stage not in campaign.stages
+    assert "for mass_left" in campaign.reason
+
+
+def test_results_and_tables_hold_every_response() -> None:
+    campaign = calibrate(twin(DENSITY, LEFT), Cases())
+    found = json.loads(json.dumps(campaign.to_dict(), allow_nan=False))
+    for stage in ("target", "noise_floor", "screening", "surface", "verification"):
+        assert set(found[stage]["responses"]) == {"density", "left"}
+    joint = found["optimum"]["joint"]
+    assert [row["response"] for row in joint["responses"]] == ["angle", "density", "left"]
+    tables = campaign.tables()
+    assert tables["joint_shrinkage"]["share"].tolist() == campaign.optimum.joint.shrinkage["share"].tolist()
+    assert tables["scene_costs"]["scene"].tolist() == ["target", "bin"]
+    assert {"screening_effects_density", "surface_anova_left", "joint_directions"} <= set(tables)

@@ -1,0 +1,162 @@
+"""Responses beside the angle in a study file: what they mean, and what is said about a wrong one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import SimpleNamespace
+
+import pandas as pd
+import pytest
+
+from dem_warp import DrawDown, Drum, Hopper, LiftedCylinder
+from experiments.calibrate.settings import MeasuredResponse, MeasuredTarget, Response, TwinTarget
+from experiments.cases import Store, execute, run_cases
+from experiments.errors import StudyError
+from experiments.study import load_study
+from experiments.study.target_section import DIMENSIONS
+from experiments.study.units import UNITS
+
+WriteStudy = Callable[..., Path]
+
+RESPONSES = """
+[response-scene.bin.hopper]
+diameter = "40 mm"
+fill_depth = "30 mm"
+outlet = "20 mm"
+
+[response-scene.short.lifted-cylinder]
+diameter = "28 mm"
+height = "14 mm"
+
+[[response]]
+observable = "solid_fraction"
+mean = 0.55
+sd = 0.01
+n = 4
+
+[[response]]
+name = "outflow"
+observable = "flow_rate"
+scene = "bin"
+mean = "12 g/s"
+sd = "0.4 g/s"
+n = 5
+
+[[response]]
+name = "short_angle"
+observable = "angle"
+scene = "short"
+mean = "25 deg"
+sd = "0.6 deg"
+n = 5
+"""
+
+TWIN = "[target.twin]\ntruth = { E = 0.3 }\n"
+
+
+def test_responses_are_read_in_si_with_their_scenes(write_study: WriteStudy) -> None:
+    study = load_study(write_study(add=RESPONSES))
+    assert study.target == MeasuredTarget(
+        mean=30.0,
+        sd=0.5,
+        n=5,
+        responses=(
+            MeasuredResponse(
+                name="solid_fraction", observable="solid_fraction", unit="1", mean=0.55, sd=0.01, n=4
+            ),
+            MeasuredResponse(
+                name="outflow", observable="flow_rate", unit="kg/s", scene="bin", mean=0.012, sd=0.0004, n=5
+            ),
+            MeasuredResponse(
+                name="short_angle", observable="angle", unit="deg", scene="short", mean=25.0, sd=0.6, n=5
+            ),
+        ),
+    )
+    assert list(study.scenes) == ["target", "bin", "short"]
+
+
+def test_a_twin_needs_no_measurements_of_its_responses(write_study: WriteStudy) -> None:
+    path = write_study(add=f'{TWIN}[[response]]\nobservable = "fill_height"\n')
+    response = Response(name="fill_height", observable="fill_height", unit="m")
+    assert load_study(path).target == TwinTarget(truth={"E": 0.3}, responses=(response,))
+
+
+def test_a_case_of_a_further_scene_has_the_same_grains_and_contacts(write_study: WriteStudy) -> None:
+    study = load_study(write_study(add=RESPONSES))
+    heap, outflow = (study.case({"E": 0.3}, seed=1, scene=name) for name in ("target", "bin"))
+    assert isinstance(heap.scene, LiftedCylinder)
+    assert isinstance(outflow.scene, Hopper)
+    assert outflow.scene.wall_material == heap.scene.wall_material
+    assert (outflow.grains, outflow.grain_grain, outflow.grain_wall, outflow.numerics) == (
+        heap.grains,
+        heap.grain_grain,
+        heap.grain_wall,
+        heap.numerics,
+    )
+    with pytest.raises(StudyError, match="did you mean 'bin'"):
+        study.case({}, seed=1, scene="bim")
+
+
+def test_a_table_is_simulated_each_row_in_its_scene(
+    write_study: WriteStudy, cone: Callable, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    simulated = []
+
+    def engine(cases, *, on_result, **_) -> None:
+        simulated.append([type(case.scene) for case in cases])
+        for index, _ in enumerate(cases):
+            on_result(index, cone())
+
+    monkeypatch.setattr(execute, "simulate", engine)
+    monkeypatch.setattr(execute, "measure_heap", lambda *_: SimpleNamespace(mean=25.0, se=0.1))
+    study = load_study(write_study(add=RESPONSES))
+    table = pd.DataFrame({"seed": [1, 2, 3], "scene": ["target", "bin", "short"]})
+    found = run_cases(study, table, Store(tmp_path))
+    assert simulated == [[LiftedCylinder, Hopper, LiftedCylinder]]  # one call for all
+    # A bin leaves no heap, and is none that failed to be measured.
+    assert found["angle"].notna().tolist() == [True, False, True]
+    assert found["reason"].eq("").all()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key", "rule"),
+    [
+        ('observable = "flow_rate"', 'observable = "flow"', "response[2].observable", "the scene measures"),
+        ('scene = "bin"', 'scene = "bim"', "response[2].scene", "did you mean 'bin'?"),
+        ('mean = "12 g/s"', 'mean = "12 g"', "response[2]", "unit of mass flow"),
+        ('mean = "12 g/s"\n', "", "response[2]", "missing: mean"),
+        ("sd = 0.01", "sd = 0.0", "response[1]", "sd must be positive"),
+        ("n = 4", "n = 1", "response[1].n", "greater than or equal to 2"),
+        ("mean = 0.55", "meen = 0.55", "response[1].meen", "did you mean 'mean'?"),
+        ('name = "outflow"', 'name = "out flow"', "response[2].name", "pattern"),
+        ('name = "outflow"', 'name = "solid_fraction"', "response[2]", "a name of its own"),
+        ('name = "short_angle"\n', "", "response[3]", "a name of its own, other than 'angle'"),
+        ('"solid_fraction"', '"angle"\nname = "a"', "response[1].observable", "is the [target]"),
+        ('outlet = "20 mm"', 'outlet = "50 mm"', "response-scene.bin.hopper", "below the diameter"),
+    ],
+)  # fmt: skip
+def test_a_breach_is_named_with_its_rule_and_place(
+    write_study: WriteStudy, old: str, new: str, key: str, rule: str
+) -> None:
+    assert RESPONSES.count(old) == 1
+    with pytest.raises(StudyError) as caught:
+        load_study(write_study(add=RESPONSES.replace(old, new)))
+    assert rule in caught.value.rule
+    assert caught.value.place.rpartition(": ")[2] == key
+
+
+def test_a_further_scene_has_a_name_of_its_own(write_study: WriteStudy) -> None:
+    scene = '[response-scene.target.hopper]\ndiameter = "40 mm"\nfill_depth = "30 mm"\noutlet = "20 mm"\n'
+    with pytest.raises(StudyError, match="'target' is the study's own") as caught:
+        load_study(write_study(add=scene))
+    assert caught.value.place.endswith("response-scene.target")
+
+
+@pytest.mark.parametrize("scene", [LiftedCylinder, Hopper, Drum, DrawDown])
+def test_every_observable_has_a_unit_that_a_study_can_write(scene: type) -> None:
+    observables: Mapping = scene.observables
+    assert observables
+    for observable in observables.values():
+        dimension = DIMENSIONS[observable.unit]
+        assert not dimension or UNITS[dimension][observable.unit] == 1.0
