@@ -191,13 +191,28 @@ def clump(
 
 
 @app.command(epilog="Example: [bold]dem-warp new mygrain[/] writes mygrain.toml")
-def new(name: Annotated[str, typer.Argument(help="Name of the grain, and of the file.")]) -> None:
-    """Write a commented study file to start from."""
+def new(
+    name: Annotated[str, typer.Argument(help="Name of the grain, and of the file.")],
+    measured: Annotated[
+        bool,
+        typer.Option(
+            "--measured", help="Write NAME-measured.csv instead: room for heaps measured for the study NAME."
+        ),
+    ] = False,
+) -> None:
+    """Write a commented study file to start from, or a file for the measured heaps of a study."""
     with clear_errors():
-        from experiments.study import write_template
+        if measured:
+            from experiments.discover.data.template import write_measured_template
+            from experiments.study import load_study
 
-        path = write_template(name)
-    typer.echo(f"Wrote {path}. Fill it in, then: dem-warp calibrate {path}")
+            study = Path(name) if name.endswith(".toml") else Path(f"{name}.toml")
+            path, then = write_measured_template(load_study(study)), f"dem-warp discover {study}"
+        else:
+            from experiments.study import write_template
+
+            path, then = write_template(name), "dem-warp calibrate"
+    typer.echo(f"Wrote {path}. Fill it in, then: {then} {path}")
 
 
 def main() -> None:

@@ -1,0 +1,138 @@
+"""What one row of a file of measured heaps says."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from experiments.discover.data.plausible import SizeOfTest
+from experiments.discover.data.table import Row
+from experiments.discover.observables import OBSERVABLES, Observable, photographed
+from experiments.errors import InputError
+from experiments.study.schema import nearest_name
+from experiments.study.units import Quantity
+from imaging import find_outline, measure, read_picture
+
+CLOGGED_ROW = "clogged"
+"""Stands for an observable where the tube held its grains."""
+
+BY_NAME = {observable.name: observable for observable in OBSERVABLES}
+"""Observables by name."""
+
+_DIMENSIONS = {"deg": "angle", "m": "length", "s": "time", "1": ""}
+
+
+@dataclass(frozen=True)
+class Reading:
+    """One value of one heap.
+
+    Attributes
+    ----------
+    row : Row
+        Where it stands.
+    observable : str
+        Its name, or `CLOGGED_ROW`.
+    value : float
+        In the unit of the observable; NaN without a heap.
+    picture : str
+        The picture that it was measured on, empty if none.
+    """
+
+    row: Row
+    observable: str
+    value: float
+    picture: str = ""
+
+
+def readings_of(row: Row, size: SizeOfTest, fit: str) -> Iterator[Reading]:
+    """Read everything that a row says of its heap.
+
+    Parameters
+    ----------
+    row
+        Of the columns observable, value, unit, picture and pixel.
+    size
+        Of the test, which bounds the values.
+    fit
+        Part of the flank that angles of pictures are fitted to.
+
+    Raises
+    ------
+    InputError
+        When a cell breaks a rule.
+    imaging.PictureError
+        When the picture shows no heap that can be measured.
+    """
+    name = row["observable"]
+    if name == CLOGGED_ROW:
+        if row["value"] or row["picture"]:
+            raise row.error("stands without a value and a picture: there is no heap", "observable")
+        yield Reading(row, CLOGGED_ROW, np.nan)
+    elif name and name not in BY_NAME:
+        rule = f"must be an observable or {CLOGGED_ROW!r}, {nearest_name(name, [*BY_NAME, CLOGGED_ROW])}"
+        raise row.error(rule, "observable")
+    elif row["value"]:
+        if not name:
+            raise row.error("must say what the value is of", "observable")
+        yield Reading(row, name, _value(row, BY_NAME[name], size))
+    elif row["picture"]:
+        yield from _seen(row, size, fit)
+
+
+def _value(row: Row, observable: Observable, size: SizeOfTest) -> float:
+    """The value of a row in the base unit."""
+    unit = row["unit"]
+    if "," in row["value"]:
+        raise row.error("needs a decimal point, not a comma", "value")
+    try:
+        quantity = Quantity.parse(f"{row['value']} {'' if unit == '1' else unit}")
+        if not quantity.unit and observable.unit != "1":
+            quantity = replace(quantity, unit=observable.unit)
+        value = quantity.to_base(_DIMENSIONS[observable.unit])
+    except ValueError as error:
+        raise row.error(str(error), "value") from None
+    _check_size(row, observable, value, size)
+    return value
+
+
+def _seen(row: Row, size: SizeOfTest, fit: str) -> Iterator[Reading]:
+    """Values of a row's picture: the observable that it names, or all of them."""
+    path, name = row.file.parent / row["picture"], row["observable"]
+    if name and not BY_NAME[name].by_photograph:
+        raise row.error("needs a value: no photograph shows it", "observable")
+    if not path.is_file():
+        raise row.error(f"must name a picture file, relative to this one (looked for {path})", "picture")
+    pixel = _pixel(row)
+    if name and pixel is None and BY_NAME[name].unit == "m":
+        raise row.error("a length in a picture needs the size of its pixels, as 0.1 mm", "pixel")
+    outline = find_outline(read_picture(path), meters_per_pixel=pixel, place=str(path))
+    for shown, value in photographed([measure(outline, fit, str(path))]).items():
+        observable = BY_NAME[shown]
+        if shown == name or (not name and (observable.unit != "m" or pixel)):
+            _check_size(row, observable, value, size)
+            yield Reading(row, shown, value, row["picture"])
+
+
+def _pixel(row: Row) -> float | None:
+    if not row["pixel"]:
+        return None
+    try:
+        pixel = Quantity.parse(row["pixel"]).to_base("length")
+    except ValueError as error:
+        raise row.error(str(error), "pixel") from None
+    if pixel <= 0.0:
+        raise row.error("must be greater than 0", "pixel")
+    return pixel
+
+
+def _check_size(row: Row, observable: Observable, value: float, size: SizeOfTest) -> None:
+    low, high = size.limits(observable.name, observable.unit)
+    if low <= value <= high:
+        return
+    unit = "" if observable.unit == "1" else f" {observable.unit}"
+    question = f"is the unit right (none given:{unit})?" if unit and not row["unit"] else "is the unit right?"
+    rule = f"{observable.name} lies between {low:.3g} and {high:.3g}{unit} in this test: {question}"
+    column = "value" if row["value"] else "picture"
+    raise InputError(rule, f"{value:.6g}{unit}", f"{row.file}:{row.line}: {column}")

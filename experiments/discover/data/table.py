@@ -1,0 +1,85 @@
+"""Rows of a CSV file with their places, so that every error can say where it is."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from experiments.errors import InputError
+from experiments.study.schema import nearest_name
+
+
+@dataclass(frozen=True)
+class Row:
+    """One row: its line in the file, counted from 1, and its cells by column, without spaces around."""
+
+    file: Path
+    line: int
+    cells: Mapping[str, str]
+
+    def __getitem__(self, column: str) -> str:
+        """The cell of a column; empty where the file has no such column."""
+        return self.cells.get(column, "")
+
+    def error(self, rule: str, column: str) -> InputError:
+        """Build the error of a cell that breaks a rule."""
+        return InputError(rule, self[column] or "nothing", f"{self.file}:{self.line}: {column}")
+
+
+def read_rows(path: Path, needed: Collection[str], known: Collection[str]) -> Iterator[Row]:
+    """Read the rows of a CSV file; empty rows, and rows that begin with ``#``, are skipped.
+
+    Parameters
+    ----------
+    path
+        The file, UTF-8, separated by commas. The first row names the columns.
+    needed
+        Columns that it must have.
+    known
+        Columns that it may have.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be read, its columns are not these, or a row has more cells than columns.
+    """
+    header: list[str] = []
+    for line, cells in _lines(path):
+        if not header:
+            header = cells
+            _check_header(path, line, header, needed, known)
+        elif any(cells[len(header) :]):
+            rule = (
+                f"a row has a cell for each of the {len(header)} columns (a comma inside a text needs quotes)"
+            )
+            raise InputError(rule, f"{len(cells)} cells", f"{path}:{line}")
+        else:
+            yield Row(path, line, dict(zip(header, cells, strict=False)))
+
+
+def _lines(path: Path) -> Iterator[tuple[int, list[str]]]:
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            reader = csv.reader(file)
+            for row in reader:
+                cells = [cell.strip() for cell in row]
+                if any(cells) and not cells[0].startswith("#"):
+                    yield reader.line_num, cells
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise InputError("must be a readable CSV file in UTF-8", str(error), str(path)) from None
+
+
+def _check_header(
+    path: Path, line: int, header: list[str], needed: Collection[str], known: Collection[str]
+) -> None:
+    place = f"{path}:{line}"
+    if missing := [name for name in needed if name not in header]:
+        rule = f"the first row names the columns, separated by commas; missing: {', '.join(missing)}"
+        raise InputError(rule, ", ".join(header), place)
+    for name in header:
+        if name not in known:
+            raise InputError(f"must be a known column, {nearest_name(name, list(known))}", name, place)
+        if header.count(name) > 1:
+            raise InputError("every column stands once", name, place)

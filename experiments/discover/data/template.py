@@ -1,0 +1,118 @@
+"""A file of measured heaps to start from: every condition of a study and every observable, still empty."""
+
+from __future__ import annotations
+
+import csv
+import io
+import textwrap
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from experiments.discover.data.file import COLUMNS
+from experiments.discover.data.readings import CLOGGED_ROW
+from experiments.discover.observables import OBSERVABLES
+from experiments.errors import InputError
+from experiments.files import write_text
+from experiments.study import Study
+from experiments.study.conditions import Condition
+
+REPLICATES = 5
+"""Heaps of each condition that the file has room for."""
+
+LABORATORY_UNITS = {"m": "mm"}
+"""Units that the file is filled in with, where they are not those of the observables."""
+
+_HEAD = """\
+Heaps measured for the study {study}: a row a measurement. Fill in what was measured, then
+    dem-warp discover {study} {file}
+A row without a value is not measured; whole rows may be left out or added, with other units too.
+
+condition: how the test was done, a condition of the study.
+{conditions}
+
+replicate: one heap, a label. Five or more of each condition show small effects; a copy of a heap shows none.
+
+observable: what was measured, or {clogged} (without a value) where the tube held its grains: no heap.
+{observables}
+
+picture: instead of a value, a photograph of the heap from the side, level with the plate, x of the study to
+the right; its file relative to this one. pixel: the size of one of its pixels at the heap, as 0.08 mm;
+lengths need it. A row with a picture and no observable gives all that the picture shows; several pictures of
+one heap count with their mean."""
+
+
+def write_measured_template(study: Study, folder: Path | None = None) -> Path:
+    """Write a commented file for the measured heaps of a study.
+
+    Parameters
+    ----------
+    study
+        Whose conditions are to be measured.
+    folder
+        Where it is written; None: the current folder.
+
+    Returns
+    -------
+    Path
+        The file, ``NAME-measured.csv`` for ``NAME.toml``.
+
+    Raises
+    ------
+    InputError
+        When the file exists.
+    """
+    path = (folder or Path()) / f"{study.file.stem}-measured.csv"
+    if path.exists():
+        raise InputError("a new file never overwrites another", "one that exists", str(path))
+    head = _HEAD.format(
+        study=study.file.name,
+        file=path.name,
+        clogged=CLOGGED_ROW,
+        conditions="\n".join(_described(condition) for condition in study.conditions),
+        observables="\n".join(_defined()),
+    )
+    text = io.StringIO()
+    text.writelines(f"# {line}".rstrip() + "\n" for line in head.splitlines())
+    writer = csv.DictWriter(text, COLUMNS, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(_empty_rows(study))
+    write_text(path, text.getvalue())
+    return path
+
+
+def _described(condition: Condition) -> str:
+    """One condition, and what it changes."""
+    changes = (
+        "; ".join(f"{place} = {value}" for place, value in _flat(condition.changes)) or "the test as it is"
+    )
+    return f"    {condition.name}: {changes}{' (held out: it only judges)' if condition.held_out else ''}"
+
+
+def _flat(table: Mapping[str, Any], place: str = "") -> Iterator[tuple[str, Any]]:
+    for key, value in table.items():
+        name = f"{place}.{key}".removeprefix(".")
+        if isinstance(value, Mapping):
+            yield from _flat(value, name)
+        else:
+            yield name, value
+
+
+def _defined() -> Iterator[str]:
+    """Every observable, with its unit, its instrument and its definition."""
+    for observable in OBSERVABLES:
+        unit = LABORATORY_UNITS.get(observable.unit, observable.unit)
+        text = f"{observable.name} [{unit}], {observable.instrument}: {observable.definition}"
+        yield textwrap.fill(text, 108, initial_indent=4 * " ", subsequent_indent=8 * " ")
+
+
+def _empty_rows(study: Study) -> Iterator[dict[str, object]]:
+    for condition in study.conditions:
+        for replicate in range(1, REPLICATES + 1):
+            for observable in OBSERVABLES:
+                yield {
+                    "condition": condition.name,
+                    "replicate": replicate,
+                    "observable": observable.name,
+                    "unit": LABORATORY_UNITS.get(observable.unit, observable.unit),
+                }
