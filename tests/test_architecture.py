@@ -36,7 +36,7 @@ LAYERS = {
     },
 }  # fmt: skip
 
-DISTRIBUTIONS = {"cv2": "opencv-python-headless", "warp": "warp-lang"}
+DISTRIBUTIONS = {"cv2": "opencv-python-headless", "sklearn": "scikit-learn", "warp": "warp-lang"}
 COMES_WITH = {
     "annotated_types": "pydantic",
     "contourpy": "matplotlib",

@@ -1,0 +1,170 @@
+"""The bank: simulated heaps over factors and mechanisms in every condition, made once for a study.
+
+Every data set on the same grain is analysed from it. Points are Sobol points. Those without a mechanism are
+run more than once, so that the noise is known apart from what a polynomial cannot follow; those with one
+vary its size together with the factors.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.stats import qmc
+
+from experiments.discover.settings import Settings
+from experiments.discover.simulator import Outcomes, Point
+from experiments.discover.space import MechanismRange, SearchSpace
+from experiments.errors import InputError
+
+
+def sobol(count: int, columns: int, seed: int) -> np.ndarray:
+    """First points of a scrambled Sobol sequence in the unit cube, (count, columns)."""
+    sampler = qmc.Sobol(columns, seed=np.random.default_rng(seed))
+    return np.asarray(sampler.random_base2(int(np.ceil(np.log2(max(count, 2)))))[:count])
+
+
+def bank_points(space: SearchSpace, settings: Settings, seed: int = 0) -> list[Point]:
+    """Cases of the library waves, in an order that never changes.
+
+    Parameters
+    ----------
+    space : SearchSpace
+    settings : Settings
+    seed : int
+        Seed of the points; the cases' own seeds follow from it.
+
+    Returns
+    -------
+    list of Point
+        (points x repeats + mechanisms x mechanism points) x conditions.
+    """
+    factors = len(space.factors)
+    rows: list[tuple[np.ndarray, tuple[str, ...]]] = []
+    for row in sobol(settings.bank_points, factors, seed):
+        rows += [(2.0 * row - 1.0, ())] * settings.bank_repeats
+    for number, name in enumerate(space.names, start=1):
+        for row in sobol(settings.bank_mechanism_points, factors + 1, seed + number):
+            rows.append((np.append(2.0 * row[:-1] - 1.0, row[-1]), (name,)))
+    cases = [(row, names, condition) for row, names in rows for condition in space.conditions]
+    seeds = np.random.SeedSequence(seed).generate_state(len(cases)) >> 1
+    return [space.point(row, names, c, int(s)) for (row, names, c), s in zip(cases, seeds, strict=True)]
+
+
+@dataclass(frozen=True, eq=False)
+class Bank:
+    """Finished library waves as a table, one row a case.
+
+    Attributes
+    ----------
+    space : SearchSpace
+    observables : tuple of str
+        Columns of the values.
+    theta : (n, factors) array
+        Factors in coded units.
+    mechanism : (n,) int array
+        Number of the mechanism in the space; -1 without one.
+    size : (n,) array
+        Its coded size; 0 without one.
+    condition : (n,) int array
+        Number of the condition.
+    values : (n, observables) array
+        Natural units; NaN in rows that failed.
+    reasons : (n,) array of str
+        Why a case failed, empty where it did not.
+    """
+
+    space: SearchSpace
+    observables: tuple[str, ...]
+    theta: np.ndarray
+    mechanism: np.ndarray
+    size: np.ndarray
+    condition: np.ndarray
+    values: np.ndarray
+    reasons: np.ndarray
+
+    def __post_init__(self) -> None:
+        if self.values.shape != (len(self.theta), len(self.observables)):
+            rule = "needs a row a case and a column an observable"
+            raise InputError(rule, self.values.shape, "Bank.values")
+        if not np.isfinite(self.values[self.finished]).all():
+            raise InputError("is finite wherever a case finished", "NaN", "Bank.values")
+
+    @property
+    def finished(self) -> np.ndarray:
+        """Whether each case has observables, (n,)."""
+        return np.asarray(self.reasons == "")
+
+    def rows(self, condition: int, mechanism: int) -> np.ndarray:
+        """Numbers of the finished cases of a condition with a mechanism (-1: without)."""
+        return np.flatnonzero(self.finished & (self.condition == condition) & (self.mechanism == mechanism))
+
+    def save(self, path: Path) -> None:
+        """Write the bank to one compressed .npz file."""
+        np.savez_compressed(
+            path,
+            space=np.array(json.dumps(asdict(self.space))),
+            observables=np.array(self.observables),
+            theta=self.theta,
+            mechanism=self.mechanism.astype(np.int16),
+            size=self.size,
+            condition=self.condition.astype(np.int16),
+            values=self.values.astype(np.float32),
+            reasons=self.reasons,
+        )
+
+
+def load_bank(path: Path) -> Bank:
+    """Read a bank that `Bank.save` wrote.
+
+    Raises
+    ------
+    InputError
+        When the file is no bank.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            columns = {name: file[name] for name in file.files}
+        document = json.loads(str(columns.pop("space")))
+        ranges = tuple(MechanismRange(**entry) for entry in document.pop("mechanisms"))
+        space = SearchSpace(**{name: tuple(value) for name, value in document.items()}, mechanisms=ranges)
+        names = tuple(str(name) for name in columns.pop("observables"))
+        columns["values"] = columns["values"].astype(float)
+        return Bank(space, names, **columns)
+    except (KeyError, TypeError, ValueError, OSError) as error:
+        raise InputError("must be a bank that this program wrote", str(error), str(path)) from error
+
+
+def make_bank(
+    space: SearchSpace, observables: Sequence[str], points: Sequence[Point], outcomes: Outcomes
+) -> Bank:
+    """Table of finished library waves.
+
+    Raises
+    ------
+    InputError
+        For a point with two mechanisms: a bank knows none or one at a time.
+    """
+    if any(len(point.sizes) > 1 for point in points):
+        raise InputError("has at most one mechanism in a case", "two", "points of a bank")
+    names = space.names
+    sizes = [point.sizes[0] if point.sizes else None for point in points]
+    coded = [0.0 if entry is None else _coded_size(space, *entry) for entry in sizes]
+    return Bank(
+        space,
+        tuple(observables),
+        theta=space.coded_theta(np.array([point.theta for point in points])),
+        mechanism=np.array([-1 if entry is None else names.index(entry[0]) for entry in sizes]),
+        size=np.array(coded),
+        condition=np.array([space.conditions.index(point.condition) for point in points]),
+        values=np.asarray(outcomes.values, dtype=float),
+        reasons=np.array(outcomes.reasons, dtype=np.str_),
+    )
+
+
+def _coded_size(space: SearchSpace, name: str, size: float) -> float:
+    mechanism = space.mechanism(name)
+    return (size - mechanism.null) / (mechanism.maximum - mechanism.null)

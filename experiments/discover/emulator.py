@@ -1,0 +1,103 @@
+"""The emulator: the bank's runs as smooth surfaces, so that a model can be fitted in no time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from experiments.discover.bank import Bank, load_bank
+from experiments.discover.space import SearchSpace
+from experiments.discover.surfaces import Surfaces, added, fit_surfaces
+from experiments.errors import InputError
+
+RESOLUTION = 1e-3
+"""Least standard deviation of an observable, as a share of its range over the whole bank."""
+
+
+@dataclass(frozen=True, eq=False)
+class Emulator:
+    """Surfaces of every condition.
+
+    Attributes
+    ----------
+    space : SearchSpace
+    observables : tuple of str
+        Columns of every prediction; those that never vary in the bank are left out.
+    surfaces : dict of Surfaces
+        By condition.
+    cases : int
+        Cases of the bank.
+    notes : tuple of str
+        What was left out of the bank, and why.
+    """
+
+    space: SearchSpace
+    observables: tuple[str, ...]
+    surfaces: Mapping[str, Surfaces]
+    cases: int
+    notes: tuple[str, ...] = ()
+
+    def without(self, *mechanisms: str) -> Emulator:
+        """Return the same emulator with some mechanisms withheld from the library."""
+        return replace(self, space=self.space.without(*mechanisms))
+
+
+def fit_emulator(bank: Bank) -> Emulator:
+    """Fit every surface to a bank.
+
+    Raises
+    ------
+    InputError
+        When a condition has too few finished runs.
+    """
+    finished = bank.values[bank.finished]
+    if not len(finished):
+        raise InputError("needs finished cases", "none", "bank")
+    spread = np.ptp(finished, axis=0)
+    columns = np.flatnonzero(spread > 0.0)
+    notes = [
+        f"{bank.observables[i]} never varies in the bank: left out" for i in np.flatnonzero(spread == 0.0)
+    ]
+    failed = int((~bank.finished).sum())
+    if failed:
+        notes.append(f"{failed} of {len(bank.reasons)} cases of the bank left no heap")
+    thin = _too_few(bank)
+    notes += [f"{name} has too few finished cases in the bank: left out of the library" for name in thin]
+    surfaces = {}
+    for number, condition in enumerate(bank.space.conditions):
+        base = bank.rows(number, -1)
+        mechanisms = [(index, name) for index, name in enumerate(bank.space.names) if name not in thin]
+        runs = {name: bank.rows(number, index) for index, name in mechanisms}
+        try:
+            surfaces[condition] = fit_surfaces(
+                bank.theta[base],
+                bank.values[np.ix_(base, columns)],
+                {
+                    name: (bank.theta[rows], bank.size[rows], bank.values[np.ix_(rows, columns)])
+                    for name, rows in runs.items()
+                },
+                RESOLUTION * spread[columns],
+            )
+        except InputError as error:
+            raise InputError(error.rule, error.value, f"condition {condition} of the bank") from error
+    names = tuple(bank.observables[column] for column in columns)
+    return Emulator(bank.space.without(*thin), names, surfaces, len(bank.reasons), tuple(notes))
+
+
+def _too_few(bank: Bank) -> list[str]:
+    """Mechanisms with fewer runs than two a term in some condition."""
+    least = 2 * added(bank.theta[:1], bank.size[:1]).shape[1]
+    conditions = range(len(bank.space.conditions))
+    return [
+        name
+        for index, name in enumerate(bank.space.names)
+        if min(len(bank.rows(condition, index)) for condition in conditions) < least
+    ]
+
+
+def read_emulator(path: Path) -> Emulator:
+    """Fit the emulator of a bank file."""
+    return fit_emulator(load_bank(path))

@@ -1,0 +1,137 @@
+"""Measured means as a model sees them: stacked over conditions, with the covariance of their error."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from experiments.discover.emulator import Emulator
+from experiments.discover.measured import Measured
+
+SCATTER_LEVEL = 0.01
+"""Replicates that scatter more than the model's with this probability or less count by their own scatter."""
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """The means of one condition.
+
+    Attributes
+    ----------
+    condition : str
+    columns : (k,) int array
+        Observables of the emulator that were measured.
+    mean : (k,) array
+    share : (k, k) array
+        Covariance of the means over that of one replicate: 1 / n where all have n replicates.
+    inflation : (k,) array
+        How many times more the measured replicates scatter than the model's (standard deviations).
+    """
+
+    condition: str
+    columns: np.ndarray
+    mean: np.ndarray
+    share: np.ndarray
+    inflation: np.ndarray
+
+    @property
+    def replicates(self) -> np.ndarray:
+        """Replicates of each mean, (k,)."""
+        return np.rint(1.0 / np.diag(self.share)).astype(int)
+
+    def scatter(self, covariance: np.ndarray) -> np.ndarray:
+        """Covariance of the means' noise, of that of one run (k, k)."""
+        return np.asarray(covariance * self.share * self.inflation[:, None] * self.inflation)
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """What was measured, cut to what the emulator knows.
+
+    Attributes
+    ----------
+    training, held_out : tuple of Block
+    notes : tuple of str
+    """
+
+    training: tuple[Block, ...]
+    held_out: tuple[Block, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def count(self) -> int:
+        """Means that take part in a fit."""
+        return sum(len(block.mean) for block in self.training)
+
+
+def gather(measured: Measured, emulator: Emulator) -> Evidence:
+    """Cut measured data to the emulator's conditions and observables.
+
+    What is left out is said in the notes. Scatter beyond the model's own, by a one-sided F test of each
+    observable over all conditions, widens the error of that observable's means.
+    """
+    notes = list(measured.notes)
+    strange = [name for name in measured.observables if name not in emulator.observables]
+    notes += [f"{name} is not among the simulated observables: left out" for name in strange]
+    inflation = _inflation(measured, emulator, notes)
+    blocks = []
+    for condition in measured.conditions:
+        if condition not in emulator.surfaces:
+            notes.append(f"condition {condition} is not in the bank: left out")
+            continue
+        block = _block(measured, emulator, condition, inflation)
+        if len(block.mean):
+            blocks.append(block)
+        else:
+            notes.append(f"condition {condition} left no heap to compare: left out")
+    held_out = tuple(block for block in blocks if emulator.space.is_held_out(block.condition))
+    training = tuple(block for block in blocks if not emulator.space.is_held_out(block.condition))
+    present = {block.condition for block in blocks}
+    notes += [f"condition {c} was not measured" for c in emulator.space.conditions if c not in present]
+    return Evidence(training, held_out, tuple(dict.fromkeys(notes)))
+
+
+def _block(measured: Measured, emulator: Emulator, condition: str, inflation: np.ndarray) -> Block:
+    names = list(measured.observables)
+    rows = measured.values[condition]
+    columns = np.array(
+        [
+            column
+            for column, name in enumerate(emulator.observables)
+            if name in names and np.isfinite(rows[:, names.index(name)]).any()
+        ],
+        dtype=int,
+    )
+    present = np.isfinite(rows[:, [names.index(emulator.observables[c]) for c in columns]]).astype(float)
+    counts = present.sum(axis=0)
+    mean = measured.mean(condition)[[names.index(emulator.observables[c]) for c in columns]]
+    return Block(condition, columns, mean, present.T @ present / np.outer(counts, counts), inflation[columns])
+
+
+def _inflation(measured: Measured, emulator: Emulator, notes: list[str]) -> np.ndarray:
+    out = np.ones(len(emulator.observables))
+    centre = np.zeros(len(emulator.space.factors))
+    for column, name in enumerate(emulator.observables):
+        if name not in measured.observables:
+            continue
+        ratios, freedoms, known = [], [], []
+        for condition in measured.conditions:
+            count = int(measured.counts(condition)[measured.observables.index(name)])
+            if count < 2 or condition not in emulator.surfaces:
+                continue
+            noise = emulator.surfaces[condition].noise
+            index = measured.observables.index(name)
+            ratios.append(measured.covariance(condition)[index, index] / noise.variance(centre)[column])
+            freedoms.append(count - 1)
+            known.append(noise.degrees_of_freedom)
+        if not freedoms:
+            continue
+        ratio = float(np.average(ratios, weights=freedoms))
+        if ratio > stats.f.isf(SCATTER_LEVEL, sum(freedoms), sum(known)):
+            out[column] = np.sqrt(ratio)
+            notes.append(
+                f"replicates of {name} scatter {out[column]:.1f} times as much as the model's, and count so"
+            )
+    return out

@@ -1,0 +1,220 @@
+"""Fits of models to means: bounded least squares, many at once, and what they say of the parameters."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+from scipy.linalg import cholesky, solve_triangular
+
+from experiments.discover.bank import sobol
+from experiments.discover.model import Model, Stack
+
+ITERATIONS = 40
+CONVERGED = 1e-4
+"""Longest step of a fit that has arrived, in coded units."""
+AT_BOUND = 1e-3
+"""A parameter so near an end of its range, in coded units, is at that end."""
+PROFILE_POINTS = 61
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """A model at its optimum.
+
+    Attributes
+    ----------
+    stack : Stack
+    x : (parameters,) array
+        Coded.
+    covariance : (means, means) array
+        Of measured less predicted means, which the fit was weighted with.
+    whitening : (means, means) array
+        W with W' W its inverse.
+    q : float
+        Sum of squares of the whitened residuals.
+    score : float
+        q plus the logarithm of the determinant: minus twice the log-likelihood, but for a constant.
+    spread : (parameters, parameters) array
+        Covariance of the parameters.
+    """
+
+    stack: Stack
+    x: np.ndarray
+    covariance: np.ndarray
+    whitening: np.ndarray
+    q: float
+    score: float
+    spread: np.ndarray
+
+    @property
+    def model(self) -> Model:
+        """The model that was fitted."""
+        return self.stack.model
+
+    @property
+    def mechanisms(self) -> tuple[str, ...]:
+        """Mechanisms of the model."""
+        return self.model.mechanisms
+
+    @property
+    def sizes(self) -> np.ndarray:
+        """Coded sizes of the mechanisms."""
+        return self.x[len(self.x) - len(self.mechanisms) :]
+
+    @property
+    def size_errors(self) -> np.ndarray:
+        """Standard errors of the coded sizes."""
+        return np.sqrt(np.diag(self.spread))[len(self.x) - len(self.mechanisms) :]
+
+    @property
+    def freedom(self) -> int:
+        """Degrees of freedom of q."""
+        return max(len(self.covariance) - len(self.x), 0)
+
+    @property
+    def residuals(self) -> np.ndarray:
+        """Whitened residuals, (means,)."""
+        return self.whitening @ (self.stack.target - self.stack.predict(self.x[None])[0])
+
+    @property
+    def sensitivities(self) -> np.ndarray:
+        """Whitened derivatives by the parameters that are not at an end of their range, (means, free)."""
+        free = (self.x > self.model.lower + AT_BOUND) & (self.x < self.model.upper - AT_BOUND)
+        return np.asarray(self.whitening @ self.stack.jacobian(self.x[None])[0][:, free])
+
+
+def minimise(
+    stack: Stack,
+    whitening: np.ndarray,
+    target: np.ndarray,
+    starts: np.ndarray,
+    lower: np.ndarray,
+    upper: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Least squares within bounds from many starts at once (Levenberg and Marquardt, active bounds frozen).
+
+    Parameters
+    ----------
+    stack : Stack
+    whitening : (means, means) array
+    target : (means,) array
+    starts : (n, parameters) array
+    lower, upper : (parameters,) or (n, parameters) array
+        Equal ends fix a parameter.
+
+    Returns
+    -------
+    x : (n, parameters) array
+    q : (n,) array
+    """
+    x = np.clip(starts, lower, upper)
+    damping = np.full(len(x), 1e-2)
+    residual = (target - stack.predict(x)) @ whitening.T
+    q = (residual**2).sum(axis=1)
+    for _ in range(ITERATIONS):
+        slopes = np.einsum("ij,njk->nik", whitening, stack.jacobian(x))
+        descent = np.einsum("nik,ni->nk", slopes, residual)
+        frozen = ((x <= lower) & (descent < 0.0)) | ((x >= upper) & (descent > 0.0))
+        slopes = np.where(frozen[:, None, :], 0.0, slopes)
+        normal = np.einsum("nik,nil->nkl", slopes, slopes)
+        diagonal = np.einsum("nkk->nk", normal)
+        scale = np.where(frozen, 1.0, diagonal * damping[:, None] + 1e-9)
+        step = np.linalg.solve(
+            normal + scale[:, :, None] * np.eye(x.shape[1]), np.where(frozen, 0.0, descent)[:, :, None]
+        )
+        proposed = np.clip(x + step[:, :, 0], lower, upper)
+        trial = (target - stack.predict(proposed)) @ whitening.T
+        better = (trial**2).sum(axis=1) <= q
+        moved = np.abs(proposed - x).max(axis=1)
+        x = np.where(better[:, None], proposed, x)
+        residual = np.where(better[:, None], trial, residual)
+        q = np.where(better, (trial**2).sum(axis=1), q)
+        damping = np.where(better, damping / 5.0, damping * 5.0).clip(1e-9, 1e9)
+        if (moved < CONVERGED).all():
+            break
+    return x, q
+
+
+def fit(stack: Stack, starts: np.ndarray | None = None, count: int = 8) -> Fitted:
+    """Calibrate a model: the least sum of squares over several starts, weighted at its optimum.
+
+    Parameters
+    ----------
+    stack : Stack
+    starts : (n, parameters) array, optional
+        Coded parameters to start from as well.
+    count : int
+        Sobol points to start from.
+    """
+    model = stack.model
+    lower, upper = model.lower, model.upper
+    tried = [model.start[None], lower + sobol(count, len(lower), 0) * (upper - lower)]
+    x = np.concatenate(tried if starts is None else [np.atleast_2d(starts), *tried])
+    best, target = x[0], stack.target
+    for _ in range(3):
+        whitening = whiten(stack.covariance(best))
+        x, q = minimise(stack, whitening, target, x, lower, upper)
+        best = x[np.argmin(q)]
+        x = best[None]
+    return weigh(stack, best)
+
+
+def weigh(stack: Stack, x: np.ndarray) -> Fitted:
+    """Sums of squares and covariances of a model at given coded parameters."""
+    covariance = stack.covariance(x)
+    whitening = whiten(covariance)
+    residual = whitening @ (stack.target - stack.predict(x[None])[0])
+    q = float(residual @ residual)
+    score = q - 2.0 * float(np.log(np.diag(whitening)).sum())
+    slopes = whitening @ stack.jacobian(x[None])[0]
+    # The ranges are what is known of a parameter that the data say nothing of.
+    spread = np.linalg.inv(slopes.T @ slopes + np.diag((model_width(stack.model)) ** -2))
+    return Fitted(stack, x, covariance, whitening, q, score, spread)
+
+
+def model_width(model: Model) -> np.ndarray:
+    """Widths of the coded ranges, (parameters,)."""
+    return np.asarray(model.upper - model.lower)
+
+
+def whiten(covariance: np.ndarray) -> np.ndarray:
+    """Lower triangle W with W' W the inverse of a covariance."""
+    triangle = cholesky(covariance, lower=True)
+    return np.asarray(solve_triangular(triangle, np.eye(len(triangle)), lower=True))
+
+
+def size_interval(fitted: Fitted, number: int, coverage: float = 0.9) -> tuple[float, float]:
+    """Profile-likelihood interval of a coded size.
+
+    It ends where q, with all else refitted, has risen by the point of chi2 for the coverage.
+
+    Parameters
+    ----------
+    fitted : Fitted
+    number : int
+        Which of the model's mechanisms.
+    coverage : float
+    """
+    column = len(fitted.x) - len(fitted.mechanisms) + number
+    se = max(float(fitted.size_errors[number]), 1e-3)
+    low, high = max(fitted.x[column] - 5.0 * se, 0.0), min(fitted.x[column] + 5.0 * se, 1.0)
+    grid = np.unique(np.append(np.linspace(low, high, PROFILE_POINTS), fitted.x[column]))
+    starts = np.repeat(fitted.x[None], len(grid), axis=0)
+    starts[:, column] = grid
+    lower = np.repeat(fitted.model.lower[None], len(grid), axis=0)
+    upper = np.repeat(fitted.model.upper[None], len(grid), axis=0)
+    lower[:, column] = upper[:, column] = grid
+    _, q = minimise(fitted.stack, fitted.whitening, fitted.stack.target, starts, lower, upper)
+    rise = q - q.min() - stats.chi2.ppf(coverage, 1)
+    inside = np.flatnonzero(rise <= 0.0)
+    return _crossing(grid, rise, inside[0], -1), _crossing(grid, rise, inside[-1], 1)
+
+
+def _crossing(grid: np.ndarray, rise: np.ndarray, inside: int, step: int) -> float:
+    outside = inside + step
+    if not 0 <= outside < len(grid):
+        return float(grid[inside])
+    share = rise[inside] / (rise[inside] - rise[outside])
+    return float(grid[inside] + share * (grid[outside] - grid[inside]))

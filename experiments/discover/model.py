@@ -1,0 +1,158 @@
+"""A model to be fitted: the base with some mechanisms, as emulated or as fresh runs correct it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from experiments.discover.emulator import Emulator
+from experiments.discover.evidence import Block
+from experiments.discover.kriging import Kriging
+
+STEP = 0.02
+"""Half the step of derivatives, in coded units."""
+
+
+@dataclass(frozen=True, eq=False)
+class Correction:
+    """What fresh runs around an optimum say beyond the emulator, for one condition.
+
+    Attributes
+    ----------
+    parts : tuple of Kriging
+        One an observable.
+    correlation : (observables, observables) array
+        Of their errors.
+    noise : (observables, observables) array
+        Covariance of one run around the optimum.
+    noise_df : int
+        Its degrees of freedom.
+    """
+
+    parts: tuple[Kriging, ...]
+    correlation: np.ndarray
+    noise: np.ndarray
+    noise_df: int
+
+    def mean(self, x: np.ndarray) -> np.ndarray:
+        """What is added to the emulator, (n, observables)."""
+        return np.column_stack([part.mean(x) for part in self.parts])
+
+    def error(self, x: np.ndarray) -> np.ndarray:
+        """Covariance of the corrected prediction's error at one row of coded parameters."""
+        sd = np.sqrt([part.variance(x[None])[0] for part in self.parts])
+        return np.asarray(sd[:, None] * self.correlation * sd)
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """Predictions of the base with some mechanisms.
+
+    Attributes
+    ----------
+    emulator : Emulator
+    mechanisms : tuple of str
+    systematic : float
+        Standard deviation, in units of that of one run, that is added to the error of every mean.
+    corrections : dict of Correction
+        By condition; empty for the emulator alone.
+    """
+
+    emulator: Emulator
+    mechanisms: tuple[str, ...]
+    systematic: float
+    corrections: Mapping[str, Correction] = field(default_factory=dict)
+
+    @property
+    def lower(self) -> np.ndarray:
+        """Least coded parameters."""
+        return np.array([-1.0] * len(self.emulator.space.factors) + [0.0] * len(self.mechanisms))
+
+    @property
+    def upper(self) -> np.ndarray:
+        """Largest coded parameters."""
+        return np.ones(len(self.lower))
+
+    @property
+    def start(self) -> np.ndarray:
+        """The middle of the ranges."""
+        return (self.lower + self.upper) / 2.0
+
+    def predict(self, x: np.ndarray, condition: str) -> np.ndarray:
+        """Observables at coded parameters (n, parameters), (n, observables)."""
+        values = self.emulator.surfaces[condition].predict(x, self.mechanisms)
+        if condition in self.corrections:
+            values = values + self.corrections[condition].mean(x)
+        return values
+
+    def noise(self, x: np.ndarray, block: Block) -> np.ndarray:
+        """Covariance of the noise of the means of a block, at one row of coded parameters, (k, k)."""
+        known = self.emulator.surfaces[block.condition].noise
+        covariance, freedom = (
+            known.covariance(x[: len(self.emulator.space.factors)]),
+            known.degrees_of_freedom,
+        )
+        if block.condition in self.corrections:
+            correction = self.corrections[block.condition]
+            covariance, freedom = correction.noise, correction.noise_df
+        count = len(block.columns)
+        # The inverse of an estimated covariance is too large on average (Wishart).
+        unbiased = freedom / max(freedom - count - 1.0, 1.0)
+        return block.scatter(covariance[np.ix_(block.columns, block.columns)]) * unbiased
+
+    def error(self, x: np.ndarray, block: Block) -> np.ndarray:
+        """Covariance of the error of the prediction of a block, with what is systematic, (k, k)."""
+        surfaces = self.emulator.surfaces[block.condition]
+        if block.condition in self.corrections:
+            error = self.corrections[block.condition].error(x)
+        else:
+            error = surfaces.error(x, self.mechanisms)
+        theta = x[: len(self.emulator.space.factors)]
+        own = self.systematic**2 * surfaces.noise.variance(theta)
+        return np.asarray((error + np.diag(own))[np.ix_(block.columns, block.columns)])
+
+
+@dataclass(frozen=True, eq=False)
+class Stack:
+    """A model against the means of some conditions, as one vector.
+
+    Attributes
+    ----------
+    model : Model
+    blocks : tuple of Block
+    """
+
+    model: Model
+    blocks: tuple[Block, ...]
+
+    @property
+    def target(self) -> np.ndarray:
+        """The measured means, (means,)."""
+        return np.concatenate([block.mean for block in self.blocks])
+
+    def predict(self, x: np.ndarray) -> np.ndarray:
+        """The predicted means at coded parameters (n, parameters), (n, means)."""
+        parts = [self.model.predict(x, block.condition)[:, block.columns] for block in self.blocks]
+        return np.concatenate(parts, axis=1)
+
+    def jacobian(self, x: np.ndarray) -> np.ndarray:
+        """Derivatives by central differences at coded parameters, (n, means, parameters)."""
+        count, size = x.shape
+        steps = STEP * np.concatenate([np.eye(size), -np.eye(size)])
+        values = self.predict((x[:, None, :] + steps).reshape(-1, size)).reshape(count, 2 * size, -1)
+        return np.asarray(np.swapaxes(values[:, :size] - values[:, size:], 1, 2) / (2.0 * STEP))
+
+    def covariance(self, x: np.ndarray) -> np.ndarray:
+        """Covariance of measured less predicted means at one row of coded parameters, (means, means)."""
+        return _blocks(self.model.noise(x, block) + self.model.error(x, block) for block in self.blocks)
+
+    def noise(self, x: np.ndarray) -> np.ndarray:
+        """Covariance of the measured means alone, (means, means)."""
+        return _blocks(self.model.noise(x, block) for block in self.blocks)
+
+
+def _blocks(parts: Sequence[np.ndarray] | object) -> np.ndarray:
+    return np.asarray(block_diag(*parts))  # type: ignore[misc]

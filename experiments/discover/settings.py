@@ -1,0 +1,132 @@
+"""The rules of an analysis: everything that is decided before the data are opened.
+
+They are written to a file, and the hash of that text stands in every result: rules that were bent
+afterwards would show.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+
+from experiments.errors import InputError
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Levels, margins and numbers of runs.
+
+    Attributes
+    ----------
+    bank_points, bank_repeats : int
+        Points of the library waves without a mechanism, and runs of each (their scatter is the noise).
+    bank_mechanism_points : int
+        Points for each mechanism, one run each.
+    false_alarm : float
+        Probability that a model that lacks nothing is said to lack something.
+    fit_level : float
+        A model whose disagreement with the data has a smaller p value is not admitted.
+    least_ratio : float
+        Least size over standard error of a mechanism that is named.
+    pair_ratio : float
+        The same for each of two mechanisms named together: there are many more pairs to choose among.
+    tie_margin : float
+        Mechanisms within so much of the best in Q (plus the logarithm of the determinant) are a tie.
+    held_out_coverage : float
+        Coverage of the interval of the held-out gain, which must lie above zero.
+    incomplete_share : float
+        Least share of the excess that a mechanism explains which is named although something is left.
+    power : float
+        Probability at which ``gamma80`` is stated.
+    systematic : float
+        Standard deviation, in units of that of one run, of what cameras and time steps add to every mean.
+    draws : int
+        Draws of every bootstrap.
+    shortlist_margin : float
+        Models within so much of the best are simulated again.
+    shortlist : int
+        Most models that are simulated again at a time.
+    refinement_points, refinement_repeats : int
+        Fresh points around an optimum, and runs of each, in every condition.
+    refinement_rounds : int
+        Most times that the optima are simulated again.
+    pair_candidates : int
+        The best so many mechanisms are tried in pairs.
+    direct_runs : int
+        Fresh runs a model and condition at the final optimum.
+    resolvable : tuple of str or None
+        Mechanisms that may be named. None: those that the data can tell from every other.
+    """
+
+    bank_points: int = 160
+    bank_repeats: int = 2
+    bank_mechanism_points: int = 64
+    false_alarm: float = 0.025
+    fit_level: float = 0.025
+    least_ratio: float = 3.0
+    pair_ratio: float = 3.5
+    tie_margin: float = 5.0
+    held_out_coverage: float = 0.5
+    incomplete_share: float = 0.95
+    power: float = 0.8
+    systematic: float = 0.1
+    draws: int = 4000
+    shortlist_margin: float = 30.0
+    shortlist: int = 4
+    refinement_points: int = 10
+    refinement_repeats: int = 2
+    refinement_rounds: int = 3
+    pair_candidates: int = 6
+    direct_runs: int = 16
+    resolvable: tuple[str, ...] | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("false_alarm", "fit_level", "held_out_coverage", "incomplete_share", "power"):
+            if not 0.0 < getattr(self, name) < 1.0:
+                raise InputError("must lie between 0 and 1", getattr(self, name), f"Settings.{name}")
+        least = {"bank_points": 10, "bank_repeats": 2, "bank_mechanism_points": 4, "draws": 100}
+        least |= {"shortlist": 1, "refinement_points": 2, "refinement_repeats": 2, "refinement_rounds": 1}
+        least |= {"pair_candidates": 0, "direct_runs": 2}
+        for name, value in least.items():
+            if getattr(self, name) < value:
+                raise InputError(f"must be at least {value}", getattr(self, name), f"Settings.{name}")
+        for name in ("least_ratio", "pair_ratio", "tie_margin", "systematic", "shortlist_margin"):
+            if not getattr(self, name) >= 0.0:
+                raise InputError("must not be negative", getattr(self, name), f"Settings.{name}")
+
+    @property
+    def text(self) -> str:
+        """The settings as they are written and hashed."""
+        return json.dumps(asdict(self), indent=2) + "\n"
+
+    @property
+    def sha256(self) -> str:
+        """Hash of the text, hexadecimal."""
+        return hashlib.sha256(self.text.encode()).hexdigest()
+
+    def write(self, path: Path) -> None:
+        """Write the text to a file."""
+        path.write_text(self.text, encoding="utf-8")
+
+
+def read_settings(path: Path) -> Settings:
+    """Read settings that `Settings.write` wrote; what the file leaves out has its default.
+
+    Raises
+    ------
+    InputError
+        For text that is not JSON, an unknown name or a value out of its range.
+    """
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+    except json.JSONDecodeError as error:
+        raise InputError("must be a JSON object", str(error), str(path)) from None
+    known = {field.name for field in fields(Settings)}
+    for name in document:
+        if name not in known:
+            raise InputError(f"must be one of {', '.join(sorted(known))}", name, str(path))
+    if document.get("resolvable") is not None:
+        document["resolvable"] = tuple(document["resolvable"])
+    return Settings(**document)

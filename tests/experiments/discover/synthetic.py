@@ -1,0 +1,144 @@
+"""A synthetic world for the statistics: known quadratic responses, correlated noise, known mechanisms."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from experiments.discover.bank import Bank, bank_points, make_bank
+from experiments.discover.emulator import Emulator, fit_emulator
+from experiments.discover.measured import Measured
+from experiments.discover.settings import Settings
+from experiments.discover.simulator import Outcomes, Point
+from experiments.discover.space import MechanismRange, SearchSpace
+
+OBSERVABLES = (
+    "flank_angle", "concavity", "height", "r50", "r90", "asymmetry",
+    "rolled_fraction", "fill_height", "wall_drag", "t75", "t55", "centre_height",
+)  # fmt: skip
+CONDITIONS = ("base", "fast", "wide", "rough", "fast-wide")
+MECHANISMS = ("alpha", "beta", "gamma", "delta", "epsilon", "zeta", "twin")
+SETTINGS = Settings(bank_points=128, bank_mechanism_points=64)
+
+
+def space(mechanisms: Sequence[str] = MECHANISMS) -> SearchSpace:
+    """Three factors, five conditions of which the last is held out."""
+    return SearchSpace(
+        ("mu", "mu_wall", "restitution"),
+        (0.1, 0.1, 0.2),
+        (0.9, 0.7, 0.8),
+        CONDITIONS,
+        tuple(name == "fast-wide" for name in CONDITIONS),
+        tuple(MechanismRange(name, 0.0, 2.0) for name in mechanisms),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class SyntheticSimulator:
+    """Quadratic responses in coded units, in units of the noise, times an observable's own scale.
+
+    ``twin`` acts as ``alpha`` does, but for one part in a hundred; ``stranger`` is in no library.
+    """
+
+    space: SearchSpace
+    noise: float = 1.0
+    observables: tuple[str, ...] = OBSERVABLES
+
+    def __call__(self, points: Sequence[Point]) -> Outcomes:
+        values = np.array([self._run(point) for point in points]).reshape(len(points), len(self.observables))
+        return Outcomes(values, ("",) * len(points))
+
+    def mean(self, theta: Sequence[float], sizes: Mapping[str, float], condition: str) -> np.ndarray:
+        """Expected observables, (observables,)."""
+        coded = self.space.coded_theta(np.array(theta))
+        linear, curved = _base(condition)
+        total = (
+            3.0 * np.arange(1, len(OBSERVABLES) + 1)
+            + coded @ linear
+            + np.outer(coded, coded).ravel() @ curved
+        )
+        for name, size in sizes.items():
+            g = size / 2.0
+            direct, turned = _signature(name, condition)
+            total = total + g * (1.0 + 0.15 * g) * direct + g * coded @ turned
+        return total * SCALES
+
+    def _run(self, point: Point) -> np.ndarray:
+        rng = np.random.default_rng(point.seed)
+        scatter = _triangle() @ rng.standard_normal(len(OBSERVABLES))
+        return self.mean(point.theta, dict(point.sizes), point.condition) + self.noise * scatter * SCALES
+
+
+SCALES = np.geomspace(0.01, 10.0, len(OBSERVABLES))
+
+
+@cache
+def _triangle() -> np.ndarray:
+    rng = np.random.default_rng(7)
+    loading = rng.standard_normal((len(OBSERVABLES), 3)) * 0.8
+    covariance = loading @ loading.T + np.eye(len(OBSERVABLES))
+    sd = np.sqrt(np.diag(covariance))
+    return np.linalg.cholesky(covariance / np.outer(sd, sd))
+
+
+@cache
+def _base(condition: str) -> tuple[np.ndarray, np.ndarray]:
+    common, own = np.random.default_rng(11), np.random.default_rng([12, CONDITIONS.index(condition)])
+    size = (3, len(OBSERVABLES))
+    linear = 4.0 * common.standard_normal(size) + 1.5 * own.standard_normal(size)
+    curved = 0.7 * common.standard_normal((9, size[1])) + 0.3 * own.standard_normal((9, size[1]))
+    return linear, curved
+
+
+@cache
+def _signature(name: str, condition: str) -> tuple[np.ndarray, np.ndarray]:
+    if name == "twin":
+        direct, turned = _signature("alpha", condition)
+        nudge = np.random.default_rng([15, CONDITIONS.index(condition)]).standard_normal(len(OBSERVABLES))
+        return direct + 0.05 * nudge, turned
+    number = (*MECHANISMS, "stranger").index(name)
+    common, own = (
+        np.random.default_rng([13, number]),
+        np.random.default_rng([14, number, CONDITIONS.index(condition)]),
+    )
+    size = len(OBSERVABLES)
+    direct = 3.0 * common.standard_normal(size) + 2.0 * own.standard_normal(size)
+    return direct, 0.4 * common.standard_normal((3, size))
+
+
+@cache
+def bank(mechanisms: tuple[str, ...] = MECHANISMS) -> Bank:
+    """The bank of the synthetic world."""
+    points = bank_points(space(mechanisms), SETTINGS, seed=1)
+    simulator = SyntheticSimulator(space(mechanisms))
+    return make_bank(space(mechanisms), OBSERVABLES, points, simulator(points))
+
+
+@cache
+def emulator() -> Emulator:
+    """The emulator of the synthetic world's bank."""
+    return fit_emulator(bank())
+
+
+def measure(
+    sizes: Mapping[str, float],
+    seed: int,
+    theta: Sequence[float] | None = None,
+    replicates: int = 5,
+    conditions: Sequence[str] = CONDITIONS,
+    noise: float = 1.0,
+) -> Measured:
+    """Replicates of every condition with mechanisms of natural sizes at random (or given) factors."""
+    rng = np.random.default_rng([seed, 99])
+    simulator = SyntheticSimulator(space(), noise)
+    if theta is None:
+        theta = tuple(simulator.space.natural_theta(rng.uniform(-0.9, 0.9, 3)))
+    values = {}
+    for condition in conditions:
+        seeds = rng.integers(2**31, size=replicates)
+        points = [Point(tuple(theta), tuple(sorted(sizes.items())), condition, int(s)) for s in seeds]
+        values[condition] = simulator(points).values
+    return Measured(tuple(conditions), OBSERVABLES, values)
