@@ -227,6 +227,10 @@ def build_neighbours(
     near.wall_path = wp.zeros(layout.world_count, dtype=precision.real, device=device)
     near.travel = wp.zeros(layout.grain_total, dtype=precision.real, device=device)
     hood.near = near
+    hood.reactions = device_structs(precision).Reactions()
+    for name in ("force", "torque"):
+        reacting = 0 if wp.get_device(device).is_cuda else layout.grain_total
+        setattr(hood.reactions, name, wp.zeros(reacting, dtype=precision.vec4, device=device))
     return hood
 
 

@@ -126,6 +126,7 @@ def device_structs(precision: Precision) -> SimpleNamespace:
         velocity: vec3  # of the grain's surface relative to the partner's [m/s]
         spin: vec3  # of the grain relative to the partner [rad/s]
         lever: vec3  # from the grain's centre to the contact [m]
+        partner_lever: vec3  # from the centre of a grain that is its partner [m]
         mobility: real  # 1 / (m lever^2) of the grain and of a grain that is its partner, added [1/(kg m2)]
         time_step: real  # [s]
         is_new: bool  # nothing is remembered from the step before
@@ -230,6 +231,11 @@ def device_structs(precision: Precision) -> SimpleNamespace:
         travel: wp.array(dtype=real)  # of a grain when this was written [m], (grains,)
 
     @wp.struct
+    class Reactions:  # to the contacts, so far in a step, with grains before it; 0 between steps
+        force: wp.array(dtype=vec4)  # [N] and rolling torque [N m], (grains,) on a CPU, else (0,)
+        torque: wp.array(dtype=vec4)  # [N m], as long
+
+    @wp.struct
     class Neighbours:
         capacity: int  # entries a grain
         list: wp.array(dtype=int)  # which of the two lists holds, (worlds,)
@@ -240,6 +246,7 @@ def device_structs(precision: Precision) -> SimpleNamespace:
         rebuilt: wp.array(dtype=int)  # step of the last rebuild, (worlds,)
         travel: wp.array(dtype=real)  # path of a grain's farthest point since the rebuild [m], (grains,)
         near: Near
+        reactions: Reactions
 
     @wp.struct
     class Cells:
@@ -267,5 +274,6 @@ def device_structs(precision: Precision) -> SimpleNamespace:
         Model=Model,
         Grains=Grains,
         Near=Near,
+        Reactions=Reactions,
         Neighbours=Neighbours,
     )

@@ -148,7 +148,8 @@ def cell_kernels(build: Build) -> SimpleNamespace:
 
         Threads follow the buckets, so that neighbouring threads read the same memory. One thread alone meets
         each pair once: in its own bucket, and in the half of the buckets ahead of it. Many at once find each
-        its own partners, so that nobody has to wait for a place in another one's list.
+        its own partners, so that nobody has to wait for a place in another one's list. Of the first, the
+        earlier grain alone has the other in its list.
         """
         slot = wp.tid()
         w = slot // (spheres_each * model.grain_count)
@@ -180,8 +181,7 @@ def cell_kernels(build: Build) -> SimpleNamespace:
                                 cells.found[i * cells.found_capacity + own] = j - first
                             own += 1
                         else:
-                            append(cells, i, j - first)
-                            append(cells, j, i - first)
+                            append(cells, wp.min(i, j), wp.max(i, j) - first)
         if wp.static(build.cooperative):
             cells.found_count[i] = own
         for k in range(walls_each):

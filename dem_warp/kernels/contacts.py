@@ -17,9 +17,9 @@ from dem_warp.types import SPHERE_BITS, SPHERE_MASK, Build, device_structs
 
 @functools.cache
 def contact_functions(build: Build) -> SimpleNamespace:
-    """`nears` and `contact` of one build."""
+    """`nears`, `is_free` and `contact` of one build."""
     precision = build.precision
-    real, vec3 = precision.real, precision.vec3
+    real, vec3, vec4 = precision.real, precision.vec3, precision.vec4
     Sphere = precision.sphere
     types = device_structs(precision)
     Model, World, Grains, Neighbours = types.Model, types.World, types.Grains, types.Neighbours
@@ -52,6 +52,13 @@ def contact_functions(build: Build) -> SimpleNamespace:
         return wp.dot(d, d) < reach * reach
 
     @wp.func
+    def is_free(model: Model, hood: Neighbours, w: int, item: int, step: int) -> bool:
+        """Whether the partner in an item of `near` is a grain that moves freely."""
+        partner = load_pair(hood.near.item, item)[0] & SPHERE_MASK
+        j = partner // spheres_each
+        return j < model.grain_count and step >= model.release_step[w * model.grain_count + j]
+
+    @wp.func
     def spin_of(grains: Grains, g: int) -> vec3:
         omega = pack.load_vec4(grains.spin, g)
         return vec3(omega[0], omega[1], omega[2])
@@ -81,6 +88,7 @@ def contact_functions(build: Build) -> SimpleNamespace:
         lever = lever_of(grains, world, j, b, to_contact)
         contact.velocity = -surface_velocity(grains, j, lever)
         contact.spin = -spin_of(grains, j)
+        contact.partner_lever = lever
         mb = pack.load_vec4(grains.velocity, j)[3]
         contact.mobility = real(1.0) / (mb * wp.dot(lever, lever))
         contact.mass = contact.mass * mb / (contact.mass + mb)
@@ -128,12 +136,36 @@ def contact_functions(build: Build) -> SimpleNamespace:
                         return
 
     @wp.func
+    def recall(
+        model: Model, world: World, grains: Grains, hood: Neighbours, w: int, g: int, slot: int, step: int
+    ):
+        """Tangential displacement [m] of a contact in the step before, and whether there was no contact."""
+        if wp.static(build.has_mesh):
+            is_triangle = hood.entry[slot] & SPHERE_MASK >= model.grain_count * spheres_each + walls_each
+            if is_triangle and pack.stamped_step(pack.load_vec4(hood.history, slot)) != step:
+                take_over(model, world, grains, hood, w, g, slot, step)
+        history = pack.load_vec4(hood.history, slot)
+        displacement = vec3(history[0], history[1], history[2])
+        is_new = pack.stamped_step(history) != step
+        if is_new:
+            displacement = vec3()
+        return displacement, is_new
+
+    @wp.func
+    def react(hood: Neighbours, g: int, force: vec3, torque: vec3, rolling: real):
+        """Sets the opposite of a force and torque, and a rolling torque, on a grain whose turn is to come."""
+        f = pack.load_vec4(hood.reactions.force, g)
+        t = pack.load_vec4(hood.reactions.torque, g)
+        pack.store_vec4(hood.reactions.force, g, f + vec4(-force[0], -force[1], -force[2], rolling))
+        pack.store_vec4(hood.reactions.torque, g, t - vec4(torque[0], torque[1], torque[2], real(0.0)))
+
+    @wp.func
     def contact(
         model: Model, world: World, grains: Grains, hood: Neighbours, w: int, g: int, item: int, step: int
     ):
         """Force [N], torque and rolling torque [N m] of an item of `near`, none if the two do not meet.
 
-        Updates the history of the contact.
+        Updates the history of the contact and, on a CPU, the reactions of the partner.
         """
         near = load_pair(hood.near.item, item)
         entry = near[0]
@@ -175,18 +207,15 @@ def contact_functions(build: Build) -> SimpleNamespace:
             c.mobility += real(1.0) / (mass * wp.dot(c.lever, c.lever))
             c.velocity += surface_velocity(grains, g, c.lever)
             c.spin += spin_of(grains, g)
-            if wp.static(build.has_mesh):
-                is_triangle = partner >= wall_base + walls_each
-                if is_triangle and pack.stamped_step(pack.load_vec4(hood.history, slot)) != step:
-                    take_over(model, world, grains, hood, w, g, slot, step)
-            history = pack.load_vec4(hood.history, slot)
-            displacement = vec3(history[0], history[1], history[2])
-            c.is_new = pack.stamped_step(history) != step
-            if c.is_new:
-                displacement = vec3()
-            force, displacement, torque, rolling = law(
+            displacement, is_new = recall(model, world, grains, hood, w, g, slot, step)
+            c.is_new = is_new
+            force, displacement, torque, rolling, partner_rolling = law(
                 model.contact[pair], c, displacement, hood.memory, slot * memory_each
             )
+            if wp.static(not build.cooperative):
+                if partner < wall_base:
+                    j = w * model.grain_count + partner // spheres_each
+                    react(hood, j, force, torque + wp.cross(c.partner_lever, force), partner_rolling)
             torque += wp.cross(c.lever, force)
             if meets:
                 pack.store_vec4(hood.history, slot, pack.stamp(displacement, step + 1))
@@ -196,4 +225,4 @@ def contact_functions(build: Build) -> SimpleNamespace:
             rolling = real(0.0)
         return force, torque, rolling
 
-    return SimpleNamespace(nears=nears, contact=contact)
+    return SimpleNamespace(nears=nears, is_free=is_free, contact=contact)

@@ -1,9 +1,10 @@
 """Neighbour lists: every sphere of another grain, and every wall, nearer to a sphere than the skin.
 
-Two grains have each other in their lists. Walls are numbered after the spheres of their world.
+On a GPU two grains have each other in their lists; on a CPU, which works each pair out once, the earlier one
+has the other. Walls are numbered after the spheres of their world.
 
 A list is sorted by the own sphere's number and then by the partner's, so its order, and with it the order of
-a grain's force sum, depends on the grains alone: not on cells, skin, moment of the rebuild, batch or device.
+a grain's force sum, depends on the grains alone: not on cells, skin, moment of the rebuild or batch.
 Only worlds whose `stale` flag is set are rebuilt. A contact's history moves over to the new list with its
 entry.
 """

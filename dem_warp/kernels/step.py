@@ -129,7 +129,10 @@ def step_kernels(build: Build) -> SimpleNamespace:
         # state out
         grains_out: Grains,
     ):
-        """Moves the `slot_count` grain slots of `running` worlds on by a step; `lanes` threads a grain."""
+        """Moves the `slot_count` grain slots of `running` worlds on by a step; `lanes` threads a grain.
+
+        On a CPU one thread takes the slots in their order, which the sums of their contacts rest on.
+        """
         thread = wp.tid()
         slot = thread // lanes
         lane = thread - slot * lanes
@@ -154,8 +157,9 @@ def step_kernels(build: Build) -> SimpleNamespace:
             count = hood.near.count[g]
             moving = alive[g] > 0
             step = grains_in.step[w]
-            if not moving or step < model.release_step[g]:
-                count = 0
+            if wp.static(build.cooperative):
+                if not moving or step < model.release_step[g]:
+                    count = 0
             if lane == 0 and place == 0:
                 grains_out.step[w] = step + 1
         force, torque, rolling = sum_contacts(

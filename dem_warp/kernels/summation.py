@@ -1,8 +1,11 @@
 """Sum of the contacts of a grain, in the order of its neighbour list: on one thread, or by a warp of a GPU.
 
-A single thread walks through what is near the grain. The lanes of a GPU warp share out what is near all of
-its grains, 32 items at once; then the grains' lanes add up, component by component, in the order of the list.
-Both ways, and any number of lanes, add the same floats in the same order; what does not touch adds zero.
+A single thread takes the grains in their order. It walks through what is near a grain and comes after it, and
+sets the opposite force on each partner; so the sum begins with what earlier grains have set, in their order.
+
+The lanes of a GPU warp share out what is near all of its grains, 32 items at once; then the grains' lanes add
+up, component by component, in the order of the list. Any number of lanes adds the same floats in the same
+order; what does not touch adds zero.
 """
 
 import functools
@@ -12,6 +15,7 @@ import warp as wp
 
 from dem_warp.kernels.contacts import contact_functions
 from dem_warp.kernels.lanes import WARP, from_lane, running_sum, shared, sync_warp
+from dem_warp.kernels.packing import packing
 from dem_warp.types import Build, device_structs
 
 MIN_LANES = 2
@@ -24,26 +28,34 @@ SUMS = COMPONENTS * WARP // MIN_LANES
 
 @functools.cache
 def serial_sum(build: Build):
-    """Function that sums a grain's contacts on one thread."""
-    real, vec3 = build.precision.real, build.precision.vec3
+    """Function that sums a grain's contacts on one thread, called for every grain of a world in order."""
+    vec3, vec4 = build.precision.vec3, build.precision.vec4
     types = device_structs(build.precision)
     Model, Grains, Neighbours = types.Model, types.Grains, types.Neighbours
     contacts = contact_functions(build)
+    pack = packing(build.precision)
 
     @wp.func
     def sum_contacts(
         model: Model, grains: Grains, hood: Neighbours, w: int, g: int, count: int, first: int,
         step: int, thread: int, lane: int, lanes: int,
     ):  # fmt: skip
-        force = vec3()
-        torque = vec3()
-        rolling = real(0.0)
+        """A grain that waits to be released feels nothing, but it may be in the way of another."""
+        f4 = pack.load_vec4(hood.reactions.force, g)
+        t4 = pack.load_vec4(hood.reactions.torque, g)
+        pack.store_vec4(hood.reactions.force, g, vec4())
+        pack.store_vec4(hood.reactions.torque, g, vec4())
+        force = vec3(f4[0], f4[1], f4[2])
+        torque = vec3(t4[0], t4[1], t4[2])
+        rolling = f4[3]
         world = model.world[w]
+        is_free = step >= model.release_step[g]
         for item in range(first, first + count):
-            f, t, r = contacts.contact(model, world, grains, hood, w, g, item, step)
-            force += f
-            torque += t
-            rolling += r
+            if is_free or contacts.is_free(model, hood, w, item, step):
+                f, t, r = contacts.contact(model, world, grains, hood, w, g, item, step)
+                force += f
+                torque += t
+                rolling += r
         return force, torque, rolling
 
     return sum_contacts

@@ -30,7 +30,8 @@ def contact_law(mechanisms: Mechanisms) -> Any:
     It takes `params` (ContactParams), `contact` (Contact), the tangential displacement so far [m], and an
     array and the index in it at which the mechanisms' memory of this contact begins. It gives the force on
     the grain [N], the new tangential displacement [m], the torque [N m] beside that of the force, and the
-    largest torque [N m] that rolling resistance may set against the grain's spin.
+    largest torques [N m] that rolling resistance may set against the spin of the grain and of its partner.
+    Force and torque on the partner are the opposite ones.
 
     Both dampings use the same constant 2 sqrt(5/6) |beta|, each with its own stiffness, as in EDEM; the
     tangential one can be left out.
@@ -83,12 +84,14 @@ def contact_law(mechanisms: Mechanisms) -> Any:
             coefficient * support,
         )
         limit = rolling(params, rolling_torque(params.rolling_friction, support, contact.lever))
+        partner_torque = rolling_torque(params.rolling_friction, support, contact.partner_lever)
         force = contact.normal * (normal_force - attracting)
         return (
             force + tangential_force,
             displacement,
             torque(params, contact, support, memory, first),
             limit,
+            rolling(params, partner_torque),
         )
 
     return law

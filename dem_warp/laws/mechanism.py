@@ -37,7 +37,7 @@ class Mechanism:
         Coefficient of friction in place of `coefficient`, knowing the force of the tangential spring [N], not
         yet limited, and the normal force [N] by which the surfaces push each other off.
     torque(params, contact, support, memory, at)
-        Torque [N m] on the grain beside that of the contact force.
+        Torque [N m] on the grain beside that of the contact force; the partner feels the opposite one.
     rolling(params, limit)
         Largest torque [N m] of the base law's rolling resistance in place of `limit`: none where `torque`
         stands in its place. One mechanism of a build at the most has it.

@@ -35,10 +35,9 @@ class ContactCounts:
     grain_pairs: int
     wall_pairs: int
 
-    @property
-    def entries(self) -> int:
-        """Contacts as the grains see them: each pair of grains counts twice."""
-        return 2 * self.grain_pairs + self.wall_pairs
+    def entries(self, mutual: bool) -> int:
+        """Entries of the grains' lists: each pair stands in both lists if they are mutual, else in one."""
+        return (2 if mutual else 1) * self.grain_pairs + self.wall_pairs
 
 
 def count_contacts(

@@ -80,6 +80,7 @@ def step_traffic(solver: Solver) -> Traffic:
         ("histories", hood.history, touching, 2),
         ("memories of mechanisms", hood.memory, touching * hood.memory.size / hood.history.size, 2),
         ("path since the rebuild", hood.travel, 1.0, 2),
+        *((f"reactions: {name}", array, array.size / grains, 2) for name, array in _arrays(hood.reactions)),
     ]
     table = pd.DataFrame(
         [(name, _element_bytes(array), elements, moves) for name, array, elements, moves in rows],
@@ -90,7 +91,8 @@ def step_traffic(solver: Solver) -> Traffic:
 
 def memory_bytes(solver: Solver) -> int:
     """Bytes of all device arrays of a solver."""
-    holders = (solver, solver.model, *solver.grains, solver.hood, solver.hood.near, solver.cells)
+    hood = solver.hood
+    holders = (solver, solver.model, *solver.grains, hood, hood.near, hood.reactions, solver.cells)
     return sum(array.size * _element_bytes(array) for holder in holders for _, array in _arrays(holder))
 
 
@@ -105,10 +107,11 @@ def world_contacts(solver: Solver, world: int) -> ContactCounts:
 
 
 def _touching(solver: Solver) -> float:
-    """Contacts of a grain as it sees them, in the first worlds."""
+    """Entries of a grain's list that touch, in the first worlds."""
     worlds = range(min(SAMPLE, solver.layout.world_count))
     grains = sum(len(solver.poses(world)["slots"]) for world in worlds)
-    return sum(world_contacts(solver, world).entries for world in worlds) / grains
+    mutual = solver.build.cooperative
+    return sum(world_contacts(solver, world).entries(mutual) for world in worlds) / grains
 
 
 def _arrays(holder: Any) -> list[tuple[str, Any]]:

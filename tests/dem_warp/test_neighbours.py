@@ -42,12 +42,12 @@ def listed(solver: Solver) -> list[tuple[int, int]]:
 
 
 def near(solver: Solver, skin: float) -> set[tuple[int, int]]:
-    """The same pairs by brute force from the poses: spheres of other grains, then plane and tube."""
+    """The same pairs by brute force from the poses: spheres of later grains, then plane and tube."""
     poses, sizes = state(solver), solver.worlds[0].grains.sizes
     centers, radii = spheres_of(PYRAMID, poses, sizes)
     owner = np.arange(len(radii)) // SPHERES
     gap = np.linalg.norm(centers[:, None] - centers[None], axis=2) - radii[:, None] - radii[None]
-    pairs = set(zip(*np.nonzero((gap < skin) & (owner[:, None] != owner[None])), strict=True))
+    pairs = set(zip(*np.nonzero((gap < skin) & (owner[:, None] < owner[None])), strict=True))
     to_tube = np.abs(np.hypot(centers[:, 0], centers[:, 1]) - PILE_TUBE.radius)
     for number, distance in enumerate((centers[:, 2], to_tube)):
         pairs |= {(i, len(radii) + number) for i in np.flatnonzero(distance - radii < skin)}
@@ -87,12 +87,10 @@ def test_the_lists_are_those_of_brute_force():
         solver = solve(setup, precision=precision)
         found = listed(solver)
         assert solver.flags.numpy()[0] == 0
-        assert len(found) > 1000
+        assert len(found) > 600
         assert set(found) == near(solver, 8e-4)
-        # In order of own sphere and partner, each once; and two grains have each other.
+        # In order of own sphere and partner, each once.
         assert found == sorted(set(found))
-        between_grains = {(i, j) for i, j in found if j < 50 * SPHERES}
-        assert between_grains == {(j, i) for i, j in between_grains}
 
 
 def test_a_moved_pile_has_the_lists_of_its_new_place():
@@ -117,7 +115,7 @@ def test_a_grain_of_few_spheres_has_no_others():
     solver = solve(world(bodies, pair(), PILE_STEP, shapes=(PYRAMID, BOOT), skin=1e-3))
     counts = np.where(kinds == 0, SPHERES, BOOT.sphere_count)
     spheres = np.array([sphere for both in listed(solver) for sphere in both])
-    assert len(spheres) > 1000
+    assert len(spheres) > 500
     assert (spheres % SPHERES < counts[spheres // SPHERES]).all()
 
 
