@@ -176,7 +176,8 @@ class JointFit:
         -------
         DataFrame, index ``direction`` from 1
             A column for each factor (the unit vector, its largest component positive), half_width (of the
-            1 - alpha interval along it, coded; infinite where no response changes).
+            1 - alpha interval along it, coded; infinite where no response changes), span (of the compatible
+            region along it, over that of the region explored; 0 where nothing is compatible).
         """
         slopes = []
         for goal in self.goals.values():
@@ -193,7 +194,13 @@ class JointFit:
             half_width = stats.norm.isf(0.5 * self.alpha) / np.sqrt(values)
         index = pd.RangeIndex(1, len(values) + 1, name="direction")
         table = pd.DataFrame(vectors.T, columns=[factor.name for factor in self.factors], index=index)
-        return table.assign(half_width=half_width)
+        return table.assign(half_width=half_width, span=[self._span(vector) for vector in vectors.T])
+
+    def _span(self, direction: NDArray[np.float64]) -> float:
+        """Return the compatible region's shadow on a direction, over that of the region explored."""
+        shadow = self.cells @ direction
+        belonging = shadow[self.region().mask]
+        return float(np.ptp(belonging) / np.ptp(shadow[self.explored])) if belonging.size else 0.0
 
     def _order(self) -> Iterator[tuple[str, ...]]:
         """Return the responses so far, from the first on, each time with the one that shrinks most."""

@@ -49,14 +49,13 @@ def joint_decisions(
 
 
 def open_directions(joint: JointFit, settings: OptimumSettings) -> pd.DataFrame:
-    """Return the directions along which the compatible values span too much of the region, the worst last."""
-    directions = joint.directions
-    return directions[directions["half_width"] / joint.extent > settings.unidentified_span]
+    """Return the directions along which the compatible region spans too much of the design."""
+    return joint.directions[joint.directions["span"] > settings.unidentified_span]
 
 
 def direction_text(direction: pd.Series) -> str:
     """Write a direction by what it moves, as ``E up, F down (1 : 0.6)``."""
-    parts = direction.drop("half_width")
+    parts = direction.drop(["half_width", "span"])
     named = parts[parts.abs() >= SMALL_COMPONENT].sort_values(key=np.abs, ascending=False)
     moves = ", ".join(f"{name} {'up' if part > 0.0 else 'down'}" for name, part in named.items())
     if len(named) == 1:
@@ -116,19 +115,20 @@ def _purchase(joint: JointFit) -> Decision:
 
 def _directions(joint: JointFit, settings: OptimumSettings) -> Decision:
     numbers = {
-        f"half width along {direction_text(row)}": float(row["half_width"])
-        for _, row in joint.directions.iterrows()
+        f"span along {direction_text(row)}": float(row["span"]) for _, row in joint.directions.iterrows()
     }
     left = open_directions(joint, settings)
-    if left.empty:
+    if not joint.region().mask.any():
+        outcome = "Nothing is compatible, so that nothing can be said of what stays open."
+    elif left.empty:
         outcome = "The responses pin every direction down."
     else:
         texts = "; ".join(direction_text(row) for _, row in left.iterrows())
         outcome = f"Along these the responses do not change enough to tell settings apart: {texts}."
     return Decision(
         STAGE,
-        "Eigenvectors of the joint Fisher information: a direction is open when its interval spans more than "
-        f"{settings.unidentified_span:.0%} of the design's range.",
+        "Directions are eigenvectors of the joint Fisher information; one is open when the compatible region "
+        f"spans more than {settings.unidentified_span:.0%} of what the design explored along it.",
         numbers,
         outcome,
     )

@@ -11,6 +11,7 @@ import numpy as np
 
 from doe import Region
 from experiments.calibrate.results import Campaign, OptimumResult
+from experiments.calibrate.settings import Response
 from experiments.files import replacing, write_text
 from experiments.study import Study
 from experiments.study.card import MATERIAL, SECTIONS, shapes_of
@@ -27,8 +28,8 @@ MOST_POINTS = 60
 
 HEAD = """\
 # Material card, written by dem-warp calibrate. A study takes its values by  material = "{card}"
-# They hold together with the contact law, the clump and the estimator that they were found with. One angle is
-# one equation: every point of [compatible] is as good as the chosen one; not so every pair of the ranges.
+# They hold together with the contact law, the clump and the estimator that they were found with. Every point
+# of [compatible] is as good as the chosen one; not so every combination of the ranges.
 
 """
 
@@ -92,6 +93,25 @@ def _fitted(campaign: Campaign, study: Study) -> dict[str, Any]:
         test = campaign.verification.comparison
         facts["heaps"] = {"mean": _angle(test.a.mean), "sd": _angle(test.a.sd), "n": test.a.n}
         facts["heaps"] |= {"difference": _angle(test.difference), "interval": [*map(_angle, test.interval)]}
+    if study.responses:
+        facts["response"] = {response.name: _response(campaign, response) for response in study.responses}
+        facts["response-scene"] = study.document.get("response-scene", {})
+    return facts
+
+
+def _response(campaign: Campaign, response: Response) -> dict[str, Any]:
+    """What a further response was fitted to, and what fresh cases gave."""
+    facts: dict[str, Any] = {
+        "observable": response.observable,
+        "scene": response.scene,
+        "unit": response.unit,
+    }
+    if campaign.target is not None:
+        sample = campaign.target.responses[response.name]
+        facts |= {"mean": _short(sample.mean), "sd": _short(sample.sd), "n": sample.n}
+    if campaign.verification is not None:
+        test = campaign.verification.responses[response.name]
+        facts |= {"fresh_mean": _short(test.a.mean), "fresh_sd": _short(test.a.sd), "fresh_n": test.a.n}
     return facts
 
 

@@ -58,7 +58,7 @@ def render_page(
     replay
         The paper's own runs simulated again.
     """
-    context = Context(campaign, _labels(study), published_for(study))
+    context = Context(campaign, _labels(study), published_for(study), study.responses)
     sections = stage_sections(context)
     if pictures:
         sections.append(Section("heaps"))
@@ -99,7 +99,13 @@ def study_facts(study: Study) -> dict[str, str]:
         "Shear modulus": softened,
         "Time step": f"{100.0 * numerics.time_step_fraction:g} % of the Rayleigh time",
         "Angle": f"“{measurement.fit}” fit, mean of {measurement.azimuths} views of a heap, both flanks",
-    }
+    } | {f"Scene “{name}”": _scene_text(study, name) for name in study.response_scenes}
+
+
+def _scene_text(study: Study, name: str) -> str:
+    """Say what a further scene is, as the study writes it."""
+    [(kind, settings)] = study.document["response-scene"][name].items()
+    return ", ".join([kind, *(f"{key.replace('_', ' ')} {value}" for key, value in settings.items())])
 
 
 def _sphere_counts(grains: GrainPopulation) -> str:

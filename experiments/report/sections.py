@@ -6,9 +6,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from experiments.calibrate.results import Campaign
+from experiments.calibrate.settings import Response
 from experiments.report import charts, stage_tables, surfaces
+from experiments.report.joint_charts import joint_charts
 from experiments.report.published import Published
 from experiments.report.replay_tables import replay_tables
+from experiments.report.response_tables import response_tables
 from experiments.report.tables import Table
 from experiments.report.theme import Chart
 from experiments.studies.buckwheat.replay import Replay
@@ -22,6 +25,7 @@ TITLES = {
     "climb": "Steepest climb",
     "surface": "Response surface",
     "optimum": "Optimum and compatible region",
+    "responses": "Several responses",
     "verification": "Verification",
     "heaps": "Heaps",
     "failed": "Failed runs",
@@ -58,6 +62,8 @@ class Context:
     """What each factor is, in words."""
     published: Published | None
     """The paper's numbers, where the study is the paper's."""
+    responses: tuple[Response, ...] = ()
+    """What was to be matched beside the angle."""
 
     @property
     def truth(self) -> dict[str, float] | None:
@@ -66,10 +72,15 @@ class Context:
 
 
 def stage_sections(context: Context) -> list[Section]:
-    """Build the sections of the factors and of every stage that was reached."""
+    """Build the sections of the factors, of every stage that was reached, and of several responses."""
     campaign = context.campaign
     factors = stage_tables.factors_table(campaign.factors, context.labels, context.truth)
-    return [Section("factors", {"levels": factors})] + [_STAGES[name](context) for name in campaign.stages]
+    sections = [Section("factors", {"levels": factors})]
+    for name in campaign.stages:
+        sections.append(_STAGES[name](context))
+        if name == "optimum":
+            sections += _responses(context)
+    return sections
 
 
 def failed_section(campaign: Campaign) -> Section:
@@ -175,6 +186,16 @@ def _optimum(context: Context) -> Section:
         return Section("optimum")
     table = stage_tables.ranges_table(campaign.optimum, campaign.surface.design)
     return Section("optimum", {"ranges": table})
+
+
+def _responses(context: Context) -> list[Section]:
+    """Build the section of several responses; none where the angle is alone."""
+    campaign = context.campaign
+    surface, optimum, target = campaign.surface, campaign.optimum, campaign.target
+    if surface is None or optimum is None or target is None or optimum.joint is None:
+        return []
+    drawn = joint_charts(surface, optimum, target)
+    return [Section("responses", response_tables(campaign, context.responses), drawn)]
 
 
 def _verification(context: Context) -> Section:

@@ -147,6 +147,7 @@ def selection_table(result: SelectionResult) -> Table:
         Column("factor", "factor"),
         Column("effect", "effect", "angle", "°"),
         Column("p", "p", "p"),
+        *(Column(key, f"p, {key[2:]}", "p") for key in frame.columns if key.startswith("p_")),
         Column("visible", "beyond the noise floor"),
         Column("kept", "decision"),
         Column("reason", "reason"),
@@ -337,17 +338,18 @@ def failed_table(campaign: Campaign) -> Table | None:
     failed = campaign.failed_cases
     if failed.empty:
         return None
+    several = len(campaign.scene_costs) > 1
     columns = [
         Column("stage", "stage"),
+        *([Column("scene", "scene")] if several else []),
         RUN,
         Column("replicate", "replicate", "label"),
         Column("seed", "seed", "label"),
         Column("status", "status"),
         Column("reason", "reason"),
     ]
-    return make_table(
-        "failed", failed, columns, f"{len(failed)} of {len(campaign.cases)} cases gave no angle."
-    )
+    gave = "failed, or gave no angle" if several else "gave no angle"
+    return make_table("failed", failed, columns, f"{len(failed)} of {len(campaign.cases)} cases {gave}.")
 
 
 def _with_response(settings: pd.DataFrame, response: np.ndarray) -> tuple[pd.DataFrame, list[Column]]:

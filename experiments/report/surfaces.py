@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import plotly.graph_objects as go
 
-from doe import Design, Surface
+from doe import Design, Region, Surface
 from doe.plot_data import SurfaceGrid, normal_points, surface_grid
 from experiments.calibrate.results import OptimumResult, SurfaceResult, TargetResult
 from experiments.report.theme import (
@@ -37,7 +37,7 @@ CURVE_POINTS = 121
 
 
 @dataclass(frozen=True)
-class _Slice:
+class Slice:
     """A plane through the surface along two factors, the others held."""
 
     surface: Surface
@@ -72,7 +72,7 @@ def surface_charts(result: SurfaceResult, optimum: OptimumResult | None, target:
     if len(design.names) == 1:
         return [_curve_chart(result, optimum, target)]
     point = optimum.point if optimum else result.center
-    planes = [_Slice(result.reduced, x, y, point) for x, y in itertools.combinations(design.names, 2)]
+    planes = [Slice(result.reduced, x, y, point) for x, y in itertools.combinations(design.names, 2)]
     contours = [_contour_chart(plane, result, optimum, target) for plane in planes]
     return [_relief_chart(_strongest(planes), result, optimum, target), *contours]
 
@@ -105,14 +105,14 @@ def residual_charts(surface: Surface) -> list[Chart]:
     return [*charts, Chart("residual-actual", "Fitted against simulated angles.", figure)]
 
 
-def _strongest(planes: list[_Slice]) -> _Slice:
+def _strongest(planes: list[Slice]) -> Slice:
     """Return the plane along the two factors with the largest coded slopes."""
     slopes = planes[0].surface.coded_coefficients.abs()
     return max(planes, key=lambda plane: slopes.get(plane.x, 0.0) + slopes.get(plane.y, 0.0))
 
 
 def _relief_chart(
-    plane: _Slice, result: SurfaceResult, optimum: OptimumResult | None, target: TargetResult
+    plane: Slice, result: SurfaceResult, optimum: OptimumResult | None, target: TargetResult
 ) -> Chart:
     grid = plane.grid()
     figure = new_figure()
@@ -151,21 +151,21 @@ def _relief_chart(
 
 
 def _contour_chart(
-    plane: _Slice, result: SurfaceResult, optimum: OptimumResult | None, target: TargetResult
+    plane: Slice, result: SurfaceResult, optimum: OptimumResult | None, target: TargetResult
 ) -> Chart:
     grid, level = plane.grid(), target.sample.mean
     figure = new_figure(grid.x_factor.label, grid.y_factor.label)
     if optimum is not None:
-        _add_region(figure, plane, optimum)
+        add_region(figure, plane, optimum.region, "compatible region", REGION_FILL)
     lines = {"coloring": "none", "showlabels": True, "labelfont": {"size": 11, "color": MUTED}}
-    _add_contours(figure, grid, "fitted angle", lines, "#9aa3af", 1, ncontours=12, hovertemplate=plane.hover)
+    add_contours(figure, grid, "fitted angle", lines, "#9aa3af", 1, ncontours=12, hovertemplate=plane.hover)
     at_target = {"coloring": "none", "start": level, "end": level, "size": 1.0}
-    _add_contours(figure, grid, f"target {level:.2f}°", at_target, GREEN, 3, hoverinfo="skip")
-    _add_design(figure, plane, result.design)
+    add_contours(figure, grid, f"target {level:.2f}°", at_target, GREEN, 3, hoverinfo="skip")
+    add_design(figure, plane, result.design)
     if target.truth is not None:
-        add_points(figure, *_at(plane, target.truth), "hidden truth", PURPLE, "star", 16)
+        add_points(figure, *point_in(plane, target.truth), "hidden truth", PURPLE, "star", 16)
     if optimum is not None:
-        add_points(figure, *_at(plane, optimum.point), "optimum", VERMILION, "diamond", 13)
+        add_points(figure, *point_in(plane, optimum.point), "optimum", VERMILION, "diamond", 13)
     caption = "Fitted angle, target curve and compatible region (green); the dotted box is coded −1 to +1."
     return Chart(f"contour-{plane.x}-{plane.y}", caption + plane.held_text, figure, tall=True)
 
@@ -200,7 +200,7 @@ def _curve_chart(result: SurfaceResult, optimum: OptimumResult | None, target: T
 
 def _add_points_3d(
     figure: go.Figure,
-    plane: _Slice,
+    plane: Slice,
     rows: pd.DataFrame,
     z: Any,
     name: str,
@@ -211,7 +211,7 @@ def _add_points_3d(
     figure.add_scatter3d(x=rows[plane.x], y=rows[plane.y], z=z, mode="markers", name=name, marker=marker)
 
 
-def _add_target_curve(figure: go.Figure, plane: _Slice, optimum: OptimumResult, level: float) -> None:
+def _add_target_curve(figure: go.Figure, plane: Slice, optimum: OptimumResult, level: float) -> None:
     for piece, (_, points) in enumerate(optimum.contour.groupby(level=0)):
         figure.add_scatter3d(
             x=points[plane.x],
@@ -224,9 +224,10 @@ def _add_target_curve(figure: go.Figure, plane: _Slice, optimum: OptimumResult, 
         )
 
 
-def _add_contours(
+def add_contours(
     figure: go.Figure, grid: SurfaceGrid, name: str, lines: dict, color: str, width: int, **more: Any
 ) -> None:
+    """Draw lines of equal fitted response."""
     figure.add_contour(
         x=grid.x,
         y=grid.y,
@@ -240,9 +241,8 @@ def _add_contours(
     )
 
 
-def _add_region(figure: go.Figure, plane: _Slice, optimum: OptimumResult) -> None:
-    """Fill the cells of the region in the plane."""
-    region = optimum.region
+def add_region(figure: go.Figure, plane: Slice, region: Region, name: str, fill: str) -> None:
+    """Fill the cells of a region in the plane."""
     cells = region.mask.reshape([region.resolution] * len(region.factors))
     centers = region.extent * ((2.0 * np.arange(region.resolution) + 1.0) / region.resolution - 1.0)
     chosen = tuple(
@@ -258,15 +258,16 @@ def _add_region(figure: go.Figure, plane: _Slice, optimum: OptimumResult) -> Non
         z=cells[chosen].T.astype(np.uint8),  # x comes before y among the factors, and rows are y
         zmin=0,
         zmax=1,
-        colorscale=[[0.0, "rgba(0,0,0,0)"], [1.0, REGION_FILL]],
+        colorscale=[[0.0, "rgba(0,0,0,0)"], [1.0, fill]],
         showscale=False,
         hoverinfo="skip",
     )
-    square = {"symbol": "square", "size": 13, "color": REGION_FILL}
-    figure.add_scatter(x=[None], y=[None], mode="markers", name="compatible region", marker=square)
+    square = {"symbol": "square", "size": 13, "color": fill}
+    figure.add_scatter(x=[None], y=[None], mode="markers", name=name, marker=square)
 
 
-def _add_design(figure: go.Figure, plane: _Slice, design: Design) -> None:
+def add_design(figure: go.Figure, plane: Slice, design: Design) -> None:
+    """Draw the runs, and the box of the coded -1 to +1."""
     runs = design.natural.drop_duplicates([plane.x, plane.y])
     add_points(figure, runs[plane.x], runs[plane.y], "design", BLUE, "circle-open")
     x, y = design.factor(plane.x), design.factor(plane.y)
@@ -274,7 +275,8 @@ def _add_design(figure: go.Figure, plane: _Slice, design: Design) -> None:
     figure.add_shape(type="rect", x0=x.low, x1=x.high, y0=y.low, y1=y.high, line=border)
 
 
-def _at(plane: _Slice, point: Mapping[str, float]) -> tuple[list[float], list[float]]:
+def point_in(plane: Slice, point: Mapping[str, float]) -> tuple[list[float], list[float]]:
+    """Coordinates of a point in the plane, as columns of one."""
     return [point[plane.x]], [point[plane.y]]
 
 

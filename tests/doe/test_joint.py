@@ -87,6 +87,11 @@ def test_parallel_planes_leave_the_same_direction_open() -> None:
     np.testing.assert_allclose(np.abs(pinned[["E", "F"]]), np.sqrt(0.5), rtol=1e-9)
     assert free["E"] == pytest.approx(-free["F"])
     assert np.isinf(free["half_width"])
+    # The band about x + y = 0.6 cuts the disc of radius sqrt(2); its longest chord is the one nearest to the
+    # centre. A cell is sqrt(2) / 200.
+    chord = np.sqrt(2.0 - (0.6 - half_width(0.05, 2)) ** 2 / 2.0)
+    assert free["span"] == pytest.approx(chord / np.sqrt(2.0), abs=0.01)
+    assert pinned["span"] < 0.1
     # Information along (1, 1) / sqrt(2): (sqrt 2)^2 + (2 sqrt 2)^2 over 0.1^2.
     assert pinned["half_width"] == pytest.approx(half_width(0.1, 1) / np.sqrt(10.0))
     # Of the line x + y = 0.6 the point is the one nearest to the centre.

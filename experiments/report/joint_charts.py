@@ -1,0 +1,82 @@
+"""Charts of several responses together: their bands in every plane of two factors, and what is left."""
+
+from __future__ import annotations
+
+import itertools
+
+from doe import JointFit, Surface
+from experiments.calibrate.results import OptimumResult, SurfaceResult, TargetResult
+from experiments.calibrate.settings import ANGLE
+from experiments.report.surfaces import REGION_FILL, Slice, add_contours, add_design, add_region, point_in
+from experiments.report.theme import (
+    BLUE,
+    GREEN,
+    MUTED,
+    ORANGE,
+    PURPLE,
+    VERMILION,
+    Chart,
+    add_points,
+    new_figure,
+)
+
+COLORS = (BLUE, ORANGE, "#7a5195", "#8c6d46", MUTED)
+"""Of the responses, in order."""
+
+OPACITY = 0.20
+"""Of a response's own band."""
+
+
+def joint_charts(surface: SurfaceResult, optimum: OptimumResult, target: TargetResult) -> list[Chart]:
+    """Draw the shares that are left, and for every pair of factors where each response agrees."""
+    if optimum.joint is None:
+        return []
+    pairs = itertools.combinations(surface.design.names, 2)
+    planes = [_plane_chart(optimum.joint, x, y, surface, optimum, target) for x, y in pairs]
+    return [_shares_chart(optimum.joint), *planes]
+
+
+def _shares_chart(joint: JointFit) -> Chart:
+    table = joint.shrinkage
+    figure = new_figure("", "share of the region explored [%]")
+    names = [str(name) if place == 0 else f"+ {name}" for place, name in enumerate(table.index)]
+    for title, column, color in (("alone", "alone", MUTED), ("with those before", "share", GREEN)):
+        figure.add_bar(
+            x=names,
+            y=100.0 * table[column],
+            name=title,
+            marker={"color": color},
+            hovertemplate="%{x}: %{y:.2f} %<extra></extra>",
+        )
+    figure.update_xaxes(title={"text": "response added"})
+    return Chart(
+        "joint-shares", "What is compatible with each response alone, and with those before it too.", figure
+    )
+
+
+def _plane_chart(
+    joint: JointFit, x: str, y: str, surface: SurfaceResult, optimum: OptimumResult, target: TargetResult
+) -> Chart:
+    surfaces: dict[str, Surface] = {ANGLE: surface.reduced}
+    surfaces |= {name: fit.reduced for name, fit in surface.responses.items()}
+    plane = Slice(surface.reduced, x, y, optimum.point)
+    figure = new_figure(surface.design.factor(x).label, surface.design.factor(y).label)
+    for (name, fit), color in zip(surfaces.items(), itertools.cycle(COLORS)):
+        level = joint.goals[name].target.mean
+        add_region(figure, plane, joint.region(name), f"{name} agrees", _translucent(color))
+        at_target = {"coloring": "none", "start": level, "end": level, "size": 1.0}
+        grid = Slice(fit, x, y, optimum.point).grid()
+        add_contours(figure, grid, f"{name} at its target", at_target, color, 2, hoverinfo="skip")
+    add_region(figure, plane, joint.region(), "all agree", REGION_FILL.replace("0.28", "0.75"))
+    add_design(figure, plane, surface.design)
+    if target.truth is not None:
+        add_points(figure, *point_in(plane, target.truth), "hidden truth", PURPLE, "star", 16)
+    add_points(figure, *point_in(plane, optimum.point), "chosen", VERMILION, "diamond", 13)
+    caption = "Where each response alone agrees with its target, and where all do (green)."
+    return Chart(f"joint-{x}-{y}", caption + plane.held_text, figure, tall=True)
+
+
+def _translucent(color: str) -> str:
+    """Return a colour that others show through."""
+    red, green, blue = (int(color[place : place + 2], 16) for place in (1, 3, 5))
+    return f"rgba({red},{green},{blue},{OPACITY})"

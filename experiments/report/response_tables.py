@@ -1,0 +1,189 @@
+"""The tables of a campaign on several responses: what each was to match, what it buys, what stays open."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+from markupsafe import Markup
+
+from doe import JointFit
+from experiments.calibrate.joint import direction_text, open_directions
+from experiments.calibrate.results import Campaign
+from experiments.calibrate.settings import ANGLE, TARGET_SCENE, OptimumSettings, Response
+from experiments.report.numbers import term
+from experiments.report.tables import Column, Table, make_table
+
+HEAP_ANGLE = Response(name=ANGLE, observable=ANGLE, unit="deg")
+"""The first response of every campaign."""
+
+
+def response_tables(campaign: Campaign, responses: Sequence[Response]) -> dict[str, Table]:
+    """Lay out what was found of several responses; empty where the angle is alone or was not fitted.
+
+    Parameters
+    ----------
+    campaign
+        What was run.
+    responses
+        The responses beside the angle.
+    """
+    if campaign.optimum is None or campaign.optimum.joint is None:
+        return {}
+    joint = campaign.optimum.joint
+    return {
+        "responses": _responses_table(campaign, joint, responses),
+        "shrinkage": _shrinkage_table(campaign, joint, responses),
+        "directions": _directions_table(joint, campaign.settings.optimum),
+        "effects": _effects_table(campaign),
+        "surfaces": _surfaces_table(campaign),
+    }
+
+
+def _responses_table(campaign: Campaign, joint: JointFit, responses: Sequence[Response]) -> Table:
+    """Lay out every response: target, noise, fit at the chosen point, fresh cases."""
+    known = {response.name: response for response in (HEAP_ANGLE, *responses)}
+    optimum = campaign.optimum
+    table = joint.tests(optimum.point if optimum else None)
+    table["unit"] = ["" if known[name].unit == "1" else known[name].unit for name in table.index]
+    table["scene"] = [_scene_text(known[name].scene) for name in table.index]
+    if (noise := campaign.noise_floor) is not None:
+        floors = {ANGLE: noise.floor, **noise.responses}
+        table["noise"] = [floors[name].sd for name in table.index]
+    if (verification := campaign.verification) is not None:
+        tests = {ANGLE: verification.comparison, **verification.responses}
+        table["fresh"] = [tests[name].a.mean for name in table.index]
+        table["fresh_p"] = [tests[name].p for name in table.index]
+    columns = [
+        Column("response", "response"),
+        Column("scene", "scene"),
+        Column("unit", "unit"),
+        Column("target", "target", "free"),
+        Column("target_se", "se", "free"),
+        Column("noise", "sd of one case", "free"),
+        Column("fitted", "fit at the chosen point", "free"),
+        Column("t", "errors off", "ratio"),
+        Column("p", "p", "p"),
+        Column("fresh", "fresh cases", "free"),
+        Column("fresh_p", "p, no difference", "p"),
+    ]
+    note = (
+        "Scene: the study's own, or a further one by its name. Errors off: the difference of fit and target, "
+        "over the errors of both together."
+    )
+    marks = ["" if agrees else "failed" for agrees in table["agrees"]]
+    return make_table("responses", table, columns, "Every response and its target.", note, marks)
+
+
+def _shrinkage_table(campaign: Campaign, joint: JointFit, responses: Sequence[Response]) -> Table:
+    """Lay out how the region shrinks with each response, and what each takes to simulate."""
+    scenes = {response.name: response.scene for response in (HEAP_ANGLE, *responses)}
+    table = joint.shrinkage.copy()
+    for column in ("share", "alone", "with_first"):
+        table[column] *= 100.0
+    costs = campaign.scene_costs
+    costs["work"] = 100.0 * costs["grain_time"] / costs["grain_time"].sum()
+    paid: set[str] = set()
+    for name in table.index:
+        scene = scenes[str(name)]
+        for column in ("cases", "simulated_time", "work"):
+            table.loc[name, column] = 0.0 if scene in paid else costs.loc[scene, column]
+        paid.add(scene)
+    columns = [
+        Column("response", "response added"),
+        Column("share", "compatible with all so far", "free", "%"),
+        Column("ratio", "over the row above", "free"),
+        Column("alone", "with it alone", "free", "%"),
+        Column("with_first", "with the angle and it", "free", "%"),
+        Column("cases", "cases for it", "label"),
+        Column("simulated_time", "simulated", "count", "s"),
+        Column("work", "share of the work", "percent", "%"),
+    ]
+    note = (
+        "Shares of the region that the design explored. Responses stand in the order in which they shrink it "
+        "most; one that is measured in a scene that is simulated anyway takes no cases. Work: grains times "
+        "simulated time."
+    )
+    return make_table("shrinkage", table, columns, "What each response buys, and what it takes.", note)
+
+
+def _directions_table(joint: JointFit, settings: OptimumSettings) -> Table:
+    """Lay out the directions of the factors, from the best known to the least."""
+    table, left = joint.directions.copy(), open_directions(joint, settings).index
+    table["span"] *= 100.0
+    names = [factor.name for factor in joint.factors]
+    table["moves"] = [direction_text(row) for _, row in joint.directions.iterrows()]
+    table["open"] = np.where(table.index.isin(left), "open", "pinned down")
+    columns = [
+        Column("direction", "", "label"),
+        Column("moves", "moves"),
+        *(Column(name, f"{name} coded", "coded") for name in names),
+        Column("half_width", "half width, coded", "free"),
+        Column("span", "compatible span", "percent", "%"),
+        Column("open", "verdict"),
+    ]
+    note = (
+        f"Half width: of the {100.0 * (1.0 - joint.alpha):g} % interval along the direction, from the slopes "
+        "at the point of the smallest chi²; without a number no response changes there. Span: of the "
+        f"compatible region, over that of the region explored; open above "
+        f"{100.0 * settings.unidentified_span:g} %."
+    )
+    marks = ["chosen" if direction in left else "" for direction in table.index]
+    caption = "Directions of the factors, the best known first."
+    return make_table("directions", table, columns, caption, note, marks)
+
+
+def _effects_table(campaign: Campaign) -> Table:
+    """Lay out what every factor does to every response, in the screening."""
+    if (result := campaign.screening) is None:
+        raise ValueError("a campaign with an optimum has a screening")
+    alpha = campaign.settings.selection.alpha
+    screens = {ANGLE: result.screen, **result.responses}
+    frames = {name: screen.table[["effect", "p"]].add_prefix(f"{name} ") for name, screen in screens.items()}
+    table = pd.concat(frames.values(), axis=1).rename_axis("factor")
+    columns = [Column("factor", "factor")]
+    for name in screens:
+        columns += [Column(f"{name} effect", name, "free"), Column(f"{name} p", "p", "p")]
+    marks = ["strong" if row.filter(like=" p").min() < alpha else "" for _, row in table.iterrows()]
+    note = f"Marked: p < {alpha:g} for one of them. Effects from low to high, in the response's unit."
+    return make_table("response-effects", table, columns, "Effects on every response.", note, marks)
+
+
+def _surfaces_table(campaign: Campaign) -> Table:
+    """Lay out how well a quadratic describes every response."""
+    if (result := campaign.surface) is None:
+        raise ValueError("a campaign with an optimum has a surface")
+    fits = {ANGLE: (result.full, result.reduced)}
+    fits |= {name: (fit.full, fit.reduced) for name, fit in result.responses.items()}
+    rows = {
+        name: {
+            "cases": float(len(full.response)),
+            "terms": ", ".join(reduced.coded_coefficients.index[1:]),
+            "r2": reduced.r2,
+            "r2_predicted": reduced.r2_predicted,
+            "p_model": full.anova["p"]["model"],
+            "p_lack": full.anova["p"]["lack of fit"],
+        }
+        for name, (full, reduced) in fits.items()
+    }
+    table = pd.DataFrame.from_dict(rows, orient="index").rename_axis("response")
+    columns = [
+        Column("response", "response"),
+        Column("cases", "cases", "label"),
+        Column("terms", "terms kept", write=_terms),
+        Column("r2", "R²", "ratio"),
+        Column("r2_predicted", "R² predicted", "ratio"),
+        Column("p_model", "p of the model", "p"),
+        Column("p_lack", "p of lack of fit", "p"),
+    ]
+    return make_table("response-surfaces", table, columns, "Surfaces of the responses.")
+
+
+def _terms(names: str) -> Markup:
+    """Typeset the terms of a model."""
+    return Markup(", ").join(term(name) for name in names.split(", "))
+
+
+def _scene_text(scene: str) -> str:
+    return "own" if scene == TARGET_SCENE else scene

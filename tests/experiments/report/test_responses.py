@@ -1,0 +1,87 @@
+"""The page and the card of a campaign on several responses."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from experiments.calibrate import Campaign, calibrate
+from experiments.report import render_page
+from experiments.report.material_card import write_material_card
+from experiments.study import Study, load_study
+
+POINT = Path(__file__).parents[3] / "experiments" / "studies" / "buckwheat" / "curve_to_point.toml"
+
+
+def analytic(study: Study, table: pd.DataFrame) -> pd.DataFrame:
+    """Heaps and hoppers that are planes of the frictions, with noise from the seed."""
+
+    def case(row: Mapping) -> dict:
+        e, f, g = (float(factor.to_coded(row[factor.name])) for factor in study.factors[:3])
+        noise = np.random.default_rng(row["seed"]).standard_normal(2)
+        facts = {"grain_count": 400.0, "simulated_time": 2.0, "case_key": str(row["seed"])}
+        if row["scene"] == "target":
+            angle, density = 24.0 + 2.0 * e + 5.0 * f + 1.5 * g, 0.55 - 0.012 * e + 0.003 * f - 0.008 * g
+            return facts | {"angle": angle + 0.6 * noise[0], "solid_fraction": density + 0.002 * noise[1]}
+        return facts | {"angle": np.nan, "flow_rate": 0.05 - 0.006 * e - 0.002 * g + 0.001 * noise[0]}
+
+    rows = [case(row) for row in table.to_dict("records")]
+    found = pd.DataFrame(rows, index=table.index).assign(status="finished", reason="", angle_se=0.2)
+    return pd.concat([table, found], axis=1)
+
+
+@pytest.fixture(scope="module")
+def point() -> Study:
+    return load_study(POINT, "bench")
+
+
+@pytest.fixture(scope="module")
+def found(point: Study) -> Campaign:
+    return calibrate(point, lambda table: analytic(point, table))
+
+
+@pytest.fixture(scope="module")
+def responses_page(found: Campaign, point: Study, read_page: type):
+    return read_page(render_page(found, point))
+
+
+def test_the_page_says_what_each_response_buys_and_takes(found: Campaign, responses_page) -> None:
+    assert responses_page.mismatches == []
+    shrinkage = found.optimum.joint.shrinkage
+    rows = responses_page.rows("shrinkage")
+    assert [row[0][0] for row in rows] == list(shrinkage.index)
+    shown = responses_page.values("shrinkage")
+    np.testing.assert_array_equal(shown[:, 0], 100.0 * shrinkage["share"])
+    cost = dict(zip(shrinkage.index, shown[:, 4:], strict=True))
+    # The density is measured on the heaps themselves; heaps and hoppers together are all the work.
+    assert cost["density"].tolist() == [0.0, 0.0, 0.0]
+    assert cost["angle"][0] + cost["flow"][0] == len(found.cases)
+    assert cost["angle"][2] + cost["flow"][2] == pytest.approx(100.0)
+
+
+def test_the_page_shows_targets_directions_and_planes(found: Campaign, responses_page) -> None:
+    assert [row[0][0] for row in responses_page.rows("responses")] == ["angle", "density", "flow"]
+    assert len(responses_page.rows("directions")) == len(found.selection.kept)
+    assert {"joint-shares", "joint-E-F"} <= set(responses_page.charts)
+    assert "44 mm" in responses_page.text  # the hopper, among what was simulated
+    for decision in found.optimum.decisions:
+        assert decision.rule.split(".")[0] in responses_page.text
+
+
+def test_a_page_of_one_response_has_no_such_section(page) -> None:
+    assert "responses" not in page.ids
+
+
+def test_the_card_names_every_response(found: Campaign, point: Study, tmp_path: Path) -> None:
+    path = write_material_card(found, point, tmp_path)
+    fitted = tomllib.loads(path.read_text(encoding="utf-8"))["fitted"]
+    assert set(fitted["response"]) == {"density", "flow"}
+    assert fitted["response"]["flow"]["scene"] == "bin"
+    assert fitted["response-scene"]["bin"]["hopper"]["outlet"] == "30 mm"
+    target = found.target.responses["flow"]
+    assert fitted["response"]["flow"]["mean"] == pytest.approx(target.mean, rel=5e-4)  # four digits

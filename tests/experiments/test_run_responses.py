@@ -1,0 +1,106 @@
+"""Two scenes in one campaign's folder: really simulated, and a whole campaign on a stand-in engine."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import pandas as pd
+import pytest
+
+from dem_warp import CaseResult, Hopper
+from experiments.calibrate import Outcome
+from experiments.cases import Store, execute, run_cases
+from experiments.commands import run
+from experiments.commands.run import Desk
+from experiments.study import Study, load_study
+
+BIN = """
+[response-scene.bin.hopper]
+diameter = "28 mm"
+fill_depth = "16 mm"
+outlet = "20 mm"
+grain_count = 30
+
+[target.twin]
+truth = { E = 0.45 }
+
+[[response]]
+observable = "solid_fraction"
+
+[[response]]
+name = "emptying"
+observable = "discharge_time"
+scene = "bin"
+"""
+
+
+@pytest.fixture
+def study(write_study: Callable[..., Path]) -> Study:
+    return load_study(write_study(add=BIN))
+
+
+def test_heap_and_bin_are_simulated_together(study: Study, tmp_path: Path) -> None:
+    table = pd.DataFrame({"seed": [1, 2], "scene": ["target", "bin"], "E": [0.4, 0.4]})
+    heap, outflow = run_cases(study, table, Store(tmp_path), "cpu", 1).to_dict("records")
+    assert (heap["status"], outflow["status"]) == ("finished", "finished")
+    assert 0.0 < heap["angle"] < 90.0
+    assert math.isnan(outflow["angle"])
+    assert 0.0 < outflow["discharge_time"] < outflow["simulated_time"]
+    assert outflow["filled_mass"] == pytest.approx(outflow["fallen_mass"] + outflow["mass_left"], rel=1e-6)
+
+
+class Engine:
+    """Stands in for the simulator: heaps and bins that follow the friction, and stops when it is told."""
+
+    def __init__(self, heap: CaseResult) -> None:
+        self.heap, self.count, self.stop_after = heap, 0, math.inf
+
+    def __call__(self, cases, *, on_result, **_) -> None:
+        for index, case in enumerate(cases):
+            if self.count >= self.stop_after:
+                raise KeyboardInterrupt
+            self.count += 1
+            friction, noise = case.grain_grain.static_friction, math.sin(12.9898 * case.seed)
+            seen = {"grain_count": 30.0, "simulated_time": 1.5}
+            if isinstance(case.scene, Hopper):
+                seen["discharge_time"] = 0.5 + 0.4 * friction + 0.01 * noise
+            else:
+                seen |= {"truth": 15.0 + 30.0 * friction + 0.5 * noise}
+                seen |= {"solid_fraction": 0.60 - 0.1 * friction + 0.004 * math.cos(78.233 * case.seed)}
+            on_result(index, replace(self.heap, observables=seen))
+
+
+@pytest.fixture
+def engine(cone: Callable[..., CaseResult], monkeypatch: pytest.MonkeyPatch) -> Engine:
+    engine = Engine(cone())
+    monkeypatch.setattr(execute, "simulate", engine)
+    monkeypatch.setattr(
+        execute, "measure_heap", lambda _, result: SimpleNamespace(mean=result.observables["truth"], se=0.1)
+    )
+    monkeypatch.setattr(run, "heap_pictures", lambda *_: [])
+    return engine
+
+
+def test_an_interrupted_campaign_of_two_scenes_goes_on_to_the_same_end(
+    study: Study, engine: Engine, tmp_path: Path
+) -> None:
+    whole = run.run_campaign(Desk.open(study, tmp_path / "whole"))
+    total, engine.count, engine.stop_after = engine.count, 0, 25
+    with pytest.raises(KeyboardInterrupt):
+        run.run_campaign(Desk.open(study, tmp_path / "cut"))
+    engine.stop_after = math.inf
+    resumed = run.run_campaign(Desk.open(study, tmp_path / "cut", resume=True))
+    assert engine.count == total == len(whole.cases)
+    assert json.dumps(resumed.to_dict()) == json.dumps(whole.to_dict())
+    assert whole.outcome is Outcome.CALIBRATED
+    # Three standard errors of five cases through the slope: 0.5 / sqrt(5) deg over 30 deg, twice.
+    assert whole.optimum.point["E"] == pytest.approx(0.45, abs=0.03)
+    tables = tmp_path / "whole" / "tables"
+    costs = pd.read_csv(tables / "scene_costs.csv", index_col="scene")
+    assert costs["cases"].to_dict() == whole.cases["scene"].value_counts().to_dict()
+    assert pd.read_csv(tables / "joint_shrinkage.csv")["response"].iloc[0] == "angle"
