@@ -28,6 +28,8 @@ class Emulator:
         Columns of every prediction; those that never vary in the bank are left out.
     surfaces : dict of Surfaces
         By condition.
+    columns : tuple of int
+        Where they stand in the outcomes of the simulator.
     cases : int
         Cases of the bank.
     notes : tuple of str
@@ -37,6 +39,7 @@ class Emulator:
     space: SearchSpace
     observables: tuple[str, ...]
     surfaces: Mapping[str, Surfaces]
+    columns: tuple[int, ...]
     cases: int
     notes: tuple[str, ...] = ()
 
@@ -84,7 +87,14 @@ def fit_emulator(bank: Bank) -> Emulator:
         except InputError as error:
             raise InputError(error.rule, error.value, f"condition {condition} of the bank") from error
     names = tuple(bank.observables[column] for column in columns)
-    return Emulator(bank.space.without(*thin), names, surfaces, len(bank.reasons), tuple(notes))
+    return Emulator(
+        bank.space.without(*thin),
+        names,
+        surfaces,
+        tuple(int(column) for column in columns),
+        len(bank.reasons),
+        tuple(notes),
+    )
 
 
 def _too_few(bank: Bank) -> list[str]:

@@ -44,8 +44,9 @@ class Settings:
         Standard deviation, in units of that of one run, of what cameras and time steps add to every mean.
     draws : int
         Draws of every bootstrap.
-    shortlist_margin : float
-        Models within so much of the best are simulated again.
+    shortlist_share : float
+        Models whose score is within this share of the base's excess of the best are simulated again (and
+        those within twice the tie margin).
     shortlist : int
         Most models that are simulated again at a time.
     refinement_points, refinement_repeats : int
@@ -73,7 +74,7 @@ class Settings:
     power: float = 0.8
     systematic: float = 0.1
     draws: int = 4000
-    shortlist_margin: float = 30.0
+    shortlist_share: float = 0.3
     shortlist: int = 4
     refinement_points: int = 10
     refinement_repeats: int = 2
@@ -92,7 +93,7 @@ class Settings:
         for name, value in least.items():
             if getattr(self, name) < value:
                 raise InputError(f"must be at least {value}", getattr(self, name), f"Settings.{name}")
-        for name in ("least_ratio", "pair_ratio", "tie_margin", "systematic", "shortlist_margin"):
+        for name in ("least_ratio", "pair_ratio", "tie_margin", "systematic", "shortlist_share"):
             if not getattr(self, name) >= 0.0:
                 raise InputError("must not be negative", getattr(self, name), f"Settings.{name}")
 

@@ -129,10 +129,19 @@ class Surfaces:
     def error(self, x: np.ndarray, mechanisms: tuple[str, ...]) -> np.ndarray:
         """Covariance of the prediction's error at one row of coded parameters, (observables, observables)."""
         theta = x[: len(x) - len(mechanisms)]
-        base = quadratic(theta[None])[0]
-        misfit = self.base.misfit_variance(theta)
+        return self._error(theta, quadratic(theta[None])[0], x[len(theta) :], mechanisms)
+
+    def added_error(self, theta: np.ndarray, size: float, mechanism: str) -> np.ndarray:
+        """Covariance of the error of what a mechanism adds, (observables, observables)."""
+        nothing = np.zeros(self.base.coefficients.shape[0])
+        return self._error(theta, nothing, np.array([size]), (mechanism,))
+
+    def _error(
+        self, theta: np.ndarray, base: np.ndarray, sizes: np.ndarray, mechanisms: tuple[str, ...]
+    ) -> np.ndarray:
+        misfit = self.base.misfit_variance(theta) * base.any()
         own = np.zeros(len(misfit))
-        for name, size in zip(mechanisms, x[len(theta) :], strict=True):
+        for name, size in zip(mechanisms, sizes, strict=True):
             part = self.additions[name]
             terms = added(theta[None], np.array([size]))[0]
             base = base - part.base_terms.T @ terms

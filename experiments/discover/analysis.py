@@ -1,0 +1,259 @@
+"""The whole analysis of measured heaps: is something missing from the model, and what?
+
+It is a generator. It yields waves of points, is sent their outcomes, and returns what it found; so a command
+runs one with the engine, and trials run hundreds side by side with all their waves in one batch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from experiments.discover.before_after import compare
+from experiments.discover.contest import Contender, Contenders, simulate_again
+from experiments.discover.decision import Assessment, Decision, decide, explained_share
+from experiments.discover.discovery import (
+    BeforeAfter,
+    Confounding,
+    Discovery,
+    Effort,
+    Gap,
+    NextExperiment,
+    Verdict,
+)
+from experiments.discover.emulator import Emulator
+from experiments.discover.evidence import Evidence, gather
+from experiments.discover.fitting import Fitted, fit
+from experiments.discover.gap import GapTest, find_gap
+from experiments.discover.held_out import held_out_gain
+from experiments.discover.laboratory import Laboratory, Request
+from experiments.discover.measured import Measured
+from experiments.discover.model import Model, Stack
+from experiments.discover.next_experiment import propose
+from experiments.discover.ranking import Signatures, Visibility, signatures, visibilities
+from experiments.discover.records import (
+    candidate_record,
+    data_record,
+    drift_records,
+    fit_record,
+    power_records,
+)
+from experiments.discover.settings import Settings
+from experiments.discover.simulator import Outcomes, Point
+
+Analysis = Generator[list[Point], Outcomes, Discovery]
+
+LEAST_FREEDOM = 2
+"""Degrees of freedom that a calibration must leave: with one, every mechanism has the same signature."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Base:
+    """The calibrated base with all that the library could change about it."""
+
+    fitted: Fitted
+    gap: GapTest
+    seen: Signatures
+    visible: tuple[Visibility, ...]
+
+
+def analyse(measured: Measured, emulator: Emulator, settings: Settings, seed: int) -> Analysis:
+    """Analyse measured heaps.
+
+    Parameters
+    ----------
+    measured : Measured
+    emulator : Emulator
+        Of the study's bank; what it was told to leave out (``without``) is not in the library.
+    settings : Settings
+    seed : int
+        Of the bootstraps and of the fresh runs.
+
+    Yields
+    ------
+    list of Point
+        A wave; its `Outcomes` must be sent back, columns as in the bank.
+
+    Returns
+    -------
+    Discovery
+    """
+    evidence = gather(measured, emulator)
+    if not evidence.training:
+        decision = Decision(
+            Verdict.NOT_IDENTIFIABLE, (), "no training condition left a heap to compare", None
+        )
+        return _empty(emulator, evidence, settings, seed, decision)
+    base = _base(fit(Stack(Model(emulator, (), settings.systematic), evidence.training)), settings, seed)
+    laboratory = Laboratory(emulator, emulator.space.conditions, seed)
+    parts = _Parts(emulator, evidence, settings, seed, laboratory)
+    factors = len(emulator.space.factors)
+    if evidence.count - factors < LEAST_FREEDOM:
+        reason = (
+            f"{evidence.count} measured mean{'s' * (evidence.count > 1)}, {factors} factors and the size of a"
+            " mechanism: other values of the factors can take any such disagreement up"
+        )
+        return parts.discovery(base, Decision(Verdict.NOT_IDENTIFIABLE, (), reason, None), [])
+    if not base.gap.found:
+        reason = f"the calibrated model agrees with the data within the noise (p = {base.gap.p:.2g})"
+        return parts.discovery(base, Decision(Verdict.NONE, (), reason, None), [])
+    return (yield from _search(parts, base))
+
+
+def _search(parts: _Parts, base: _Base) -> Analysis:
+    """Steps 4 to 8: who could explain the gap, simulated again, decided, shown before and after."""
+    settings = parts.settings
+    contenders: Contenders = {(): Contender(base.fitted), **parts.contenders([(n,) for n in base.seen.names])}
+    contenders = yield from simulate_again(contenders, parts.laboratory, settings)
+    base = _base(contenders[()].fitted, settings, parts.seed)
+    if not base.gap.found:
+        reason = f"fresh runs at the optimum agree with the data within the noise (p = {base.gap.p:.2g})"
+        return parts.discovery(base, Decision(Verdict.NONE, (), reason, None), [])
+    singles = parts.assess(base, {names: one for names, one in contenders.items() if names})
+    decision, assessments = decide(singles, settings), singles
+    if decision.verdict in (Verdict.UNKNOWN, Verdict.INCOMPLETE) and _nothing_fits(singles, settings):
+        pairs = yield from _pairs(parts, base, singles)
+        with_two = decide(pairs, settings) if pairs else decision
+        if with_two.chosen is not None:
+            decision, assessments = with_two, [*pairs, *singles]
+        else:
+            assessments = [*singles, *pairs]
+    if decision.chosen is None:
+        return parts.discovery(base, decision, assessments)
+    chosen = assessments[decision.chosen].fitted
+    requests = [Request(one.mechanisms, one.x[None], settings.direct_runs) for one in (base.fitted, chosen)]
+    direct = yield from parts.laboratory.wave(requests)
+    compared = []
+    for held_out, blocks in ((False, parts.evidence.training), (True, parts.evidence.held_out)):
+        compared.append(
+            compare(base.fitted, chosen, direct[0], direct[1], blocks, held_out, settings.draws, parts.seed)
+        )
+    return parts.discovery(base, decision, assessments, [one for one in compared if one is not None])
+
+
+def _nothing_fits(singles: Sequence[Assessment], settings: Settings) -> bool:
+    """Whether even the best single mechanism leaves a gap: only then two are asked for."""
+    best = min(singles, key=lambda one: one.fitted.score, default=None)
+    return best is not None and best.gap.p < settings.fit_level
+
+
+def _pairs(
+    parts: _Parts, base: _Base, singles: Sequence[Assessment]
+) -> Generator[list[Point], Outcomes, list[Assessment]]:
+    ranked = sorted(singles, key=lambda one: one.fitted.score)[: parts.settings.pair_candidates]
+    names = [one.mechanisms[0] for one in ranked]
+    contenders: Contenders = parts.contenders(list(combinations(names, 2)))
+    contenders = yield from simulate_again(contenders, parts.laboratory, parts.settings)
+    return parts.assess(base, contenders)
+
+
+def _base(fitted: Fitted, settings: Settings, seed: int) -> _Base:
+    seen = signatures(fitted)
+    gap = find_gap(fitted, seen, settings.false_alarm, settings.draws, seed)
+    return _Base(fitted, gap, seen, visibilities(fitted, seen, settings))
+
+
+@dataclass(frozen=True, eq=False)
+class _Parts:
+    """What every step of one analysis shares."""
+
+    emulator: Emulator
+    evidence: Evidence
+    settings: Settings
+    seed: int
+    laboratory: Laboratory
+
+    def contenders(self, models: Sequence[tuple[str, ...]]) -> dict[tuple[str, ...], Contender]:
+        """Fit models on the emulator."""
+        blocks = self.evidence.training
+        systematic = self.settings.systematic
+        return {m: Contender(fit(Stack(Model(self.emulator, m, systematic), blocks))) for m in models}
+
+    def assess(self, base: _Base, contenders: Contenders) -> list[Assessment]:
+        """Look at contenders by every rule, best first."""
+        resolvable = {one.name for one in base.visible if one.resolvable}
+        settings, out = self.settings, []
+        for names, one in contenders.items():
+            gap = find_gap(one.fitted, signatures(one.fitted), settings.fit_level, settings.draws, self.seed)
+            gain = held_out_gain(
+                base.fitted,
+                one.fitted,
+                self.evidence.held_out,
+                settings.held_out_coverage,
+                settings.draws,
+                self.seed,
+            )
+            share = explained_share(base.fitted, one.fitted)
+            out.append(Assessment(one.fitted, gap, gain, share, one.simulated, set(names) <= resolvable))
+        return sorted(out, key=lambda one: one.fitted.score)
+
+    def discovery(
+        self,
+        base: _Base,
+        decision: Decision,
+        assessments: Sequence[Assessment],
+        before_after: Sequence[BeforeAfter] = (),
+    ) -> Discovery:
+        """The record of all that was found."""
+        chosen = None if decision.chosen is None else assessments[decision.chosen]
+        failures = self.laboratory.failures
+        notes = [f"{failures} of {self.laboratory.cases} fresh runs left no heap"] if failures else []
+        drop = base.gap
+        return Discovery(
+            verdict=decision.verdict,
+            reason=decision.reason,
+            named=decision.named,
+            factors=self.emulator.space.factors,
+            data=data_record(self.emulator, self.evidence),
+            base=fit_record(base.fitted, base.gap, self.evidence),
+            chosen=None if chosen is None else fit_record(chosen.fitted, chosen.gap, self.evidence),
+            gap=Gap(drop.found, drop.drop, drop.drop_limit, drop.mechanism),
+            drifts=drift_records(base.fitted),
+            candidates=tuple(
+                candidate_record(one, base.seen, base.gap.scores, self.settings) for one in assessments
+            ),
+            power=power_records(self.emulator, base.visible),
+            confounding=Confounding(base.seen.names, base.seen.correlations),
+            before_after=tuple(before_after),
+            next_experiment=self._next(base, decision, assessments),
+            notes=(*self.evidence.notes, *self.emulator.notes, *notes),
+            effort=Effort(self.seed, self.settings.sha256, self.emulator.cases, self.laboratory.cases),
+        )
+
+    def _next(
+        self, base: _Base, decision: Decision, assessments: Sequence[Assessment]
+    ) -> NextExperiment | None:
+        """For the two best explanations, where there are two; else for the best against the base."""
+        if decision.verdict in (Verdict.NONE, Verdict.NOT_IDENTIFIABLE) or not assessments:
+            return None
+        ranked = sorted((one.fitted for one in assessments), key=lambda one: one.score)
+        second = ranked[1] if len(ranked) > 1 else base.fitted
+        most = max(int(np.max(block.replicates)) for block in self.evidence.training)
+        return propose(ranked[0], second, most)
+
+
+def _empty(
+    emulator: Emulator, evidence: Evidence, settings: Settings, seed: int, decision: Decision
+) -> Discovery:
+    """The record of data that nothing can be fitted to."""
+    return Discovery(
+        verdict=decision.verdict,
+        reason=decision.reason,
+        named=(),
+        factors=emulator.space.factors,
+        data=data_record(emulator, evidence),
+        base=None,
+        chosen=None,
+        gap=None,
+        drifts=(),
+        candidates=(),
+        power=(),
+        confounding=None,
+        before_after=(),
+        next_experiment=None,
+        notes=(*evidence.notes, *emulator.notes),
+        effort=Effort(seed, settings.sha256, emulator.cases, 0),
+    )

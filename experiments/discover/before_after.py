@@ -1,0 +1,98 @@
+"""The gap before and after a mechanism was added, from fresh runs at both optima."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from experiments.discover.discovery import BeforeAfter, Interval
+from experiments.discover.evidence import Block
+from experiments.discover.fitting import Fitted, whiten
+from experiments.discover.model import Model, Stack
+from experiments.discover.refinement import Runs
+
+COVERAGE = 0.9
+
+
+def compare(
+    base: Fitted,
+    chosen: Fitted,
+    base_runs: Runs,
+    chosen_runs: Runs,
+    blocks: Sequence[Block],
+    held_out: bool,
+    draws: int,
+    seed: int,
+) -> BeforeAfter | None:
+    """Q of the means of fresh runs, without and with the mechanism, on some conditions.
+
+    Both are measured against the same covariance, the chosen model's: what each disagrees by, not how it
+    scatters. The interval is over the noise of the measured and the simulated means.
+
+    Parameters
+    ----------
+    base, chosen : Fitted
+    base_runs, chosen_runs : Runs
+        At their optima.
+    blocks : sequence of Block
+    held_out : bool
+        What the blocks are; the expected Q of a true model is larger where its parameters come from
+        elsewhere.
+    draws, seed : int
+
+    Returns
+    -------
+    BeforeAfter or None
+        None where a condition has no data or fewer than two runs a model.
+    """
+    kept = [
+        b for b in blocks if all(np.sum(r.conditions == b.condition) >= 2 for r in (base_runs, chosen_runs))
+    ]
+    if not kept:
+        return None
+    counts = [int(np.sum(runs.conditions == b.condition)) for b in kept for runs in (base_runs, chosen_runs)]
+    normal = np.random.default_rng(seed).standard_normal((draws, sum(len(block.mean) for block in kept)))
+    before, after, start = np.zeros(draws + 1), np.zeros(draws + 1), 0
+    for block in kept:
+        own = normal[:, start : start + len(block.mean)]
+        start += len(block.mean)
+        noise = chosen.model.noise(chosen.x, block)
+        for total, runs in ((before, base_runs), (after, chosen_runs)):
+            mean, error = _mean(runs, block, chosen.model, chosen.x)
+            whitening = whiten(noise + error)
+            drawn = np.concatenate([np.zeros((1, len(block.mean))), own]) + whitening @ (block.mean - mean)
+            total += (drawn**2).sum(axis=1)
+    freedom = _expected(chosen, tuple(kept)) if held_out else max(start - len(chosen.x), 1)
+    # A noisy residual is larger by its noise on average: a second noise would count it twice.
+    before[1:] -= start
+    after[1:] -= start
+    excess_before = np.maximum(before - freedom, 1e-9)
+    removed = np.clip(1.0 - np.maximum(after - freedom, 0.0) / excess_before, -1.0, 1.0)
+    return BeforeAfter(
+        held_out, freedom, _interval(before), _interval(after), _interval(removed), min(counts)
+    )
+
+
+def _expected(chosen: Fitted, blocks: tuple[Block, ...]) -> int:
+    """Q of a true model whose parameters come from other conditions: its means, and what their errors add."""
+    stack = Stack(chosen.model, blocks)
+    slopes = whiten(stack.covariance(chosen.x)) @ stack.jacobian(chosen.x[None])[0]
+    return round(len(stack.target) + float(np.trace(slopes @ chosen.spread @ slopes.T)))
+
+
+def _mean(runs: Runs, block: Block, model: Model, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Mean of the runs of a block, and the covariance of its error."""
+    here = runs.values[runs.conditions == block.condition][:, block.columns]
+    size = here.shape[1]
+    own = Block(
+        block.condition, block.columns, block.mean, np.full((size, size), 1.0 / len(here)), np.ones(size)
+    )
+    return here.mean(axis=0), model.noise(x, own)
+
+
+def _interval(values: np.ndarray) -> Interval:
+    """The first value, between the quantiles of the others."""
+    low, high = np.quantile(values[1:], [(1.0 - COVERAGE) / 2.0, (1.0 + COVERAGE) / 2.0])
+    value = float(values[0])
+    return Interval(min(float(low), value), value, max(float(high), value))

@@ -1,0 +1,67 @@
+"""How well a model predicts the conditions that took no part in its fit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from experiments.discover.discovery import Interval
+from experiments.discover.evidence import Block
+from experiments.discover.fitting import Fitted, whiten
+from experiments.discover.model import Stack
+
+
+@dataclass(frozen=True, eq=False)
+class Forecast:
+    """Predicted means of some conditions, with what is unknown of them.
+
+    Attributes
+    ----------
+    measured, predicted : (means,) array
+    covariance : (means, means) array
+        Of their difference: noise, emulator and the fitted parameters.
+    noise : (means, means) array
+        Of the measured means alone.
+    """
+
+    measured: np.ndarray
+    predicted: np.ndarray
+    covariance: np.ndarray
+    noise: np.ndarray
+
+    def log_score(self, measured: np.ndarray) -> np.ndarray:
+        """Logarithm of the predicted density of measured means (..., means), but for a constant."""
+        whitening = whiten(self.covariance)
+        residual = (measured - self.predicted) @ whitening.T
+        return np.asarray(np.log(np.diag(whitening)).sum() - 0.5 * (residual**2).sum(axis=-1))
+
+
+def forecast(fitted: Fitted, blocks: tuple[Block, ...]) -> Forecast:
+    """Predict conditions from a fit to others."""
+    stack = Stack(fitted.model, blocks)
+    slopes = stack.jacobian(fitted.x[None])[0]
+    covariance = stack.covariance(fitted.x) + slopes @ fitted.spread @ slopes.T
+    return Forecast(stack.target, stack.predict(fitted.x[None])[0], covariance, stack.noise(fitted.x))
+
+
+def held_out_gain(
+    base: Fitted, fitted: Fitted, blocks: tuple[Block, ...], coverage: float, draws: int, seed: int
+) -> Interval | None:
+    """What the log score gains over the base, with a bootstrap interval over the replicates' noise.
+
+    Returns
+    -------
+    Interval or None
+        None where no held-out condition was measured.
+    """
+    if not blocks:
+        return None
+    before, after = forecast(base, blocks), forecast(fitted, blocks)
+    value = float(after.log_score(after.measured) - before.log_score(after.measured))
+    noise = np.random.default_rng(seed).standard_normal((draws, len(after.measured)))
+    drawn = after.measured + noise @ np.linalg.cholesky(after.noise).T
+    gains = after.log_score(drawn) - before.log_score(drawn)
+    # Measured means have been drawn once already: only the spread of a second draw is of interest.
+    low, high = np.quantile(gains - gains.mean(), [(1.0 - coverage) / 2.0, (1.0 + coverage) / 2.0])
+    return Interval(value + float(low), value, value + float(high))

@@ -1,0 +1,93 @@
+"""Fresh runs in waves: which points, with which seeds, and what came back."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from experiments.discover.emulator import Emulator
+from experiments.discover.refinement import Runs
+from experiments.discover.simulator import Outcomes, Point
+from experiments.errors import InputError
+
+Waves = Generator[list[Point], Outcomes, list[Runs]]
+
+
+@dataclass(frozen=True, eq=False)
+class Request:
+    """Runs of one model.
+
+    Attributes
+    ----------
+    mechanisms : tuple of str
+    x : (n, parameters) array
+        Coded points.
+    repeats : int
+        Runs of each point, in every condition.
+    """
+
+    mechanisms: tuple[str, ...]
+    x: np.ndarray
+    repeats: int
+
+
+class Laboratory:
+    """Sends waves of points and keeps count; every case of a data set has its own seed.
+
+    Parameters
+    ----------
+    emulator : Emulator
+    conditions : sequence of str
+        Where every point is run.
+    seed : int
+    """
+
+    def __init__(self, emulator: Emulator, conditions: Sequence[str], seed: int) -> None:
+        self.emulator = emulator
+        self.conditions = tuple(conditions)
+        self.seed = seed
+        self.cases = 0
+        self.failures = 0
+        self._waves = 0
+
+    def wave(self, requests: Sequence[Request]) -> Waves:
+        """Yield the points of one wave, be sent their outcomes, return the finished runs by request.
+
+        Raises
+        ------
+        InputError
+            When there are not as many outcomes as points.
+        """
+        cases = [
+            (number, row, condition)
+            for number, request in enumerate(requests)
+            for row in request.x
+            for _ in range(request.repeats)
+            for condition in self.conditions
+        ]
+        self._waves += 1
+        seeds = np.random.SeedSequence([self.seed, self._waves]).generate_state(len(cases)) >> 1
+        space = self.emulator.space
+        outcomes = yield [
+            space.point(row, requests[number].mechanisms, condition, int(seed))
+            for (number, row, condition), seed in zip(cases, seeds, strict=True)
+        ]
+        if len(outcomes.reasons) != len(cases):
+            rule = f"needs an outcome for each of {len(cases)} points"
+            raise InputError(rule, len(outcomes.reasons), "wave")
+        self.cases += len(cases)
+        self.failures += int((~outcomes.finished).sum())
+        owners = np.array([number for number, _, _ in cases])
+        return [
+            self._runs(cases, outcomes, np.flatnonzero((owners == number) & outcomes.finished))
+            for number in range(len(requests))
+        ]
+
+    def _runs(
+        self, cases: Sequence[tuple[int, np.ndarray, str]], outcomes: Outcomes, rows: np.ndarray
+    ) -> Runs:
+        x = np.array([cases[row][1] for row in rows])
+        conditions = np.array([cases[row][2] for row in rows], dtype=np.str_)
+        return Runs(x, conditions, outcomes.values[rows][:, self.emulator.columns])

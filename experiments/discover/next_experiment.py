@@ -1,0 +1,63 @@
+"""The experiment that would tell two models apart best (Hunter and Reiner 1965; Box and Hill 1967)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from experiments.discover.discovery import NextExperiment
+from experiments.discover.evidence import Block
+from experiments.discover.fitting import Fitted, whiten
+from experiments.discover.model import Stack
+from experiments.discover.ranking import projector
+
+
+def propose(first: Fitted, second: Fitted, replicates: int) -> NextExperiment:
+    """Choose the condition whose repetition separates two fitted models by most, the second refitted.
+
+    The expected Q between them is that of the means that the first predicts, fitted by the second
+    (linearised) in the old conditions and the new one together.
+
+    Parameters
+    ----------
+    first, second : Fitted
+    replicates : int
+        Measurements of the new condition.
+
+    Returns
+    -------
+    NextExperiment
+        Without its ``changes``, which the study knows.
+    """
+    emulator = first.model.emulator
+    best: tuple[float, str, str] | None = None
+    for condition in emulator.space.conditions:
+        block = _new_block(emulator.observables, condition, replicates)
+        expected, contrast = _separation(first, second, block)
+        if best is None or expected > best[0]:
+            best = (expected, condition, emulator.observables[int(np.argmax(np.abs(contrast)))])
+    if best is None:
+        raise ValueError(f"a next experiment needs a condition (received {emulator.space.conditions})")
+    titles = (_title(first), _title(second))
+    return NextExperiment(best[1], (), titles, best[0], replicates, best[2])
+
+
+def _new_block(observables: tuple[str, ...], condition: str, replicates: int) -> Block:
+    count = len(observables)
+    share = np.full((count, count), 1.0 / replicates)
+    return Block(condition, np.arange(count), np.zeros(count), share, np.ones(count))
+
+
+def _separation(first: Fitted, second: Fitted, block: Block) -> tuple[float, np.ndarray]:
+    """Expected Q, and the new condition's differences in standard deviations."""
+    blocks = (*second.stack.blocks, block)
+    stack = Stack(second.model, blocks)
+    whitening = whiten(stack.covariance(second.x))
+    difference = Stack(first.model, blocks).predict(first.x[None])[0] - stack.predict(second.x[None])[0]
+    slopes = whitening @ stack.jacobian(second.x[None])[0]
+    left = projector(slopes) @ whitening @ difference
+    new = slice(len(difference) - len(block.mean), None)
+    return float(left @ left), difference[new] / np.sqrt(np.diag(stack.covariance(second.x)))[new]
+
+
+def _title(fitted: Fitted) -> str:
+    return " + ".join(fitted.mechanisms) if fitted.mechanisms else "base"

@@ -1,0 +1,171 @@
+"""From the arrays of an analysis to the records of a discovery, in natural units."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy import stats
+from statsmodels.stats.multitest import multipletests
+
+from experiments.discover.decision import Assessment, objections
+from experiments.discover.discovery import Candidate, Data, Drift, Fit, Interval, Power
+from experiments.discover.emulator import Emulator
+from experiments.discover.evidence import Block, Evidence
+from experiments.discover.fitting import AT_BOUND, Fitted, size_interval
+from experiments.discover.gap import GapTest, condition_fits, drift_p
+from experiments.discover.held_out import forecast
+from experiments.discover.ranking import Signatures, Visibility, projector
+from experiments.discover.settings import Settings
+
+
+def data_record(emulator: Emulator, evidence: Evidence) -> Data:
+    """The measured means, a row a condition of the emulator."""
+    conditions, observables = emulator.space.conditions, emulator.observables
+    shape = (len(conditions), len(observables))
+    means, errors, replicates = np.full(shape, np.nan), np.full(shape, np.nan), np.zeros(shape, dtype=int)
+    centre = np.zeros(len(emulator.space.factors))
+    for block in (*evidence.training, *evidence.held_out):
+        row = conditions.index(block.condition)
+        noise = emulator.surfaces[block.condition].noise.covariance(centre)
+        means[row, block.columns] = block.mean
+        own = block.scatter(noise[np.ix_(block.columns, block.columns)])
+        errors[row, block.columns] = np.sqrt(np.diag(own))
+        replicates[row, block.columns] = block.replicates
+    return Data(conditions, observables, emulator.space.held_out, means, errors, replicates)
+
+
+def fit_record(fitted: Fitted, gap: GapTest, evidence: Evidence) -> Fit:
+    """A calibrated model: parameters, predictions of every condition, residuals with Holm's p values."""
+    emulator = fitted.model.emulator
+    space = emulator.space
+    factors = len(space.factors)
+    theta = space.natural_theta(fitted.x[:factors])
+    half_range = (np.array(space.upper) - np.array(space.lower)) / 2.0
+    errors = np.sqrt(np.diag(fitted.spread))[:factors] * half_range
+    at_bounds = (fitted.x < fitted.model.lower + AT_BOUND) | (fitted.x > fitted.model.upper - AT_BOUND)
+    names = (*space.factors, *fitted.mechanisms)
+    predicted, predicted_se = _predictions(fitted)
+    residuals, adjusted = _residual_map(fitted, evidence)
+    return Fit(
+        mechanisms=fitted.mechanisms,
+        theta=tuple(float(value) for value in theta),
+        theta_se=tuple(float(value) for value in errors),
+        sizes=size_intervals(fitted),
+        at_bounds=tuple(name for name, at in zip(names, at_bounds, strict=True) if at),
+        q=fitted.q,
+        degrees_of_freedom=fitted.freedom,
+        q_limit=gap.q_limit,
+        p_value=gap.q_p,
+        predicted=predicted,
+        predicted_se=predicted_se,
+        residuals=residuals,
+        adjusted_p=adjusted,
+    )
+
+
+def size_intervals(fitted: Fitted) -> tuple[Interval, ...]:
+    """Natural size of each mechanism with its 90 % interval."""
+    space = fitted.model.emulator.space
+    out = []
+    for number, (name, size) in enumerate(zip(fitted.mechanisms, fitted.sizes, strict=True)):
+        ends = [space.natural_size(name, end) for end in size_interval(fitted, number)]
+        out.append(Interval(min(ends), space.natural_size(name, float(size)), max(ends)))
+    return tuple(out)
+
+
+def _predictions(fitted: Fitted) -> tuple[np.ndarray, np.ndarray]:
+    """Every observable of every condition, and its standard error from the fit and the emulator."""
+    emulator = fitted.model.emulator
+    count = len(emulator.observables)
+    values, errors = [], []
+    for condition in emulator.space.conditions:
+        whole = Block(condition, np.arange(count), np.zeros(count), np.ones((count, count)), np.ones(count))
+        told = forecast(fitted, (whole,))
+        values.append(told.predicted)
+        errors.append(np.sqrt(np.maximum(np.diag(told.covariance - told.noise), 0.0)))
+    return np.array(values), np.array(errors)
+
+
+def _residual_map(fitted: Fitted, evidence: Evidence) -> tuple[np.ndarray, np.ndarray]:
+    """Residuals in standard deviations, (conditions, observables), and two-sided p values after Holm."""
+    emulator = fitted.model.emulator
+    shape = (len(emulator.space.conditions), len(emulator.observables))
+    residuals, adjusted = np.full(shape, np.nan), np.full(shape, np.nan)
+    # The variance of a training residual is what a refit leaves of that of the measured less the predicted.
+    root = np.linalg.inv(fitted.whitening) @ projector(fitted.sensitivities)
+    training = np.sqrt(np.maximum((root**2).sum(axis=1), 1e-12 * np.diag(fitted.covariance)))
+    raw = [(fitted.stack.target - fitted.stack.predict(fitted.x[None])[0]) / training]
+    blocks = list(evidence.training)
+    for block in evidence.held_out:
+        told = forecast(fitted, (block,))
+        raw.append((told.measured - told.predicted) / np.sqrt(np.diag(told.covariance)))
+        blocks.append(block)
+    whole = np.concatenate(raw)
+    p_values = multipletests(2.0 * stats.norm.sf(np.abs(whole)), method="holm")[1]
+    start = 0
+    for block in blocks:
+        row, end = emulator.space.conditions.index(block.condition), start + len(block.mean)
+        residuals[row, block.columns], adjusted[row, block.columns] = whole[start:end], p_values[start:end]
+        start = end
+    return residuals, adjusted
+
+
+def drift_records(base: Fitted) -> tuple[Drift, ...]:
+    """Each factor fitted to one condition at a time."""
+    fits = condition_fits(base)
+    if len(fits) < 2:
+        return ()
+    space = base.model.emulator.space
+    half_range = (np.array(space.upper) - np.array(space.lower)) / 2.0
+    conditions = tuple(one.stack.blocks[0].condition for one in fits)
+    values = np.array([space.natural_theta(one.x) for one in fits])
+    errors = np.array([np.sqrt(np.diag(one.spread)) * half_range for one in fits])
+    return tuple(
+        Drift(
+            factor,
+            conditions,
+            tuple(float(value) for value in values[:, column]),
+            tuple(float(value) for value in errors[:, column]),
+            drift_p(values[:, column], errors[:, column]),
+        )
+        for column, factor in enumerate(space.factors)
+    )
+
+
+def candidate_record(
+    assessment: Assessment, base: Signatures, scores: np.ndarray, settings: Settings
+) -> Candidate:
+    """One row of the evidence table; of a pair, score and share are those of the stronger."""
+    fitted = assessment.fitted
+    numbers = [base.names.index(name) for name in assessment.mechanisms]
+    found = objections(assessment, settings)
+    return Candidate(
+        mechanisms=assessment.mechanisms,
+        score=float(max(scores[number] for number in numbers)),
+        visible_share=float(max(base.shares[number] for number in numbers)),
+        sizes=size_intervals(fitted),
+        size_over_se=tuple(float(value) for value in assessment.ratios),
+        q=fitted.q,
+        degrees_of_freedom=fitted.freedom,
+        q_limit=assessment.gap.q_limit,
+        explained=assessment.explained,
+        held_out_gain=assessment.gain,
+        simulated=assessment.simulated,
+        admitted=not found,
+        objection=found[0] if found else "",
+    )
+
+
+def power_records(emulator: Emulator, seen: Sequence[Visibility]) -> tuple[Power, ...]:
+    """The smallest visible size of each mechanism in its natural units."""
+    return tuple(
+        Power(
+            one.name,
+            emulator.space.natural_size(one.name, one.gamma80) if np.isfinite(one.gamma80) else float("inf"),
+            emulator.space.mechanism(one.name).maximum,
+            one.share,
+            one.resolvable,
+        )
+        for one in seen
+    )
