@@ -9,7 +9,6 @@ from dem_warp.checkpoint import Checkpoints
 from dem_warp.clumps import stack_spheres
 from dem_warp.provenance import engine_fingerprint, provenance
 from dem_warp.result import CaseResult
-from dem_warp.scenes.scene import Decision
 from dem_warp.snapshot import STEP, put_snapshot, take_snapshot
 from dem_warp.solver import CHUNK, Solver
 from dem_warp.types import WorldFlag
@@ -107,25 +106,22 @@ class Batch:
     def _look(self, due: Sequence[int]) -> list[tuple[int, CaseResult]]:
         """Let the controllers of the worlds that are due decide; results of those that ended."""
         flags = self.solver.flags.numpy()
-        ended = []
+        ended, moves = [], []
         for w, view in zip(due, self.solver.view(due), strict=True):
             verdict = _verdict(WorldFlag(int(flags[w])), view.time)
             if verdict is None:
                 decision = self.controllers[w].look(view)
-                self._carry_out(w, decision)
+                if decision.remove is not None:
+                    self.solver.remove(w, decision.remove)
+                moves += [(w, wall, motion) for wall, motion in decision.move.items()]
                 if not decision.done:
                     continue
                 verdict = ("failed" if decision.failure else "finished", decision.failure)
             self.solver.stop(w)
             self.running.remove(w)
             ended.append((w, self._result(w, *verdict)))
+        self.solver.move_walls(moves)
         return ended
-
-    def _carry_out(self, w: int, decision: Decision) -> None:
-        if decision.remove is not None:
-            self.solver.remove(w, decision.remove)
-        for wall, motion in decision.move.items():
-            self.solver.move_wall(w, wall, motion)
 
     def _result(self, w: int, status: str, reason: str) -> CaseResult:
         poses, course, setup = self.solver.poses(w), self.controllers[w].course, self.setups[w]

@@ -1,5 +1,6 @@
 """What one world is made of, described on the host, and the stacking of many worlds into arrays."""
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
@@ -82,10 +83,15 @@ class ContactCoefficients:
     def parameters(self) -> dict[str, float]:
         """Fields of `ContactParams`; a mechanism that is not there is at its null."""
         base = {f.name: float(getattr(self, f.name)) for f in fields(self) if f.name != "mechanisms"}
-        absent = (kind() for kind in MECHANISMS.values())
-        null = {name: value for mechanism in absent for name, value in mechanism.parameters.items()}
         own = {name: value for m in self.mechanisms for name, value in m.parameters.items()}
-        return base | null | own
+        return base | _nulls() | own
+
+
+@functools.cache
+def _nulls() -> dict[str, float]:
+    """Parameters of every mechanism of the library at its null."""
+    absent = (kind() for kind in MECHANISMS.values())
+    return {name: value for mechanism in absent for name, value in mechanism.parameters.items()}
 
 
 @dataclass(frozen=True, eq=False)

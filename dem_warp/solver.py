@@ -1,8 +1,9 @@
 """The sequence of launches that moves a batch on, captured once as a graph and replayed."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, fields
-from itertools import product
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,14 +18,17 @@ from dem_warp.kernels.walls import wall_kernels
 from dem_warp.kernels.watch import watch_kernels
 from dem_warp.laws.contact_law import memory_size
 from dem_warp.model import WorldSetup
+from dem_warp.room import neighbour_room
 from dem_warp.state import (
     Layout,
     build_grains,
     build_model,
     build_neighbours,
     copy_grains,
+    living_grains,
+    unchanged,
 )
-from dem_warp.triangles import meshes_of, most_within, place_triangles
+from dem_warp.triangles import place_triangles
 from dem_warp.types import FRAMES, PRECISIONS, Build, device_structs
 from dem_warp.walls import Motion
 
@@ -44,6 +48,9 @@ for more lanes a grain, which shorten a step."""
 
 MOST_LANES = 16
 
+FAR = 1.0e3
+"""Distance from which nothing touches a wall [m]."""
+
 
 @dataclass(frozen=True)
 class WorldView:
@@ -62,6 +69,8 @@ class WorldView:
         [m], [m/s]
     masses : (n,) array
         [kg]
+    load : callable
+        Force [N], (3,), that the grains put on a wall, by its number; see `Solver.wall_load`.
     """
 
     step: int
@@ -71,6 +80,7 @@ class WorldView:
     positions: np.ndarray
     velocities: np.ndarray
     masses: np.ndarray
+    load: Callable[[int], np.ndarray]
 
 
 class Solver:
@@ -110,7 +120,7 @@ class Solver:
         self._cell_kernels = cell_kernels(self.build.without_mechanisms)
         self._wall_kernels = wall_kernels(self.build.without_mechanisms)
         self._list_kernels = neighbour_kernels(self.build)
-        room = [_neighbour_room(world) for world in worlds]
+        room = [neighbour_room(world) for world in worlds]
         self._watch_kernels = watch_kernels(self.build)
         self.cycle_limit = LONGEST_CYCLE
         with wp.ScopedDevice(self.device):
@@ -127,7 +137,7 @@ class Solver:
         first = build_grains(self.worlds, layout, self.precision, device)
         self.grains = (first, copy_grains(first, self.precision))
         self.hood = build_neighbours(layout, capacity, memory_size(layout.mechanisms), self.precision, device)
-        self.alive = _padded_ones(self.worlds, layout, device)
+        self.alive = living_grains(self.worlds, layout, device)
         self.flags, self.stale, self.idle, self.rebuilds, self.running = (
             wp.zeros(layout.world_count, dtype=int) for _ in range(5)
         )
@@ -293,26 +303,82 @@ class Solver:
 
     def move_wall(self, world: int, wall: int, motion: Motion) -> None:
         """Let a wall move on from its present place, in any way, from the present step on."""
-        walls = np.array(self.model.wall.numpy())
-        row = walls[world * self.layout.wall_count + wall]
-        row["start_step"] = self.grains[0].step.numpy()[world]
-        row["point"], row["orientation"] = self.wall_pose(world, wall)
-        for field in fields(motion):
-            row[field.name] = getattr(motion, field.name)
+        self.move_walls([(world, wall, motion)])
+
+    def move_walls(self, moves: Sequence[tuple[int, int, Motion]]) -> None:
+        """Let several walls move on, each given by its world and its number; hardly longer than one."""
+        if not moves:
+            return
+        walls, stale = np.array(self.model.wall.numpy()), np.array(self.stale.numpy())
+        steps = self.grains[0].step.numpy()
+        self._place_walls(0)
+        for world, wall, motion in moves:
+            row = walls[world * self.layout.wall_count + wall]
+            row["start_step"] = steps[world]
+            frame = self._frame(world, wall).numpy()[0]
+            row["point"], row["orientation"] = frame["origin"], frame["rotation"]
+            for field in fields(motion):
+                row[field.name] = getattr(motion, field.name)
+            stale[world] = 1
         self.model.wall.assign(walls)
         self._place_walls(0)
         # the lists know of the old motion only
-        self.stale[world : world + 1].fill_(1)
+        self.stale.assign(stale)
         self._rebuild(0)
         self._look_back(0)
 
     def wall_pose(self, world: int, wall: int) -> tuple[np.ndarray, np.ndarray]:
         """Where the wall's own point is [m], and how far the wall has turned (quaternion x y z w)."""
         self._place_walls(0)
-        number = world * self.layout.wall_count + wall
-        step = int(self.grains[0].step.numpy()[world])
-        frame = self.model.frame.numpy()[number * FRAMES + step % FRAMES]
+        frame = self._frame(world, wall).numpy()[0]
         return np.array(frame["origin"]), np.array(frame["rotation"])
+
+    def _frame(self, world: int, wall: int) -> Any:
+        """Where a wall stands in the present step, as an array of one on the device."""
+        step = int(self.grains[0].step[world : world + 1].numpy()[0])
+        place = (world * self.layout.wall_count + wall) * FRAMES + step % FRAMES
+        return self.model.frame[place : place + 1]
+
+    def wall_load(self, world: int, wall: int) -> np.ndarray:
+        """Force that the grains put on a wall [N], (3,), whatever the contact law.
+
+        It is the momentum that grains and wall would exchange in the next step if there were no other wall,
+        over the length of the step: the forces between grains cancel in the sum. Nothing is changed. To be
+        called between `advance` and all that changes the world.
+        """
+        n, lanes, setup = self.layout.grain_count, self.lanes, self.worlds[world]
+        rows = slice(world * n, (world + 1) * n)
+        probed: Any = wp.array([world], dtype=int, device=self.device)
+        inputs = [
+            lanes, n, self.model, probed, self.grains[0], self.hood, self.alive, self.flags, self.grains[1],
+        ]  # fmt: skip
+        with unchanged(self._changed_by_step(world)), self._alone(world, wall):
+            self._launch(self._step_kernels.step, self._whole_warps(n * lanes), inputs)
+        step = self.grains[0].step[world : world + 1].numpy()
+        free = (self.alive[rows].numpy() > 0) & (self.model.release_step[rows].numpy() <= step)
+        start, end = (grains.velocity[rows].numpy()[free].astype(float) for grains in self.grains)
+        gained = start[:, 3] @ (end[:, :3] - start[:, :3]) / setup.time_step
+        return start[:, 3].sum() * np.array(setup.gravity) - gained
+
+    def _changed_by_step(self, world: int) -> list[Any]:
+        """What a step writes of a world, beside the second copy of its grains."""
+        held, count = int(self.hood.list[world : world + 1].numpy()[0]), self.layout.world_count
+        lists = [
+            array.reshape((2, count, -1)) for array in (self.hood.history, self.hood.memory) if array.size
+        ]
+        others = [array.reshape((count, -1)) for array in (self.hood.travel, self.alive, self.flags)]
+        return [array[held, world] for array in lists] + [array[world] for array in others]
+
+    @contextmanager
+    def _alone(self, world: int, wall: int) -> Iterator[None]:
+        """Take the other walls of a world out of reach in the present step."""
+        frames = [self._frame(world, other) for other in range(self.layout.wall_count) if other != wall]
+        with unchanged(frames):
+            for frame in frames:
+                away = np.array(frame.numpy())
+                away["origin"] -= FAR * away["axis"]
+                frame.assign(away)
+            yield
 
     def view(self, worlds: Sequence[int]) -> list[WorldView]:
         """What scenes need of some worlds, copied from the device."""
@@ -331,6 +397,7 @@ class Solver:
                 positions[w],
                 velocities[w, :, :3],
                 velocities[w, :, 3],
+                partial(self.wall_load, w),
             )
             for w in worlds
         ]
@@ -339,39 +406,12 @@ class Solver:
         """Slots, positions [m], orientations, velocities [m/s] and spins [rad/s] of the living grains."""
         n = self.layout.grain_count
         rows = slice(world * n, (world + 1) * n)
-        slots = np.flatnonzero(self.alive.numpy()[rows] > 0)
+        slots = np.flatnonzero(self.alive[rows].numpy() > 0)
         grains = self.grains[0]
         return {
             "slots": slots,
-            "positions": grains.position.numpy()[rows][slots],
-            "orientations": grains.orientation.numpy()[rows][slots],
-            "velocities": grains.velocity.numpy()[rows][slots, :3],
-            "spins": grains.spin.numpy()[rows][slots, :3],
+            "positions": grains.position[rows].numpy()[slots],
+            "orientations": grains.orientation[rows].numpy()[slots],
+            "velocities": grains.velocity[rows].numpy()[slots, :3],
+            "spins": grains.spin[rows].numpy()[slots, :3],
         }
-
-
-def _padded_ones(worlds: Sequence[WorldSetup], layout: Layout, device: Any) -> wp.array:
-    alive = np.zeros((layout.world_count, layout.grain_count), dtype=np.int32)
-    for w, world in enumerate(worlds):
-        alive[w, : world.grains.count] = 1
-    return wp.array(alive.ravel(), dtype=int, device=device)
-
-
-def _neighbour_room(world: WorldSetup) -> tuple[int, int]:
-    """Partners of a sphere and entries of a grain that no packing of the world's grains should pass."""
-    found, listed = 16, 32
-    for shape, others in product(world.shapes, repeat=2):
-        reach = shape.radii.mean() + others.radii.mean() + world.skin + world.reach
-        per_volume = 0.7 * others.sphere_count / others.volume
-        around = per_volume * (4 / 3 * np.pi * reach**3)
-        found = max(found, int(1.5 * around) + 16)
-        listed = max(listed, int(shape.sphere_count * around * 0.7) + 32)
-    triangles = _triangles_near(world)
-    listed += triangles * max(shape.sphere_count for shape in world.shapes)
-    return found + triangles, -(-listed // 8) * 8
-
-
-def _triangles_near(world: WorldSetup) -> int:
-    """Triangles that a sphere lists at the most, and some more."""
-    reach = world.largest_sphere + world.skin + world.reach
-    return sum(int(1.5 * most_within(mesh, reach)) + 8 for mesh in meshes_of([world]))

@@ -1,6 +1,7 @@
 """The device arrays of a batch: what stays (`Model`), what moves (`Grains`, twice), the neighbour lists."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -114,7 +115,8 @@ def build_model(
     shapes = shape_table(worlds)
     real = np.float32 if precision.real is wp.float32 else np.float64
     spheres = stack_spheres(shapes)
-    shape_index = [np.array([shapes.index(s) for s in world.shapes])[world.grains.shapes] for world in worlds]
+    number = {shape: i for i, shape in enumerate(shapes)}
+    shape_index = [np.array([number[s] for s in world.shapes])[world.grains.shapes] for world in worlds]
     inertia = [np.column_stack([world.inertias, world.bounding_radii]) for world in worlds]
     world_rows = [
         {
@@ -197,12 +199,31 @@ def arrays_of(struct: Any) -> dict[str, wp.array]:
     return {name: value for name, value in vars(struct).items() if isinstance(value, wp.array)}
 
 
+@contextmanager
+def unchanged(arrays: Sequence[Any]) -> Iterator[None]:
+    """Give arrays back the values that they have now."""
+    kept = [wp.clone(array) for array in arrays]
+    try:
+        yield
+    finally:
+        for array, values in zip(arrays, kept, strict=True):
+            wp.copy(array, values)
+
+
 def copy_grains(grains: Any, precision: Precision) -> Any:
     """A second copy of `Grains`, for steps that read one and write the other."""
     other = device_structs(precision).Grains()
     for name, array in arrays_of(grains).items():
         setattr(other, name, wp.clone(array))
     return other
+
+
+def living_grains(worlds: Sequence[WorldSetup], layout: Layout, device: Any) -> wp.array:
+    """1 for each slot that holds a grain at the start."""
+    alive = np.zeros((layout.world_count, layout.grain_count), dtype=np.int32)
+    for w, world in enumerate(worlds):
+        alive[w, : world.grains.count] = 1
+    return wp.array(alive.ravel(), dtype=int, device=device)
 
 
 def build_neighbours(

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -14,6 +14,7 @@ from dem_warp.scenes.poured_controller import UNREST, Phase, PouredController
 from dem_warp.scenes.poured_scene import FILL_OBSERVABLES, GRAVITY, PouredScene
 from dem_warp.scenes.rain import CrossSection
 from dem_warp.scenes.scene import Course, Decision, Observable
+from dem_warp.scenes.surfaces import bed_level
 from dem_warp.solver import WorldView
 from dem_warp.walls import Cylinder, Disc, Motion, Plane, Wall
 
@@ -21,8 +22,41 @@ PLATE, TUBE = 0, 1
 GONE = 1.5
 """Grains that have risen with the tube by this many times its height leave with it."""
 
+FALLS = {"t75": 0.75, "t55": 0.55}
+"""Parts of the fill height to which the falling surface is timed."""
+
+ROLLED = 2.0
+"""Grains that end farther from the axis than this many radii of the tube have rolled off the heap."""
+
 CLOGGED = 0.02
 """Part of the grains from which on a tube that takes them along is clogged: no heap."""
+
+
+LIFT_OBSERVABLES = {
+    "time_to_rest": Observable("s", "from the start of the lift until the heap rests"),
+    "grains_lost": Observable("1", "grains that left the plate, or rose with the tube"),
+    "wall_drag": Observable(
+        "1",
+        "part of the grains' weight that hangs on the tube when all that was poured rests in it: what a "
+        "balance under the plate does not show",
+    ),
+    "centre_height": Observable(
+        "m", "height of the heap's centre of mass above the plate; absent where every grain was lost"
+    ),
+    "rolled_fraction": Observable(
+        "1",
+        f"part of the mass in the tube that ends farther from its axis than {ROLLED:g} of its inner radii, "
+        "or is lost",
+    ),
+} | {
+    name: Observable(
+        "s",
+        f"from the start of the lift until the surface has fallen to {100 * part:g} % of fill_height; it is "
+        "measured as that is, from the grains within the tube's cross-section; straight between two looks, "
+        "absent where it does not fall so far",
+    )
+    for name, part in FALLS.items()
+}
 
 
 @dataclass(frozen=True)
@@ -69,10 +103,7 @@ class LiftedCylinder(PouredScene):
     vibration_frequency: float = 50.0
     vibration_hold: float = 0.5
 
-    observables: ClassVar[Mapping[str, Observable]] = FILL_OBSERVABLES | {
-        "time_to_rest": Observable("s", "from the start of the lift until the heap rests"),
-        "grains_lost": Observable("1", "grains that left the plate, or rose with the tube"),
-    }
+    observables: ClassVar[Mapping[str, Observable]] = FILL_OBSERVABLES | LIFT_OBSERVABLES
     densest_fill = 0.58
     floor = 0.0
 
@@ -168,20 +199,41 @@ class LiftedCylinder(PouredScene):
         return LiftController(case, setup, chunk)
 
 
-class LiftController(PouredController[Course]):
+@dataclass
+class Lift(Course):
+    """Course of a lifted cylinder.
+
+    Attributes
+    ----------
+    mass : float
+        Of the grains that filled the tube [kg].
+    surface : list of float
+        Time since the start of the lift [s], and level of the surface [m], when last looked at.
+    """
+
+    mass: float = 0.0
+    surface: list[float] = field(default_factory=list)
+
+
+class LiftController(PouredController[Lift]):
     """Phases of one lifted cylinder: fill, settle, lift."""
 
     LIFT_MARGIN = 6.0
     """Time [s] allowed beyond the tube's own height."""
 
     def __init__(self, case: Case[LiftedCylinder], setup: WorldSetup, chunk: int) -> None:
-        super().__init__(case, setup, chunk, Course("fill"))
+        super().__init__(case, setup, chunk, Lift("fill"))
         self.scene = case.scene
         lift = max(0.5 * self.scene.diameter / self.scene.lift_speed, self.scene.vibration_time)
         self.phases["lift"] = Phase(self._lift, lift + 0.3)
 
     def begin(self, view: WorldView, kept: np.ndarray) -> Mapping[int, Motion]:
         """Lift the tube, and let the drive shake the plate."""
+        alive = view.masses[view.alive].astype(float).sum()
+        self.course.mass = float(view.masses[kept].astype(float).sum())
+        weight = alive * self.scene.gravity[2]
+        self.course.observables["wall_drag"] = float(view.load(TUBE)[2] / weight)
+        self.course.surface = [0.0, self.course.observables["fill_height"]]
         self.course.enter("lift", view)
         return self.scene.lift
 
@@ -197,6 +249,7 @@ class LiftController(PouredController[Course]):
 
     def _lifted(self, view: WorldView) -> Decision:
         elapsed = view.time - self.course.phase_start
+        self._time_fall(view, elapsed)
         rise = self.scene.lift_speed * elapsed
         positions = view.positions[view.alive]
         top = positions[:, 2].max() + self.reach if len(positions) else 0.0
@@ -218,6 +271,20 @@ class LiftController(PouredController[Course]):
             return Decision(done=True, failure=failure)
         return Decision()
 
+    def _time_fall(self, view: WorldView, elapsed: float) -> None:
+        """Note when the surface has fallen to parts of the height it had."""
+        seen = self.course.observables
+        awaited = {name: part * seen["fill_height"] for name, part in FALLS.items() if name not in seen}
+        if not awaited:
+            return
+        radius, (before, above) = self.scene.diameter / 2, self.course.surface
+        inside = view.alive & (np.hypot(view.positions[:, 0], view.positions[:, 1]) < radius)
+        level = bed_level(view.positions[inside], (radius, radius), self.case.grains.grain_reach)
+        for name, awaited_level in awaited.items():
+            if level <= awaited_level:
+                seen[name] = before + (above - awaited_level) / (above - level) * (elapsed - before)
+        self.course.surface = [elapsed, level]
+
     def _finish(self, view: WorldView, elapsed: float) -> None:
         course = self.course
         rested = elapsed if course.slow_since is None else course.slow_since - course.phase_start
@@ -226,4 +293,13 @@ class LiftController(PouredController[Course]):
             "simulated_time": view.time,
             "grains_lost": course.observables["grain_count"] - float(np.count_nonzero(view.alive)),
         }
+        self._weigh_heap(view)
         course.enter("rest", view)
+
+    def _weigh_heap(self, view: WorldView) -> None:
+        """Where the mass came to lie."""
+        masses, positions = view.masses[view.alive].astype(float), view.positions[view.alive]
+        near = np.hypot(positions[:, 0], positions[:, 1]) <= ROLLED * self.scene.diameter / 2
+        self.course.observables["rolled_fraction"] = 1.0 - float(masses[near].sum()) / self.course.mass
+        if len(masses):
+            self.course.observables["centre_height"] = float(masses @ positions[:, 2] / masses.sum())

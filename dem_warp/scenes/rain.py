@@ -88,7 +88,8 @@ def place_rain(
     reaches = [float(drawn.bounding_radii.max()) for drawn in grains]
     first = np.cumsum([0, *(drawn.count for drawn in grains)])
     table = list(dict.fromkeys(clump for drawn in grains for clump in drawn.clumps))
-    shapes = [np.array([table.index(clump) for clump in drawn.clumps])[drawn.shapes] for drawn in grains]
+    number = {clump: i for i, clump in enumerate(table)}
+    shapes = [np.array([number[clump] for clump in drawn.clumps])[drawn.shapes] for drawn in grains]
     spheres = stack_spheres(table)
     with wp.ScopedDevice(device):
         position = wp.zeros(int(first[-1]), dtype=wp.vec3)

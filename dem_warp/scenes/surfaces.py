@@ -36,13 +36,15 @@ def column_tops(places: np.ndarray, heights: np.ndarray, side: float) -> tuple[n
     tops : (k,) array
         [m]
     """
-    columns, first, owner = np.unique(
-        np.floor(places / side).astype(int), axis=0, return_index=True, return_inverse=True
-    )
-    tops = np.full(len(columns), -np.inf)
-    np.maximum.at(tops, owner.ravel(), heights)
-    order = np.argsort(first)
-    return columns[order], tops[order]
+    cells = np.floor(places / side).astype(int)
+    i, j = (cells - cells.min(axis=0)).T
+    owner, number = i * (j.max() + 1) + j, np.arange(len(cells))
+    tops = np.full(owner.max() + 1, -np.inf)
+    np.maximum.at(tops, owner, heights)
+    first = np.full(len(tops), len(cells))
+    np.minimum.at(first, owner, number)
+    seen = number[first[owner] == number]
+    return cells[seen], tops[owner[seen]]
 
 
 def bed_level(positions: np.ndarray, half_sides: tuple[float, float], reach: float) -> float:

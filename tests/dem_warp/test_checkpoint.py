@@ -22,7 +22,7 @@ from dem_warp import Case, CaseResult, simulate
 from dem_warp.batch import Batch
 from dem_warp.checkpoint import Checkpoints
 from dem_warp.device import resolve_device
-from dem_warp.scenes.scene import Course
+from dem_warp.scenes.lifted_cylinder import Lift
 from dem_warp.snapshot import put_snapshot, take_snapshot
 from dem_warp.walls import Motion
 
@@ -103,7 +103,7 @@ def marked(folder: Path, *cases: Case) -> None:
         kept = Checkpoints(folder)
         course, snapshot = kept.load(case, batch.maker)
         course["observables"]["taken_up"] = 1.0
-        kept.save(case, batch.maker, Course(**course), snapshot)
+        kept.save(case, batch.maker, Lift(**course), snapshot)
 
 
 def without_mark(result: CaseResult) -> CaseResult:

@@ -244,7 +244,8 @@ def end_of_lift(riding: int) -> tuple[Decision, Decision, float]:
         positions = bed.copy()
         positions[:riding, 2] += rise
         step = round(time / setup.time_step)
-        decision = controller.look(WorldView(step, time, alive, alive, positions, rest, setup.masses))
+        view = WorldView(step, time, alive, alive, positions, rest, setup.masses, lambda wall: np.zeros(3))
+        decision = controller.look(view)
         if decision.remove is not None:
             alive[decision.remove] = False
         if lifted_at is not None and first is None and (decision.done or decision.remove is not None):
