@@ -194,4 +194,4 @@ def replay_chart(replay: Replay) -> Chart:
             text=[f"run {run}" for run in points["run"]],
         )
     caption = "Mean angle of each run against the published one; bars: ± 1 sd over its heaps."
-    return Chart("replay-chart", caption, figure, tall=True)
+    return Chart("replay-chart", caption, figure, height="tall")

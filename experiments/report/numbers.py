@@ -145,6 +145,11 @@ def enumeration(names: Iterable[str]) -> str:
     return f"{', '.join(first)} and {last}" if first else last
 
 
+def capital(text: str) -> str:
+    """Begin a text with a capital letter; the rest stays as it is."""
+    return text[:1].upper() + text[1:]
+
+
 def interval(ends: Iterable[float], decimals: int = 2) -> str:
     """Write an interval as "[low, high]"."""
     return f"[{', '.join(fixed(end, decimals) for end in ends)}]"

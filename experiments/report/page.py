@@ -64,8 +64,10 @@ def render_page(
         sections.append(Section("heaps"))
     sections += [failed_section(campaign), *replay_sections(replay, campaign)]
     sections += [*paper_sections(context.published), Section("provenance")]
-    page = _environment().get_template("report.html.j2")
+    page = environment().get_template("page.html.j2")
     return page.render(
+        kind="calibration report",
+        folder="sections",
         campaign=campaign,
         study=study,
         outcome=OUTCOMES[campaign.outcome],
@@ -134,7 +136,8 @@ def _labels(study: Study) -> dict[str, str]:
     return {section.name: section.label for section in study.factor_sections}
 
 
-def _environment() -> jinja2.Environment:
+def environment() -> jinja2.Environment:
+    """Open the templates, with the filters that they use."""
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("experiments.report"),
         autoescape=True,
@@ -150,6 +153,7 @@ def _environment() -> jinja2.Environment:
         "plain": numbers.plain,
         "named_number": numbers.named_number,
         "prose": numbers.prose,
+        "capital": numbers.capital,
         "enumeration": numbers.enumeration,
         "equation": numbers.equation,
         "term": numbers.term,

@@ -147,7 +147,7 @@ def _relief_chart(
         margin={"l": 0, "r": 0, "t": 36, "b": 0},
     )
     caption = f"Fitted repose angle; drag to turn it.{plane.held_text}"
-    return Chart("surface-relief", caption, figure, tall=True)
+    return Chart("surface-relief", caption, figure, height="tall")
 
 
 def _contour_chart(
@@ -167,7 +167,7 @@ def _contour_chart(
     if optimum is not None:
         add_points(figure, *point_in(plane, optimum.point), "optimum", VERMILION, "diamond", 13)
     caption = "Fitted angle, target curve and compatible region (green); the dotted box is coded −1 to +1."
-    return Chart(f"contour-{plane.x}-{plane.y}", caption + plane.held_text, figure, tall=True)
+    return Chart(f"contour-{plane.x}-{plane.y}", caption + plane.held_text, figure, height="tall")
 
 
 def _curve_chart(result: SurfaceResult, optimum: OptimumResult | None, target: TargetResult) -> Chart:
@@ -195,7 +195,7 @@ def _curve_chart(result: SurfaceResult, optimum: OptimumResult | None, target: T
         chosen = [optimum.point[factor.name]], [optimum.prediction["mean"]]
         add_points(figure, *chosen, "optimum", VERMILION, "diamond", 13)
     caption = "Fitted curve; the green band is the target ± its standard error."
-    return Chart("surface-curve", caption, figure, tall=True)
+    return Chart("surface-curve", caption, figure, height="tall")
 
 
 def _add_points_3d(

@@ -32,8 +32,8 @@ class Chart:
     """Its anchor in the page."""
     caption: str
     figure: go.Figure
-    tall: bool = False
-    """Takes more height than the usual."""
+    height: str = ""
+    """"tall" or "low" where it takes more or less height than the usual."""
 
     @property
     def json(self) -> str:

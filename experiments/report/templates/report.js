@@ -13,7 +13,7 @@ for (const source of document.querySelectorAll("script[data-plot]")) {
 window.addEventListener("beforeprint", () => {
   for (const place of places) {
     const width = place.closest(".grid") ? 320 : 660;
-    const height = place.closest(".tall") ? 340 : 300;
+    const height = place.closest(".tall") ? 340 : place.closest(".low") ? 220 : 300;
     Plotly.relayout(place, { width, height });
   }
 });

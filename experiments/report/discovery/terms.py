@@ -1,0 +1,93 @@
+"""What the names in a discovery mean: titles, units, and numbers with both."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from experiments.discover.discovery import Interval
+from experiments.discover.library import Mechanism
+from experiments.discover.observables import Observable
+from experiments.report.numbers import enumeration, fixed, trimmed
+from experiments.study.factor_section import FactorSection
+
+SHOWN_UNITS = {"m": (1e3, "mm"), "deg": (1.0, "°"), "1": (1.0, "")}
+"""Units that a reader likes better: the factor, and the unit."""
+
+SIZE_DIGITS = 3
+"""Significant digits of the size of a mechanism."""
+
+
+@dataclass(frozen=True)
+class Terms:
+    """The vocabulary of a page."""
+
+    mechanisms: Mapping[str, Mechanism]
+    observables: Mapping[str, Observable]
+    factors: Mapping[str, FactorSection]
+
+    @classmethod
+    def of(
+        cls,
+        library: Sequence[Mechanism],
+        observables: Sequence[Observable],
+        factors: Sequence[FactorSection],
+    ) -> Terms:
+        """Collect the vocabulary by name."""
+        return cls(
+            {mechanism.name: mechanism for mechanism in library},
+            {observable.name: observable for observable in observables},
+            {factor.name: factor for factor in factors},
+        )
+
+    def title(self, name: str) -> str:
+        """Name a mechanism in words; "base" is the model without one."""
+        return self.mechanisms[name].title if name in self.mechanisms else name.replace("_", " ")
+
+    def titles(self, names: Iterable[str], joined: str = "and") -> str:
+        """Name mechanisms in words: "A", "A and B", "A, B and C"."""
+        *first, last = [self.title(name) for name in names] or [""]
+        return f"{', '.join(first)} {joined} {last}" if first else last
+
+    def value(self, name: str, value: float) -> str:
+        """Write the size of a mechanism with its unit."""
+        return f"{trimmed(value, SIZE_DIGITS)} {self._unit(name)}".rstrip()
+
+    def size(self, name: str, size: Interval) -> str:
+        """Write the size of a mechanism with its 90 % interval."""
+        low, high = (trimmed(end, SIZE_DIGITS) for end in (size.low, size.high))
+        return f"{self.value(name, size.value)} (90 % interval {low} to {high})"
+
+    def short_size(self, name: str, size: Interval) -> str:
+        """Write a size for a table: value, interval, unit."""
+        low, high = (trimmed(end, SIZE_DIGITS) for end in (size.low, size.high))
+        return f"{trimmed(size.value, SIZE_DIGITS)} [{low}, {high}] {self._unit(name)}".rstrip()
+
+    def sizes(self, names: Sequence[str], sizes: Sequence[Interval]) -> str:
+        """Write the sizes of several mechanisms in words."""
+        return enumeration(self.size(name, size) for name, size in zip(names, sizes, strict=True))
+
+    def scale(self, observable: str) -> tuple[float, str]:
+        """Factor and unit in which an observable is shown."""
+        unit = self.observables[observable].unit
+        return SHOWN_UNITS.get(unit, (1.0, unit))
+
+    def axis(self, observable: str) -> str:
+        """Name an observable with the unit in which it is shown."""
+        unit = self.scale(observable)[1]
+        name = observable.replace("_", " ")
+        return f"{name} [{unit}]" if unit else name
+
+    def _unit(self, name: str) -> str:
+        unit = self.mechanisms[name].unit
+        return SHOWN_UNITS["1"][1] if unit == "1" else "°" if unit == "deg" else unit
+
+
+def percent(share: float, decimals: int = 0) -> str:
+    """Write a share as a percentage."""
+    return f"{fixed(100.0 * share, decimals)} %"
+
+
+def condition_name(condition: str, held_out: bool) -> str:
+    """Name a condition, and say if it took no part in the fit."""
+    return f"{condition} (held out)" if held_out else condition

@@ -1,0 +1,232 @@
+"""The verdict of a discovery in words: headline, sentence, and what would change it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from experiments.discover.discovery import BeforeAfter, Candidate, Discovery, Interval, Power, Verdict
+from experiments.report.discovery.terms import Terms, percent
+from experiments.report.numbers import capital, fixed, p_value, trimmed
+
+SETTLED = (Verdict.NONE, Verdict.NAMED)
+"""Verdicts that leave no question open."""
+
+SHOWN_RIVALS = 2
+"""Refused mechanisms whose objection is told."""
+
+
+def headline(found: Discovery, terms: Terms) -> str:
+    """Say the verdict in a few words."""
+    named = terms.titles(found.named)
+    return {
+        Verdict.NONE: "Nothing is missing",
+        Verdict.NAMED: f"Missing: {named}",
+        Verdict.TIE: f"A tie: {terms.titles(found.named, 'or')}",
+        Verdict.INCOMPLETE: f"Missing: {named}, and something else",
+        Verdict.UNKNOWN: "Something is missing, and it is not in the library",
+        Verdict.NOT_IDENTIFIABLE: "These data cannot tell",
+    }[found.verdict]
+
+
+def verdict_sentence(found: Discovery, terms: Terms) -> str:
+    """Say what was found, with its numbers, in one sentence or two."""
+    return _SENTENCES[found.verdict](found, terms)
+
+
+def changes(found: Discovery, terms: Terms) -> list[str]:
+    """Say what would change the verdict, a sentence each."""
+    return [sentence for part in _CHANGES[found.verdict] for sentence in part(found, terms)]
+
+
+def next_step(found: Discovery, terms: Terms) -> str:
+    """Describe the next experiment; empty where none is proposed."""
+    step = found.next_experiment
+    if step is None:
+        return ""
+    pair = " from ".join(
+        "the base" if name == "base" else f"the model with {terms.title(name)}" for name in step.separates
+    )
+    how = ", ".join(f"{place} = {value}" for place, value in step.changes)
+    setting = f"“{step.condition}”" + (f" ({how})" if how else "")
+    return (
+        f"Measure {step.replicates} heaps under the condition {setting}. It tells {pair} best: after both are"
+        f" fitted again they are expected to lie Q = {trimmed(step.expected_q, 3)} apart there, most in the"
+        f" {step.observable.replace('_', ' ')}."
+    )
+
+
+def _none(found: Discovery, terms: Terms) -> str:
+    if found.base is None or found.gap is None:
+        return found.reason
+    return (
+        "Fitted as well as it can be, the model agrees with the data within their noise:"
+        f" Q = {trimmed(found.base.q, 3)} at {fixed(found.base.degrees_of_freedom, 0)} degrees of freedom, where"
+        f" a gap would begin at {trimmed(found.base.q_limit, 3)} (p = {p_value(found.base.p_value)})."
+    )
+
+
+def _added(found: Discovery, terms: Terms) -> str:
+    """``Adding X at a removed c % of the excess; held out, Q fell from d to e``."""
+    if found.chosen is None:
+        return found.reason
+    sizes = terms.sizes(found.chosen.mechanisms, found.chosen.sizes)
+    text = f"Adding {terms.titles(found.chosen.mechanisms)} at {sizes}"
+    training, held_out = _set(found, held_out=False), _set(found, held_out=True)
+    if training:
+        text += f" removed {_share(training.removed)} of the excess"
+    if held_out:
+        fell = "fell" if held_out.after.value < held_out.before.value else "rose"
+        text += f"; held out, Q {fell} from {_q(held_out.before)} to {_q(held_out.after)}"
+    return text + "."
+
+
+def _tie(found: Discovery, terms: Terms) -> str:
+    each = "; ".join(
+        f"{terms.title(name)} at {terms.size(name, candidate.sizes[0])} leaves Q = {trimmed(candidate.q, 3)}"
+        for name in found.named
+        for candidate in found.candidates
+        if candidate.mechanisms == (name,)
+    )
+    return f"The model disagrees with the data, and these explain it equally well: {each}."
+
+
+def _unknown(found: Discovery, terms: Terms) -> str:
+    if found.base is None:
+        return found.reason
+    text = (
+        f"The model disagrees with the data (Q = {trimmed(found.base.q, 3)} at"
+        f" {fixed(found.base.degrees_of_freedom, 0)} degrees of freedom, p {_p(found.base.p_value)}),"
+        " and nothing in the library explains it"
+    )
+    if found.candidates:
+        best = found.candidates[0]
+        text += f"; the best, {terms.titles(best.mechanisms)}, removes {percent(best.explained)} of the excess"
+    return text + "."
+
+
+def _incomplete(found: Discovery, terms: Terms) -> str:
+    rest = (
+        f" What is left, Q = {trimmed(found.chosen.q, 3)}, is still beyond the noise"
+        f" (limit {trimmed(found.chosen.q_limit, 3)}): something else is missing too."
+        if found.chosen
+        else ""
+    )
+    return _added(found, terms) + rest
+
+
+def _not_identifiable(found: Discovery, terms: Terms) -> str:
+    return found.reason
+
+
+def _smaller_effects(found: Discovery, terms: Terms) -> Iterator[str]:
+    visible = [power for power in found.power if power.resolvable]
+    hidden = [power for power in found.power if not power.resolvable]
+    if visible:
+        sizes = ", ".join(f"{terms.title(p.mechanism)} {terms.value(p.mechanism, p.gamma80)}" for p in visible)
+        yield f"Smaller effects than these would have gone unseen (one in five at these sizes): {sizes}."
+    if hidden:
+        yield f"{_cannot_be_seen(hidden, terms)}: whether they act here is left open."
+
+
+def _margins(found: Discovery, terms: Terms) -> Iterator[str]:
+    chosen = next((c for c in found.candidates if c.mechanisms == found.named), None)
+    if chosen is None:
+        return
+    weakest = min(chosen.size_over_se)
+    text = f"Data that took the size ({fixed(weakest, 1)} standard errors from its null) to less than three"
+    if chosen.held_out_gain:
+        text += f", or the held-out gain (now {_gain(chosen.held_out_gain)}) to an interval that holds zero"
+    yield text + ", would withdraw the name."
+    room = chosen.q_limit - chosen.q
+    if room > 0.0:
+        yield (
+            f"The fit with it has Q = {trimmed(chosen.q, 3)}, {trimmed(room, 2)} below its limit: a disagreement"
+            " larger by that would mean that something else is missing too."
+        )
+
+
+def _rivals(found: Discovery, terms: Terms) -> Iterator[str]:
+    refused = [c for c in found.candidates if not c.admitted and c.objection]
+    for rival in refused[:SHOWN_RIVALS]:
+        yield f"{capital(terms.titles(rival.mechanisms))} was refused: {rival.objection.rstrip('.')}."
+
+
+def _unresolved(found: Discovery, terms: Terms) -> Iterator[str]:
+    hidden = [p for p in found.power if not p.resolvable and p.mechanism not in found.named]
+    if hidden:
+        yield f"{_cannot_be_seen(hidden, terms)}, and could never be named by them."
+
+
+def _outside(found: Discovery, terms: Terms) -> Iterator[str]:
+    yield (
+        "An effect outside the library that moves the same observables in the same proportions would be taken"
+        " for this one: its further experiment, below, is what tells them apart."
+    )
+
+
+def _settle_by_experiment(found: Discovery, terms: Terms) -> Iterator[str]:
+    if found.next_experiment:
+        yield f"The condition “{found.next_experiment.condition}” would settle it (see the next experiment)."
+
+
+def _widen(found: Discovery, terms: Terms) -> Iterator[str]:
+    yield (
+        "A mechanism that is added to the library (one file) and explains the map of residuals would be named"
+        " from the same data."
+    )
+
+
+def _more_data(found: Discovery, terms: Terms) -> Iterator[str]:
+    measured = int(np.isfinite(found.data.means[~np.array(found.data.held_out)]).sum())
+    yield (
+        f"The training conditions give {measured} mean value{'' if measured == 1 else 's'} for"
+        f" {len(found.factors)} fitted parameters. More observables of the same heaps (a photograph gives six),"
+        " or the same test under other conditions, would change that; more replicates would not."
+    )
+
+
+_SENTENCES: dict[Verdict, Callable[[Discovery, Terms], str]] = {
+    Verdict.NONE: _none,
+    Verdict.NAMED: _added,
+    Verdict.TIE: _tie,
+    Verdict.INCOMPLETE: _incomplete,
+    Verdict.UNKNOWN: _unknown,
+    Verdict.NOT_IDENTIFIABLE: _not_identifiable,
+}
+
+_CHANGES: dict[Verdict, tuple[Callable[[Discovery, Terms], Iterator[str]], ...]] = {
+    Verdict.NONE: (_smaller_effects,),
+    Verdict.NAMED: (_margins, _rivals, _unresolved, _outside),
+    Verdict.TIE: (_settle_by_experiment, _rivals, _unresolved),
+    Verdict.INCOMPLETE: (_margins, _widen, _rivals, _unresolved),
+    Verdict.UNKNOWN: (_rivals, _widen, _unresolved),
+    Verdict.NOT_IDENTIFIABLE: (_more_data,),
+}
+
+
+def _set(found: Discovery, held_out: bool) -> BeforeAfter | None:
+    return next((both for both in found.before_after if both.held_out is held_out), None)
+
+
+def _cannot_be_seen(hidden: list[Power], terms: Terms) -> str:
+    return f"Within their ranges these data cannot resolve {terms.titles(p.mechanism for p in hidden)}"
+
+
+def _share(share: Interval) -> str:
+    return f"{percent(share.value)} ({fixed(100.0 * share.low, 0)} to {percent(share.high)})"
+
+
+def _q(interval: Interval) -> str:
+    low, value, high = (trimmed(end, 3) for end in (interval.low, interval.value, interval.high))
+    return f"{value} ({low} to {high})"
+
+
+def _gain(gain: Interval) -> str:
+    return f"{fixed(gain.value, 1)}, 90 % interval {fixed(gain.low, 1)} to {fixed(gain.high, 1)}"
+
+
+def _p(value: float) -> str:
+    text = p_value(value)
+    return text if text.startswith("<") else f"= {text}"
