@@ -41,16 +41,27 @@ def read_toml(path: Path, what: str = "the study") -> tuple[str, dict[str, Any]]
         raise StudyError(f"{what} must be a readable file", error.strerror or "none", str(path)) from None
 
 
-def toml_text(document: Mapping[str, Any], path: tuple[str, ...] = ()) -> str:
-    """Write nested tables of text, numbers, truth values and lists of them as TOML; None is left out."""
-    values = {key: value for key, value in document.items() if not isinstance(value, Mapping)}
-    lines = [f"{_key(key)} = {_value(value)}" for key, value in values.items() if value is not None]
-    if path and (lines or not document):
-        lines.insert(0, f"[{'.'.join(map(_key, path))}]")
-    parts = ["\n".join(lines)] if lines else []
+def toml_text(document: Mapping[str, Any], path: tuple[str, ...] = (), array: bool = False) -> str:
+    """Write nested tables of text, numbers, truth values, lists of them and lists of tables as TOML.
+
+    None is left out; `path` is where the document stands in the file, in an `array` of tables or alone.
+    """
+    arrays = {key: value for key, value in document.items() if _holds_tables(value)}
     tables = {key: value for key, value in document.items() if isinstance(value, Mapping)}
+    values = {key: value for key, value in document.items() if key not in arrays and key not in tables}
+    lines = [f"{_key(key)} = {_value(value)}" for key, value in values.items() if value is not None]
+    if path and (lines or array or not document):
+        head = f"[{'.'.join(map(_key, path))}]"
+        lines.insert(0, f"[{head}]" if array else head)
+    parts = ["\n".join(lines)] if lines else []
     parts += [toml_text(table, (*path, key)).rstrip() for key, table in tables.items()]
+    for key, items in arrays.items():
+        parts += [toml_text(item, (*path, key), array=True).rstrip() for item in items]
     return "\n\n".join(parts) + "\n"
+
+
+def _holds_tables(value: Any) -> bool:
+    return isinstance(value, list | tuple) and bool(value) and all(isinstance(item, Mapping) for item in value)
 
 
 def _key(key: str) -> str:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from experiments.discover.discovery import Data, Discovery, Interval
-from experiments.discover.library import Mechanism
+from experiments.discover.library import Mechanism, with_mechanisms
 from experiments.files import replacing, write_text
 from experiments.report.discovery.terms import Terms
 from experiments.study import Study
@@ -51,7 +51,7 @@ def write_study_files(found: Discovery, study: Study, terms: Terms, folder: Path
     """
     written = []
     for candidate in _standing(found):
-        added = [(terms.mechanisms[name], size) for name, size in candidate]
+        added = {terms.mechanisms[name]: size for name, size in candidate}
         document = extended_document(study, added, found.data)
         for shape in shapes_of(document):
             source = study.file.parent / shape["clump"]
@@ -67,7 +67,7 @@ def write_study_files(found: Discovery, study: Study, terms: Terms, folder: Path
 
 
 def extended_document(
-    study: Study, added: Sequence[tuple[Mechanism, Interval]], data: Data
+    study: Study, added: Mapping[Mechanism, Interval], data: Data
 ) -> dict[str, Any]:
     """Add mechanisms to a study's document, each as a factor that ranges over its interval.
 
@@ -82,11 +82,8 @@ def extended_document(
     data
         What was measured.
     """
-    document = study.document
-    for mechanism, size in added:
-        for place in mechanism.parameters:
-            _drop(document, place.split("."))
-        document.setdefault("factor", []).append(_factor(mechanism, size))
+    ranges = {mechanism.name: _range(mechanism, size) for mechanism, size in added.items()}
+    document = with_mechanisms(study, list(added), ranges).document
     if "target" not in document and (target := _target(data)):
         document["target"] = target
     return document
@@ -102,17 +99,11 @@ def _standing(found: Discovery) -> list[list[tuple[str, Interval]]]:
     return [list(zip(*model, strict=True)) for model in models]
 
 
-def _factor(mechanism: Mechanism, size: Interval) -> dict[str, Any]:
-    low, high = max(size.low, mechanism.null), min(size.high, mechanism.maximum)
-    if not low < high:
-        low, high = mechanism.null, mechanism.maximum
-    return {
-        "name": mechanism.name,
-        "label": mechanism.title,
-        "parameter": list(mechanism.parameters),
-        "low": _quantity(low, mechanism.unit),
-        "high": _quantity(high, mechanism.unit),
-    }
+def _range(mechanism: Mechanism, size: Interval) -> tuple[float, float]:
+    """The interval of a size within the mechanism's range, or the whole range where it holds nothing."""
+    low, high = (float(f"{end:.{DIGITS}g}") for end in (size.low, size.high))
+    low, high = max(low, mechanism.null), min(high, mechanism.maximum)
+    return (low, high) if low < high else (mechanism.null, mechanism.maximum)
 
 
 def _target(data: Data) -> dict[str, Any]:
@@ -124,18 +115,5 @@ def _target(data: Data) -> dict[str, Any]:
         mean, se, count = (table[row, column] for table in (data.means, data.standard_errors, data.replicates))
         if not held_out and count >= 2 and np.isfinite(se) and se > 0.0:
             sd = float(se) * float(np.sqrt(count))
-            return {"mean": _quantity(float(mean), "deg"), "sd": _quantity(sd, "deg"), "n": int(count)}
+            return {"mean": f"{mean:.3f} deg", "sd": f"{sd:.3f} deg", "n": int(count)}
     return {}
-
-
-def _quantity(value: float, unit: str) -> str | float:
-    rounded = float(f"{value:.{DIGITS}g}")
-    return rounded if unit in ("", "1") else f"{rounded} {unit}"
-
-
-def _drop(document: dict[str, Any], path: Sequence[str]) -> None:
-    *outer, last = path
-    for key in outer:
-        if not isinstance(document := document.get(key, {}), dict):
-            return
-    document.pop(last, None)
