@@ -61,7 +61,7 @@ def toml_text(document: Mapping[str, Any], path: tuple[str, ...] = (), array: bo
 
 
 def _holds_tables(value: Any) -> bool:
-    return isinstance(value, list | tuple) and bool(value) and all(isinstance(item, Mapping) for item in value)
+    return isinstance(value, list | tuple) and bool(value) and isinstance(value[0], Mapping)
 
 
 def _key(key: str) -> str:

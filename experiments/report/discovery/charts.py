@@ -9,8 +9,8 @@ import numpy as np
 import plotly.graph_objects as go
 
 from experiments.discover.discovery import Confounding, Discovery, Fit
-from experiments.report.discovery.terms import Terms, condition_name
-from experiments.report.numbers import MISSING, fixed
+from experiments.report.discovery.terms import Terms, condition_name, spaced
+from experiments.report.numbers import MISSING, capital, fixed
 from experiments.report.theme import (
     BLUE,
     GREEN,
@@ -104,7 +104,9 @@ def gap_chart(found: Discovery) -> Chart:
         add_points(figure, [end.value for end in ends], rows, label, color, size=11, error_x=error)
     for at, both in enumerate(found.before_after):
         df = both.degrees_of_freedom
-        figure.add_shape(type="line", x0=df, x1=df, y0=at - 0.35, y1=at + 0.35, line={"color": GREEN, "width": 3})
+        figure.add_shape(
+            type="line", x0=df, x1=df, y0=at - 0.35, y1=at + 0.35, line={"color": GREEN, "width": 3}
+        )
     figure.update_xaxes(type="log", dtick=1 if _decades(found) > 1.0 else "D2")
     figure.update_yaxes(ticks="", ticklabelstandoff=6, range=[-0.6, len(rows) - 0.4])
     caption = "The gap before and after, from fresh direct runs, with 90 % bootstrap intervals."
@@ -137,31 +139,45 @@ def _comparison(found: Discovery, terms: Terms, column: int) -> Chart:
         series.append(("with the mechanism", ADDED, "square", fit.predicted, fit.predicted_se))
     for position, (name, color, symbol, values, errors) in enumerate(series):
         place = np.arange(len(rows)) + DODGE * (position - 0.5 * (len(series) - 1))
-        bars = {"type": "data", "array": 1.96 * factor * errors[rows, column], "color": color, "thickness": 1.5}
+        bars = {
+            "type": "data",
+            "array": 1.96 * factor * errors[rows, column],
+            "color": color,
+            "thickness": 1.5,
+        }
         hover = f"{name}: %{{y:.4g}}<extra></extra>"
         add_points(
-            figure, place, factor * values[rows, column], name, color, symbol, 8, error_y=bars, hovertemplate=hover
+            figure,
+            place,
+            factor * values[rows, column],
+            name,
+            color,
+            symbol,
+            8,
+            error_y=bars,
+            hovertemplate=hover,
         )
-    for place, row in enumerate(rows):
+    for at, row in enumerate(rows):
         if data.held_out[row]:
             figure.add_vrect(
-                x0=place - 0.45, x1=place + 0.45, fillcolor=MUTED, opacity=0.10, line_width=0, layer="below"
+                x0=at - 0.45, x1=at + 0.45, fillcolor=MUTED, opacity=0.10, line_width=0, layer="below"
             )
     figure.update_xaxes(
         tickvals=list(range(len(rows))),
         ticktext=[data.conditions[row] for row in rows],
+        tickangle=-35,
         range=[-0.6, len(rows) - 0.4],
         showgrid=False,
     )
-    name = observable.replace("_", " ")
-    definition = terms.observables[observable].definition.rstrip(".")
-    return Chart(f"compared-{observable}", f"{name[:1].upper()}{name[1:]}: {definition}.", figure, height="low")
+    told = terms.observables[observable]
+    caption = f"{capital(told.title)}: {told.definition.rstrip('.')}."
+    return Chart(f"compared-{observable}", caption, figure, height="low")
 
 
 def _residual_map(name: str, found: Discovery, fit: Fit, caption: str) -> Chart:
     data = found.data
     conditions = [condition_name(c, out) for c, out in zip(data.conditions, data.held_out, strict=True)]
-    observables = [observable.replace("_", " ") for observable in data.observables]
+    observables = [spaced(observable) for observable in data.observables]
     marks = np.where(np.nan_to_num(fit.adjusted_p, nan=1.0) < SIGNIFICANT, "*", "")
     texts = np.char.add(_texts(fit.residuals, 1), marks)
     figure = new_figure(legend=False)
@@ -171,7 +187,12 @@ def _residual_map(name: str, found: Discovery, fit: Fit, caption: str) -> Chart:
 
 
 def _add_map(
-    figure: go.Figure, values: np.ndarray, rows: Sequence[str], columns: Sequence[str], reach: float, texts: Any
+    figure: go.Figure,
+    values: np.ndarray,
+    rows: Sequence[str],
+    columns: Sequence[str],
+    reach: float,
+    texts: Any,
 ) -> None:
     figure.add_heatmap(
         z=np.where(np.isfinite(values), values, np.nan),

@@ -1,4 +1,4 @@
-"""The files of a discovery: the page, the results as JSON, the tables as CSV, the study with the mechanism."""
+"""The files of a discovery: page, results as JSON, tables as CSV, the study with the mechanism added."""
 
 from __future__ import annotations
 

@@ -110,8 +110,13 @@ class Card:
 def _cards(found: Discovery, terms: Terms) -> list[Card]:
     cards = []
     if found.base:
-        more = f"{found.base.degrees_of_freedom:.0f} degrees of freedom, limit {trimmed(found.base.q_limit, 3)}"
+        more = (
+            f"{found.base.degrees_of_freedom:.0f} degrees of freedom, limit {trimmed(found.base.q_limit, 3)}"
+        )
         cards.append(Card("Q of the calibrated base", trimmed(found.base.q, 3), more))
+    if found.gap and found.gap.drop_mechanism:
+        more = f"{terms.title(found.gap.drop_mechanism)}; limit {trimmed(found.gap.drop_limit, 3)}"
+        cards.append(Card("Largest fall of Q by one mechanism", trimmed(found.gap.largest_drop, 3), more))
     if found.chosen:
         for name, size in zip(found.chosen.mechanisms, found.chosen.sizes, strict=True):
             ends = f"90 % interval {trimmed(size.low, 3)} to {trimmed(size.high, 3)}"

@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from experiments.discover.discovery import Data, Discovery, Interval
+from experiments.discover.discovery import Candidate, Data, Discovery, Fit, Interval, Verdict
 from experiments.discover.library import Mechanism, with_mechanisms
 from experiments.files import replacing, write_text
 from experiments.report.discovery.terms import Terms
+from experiments.report.discovery.verdict import tied
 from experiments.study import Study
 from experiments.study.card import shapes_of
 from experiments.study.toml_files import toml_text
@@ -66,9 +67,7 @@ def write_study_files(found: Discovery, study: Study, terms: Terms, folder: Path
     return written
 
 
-def extended_document(
-    study: Study, added: Mapping[Mechanism, Interval], data: Data
-) -> dict[str, Any]:
+def extended_document(study: Study, added: Mapping[Mechanism, Interval], data: Data) -> dict[str, Any]:
     """Add mechanisms to a study's document, each as a factor that ranges over its interval.
 
     A study without a target takes the measured repose angle of its first training condition for one.
@@ -91,12 +90,10 @@ def extended_document(
 
 def _standing(found: Discovery) -> list[list[tuple[str, Interval]]]:
     """Models to write: the chosen one, or each of a tie."""
-    if found.chosen is None or not found.named:
-        return []
-    chosen = found.chosen.mechanisms, found.chosen.sizes
-    tied = [(c.mechanisms, c.sizes) for c in found.candidates if c.mechanisms in [(n,) for n in found.named]]
-    models = [chosen] if set(chosen[0]) == set(found.named) else tied
-    return [list(zip(*model, strict=True)) for model in models]
+    models: list[Candidate | Fit] = [found.chosen] if found.chosen else []
+    if found.verdict is Verdict.TIE:
+        models = [*tied(found)]
+    return [list(zip(model.mechanisms, model.sizes, strict=True)) for model in models]
 
 
 def _range(mechanism: Mechanism, size: Interval) -> tuple[float, float]:
@@ -112,7 +109,9 @@ def _target(data: Data) -> dict[str, Any]:
         return {}
     column = data.observables.index(ANGLE)
     for row, held_out in enumerate(data.held_out):
-        mean, se, count = (table[row, column] for table in (data.means, data.standard_errors, data.replicates))
+        mean, se, count = (
+            table[row, column] for table in (data.means, data.standard_errors, data.replicates)
+        )
         if not held_out and count >= 2 and np.isfinite(se) and se > 0.0:
             sd = float(se) * float(np.sqrt(count))
             return {"mean": f"{mean:.3f} deg", "sd": f"{sd:.3f} deg", "n": int(count)}

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from experiments.discover.discovery import BeforeAfter, Candidate, Discovery, Fit, Interval
-from experiments.report.discovery.terms import Terms, condition_name
+from experiments.report.discovery.terms import GAP, Terms, condition_name
 from experiments.report.numbers import MISSING, fixed, interval, trimmed
 from experiments.report.tables import Column, Table, make_table
 
@@ -23,9 +23,7 @@ def frames(found: Discovery) -> dict[str, pd.DataFrame]:
             [
                 {"factor": drift.factor, "condition": name, "value": value, "se": se, "p": drift.p_value}
                 for drift in found.drifts
-                for name, value, se in zip(
-                    drift.conditions, drift.values, drift.standard_errors, strict=True
-                )
+                for name, value, se in zip(drift.conditions, drift.values, drift.standard_errors, strict=True)
             ]
         ),
     }
@@ -106,8 +104,8 @@ def candidates_table(found: Discovery, terms: Terms) -> Table:
     ]
     note = (
         "Q: squared residuals of the training conditions in standard deviations, after factors and size were"
-        " fitted together; its limit is what 2.5 % of data sets exceed that the model itself makes. Held-out gain:"
-        " rise of the log score of the conditions that took no part in any fit, with its 90 % interval."
+        " fitted together; its limit is what 2.5 % of data sets exceed that the model itself makes. Held-out"
+        " gain: rise of the log score of the conditions that took no part in any fit, with its 90 % interval."
     )
     marks = [
         "chosen" if candidate.admitted and set(candidate.mechanisms) <= set(found.named) else ""
@@ -123,9 +121,7 @@ def power_table(found: Discovery, terms: Terms) -> Table:
             {
                 "mechanism": terms.title(power.mechanism),
                 "what": terms.mechanisms[power.mechanism].sentence,
-                "gamma80": terms.value(power.mechanism, power.gamma80)
-                if np.isfinite(power.gamma80)
-                else MISSING,
+                "gamma80": terms.value(power.mechanism, power.gamma80),
                 "maximum": terms.value(power.mechanism, power.maximum),
                 "share": 100.0 * power.gamma80 / power.maximum,
                 "visible": 100.0 * power.visible_share,
@@ -144,10 +140,10 @@ def power_table(found: Discovery, terms: Terms) -> Table:
         Column("resolvable", "resolvable"),
     ]
     note = (
-        "Smallest size seen: found in four of five data sets like this one, at a false-alarm rate of 2.5 %. Left"
-        " after calibration: the share of its signature that other values of the factors cannot imitate."
+        "Smallest size seen: found in four of five data sets like this one, at a false-alarm rate of 2.5 %."
+        " Left after calibration: the share of its signature that other values of the factors cannot imitate."
     )
-    return make_table("power", frame, columns, "What these data could show.", note)
+    return make_table("power", frame, columns, "The smallest size of each mechanism that shows.", note)
 
 
 def before_after_table(found: Discovery) -> Table:
@@ -209,10 +205,8 @@ def drifts_table(found: Discovery) -> Table:
         [
             {"factor": drift.factor, "p": drift.p_value}
             | {
-                name: f"{trimmed(value, 3)} ± {trimmed(se, 2)}"
-                for name, value, se in zip(
-                    drift.conditions, drift.values, drift.standard_errors, strict=True
-                )
+                name: _estimate(value, se)
+                for name, value, se in zip(drift.conditions, drift.values, drift.standard_errors, strict=True)
             }
             for drift in found.drifts
         ]
@@ -220,8 +214,8 @@ def drifts_table(found: Discovery) -> Table:
     names = dict.fromkeys(name for drift in found.drifts for name in drift.conditions)
     columns = [Column("factor", "factor"), *(Column(name, name) for name in names), Column("p", "p", "p")]
     note = (
-        "A parameter of a true model is the same wherever it is fitted (Box and Hunter 1962). Small p: it had to"
-        " change to follow the condition. This describes; the verdict does not rest on it."
+        "A parameter of a true model is the same wherever it is fitted (Box and Hunter 1962). Small p: it had"
+        " to change to follow the condition. This describes; the verdict does not rest on it."
     )
     marks = ["strong" if drift.p_value < 0.05 else "" for drift in found.drifts]
     return make_table(
@@ -230,25 +224,26 @@ def drifts_table(found: Discovery) -> Table:
 
 
 def data_table(found: Discovery, terms: Terms) -> Table:
-    """Lay out the measured means: a row a condition, a column an observable."""
+    """Lay out the measured means: a row an observable, a column a condition."""
     data = found.data
     rows = []
-    for at, condition in enumerate(data.conditions):
-        row = {"condition": condition_name(condition, data.held_out[at]), "n": int(data.replicates[at].max())}
-        for column, observable in enumerate(data.observables):
-            factor = terms.scale(observable)[0]
-            mean, se = factor * data.means[at, column], factor * data.standard_errors[at, column]
-            row[observable] = f"{trimmed(mean, 3)} ± {trimmed(se, 2)}" if np.isfinite(mean) else MISSING
-        rows.append(row)
-    heads = [Column(name, terms.axis(name)) for name in data.observables]
-    columns = [Column("condition", "condition"), Column("n", "heaps", "count"), *heads]
+    for at, observable in enumerate(data.observables):
+        factor = terms.scale(observable)[0]
+        estimates = zip(factor * data.means[:, at], factor * data.standard_errors[:, at], strict=True)
+        shown = [_estimate(mean, se) if np.isfinite(mean) else MISSING for mean, se in estimates]
+        rows.append({"observable": terms.axis(observable), **dict(zip(data.conditions, shown, strict=True))})
+    heaps = [str(count) for count in data.replicates.max(axis=1)]
+    rows.append({"observable": "heaps", **dict(zip(data.conditions, heaps, strict=True))})
+    heads = [
+        Column(name, condition_name(name, held_out))
+        for name, held_out in zip(data.conditions, data.held_out, strict=True)
+    ]
+    columns = [Column("observable", "observable"), *heads]
     return make_table("data", pd.DataFrame(rows), columns, "Measured means and their standard errors.")
 
 
 def _models(found: Discovery) -> dict[str, Fit]:
-    return {
-        name: fit for name, fit in (("base", found.base), ("chosen", found.chosen)) if fit is not None
-    }
+    return {name: fit for name, fit in (("base", found.base), ("chosen", found.chosen)) if fit is not None}
 
 
 def _candidate_row(candidate: Candidate) -> dict[str, object]:
@@ -292,8 +287,12 @@ def _interval(ends: Interval | None, decimals: int) -> str:
     return (
         MISSING
         if ends is None
-        else f"{fixed(ends.value, decimals)} {interval((ends.low, ends.high), decimals)}"
+        else f"{fixed(ends.value, decimals)} {interval((ends.low, ends.high), decimals)}".replace(" ", GAP)
     )
+
+
+def _estimate(value: float, se: float) -> str:
+    return f"{trimmed(value, 3)}{GAP}±{GAP}{trimmed(se, 2)}"
 
 
 def _times(ends: Interval, factor: float) -> Interval:

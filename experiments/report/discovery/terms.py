@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from experiments.discover.discovery import Interval
 from experiments.discover.library import Mechanism
 from experiments.discover.observables import Observable
-from experiments.report.numbers import enumeration, fixed, trimmed
+from experiments.report.numbers import MISSING, enumeration, fixed, trimmed
 from experiments.study.factor_section import FactorSection
+
 SHOWN_UNITS = {"m": (1e3, "mm"), "deg": (1.0, "°"), "1": (1.0, "")}
 """Units that a reader likes better: the factor, and the unit."""
+
+GAP = "\u00a0"
+"""A space that does not break."""
 
 SIZE_DIGITS = 3
 """Significant digits of the size of a mechanism."""
@@ -41,7 +46,7 @@ class Terms:
 
     def title(self, name: str) -> str:
         """Name a mechanism in words; "base" is the model without one."""
-        return self.mechanisms[name].title if name in self.mechanisms else name.replace("_", " ")
+        return self.mechanisms[name].title if name in self.mechanisms else spaced(name)
 
     def titles(self, names: Iterable[str], joined: str = "and") -> str:
         """Name mechanisms in words: "A", "A and B", "A, B and C"."""
@@ -49,7 +54,9 @@ class Terms:
         return f"{', '.join(first)} {joined} {last}" if first else last
 
     def value(self, name: str, value: float) -> str:
-        """Write the size of a mechanism with its unit."""
+        """Write the size of a mechanism with its unit; `MISSING` where there is none."""
+        if not math.isfinite(value):
+            return MISSING
         return f"{trimmed(value, SIZE_DIGITS)} {self._unit(name)}".rstrip()
 
     def size(self, name: str, size: Interval) -> str:
@@ -60,7 +67,7 @@ class Terms:
     def short_size(self, name: str, size: Interval) -> str:
         """Write a size for a table: value, interval, unit."""
         low, high = (trimmed(end, SIZE_DIGITS) for end in (size.low, size.high))
-        return f"{trimmed(size.value, SIZE_DIGITS)} [{low}, {high}] {self._unit(name)}".rstrip()
+        return f"{trimmed(size.value, SIZE_DIGITS)}{GAP}[{low},{GAP}{high}] {self._unit(name)}".rstrip()
 
     def sizes(self, names: Sequence[str], sizes: Sequence[Interval]) -> str:
         """Write the sizes of several mechanisms in words."""
@@ -74,17 +81,21 @@ class Terms:
     def axis(self, observable: str) -> str:
         """Name an observable with the unit in which it is shown."""
         unit = self.scale(observable)[1]
-        name = observable.replace("_", " ")
-        return f"{name} [{unit}]" if unit else name
+        return f"{spaced(observable)} [{unit}]" if unit else spaced(observable)
 
     def _unit(self, name: str) -> str:
         unit = self.mechanisms[name].unit
-        return SHOWN_UNITS["1"][1] if unit == "1" else "°" if unit == "deg" else unit
+        return {"1": "", "deg": "°"}.get(unit, unit.replace("^2", "²").replace("^3", "³"))
+
+
+def spaced(name: str) -> str:
+    """Write a name of a table as words."""
+    return name.replace("_", " ")
 
 
 def percent(share: float, decimals: int = 0) -> str:
     """Write a share as a percentage."""
-    return f"{fixed(100.0 * share, decimals)} %"
+    return f"{fixed(100.0 * share, decimals)}{GAP}%"
 
 
 def condition_name(condition: str, held_out: bool) -> str:

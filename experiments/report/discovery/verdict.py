@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from experiments.discover.discovery import BeforeAfter, Candidate, Discovery, Interval, Power, Verdict
-from experiments.report.discovery.terms import Terms, percent
+from experiments.report.discovery.terms import Terms, percent, spaced
 from experiments.report.numbers import capital, fixed, p_value, trimmed
 
 SETTLED = (Verdict.NONE, Verdict.NAMED)
@@ -25,7 +25,7 @@ def headline(found: Discovery, terms: Terms) -> str:
         Verdict.NAMED: f"Missing: {named}",
         Verdict.TIE: f"A tie: {terms.titles(found.named, 'or')}",
         Verdict.INCOMPLETE: f"Missing: {named}, and something else",
-        Verdict.UNKNOWN: "Something is missing, and it is not in the library",
+        Verdict.UNKNOWN: "Something is missing, and nothing in the library explains it",
         Verdict.NOT_IDENTIFIABLE: "These data cannot tell",
     }[found.verdict]
 
@@ -33,6 +33,13 @@ def headline(found: Discovery, terms: Terms) -> str:
 def verdict_sentence(found: Discovery, terms: Terms) -> str:
     """Say what was found, with its numbers, in one sentence or two."""
     return _SENTENCES[found.verdict](found, terms)
+
+
+def tied(found: Discovery) -> list[Candidate]:
+    """Candidates of a tie: of as many mechanisms as the chosen one, all of them among those named."""
+    count = len(found.chosen.mechanisms) if found.chosen else 1
+    names = set(found.named)
+    return [one for one in found.candidates if len(one.mechanisms) == count and set(one.mechanisms) <= names]
 
 
 def changes(found: Discovery, terms: Terms) -> list[str]:
@@ -53,7 +60,7 @@ def next_step(found: Discovery, terms: Terms) -> str:
     return (
         f"Measure {step.replicates} heaps under the condition {setting}. It tells {pair} best: after both are"
         f" fitted again they are expected to lie Q = {trimmed(step.expected_q, 3)} apart there, most in the"
-        f" {step.observable.replace('_', ' ')}."
+        f" {spaced(step.observable)}."
     )
 
 
@@ -62,8 +69,8 @@ def _none(found: Discovery, terms: Terms) -> str:
         return found.reason
     return (
         "Fitted as well as it can be, the model agrees with the data within their noise:"
-        f" Q = {trimmed(found.base.q, 3)} at {fixed(found.base.degrees_of_freedom, 0)} degrees of freedom, where"
-        f" a gap would begin at {trimmed(found.base.q_limit, 3)} (p = {p_value(found.base.p_value)})."
+        f" Q = {trimmed(found.base.q, 3)} at {fixed(found.base.degrees_of_freedom, 0)} degrees of freedom,"
+        f" where a gap would begin at {trimmed(found.base.q_limit, 3)} (p = {p_value(found.base.p_value)})."
     )
 
 
@@ -76,6 +83,8 @@ def _added(found: Discovery, terms: Terms) -> str:
     training, held_out = _set(found, held_out=False), _set(found, held_out=True)
     if training:
         text += f" removed {_share(training.removed)} of the excess"
+    elif found.base:
+        text += f" brings Q from {trimmed(found.base.q, 3)} to {trimmed(found.chosen.q, 3)}"
     if held_out:
         fell = "fell" if held_out.after.value < held_out.before.value else "rose"
         text += f"; held out, Q {fell} from {_q(held_out.before)} to {_q(held_out.after)}"
@@ -83,11 +92,10 @@ def _added(found: Discovery, terms: Terms) -> str:
 
 
 def _tie(found: Discovery, terms: Terms) -> str:
+    sizes = [terms.sizes(one.mechanisms, one.sizes) for one in tied(found)]
     each = "; ".join(
-        f"{terms.title(name)} at {terms.size(name, candidate.sizes[0])} leaves Q = {trimmed(candidate.q, 3)}"
-        for name in found.named
-        for candidate in found.candidates
-        if candidate.mechanisms == (name,)
+        f"{terms.titles(one.mechanisms)} at {size} leaves Q = {trimmed(one.q, 3)}"
+        for one, size in zip(tied(found), sizes, strict=True)
     )
     return f"The model disagrees with the data, and these explain it equally well: {each}."
 
@@ -102,7 +110,9 @@ def _unknown(found: Discovery, terms: Terms) -> str:
     )
     if found.candidates:
         best = found.candidates[0]
-        text += f"; the best, {terms.titles(best.mechanisms)}, removes {percent(best.explained)} of the excess"
+        text += (
+            f"; the best, {terms.titles(best.mechanisms)}, removes {percent(best.explained)} of the excess"
+        )
     return text + "."
 
 
@@ -124,14 +134,17 @@ def _smaller_effects(found: Discovery, terms: Terms) -> Iterator[str]:
     visible = [power for power in found.power if power.resolvable]
     hidden = [power for power in found.power if not power.resolvable]
     if visible:
-        sizes = ", ".join(f"{terms.title(p.mechanism)} {terms.value(p.mechanism, p.gamma80)}" for p in visible)
+        sizes = ", ".join(
+            f"{terms.title(p.mechanism)} {terms.value(p.mechanism, p.gamma80)}" for p in visible
+        )
         yield f"Smaller effects than these would have gone unseen (one in five at these sizes): {sizes}."
     if hidden:
         yield f"{_cannot_be_seen(hidden, terms)}: whether they act here is left open."
 
 
 def _margins(found: Discovery, terms: Terms) -> Iterator[str]:
-    chosen = next((c for c in found.candidates if c.mechanisms == found.named), None)
+    model = found.chosen.mechanisms if found.chosen else ()
+    chosen = next((c for c in found.candidates if c.mechanisms == model), None)
     if chosen is None:
         return
     weakest = min(chosen.size_over_se)
@@ -142,8 +155,8 @@ def _margins(found: Discovery, terms: Terms) -> Iterator[str]:
     room = chosen.q_limit - chosen.q
     if room > 0.0:
         yield (
-            f"The fit with it has Q = {trimmed(chosen.q, 3)}, {trimmed(room, 2)} below its limit: a disagreement"
-            " larger by that would mean that something else is missing too."
+            f"The fit with it has Q = {trimmed(chosen.q, 3)}, {trimmed(room, 2)} below its limit: a"
+            " disagreement larger by that would mean that something else is missing too."
         )
 
 
@@ -156,7 +169,7 @@ def _rivals(found: Discovery, terms: Terms) -> Iterator[str]:
 def _unresolved(found: Discovery, terms: Terms) -> Iterator[str]:
     hidden = [p for p in found.power if not p.resolvable and p.mechanism not in found.named]
     if hidden:
-        yield f"{_cannot_be_seen(hidden, terms)}, and could never be named by them."
+        yield f"{_cannot_be_seen(hidden, terms)}, so they can neither name nor exclude it."
 
 
 def _outside(found: Discovery, terms: Terms) -> Iterator[str]:
@@ -182,8 +195,8 @@ def _more_data(found: Discovery, terms: Terms) -> Iterator[str]:
     measured = int(np.isfinite(found.data.means[~np.array(found.data.held_out)]).sum())
     yield (
         f"The training conditions give {measured} mean value{'' if measured == 1 else 's'} for"
-        f" {len(found.factors)} fitted parameters. More observables of the same heaps (a photograph gives six),"
-        " or the same test under other conditions, would change that; more replicates would not."
+        f" {len(found.factors)} fitted parameters. More observables of the same heaps (a photograph gives"
+        " six), or the same test under other conditions, would change that; more replicates would not."
     )
 
 

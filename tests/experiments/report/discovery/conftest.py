@@ -73,7 +73,12 @@ def made_terms(study: Study) -> Terms:
         for name, (title, unit, maximum) in MECHANISMS.items()
     ]
     observables = [
-        SimpleNamespace(name=name, unit=unit, definition=f"what is called {name.replace('_', ' ')} of a heap")
+        SimpleNamespace(
+            name=name,
+            title=name.replace("_", " "),
+            unit=unit,
+            definition=f"what is called {name.replace('_', ' ')} of a heap",
+        )
         for name, (unit, _, _) in OBSERVABLES.items()
     ]
     return Terms.of(mechanisms, observables, study.factor_sections)  # type: ignore[arg-type]
@@ -218,7 +223,7 @@ def made_discovery(verdict: Verdict) -> Discovery:
         if named
         else None,
         notes=("wide, replicate 3: the tube clogged; its row is an outcome, not a number.",
-               "rough: asymmetry does not vary over 5 replicates; the spread of the simulated heaps is used."),
+               "rough: asymmetry does not vary over 5 replicates; that of simulated heaps is used."),
         effort=Effort(7, "9f" * 32, 1440, 384),
     )  # fmt: skip
     if verdict is not Verdict.NOT_IDENTIFIABLE:
@@ -226,7 +231,15 @@ def made_discovery(verdict: Verdict) -> Discovery:
     only = replace(data, means=np.where(np.indices(data.means.shape).sum(axis=0) == 0, data.means, np.nan))
     reason = "One independent mean against two fitted factors: any mechanism fits as well as any other."
     return replace(
-        found, reason=reason, data=only, base=None, gap=None, drifts=(), candidates=(), power=(), confounding=None
+        found,
+        reason=reason,
+        data=only,
+        base=None,
+        gap=None,
+        drifts=(),
+        candidates=(),
+        power=(),
+        confounding=None,
     )
 
 

@@ -1,0 +1,102 @@
+"""The files of a discovery: the same numbers everywhere, and a study that loads with the mechanism in it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from experiments.commands.run import check_runs
+from experiments.discover.discovery import Discovery, Interval, Verdict
+from experiments.discover.library import library_for
+from experiments.discover.observables import OBSERVABLES
+from experiments.report.discovery import Terms, write_discovery
+from experiments.study import Study, load_study
+
+Discovered = Callable[[Verdict], Discovery]
+
+TRIAL = Path(__file__).parents[4] / "experiments" / "studies" / "trial" / "study.toml"
+
+
+@pytest.fixture(scope="module")
+def trial() -> Study:
+    return load_study(TRIAL, "bench")
+
+
+@pytest.fixture(scope="module")
+def trial_terms(trial: Study) -> Terms:
+    return Terms.of(library_for(trial), OBSERVABLES, trial.factor_sections)
+
+
+def found_on(trial: Study, discovered: Discovered, verdict: Verdict) -> Discovery:
+    """A discovery with the factors of the trial study."""
+    found = discovered(verdict)
+    names = tuple(factor.name for factor in trial.factors)[:2]
+    return replace(found, factors=names)
+
+
+def test_the_files_hold_the_same_numbers(
+    trial: Study, trial_terms: Terms, discovered: Discovered, tmp_path: Path
+) -> None:
+    found = found_on(trial, discovered, Verdict.NAMED)
+    page = write_discovery(found, trial, trial_terms, tmp_path, provenance={"device": "cpu"})
+    assert page.read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
+    results = json.loads((tmp_path / "results.json").read_text(encoding="utf-8"))
+    assert results["discovery"] == json.loads(json.dumps(found.to_dict()))
+    assert results["sentence"].startswith("Adding contact cohesion at 0.052 J/m²")
+    compared = pd.read_csv(tmp_path / "tables" / "compared.csv")
+    measured = np.isfinite(found.data.means)
+    np.testing.assert_array_equal(compared["measured"], found.data.means[measured])
+    assert found.chosen is not None
+    np.testing.assert_array_equal(compared["chosen_residual"], found.chosen.residuals[measured])
+    # JSON has no infinity, and CSV must not call a missing gain a number.
+    assert "Infinity" not in (tmp_path / "results.json").read_text(encoding="utf-8")
+
+
+def test_the_study_with_the_mechanism_loads_and_can_be_calibrated(
+    trial: Study, trial_terms: Terms, discovered: Discovered, tmp_path: Path
+) -> None:
+    most = trial_terms.mechanisms["contact_cohesion"].maximum
+    found = found_on(trial, discovered, Verdict.NAMED)
+    assert found.chosen is not None
+    size = Interval(0.4 * most, 0.5 * most, 1.2 * most)
+    found = replace(found, chosen=replace(found.chosen, sizes=(size,)))
+    write_discovery(found, trial, trial_terms, tmp_path)
+    study = load_study(tmp_path / "study-with-contact_cohesion.toml")
+    check_runs(study)
+    added = study.factors[-1]
+    assert added.name == "contact_cohesion"
+    # Written with four digits; the interval ends where the library does.
+    assert (added.low, added.high) == pytest.approx((0.4 * most, most), rel=1e-3)
+    assert [factor.name for factor in study.factors[:-1]] == [factor.name for factor in trial.factors]
+    # A case of it is the one that the analysis ran: the rest of the study is as it was.
+    at = {factor.name: factor.center for factor in trial.factors}
+    case = study.case(at | {"contact_cohesion": added.low}, seed=1)
+    assert case.mechanisms
+    target = study.target.model_dump()
+    column = found.data.observables.index("flank_angle")
+    assert target["mean"] == pytest.approx(found.data.means[0, column], abs=5e-4)
+    assert target["n"] == 5
+
+
+def test_a_tie_gives_a_study_for_each(
+    trial: Study, trial_terms: Terms, discovered: Discovered, tmp_path: Path
+) -> None:
+    write_discovery(found_on(trial, discovered, Verdict.TIE), trial, trial_terms, tmp_path)
+    names = sorted(path.name for path in tmp_path.glob("study-with-*.toml"))
+    assert names == ["study-with-contact_cohesion.toml", "study-with-liquid_bridges.toml"]
+    for name in names:
+        assert load_study(tmp_path / name).factors[-1].name in name
+
+
+@pytest.mark.parametrize("verdict", [Verdict.NONE, Verdict.UNKNOWN, Verdict.NOT_IDENTIFIABLE])
+def test_nothing_named_writes_no_study(
+    verdict: Verdict, trial: Study, trial_terms: Terms, discovered: Discovered, tmp_path: Path
+) -> None:
+    write_discovery(found_on(trial, discovered, verdict), trial, trial_terms, tmp_path)
+    assert list(tmp_path.glob("*.toml")) == []

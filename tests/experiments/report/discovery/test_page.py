@@ -1,0 +1,109 @@
+"""The page on a disagreement: well formed for every verdict, with the discovery's own numbers and words."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from experiments.discover.discovery import Discovery, Verdict
+from experiments.report import HeapPicture
+from experiments.report.discovery import Terms, render_discovery, verdict_sentence
+from experiments.study import Study
+
+Discovered = Callable[[Verdict], Discovery]
+
+
+@pytest.mark.parametrize("verdict", Verdict)
+def test_every_verdict_has_a_page_that_is_whole(
+    verdict: Verdict, discovered: Discovered, whole_study: Study, terms: Terms, read_page: type
+) -> None:
+    found = discovered(verdict)
+    picture = HeapPicture("Heap", "A heap.", np.zeros((8, 12, 3), np.uint8))
+    text = render_discovery(found, whole_study, terms, [picture], ["study-with.toml"], {"device": "cpu"})
+    page = read_page(text)
+    assert page.mismatches == []
+    assert [name for name, count in Counter(page.ids).items() if count > 1] == []
+    links = [link for link in page.links if not link.startswith("data:")]
+    assert {link.removeprefix("#") for link in links if link.startswith("#")} <= set(page.ids)
+    assert [link for link in links if not link.startswith("#")] == ["study-with.toml"]
+    assert re.search(r"\b(nan|inf|None)\b", page.text) is None
+    for note in found.notes:
+        assert note in page.text
+    assert found.effort.settings_sha256 in page.text
+
+
+def test_a_named_effect_is_told_with_its_size_and_what_it_removed(
+    discovered: Discovered, terms: Terms
+) -> None:
+    sentence = verdict_sentence(discovered(Verdict.NAMED), terms).replace("\u00a0", " ")
+    assert sentence == (
+        "Adding contact cohesion at 0.052 J/m² (90 % interval 0.041 to 0.064) removed 98 % (94 to 100 %) of"
+        " the excess; held out, Q fell from 121 (98 to 143) to 11 (7.1 to 16)."
+    )
+
+
+def test_a_rise_of_the_held_out_gap_is_not_called_a_fall(discovered: Discovered, terms: Terms) -> None:
+    found = discovered(Verdict.NAMED)
+    training, held_out = found.before_after
+    turned = replace(held_out, before=held_out.after, after=held_out.before)
+    assert "Q rose from 11" in verdict_sentence(replace(found, before_after=(training, turned)), terms)
+
+
+def test_the_other_verdicts_name_nothing_as_missing(discovered: Discovered, terms: Terms) -> None:
+    none, unknown, tie, unclear = (
+        verdict_sentence(discovered(verdict), terms)
+        for verdict in (Verdict.NONE, Verdict.UNKNOWN, Verdict.TIE, Verdict.NOT_IDENTIFIABLE)
+    )
+    assert "agrees with the data" in none
+    assert "nothing in the library explains it" in unknown
+    assert "contact cohesion at 0.052" in tie
+    assert "liquid bridges at 0.034" in tie
+    assert unclear == discovered(Verdict.NOT_IDENTIFIABLE).reason
+
+
+def test_the_maps_show_the_residuals_of_both_models(
+    discovered: Discovered, whole_study: Study, terms: Terms, read_page: type
+) -> None:
+    found = discovered(Verdict.NAMED)
+    page = read_page(render_discovery(found, whole_study, terms))
+    assert found.base is not None
+    assert found.chosen is not None
+    for name, fit in (("residuals-before", found.base), ("residuals-after", found.chosen)):
+        [drawn] = page.charts[name]["data"]
+        shown = np.array([[float(t.rstrip("*").replace("−", "-")) if t != "–" else np.nan for t in row]
+                          for row in drawn["text"]])  # fmt: skip
+        # Written with one decimal.
+        np.testing.assert_allclose(shown, fit.residuals, atol=0.0500001)
+        assert len(drawn["y"]) == len(found.data.conditions)
+        assert sum("*" in t for row in drawn["text"] for t in row) == int((fit.adjusted_p < 0.05).sum())
+
+
+def test_only_what_was_measured_is_compared(
+    discovered: Discovered, whole_study: Study, terms: Terms, read_page: type
+) -> None:
+    found = discovered(Verdict.NAMED)
+    page = read_page(render_discovery(found, whole_study, terms))
+    drawn = {name: chart for name, chart in page.charts.items() if name.startswith("compared-")}
+    assert len(drawn) == len(found.data.observables)
+    for name, chart in drawn.items():
+        column = found.data.observables.index(name.removeprefix("compared-"))
+        measured = int(np.isfinite(found.data.means[:, column]).sum())
+        assert [len(series["y"]["bdata"] if isinstance(series["y"], dict) else series["y"]) > 0
+                for series in chart["data"]] == [True, True, True]  # fmt: skip
+        assert len(chart["layout"]["xaxis"]["ticktext"]) == measured
+
+
+def test_candidates_stand_in_their_order_with_their_judgement(
+    discovered: Discovered, whole_study: Study, terms: Terms, read_page: type
+) -> None:
+    found = discovered(Verdict.NAMED)
+    rows = read_page(render_discovery(found, whole_study, terms)).rows("candidates")
+    for row, candidate in zip(rows, found.candidates, strict=True):
+        assert row[1][0] == terms.titles(candidate.mechanisms)
+        assert row[2][1] == 100.0 * candidate.explained
+        assert row[-1][0] == ("admitted" if candidate.admitted else candidate.objection)
