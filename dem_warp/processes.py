@@ -27,11 +27,15 @@ _shared: dict[str, Any] = {}
 
 def _start_worker(fractions: Any, phases: Any) -> None:
     _shared.update(fractions=fractions, phases=phases)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    end_with_parent()
 
 
-def _end_with_parent() -> None:
-    """End this process when its parent is gone: a parent that was killed cannot tell its workers."""
+def end_with_parent() -> None:
+    """Let this process end when its parent is gone: a parent that was killed cannot tell its workers."""
+    threading.Thread(target=_wait_for_parent, daemon=True).start()
+
+
+def _wait_for_parent() -> None:
     if parent := multiprocessing.parent_process():
         parent.join()
         os._exit(1)

@@ -108,8 +108,13 @@ def _background(channels: FloatArray) -> tuple[FloatArray, float]:
     surface = _robust_plane(terms[border, :3], sample[border])
     residual = np.linalg.norm(sample - terms[:, :3] @ surface, axis=1)
     noise = float(np.median(residual[border]))
+    before: tuple[int, bytes] | None = None
     for size in (*[3] * FIT_ROUNDS, *[6] * FIT_ROUNDS):
         chosen = residual <= max(4.0 * noise, 2.0 * LEAST_NOISE)
+        # A round on the pixels of the last one repeats it; behind a drawn heap all rounds but the first do.
+        if (now := (size, chosen.tobytes())) == before:
+            continue
+        before = now
         surface = np.linalg.lstsq(terms[chosen, :size], sample[chosen], rcond=None)[0]
         residual = np.linalg.norm(sample - terms[:, :size] @ surface, axis=1)
         noise = float(np.median(residual[chosen]))
@@ -130,7 +135,10 @@ def _robust_plane(terms: FloatArray, sample: FloatArray) -> FloatArray:
     for _ in range(ROBUST_ROUNDS):
         root = np.sqrt(weight)[:, None]
         plane = np.linalg.lstsq(root * terms, root * sample, rcond=None)[0]
+        before = weight
         weight = 1.0 / np.maximum(np.linalg.norm(sample - terms @ plane, axis=1), LEAST_NOISE)
+        if np.array_equal(weight, before):
+            break
     return np.asarray(plane)
 
 

@@ -24,7 +24,7 @@ def heap(cone: Cone, shift: float = 0.0) -> CaseResult:
     """A cone of slope 0.5, its lower parts sheared along x by their distance from the top."""
     result = cone(0.5)
     positions = result.positions + np.outer(0.5 * BASE - result.positions[:, 2], [shift, 0.0, 0.0])
-    return replace(result, positions=positions, observables=BALANCE)
+    return replace(result, positions=positions, observables=BALANCE | {"time_to_rest": 2.0})
 
 
 def test_there_are_twelve_and_a_photograph_shows_six() -> None:
@@ -59,6 +59,13 @@ def test_a_lean_along_y_is_none_along_x(cone: Cone) -> None:
     leaning = heap(cone, 0.4)
     turned = replace(leaning, positions=leaning.positions[:, [1, 0, 2]])
     assert measure(SETTINGS, turned)[0][NAMES.index("asymmetry")] == pytest.approx(0.0, abs=RADIUS / BASE)
+
+
+def test_a_surface_that_stays_high_takes_until_the_heap_rests(cone: Cone) -> None:
+    high = heap(cone)
+    del high.observables["t55"]
+    found = dict(zip(NAMES, measure(SETTINGS, high)[0], strict=True))
+    assert (found["t55"], found["t75"]) == (2.0, BALANCE["t75"])
 
 
 def test_a_failed_case_has_a_reason_and_no_numbers(cone: Cone) -> None:

@@ -1,0 +1,153 @@
+"""The engine as a simulator: what it answers, keeps and refuses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dem_warp import Progress, simulate
+from experiments.discover import engine
+from experiments.discover.engine import EngineSimulator
+from experiments.discover.library import library_for
+from experiments.discover.observables import NAMES, measure
+from experiments.discover.outcome_table import OutcomeTable
+from experiments.discover.simulator import Point
+from experiments.errors import StoreError
+from experiments.study import Study, load_study
+
+CONDITIONS = """
+[condition.base]
+
+[condition.wide]
+scene.lifted-cylinder.diameter = "32 mm"
+"""
+
+POINTS = [
+    Point((0.3,), (), "base", 1),
+    Point((0.5,), (), "wide", 2),
+    Point((0.3,), (("rolling_torque", 0.1),), "base", 1),
+]
+
+
+class KilledError(Exception):
+    """Stands for what ends a run in the middle."""
+
+
+@pytest.fixture
+def study(write_study: Callable[..., Path]) -> Study:
+    return load_study(write_study(add=CONDITIONS))
+
+
+@pytest.fixture
+def table(tmp_path: Path) -> OutcomeTable:
+    return OutcomeTable(tmp_path / "cases" / "outcomes.sqlite")
+
+
+def build(study: Study, table: OutcomeTable, progress: Callable[[Progress], None] | None = None):
+    return EngineSimulator(study, library_for(study), table, "cpu", workers=1, progress=progress)
+
+
+def test_points_are_answered_by_heaps_measured_and_kept(
+    study: Study, table: OutcomeTable, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen: list[Progress] = []
+    with build(study, table, seen.append) as simulator:
+        outcomes = simulator([*POINTS, POINTS[0]])
+        assert (seen[-1].done, seen[-1].total, seen[-1].fraction) == (3, 3, 1.0)
+
+        [direct] = simulate([study.under("wide").case({"E": 0.5}, 2)], device="cpu", workers=1)
+        assert outcomes.reasons == ("",) * 4
+        np.testing.assert_array_equal(outcomes.values[1], measure(study.measurement, direct)[0])
+        np.testing.assert_array_equal(outcomes.values[0], outcomes.values[3])
+        assert (outcomes.values[0] != outcomes.values[2]).any()
+
+    def never(*args: object, **kwargs: object) -> None:
+        raise AssertionError("what is kept is not simulated again")
+
+    monkeypatch.setattr(engine, "simulate", never)
+    again = build(study, table)(POINTS)
+    np.testing.assert_array_equal(again.values, outcomes.values[:3])
+
+
+def test_a_run_that_was_killed_keeps_what_it_had_measured(
+    study: Study, table: OutcomeTable, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(engine, "SAVE_EVERY", 0.0)
+
+    def kill(progress: Progress) -> None:
+        if progress.done == 2:
+            raise KilledError
+
+    simulator = build(study, table, kill)
+    with pytest.raises(KilledError):
+        simulator(POINTS)
+    kept = len(table)
+    seen: list[Progress] = []
+    with build(study, table, seen.append) as simulator:
+        assert simulator(POINTS).finished.all()
+    assert kept >= 1
+    assert seen[-1].total == len(POINTS) - kept
+
+
+def test_what_the_study_refuses_is_an_outcome_with_its_reason(study: Study, table: OutcomeTable) -> None:
+    both = (("rolling_spring", 0.1), ("rolling_torque", 0.1))
+    outcomes = build(study, table)([Point((0.3,), both, "base", 1), Point((-1.0,), (), "base", 1)])
+    assert not outcomes.finished.any()
+    assert "given twice" in outcomes.reasons[0]
+    assert np.isnan(outcomes.values).all()
+    assert outcomes.values.shape == (2, len(NAMES))
+    assert len(table) == 0
+
+
+@pytest.mark.parametrize(
+    ("point", "rule"),
+    [
+        (Point((0.3,), (), "wid", 1), "Point.condition: must be one of base, wide"),
+        (Point((0.3,), (("glue", 1.0),), "base", 1), "Point.sizes: must name mechanisms of the library"),
+        (Point((0.3, 0.4), (), "base", 1), "Point.theta: must be one value for each of E"),
+    ],
+)
+def test_a_point_of_another_study_is_an_error(
+    study: Study, table: OutcomeTable, point: Point, rule: str
+) -> None:
+    with pytest.raises(ValueError, match=rule):
+        build(study, table)([point])
+
+
+def test_everything_that_determines_an_outcome_is_in_its_key(
+    study: Study, table: OutcomeTable, write_study: Callable[..., Path]
+) -> None:
+    simulator = build(study, table)
+    points = [*POINTS, Point((0.3,), (), "base", 2), Point((0.3,), (("rolling_torque", 0.2),), "base", 1)]
+    keys = {simulator.key(simulator.case(point)) for point in points}
+    finer = build(load_study(write_study(("pixels = 200", "pixels = 300"), add=CONDITIONS)), table)
+    keys |= {finer.key(finer.case(POINTS[0]))}
+    assert len(keys) == len(points) + 1
+
+
+def test_no_points_are_no_outcomes(study: Study, table: OutcomeTable) -> None:
+    outcomes = build(study, table)([])
+    assert outcomes.values.shape == (0, len(NAMES))
+    assert outcomes.reasons == ()
+
+
+def test_a_table_gives_back_what_was_saved(table: OutcomeTable) -> None:
+    # More than one query asks for.
+    rows = {f"{i}": (np.array([i, np.nan]), "clogged" if i % 2 else "") for i in range(1200)}
+    table.save(rows)
+    table.save({"3": (np.array([-3.0, 0.0]), "")})
+    found = OutcomeTable(table.path).load([*rows, "not there"])
+    assert found.keys() == rows.keys()
+    np.testing.assert_array_equal(found["3"][0], [-3.0, 0.0])
+    np.testing.assert_array_equal(found["1199"][0], [1199.0, np.nan])
+    assert (found["1199"][1], found["4"][1]) == ("clogged", "")
+
+
+def test_a_file_that_is_no_table_is_refused(table: OutcomeTable) -> None:
+    table.path.parent.mkdir()
+    table.path.write_text("something else" * 100)
+    with pytest.raises(StoreError, match="must be a table of outcomes"):
+        table.load(["1"])
