@@ -81,9 +81,11 @@ class JointFit:
         """Return where some responses agree with their targets; without names, all of them."""
         chosen = names or tuple(self.goals)
         level = self.alpha / len(chosen)
-        mask = self.explored & np.all([self.p[name] >= level for name in chosen], axis=0)
-        table = pd.DataFrame(self.cells, columns=[factor.name for factor in self.factors])
-        return Region(self.factors, table, mask, self.resolution, self.extent, self.explored)
+        return self._region(np.all([self.p[name] >= level for name in chosen], axis=0))
+
+    def band(self, name: str) -> Region:
+        """Return where one response agrees at the level that all share; all bands meet in ``region()``."""
+        return self._region(self.p[name] >= self.alpha / len(self.goals))
 
     def share(self, *names: str) -> float:
         """Return which part of the region explored is compatible with some responses (default: all)."""
@@ -195,6 +197,10 @@ class JointFit:
         index = pd.RangeIndex(1, len(values) + 1, name="direction")
         table = pd.DataFrame(vectors.T, columns=[factor.name for factor in self.factors], index=index)
         return table.assign(half_width=half_width, span=[self._span(vector) for vector in vectors.T])
+
+    def _region(self, mask: NDArray[np.bool_]) -> Region:
+        table = pd.DataFrame(self.cells, columns=[factor.name for factor in self.factors])
+        return Region(self.factors, table, mask & self.explored, self.resolution, self.extent, self.explored)
 
     def _span(self, direction: NDArray[np.float64]) -> float:
         """Return the compatible region's shadow on a direction, over that of the region explored."""

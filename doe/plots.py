@@ -242,10 +242,7 @@ def agreement_plot(
 
 def _draw_region(axes: Axes, region: Region, x: str, y: str) -> Patch:
     """Hatch the region's shadow on the plane of two factors; return its key."""
-    shadow = region.projection(x, y)
-    x_factor, y_factor = (next(f for f in region.factors if f.name == name) for name in (x, y))
-    centers = region.extent * ((2.0 * np.arange(region.resolution) + 1.0) / region.resolution - 1.0)
-    drawn = (x_factor.to_natural(centers), y_factor.to_natural(centers), shadow.T.astype(float))
+    drawn = (region.axis(x), region.axis(y), region.projection(x, y).T.astype(float))
     axes.contourf(*drawn, levels=[0.5, 1.5], colors=["white"], alpha=0.35)
     axes.contour(*drawn, levels=[0.5], colors=["white"], linewidths=1.5)
     return Patch(facecolor="white", edgecolor=GREY, label=f"compatible: {100.0 * region.fraction:.0f} %")

@@ -1,5 +1,6 @@
 """Regions of a surface: the settings that a measured target does not contradict."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -51,14 +52,36 @@ class Region:
 
         A cell of the plane belongs when the region holds it for some values of the other factors.
         """
+        box, names = self._box(x, y)
+        others = tuple(axis for axis, name in enumerate(names) if name not in (x, y))
+        shadow = np.asarray(box.any(axis=others))
+        return shadow if names.index(x) < names.index(y) else shadow.T
+
+    def section(self, x: str, y: str, at: Mapping[str, float]) -> NDArray[np.bool_]:
+        """Return the region's cut by the plane of two factors, shape (cells of x, cells of y).
+
+        The other factors are held in the cells nearest to the natural values ``at``.
+        """
+        box, names = self._box(x, y)
+        held = {
+            factor.name: int(np.abs(self.axis(factor.name) - at[factor.name]).argmin())
+            for factor in self.factors
+        }
+        cut = np.asarray(box[tuple(slice(None) if name in (x, y) else held[name] for name in names)])
+        return cut if names.index(x) < names.index(y) else cut.T
+
+    def axis(self, name: str) -> NDArray[np.float64]:
+        """Return the centers of the cells along one factor in natural units."""
+        centers = self.extent * ((2.0 * np.arange(self.resolution) + 1.0) / self.resolution - 1.0)
+        return next(factor for factor in self.factors if factor.name == name).to_natural(centers)
+
+    def _box(self, x: str, y: str) -> tuple[NDArray[np.bool_], list[str]]:
+        """Return which cells belong along an axis for each factor, and the factors' names."""
         names = [factor.name for factor in self.factors]
         unknown = [name for name in (x, y) if name not in names]
         if unknown or x == y:
             raise DesignError(f"a projection takes two of {', '.join(names)}, received {x!r} and {y!r}")
-        box = self.mask.reshape((self.resolution,) * len(names))
-        others = tuple(axis for axis, name in enumerate(names) if name not in (x, y))
-        shadow = np.asarray(box.any(axis=others))
-        return shadow if names.index(x) < names.index(y) else shadow.T
+        return self.mask.reshape((self.resolution,) * len(names)), names
 
     @property
     def ranges(self) -> pd.DataFrame:

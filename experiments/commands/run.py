@@ -138,6 +138,7 @@ def run_campaign(desk: Desk, on_stage: StageHook | None = None, replay: Replay |
         "device": desk.device,
         "workers": desk.workers,
         "seconds": round(time.perf_counter() - started, 1),
+        "engine": _engine(desk, campaign.cases),
     }
     pictures = heap_pictures(campaign, desk.study, desk.store.load)
     write_report(campaign, desk.study, desk.folder, pictures, provenance, replay)
@@ -209,14 +210,18 @@ def check_runs(study: Study, campaign: bool = True, paper: bool = False) -> None
 
 def _provenance(desk: Desk, replay: Replay) -> dict[str, Any]:
     """What made the paper's runs: commit, day, machine, scale, wall times."""
-    keys = replay.cases["case_key"]
-    made_by = desk.store.load(keys.iloc[0]).provenance if desk.store.has(keys.iloc[0]) else {}
     return {
         "scale": desk.study.scale,
         "fit": desk.study.measurement.fit,
         "commit": source_commit(),
         "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
-        **made_by,
+        **_engine(desk, replay.cases),
         "versions": library_versions(),
         "walls": desk.walls.to_dict("records"),
     }
+
+
+def _engine(desk: Desk, cases: pd.DataFrame) -> dict[str, Any]:
+    """What simulated the first of some cases: device, precision, versions."""
+    key = cases["case_key"].iloc[0]
+    return desk.store.load(key).provenance if desk.store.has(key) else {}

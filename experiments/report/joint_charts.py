@@ -63,7 +63,7 @@ def _plane_chart(
     figure = new_figure(surface.design.factor(x).label, surface.design.factor(y).label)
     for (name, fit), color in zip(surfaces.items(), itertools.cycle(COLORS)):
         level = joint.goals[name].target.mean
-        add_region(figure, plane, joint.region(name), f"{name} agrees", _translucent(color))
+        add_region(figure, plane, joint.band(name), f"{name} agrees", _translucent(color))
         at_target = {"coloring": "none", "start": level, "end": level, "size": 1.0}
         grid = Slice(fit, x, y, optimum.point).grid()
         add_contours(figure, grid, f"{name} at its target", at_target, color, 2, hoverinfo="skip")
@@ -72,7 +72,7 @@ def _plane_chart(
     if target.truth is not None:
         add_points(figure, *point_in(plane, target.truth), "hidden truth", PURPLE, "star", 16)
     add_points(figure, *point_in(plane, optimum.point), "chosen", VERMILION, "diamond", 13)
-    caption = "Where each response alone agrees with its target, and where all do (green)."
+    caption = "Where each response agrees with its target, and where all do (green)."
     return Chart(f"joint-{x}-{y}", caption + plane.held_text, figure, tall=True)
 
 

@@ -243,19 +243,10 @@ def add_contours(
 
 def add_region(figure: go.Figure, plane: Slice, region: Region, name: str, fill: str) -> None:
     """Fill the cells of a region in the plane."""
-    cells = region.mask.reshape([region.resolution] * len(region.factors))
-    centers = region.extent * ((2.0 * np.arange(region.resolution) + 1.0) / region.resolution - 1.0)
-    chosen = tuple(
-        slice(None)
-        if factor.name in (plane.x, plane.y)
-        else int(np.abs(centers - factor.to_coded(plane.point[factor.name])).argmin())
-        for factor in region.factors
-    )
-    x, y = (plane.surface.design.factor(name).to_natural(centers) for name in (plane.x, plane.y))
     figure.add_heatmap(
-        x=x,
-        y=y,
-        z=cells[chosen].T.astype(np.uint8),  # x comes before y among the factors, and rows are y
+        x=region.axis(plane.x),
+        y=region.axis(plane.y),
+        z=region.section(plane.x, plane.y, plane.point).T.astype(np.uint8),  # rows are y
         zmin=0,
         zmax=1,
         colorscale=[[0.0, "rgba(0,0,0,0)"], [1.0, fill]],

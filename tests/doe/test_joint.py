@@ -58,6 +58,7 @@ def test_two_bands_that_cross_leave_their_parallelogram() -> None:
     # Of 160,000 cells over the box of side 2 sqrt(2), a perimeter of less than 1.2 passes some 170 of area
     # 5e-5; each may fall on either side.
     assert fit.share() * EXPLORED == pytest.approx(area, abs=2e-3)
+    np.testing.assert_array_equal(fit.region().mask, fit.band("a").mask & fit.band("b").mask)
     assert fit.coded_point == pytest.approx([0.0, 0.0], abs=1e-6)
     assert fit.agrees()
 

@@ -68,7 +68,7 @@ def test_the_page_shows_targets_directions_and_planes(found: Campaign, responses
     assert [row[0][0] for row in responses_page.rows("responses")] == ["angle", "density", "flow"]
     assert len(responses_page.rows("directions")) == len(found.selection.kept)
     assert {"joint-shares", "joint-E-F"} <= set(responses_page.charts)
-    assert "44 mm" in responses_page.text  # the hopper, among what was simulated
+    assert "42 mm" in responses_page.text  # the hopper, among what was simulated
     for decision in found.optimum.decisions:
         assert decision.rule.split(".")[0] in responses_page.text
 

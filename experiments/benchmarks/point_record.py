@@ -1,0 +1,168 @@
+"""The record of what further responses buy: gathered from campaigns' folders, its page written anew.
+
+    dem-warp calibrate experiments/studies/buckwheat/curve_to_point.toml --scale paper --out out/point
+    python -m experiments.benchmarks.point_record --from paper=out/point
+
+Without a folder it writes the page again from the cases of the record, which lies in
+``experiments/studies/buckwheat/point``: the campaign's statistics are repeated on them.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+from typing import Annotated, Any
+
+import pandas as pd
+import typer
+
+from doe.joint_plots import joint_plot
+from experiments.calibrate import Campaign, calibrate
+from experiments.commands.run import WALLS
+from experiments.errors import InputError
+from experiments.files import replacing, write_text
+from experiments.report.markdown import markdown_table
+from experiments.report.numbers import fixed, plain, prose
+from experiments.report.response_tables import response_tables
+from experiments.report.tables import Column, Table, make_table
+from experiments.studies.buckwheat import paper
+from experiments.study import Study, load_study
+
+STUDY = Path(paper.__file__).with_name("curve_to_point.toml")
+FOLDER = Path(paper.__file__).with_name("point")
+CASES, PROVENANCE, PAGE = "cases.csv", "provenance.json", "README.md"
+KEY = ["stage", "scene", "run", "replicate", "seed"]
+"""Columns that name a case."""
+
+
+class KeptCases:
+    """A runner that hands out the cases of an earlier campaign.
+
+    Parameters
+    ----------
+    cases
+        A campaign's table of cases.
+    source
+        Where it comes from, for error messages.
+    """
+
+    def __init__(self, cases: pd.DataFrame, source: str) -> None:
+        self.cases, self.source = cases.set_index(KEY), source
+
+    def __call__(self, table: pd.DataFrame) -> pd.DataFrame:
+        """Find the rows of a table.
+
+        Raises
+        ------
+        InputError
+            When one was not simulated, or with other settings.
+        """
+        wanted = table.set_index(KEY)
+        missing = wanted.index.difference(self.cases.index)
+        if len(missing):
+            rule = "kept cases must be those that the study's campaign asks for; gather them anew"
+            raise InputError(rule, dict(zip(KEY, missing[0], strict=True)), self.source)
+        found = self.cases.loc[wanted.index]
+        # Written by repr and read back: the same bits.
+        if not found[wanted.columns].eq(wanted).all(axis=None):
+            raise InputError("kept cases must have the study's settings", "others", self.source)
+        # An empty reason is read back as no number.
+        found = found.assign(reason=found["reason"].astype(object).fillna(""))
+        return found.reset_index()[[*table.columns, *found.columns.drop(wanted.columns)]]
+
+
+def gather(scale: str, source: Path, record: Path) -> None:
+    """Take over the cases of a campaign's folder, and what made them.
+
+    Raises
+    ------
+    InputError
+        When the folder holds no finished campaign.
+    """
+    cases, results = source / "tables" / CASES, source / "results.json"
+    for path in (cases, results, source / WALLS):
+        if not path.is_file():
+            raise InputError("a folder to gather from must hold a campaign", "no such file", str(path))
+    with replacing(record / scale / CASES) as temporary:
+        shutil.copyfile(cases, temporary)
+    made_by = json.loads(results.read_text(encoding="utf-8"))["provenance"]
+    facts = made_by | {"walls": pd.read_csv(source / WALLS).to_dict("records")}
+    write_text(record / scale / PROVENANCE, json.dumps(facts, indent=1) + "\n")
+
+
+def write_page(record: Path = FOLDER, study_file: Path = STUDY) -> Path:
+    """Write the page, and a picture for every scale that was gathered."""
+    parts = [
+        "# From a curve to a point",
+        "One repose angle leaves a curve of frictions. Here the density of the filled tube and the flow out "
+        "of a hopper stand beside it, in a twin experiment: all three come from simulations with hidden "
+        f"frictions. The study is [{study_file.name}](../{study_file.name}); this page is made from the "
+        "cases beside it by `python -m experiments.benchmarks.point_record`.",
+    ]
+    for folder in sorted(path.parent for path in record.glob(f"*/{CASES}")):
+        study = load_study(study_file, folder.name)
+        campaign = kept_campaign(study, folder)
+        facts = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))
+        parts += [f"## Scale: {folder.name}", study.note, *_findings(campaign, study, folder)]
+        parts += [_made_by(facts), markdown_table(_walls(facts["walls"]))]
+    write_text(record / PAGE, "\n\n".join(part.strip() for part in parts) + "\n")
+    return record / PAGE
+
+
+def kept_campaign(study: Study, folder: Path) -> Campaign:
+    """Repeat a campaign's statistics on its cases."""
+    return calibrate(study, KeptCases(pd.read_csv(folder / CASES), str(folder / CASES)))
+
+
+def _findings(campaign: Campaign, study: Study, folder: Path) -> list[str]:
+    """What was found; where the campaign ended early, why."""
+    outcome = f"Outcome: {campaign.outcome}. {campaign.reason}"
+    if campaign.optimum is None or campaign.optimum.joint is None:
+        return [prose(outcome)]
+    optimum, joint = campaign.optimum, campaign.optimum.joint
+    decisions = [decision.outcome for decision in optimum.decisions if "Chosen" not in decision.outcome]
+    picture, hidden = [], campaign.target.truth if campaign.target else None
+    if len(joint.factors) > 1:
+        with replacing(folder / "joint.png") as temporary:
+            joint_plot(joint, hidden).savefig(temporary, dpi=130)
+        picture = [f"![Where each response agrees, and where all do]({folder.name}/joint.png)"]
+    tables = response_tables(campaign, study.responses)
+    return [
+        prose(outcome),
+        *picture,
+        "\n".join(f"- {prose(text)}" for text in decisions),
+        *map(markdown_table, tables.values()),
+    ]
+
+
+def _made_by(facts: dict[str, Any]) -> str:
+    return "\n".join(f"- {name}: {plain(value)}" for name, value in facts.items() if name != "walls")
+
+
+def _walls(rows: list[dict[str, Any]]) -> Table:
+    walls = pd.DataFrame(rows)
+    columns = [
+        Column("stage", "batch"),
+        Column("simulated", "cases simulated", "label"),
+        Column("seconds", "wall time", "count", "s"),
+    ]
+    total = f"In all {fixed(walls['simulated'].sum(), 0)} cases in {fixed(walls['seconds'].sum(), 0)} s."
+    return make_table("walls", walls, columns, "Wall times.", total)
+
+
+def main(
+    sources: Annotated[
+        list[str] | None, typer.Option("--from", metavar="SCALE=FOLDER", help="Folder of a campaign.")
+    ] = None,
+    out: Annotated[Path, typer.Option(help="Folder of the record.")] = FOLDER,
+) -> None:
+    """Gather the record and write its page."""
+    for text in sources or []:
+        scale, _, source = text.partition("=")
+        gather(scale, Path(source), out)
+    print(write_page(out))
+
+
+if __name__ == "__main__":
+    typer.run(main)
