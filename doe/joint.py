@@ -18,8 +18,8 @@ from doe.region import Region, box_cells, misfit
 PULL = 1e-3
 """Weight of the squared distance to the centre beside chi2: it chooses among settings that are as good."""
 
-STARTS = 8
-"""Cells from which the smallest chi2 is refined."""
+STARTS = 3
+"""Cells from which the smallest chi2 is refined: the best ones of as many orthants."""
 
 
 @dataclass(frozen=True)
@@ -79,25 +79,26 @@ class JointFit:
 
     def region(self, *names: str) -> Region:
         """Return where some responses agree with their targets; without names, all of them."""
-        chosen = names or tuple(self.goals)
-        level = self.alpha / len(chosen)
-        return self._region(np.all([self.p[name] >= level for name in chosen], axis=0))
+        return self._region(self._mask(names or tuple(self.goals)))
 
     def band(self, name: str) -> Region:
         """Return where one response agrees at the level that all share; all bands meet in ``region()``."""
-        return self._region(self.p[name] >= self.alpha / len(self.goals))
+        return self._region(self.explored & (self.p[name] >= self.alpha / len(self.goals)))
 
     def share(self, *names: str) -> float:
         """Return which part of the region explored is compatible with some responses (default: all)."""
-        return self.region(*names).fraction
+        mask = self._mask(names or tuple(self.goals))
+        return float(np.count_nonzero(mask) / np.count_nonzero(self.explored))
 
     @cached_property
     def coded_point(self) -> NDArray[np.float64]:
         """The setting with the smallest chi2; among several as good, the one nearest to the centre."""
         objective = sum(self._chi2(goal, self.cells) for goal in self.goals.values())
         objective = objective + PULL * np.sum(self.cells**2, axis=1)
-        order = np.argsort(np.where(self.explored, objective, np.inf), kind="stable")[:STARTS]
-        found = [self._refined(self.cells[start]) for start in order]
+        order = np.argsort(np.where(self.explored, objective, np.inf), kind="stable")
+        orthant = (self.cells[order] > 0.0) @ 2 ** np.arange(len(self.factors))
+        _, best = np.unique(orthant, return_index=True)
+        found = [self._refined(self.cells[start]) for start in order[np.sort(best)[:STARTS]]]
         return min(found, key=self._objective)
 
     @property
@@ -198,14 +199,19 @@ class JointFit:
         table = pd.DataFrame(vectors.T, columns=[factor.name for factor in self.factors], index=index)
         return table.assign(half_width=half_width, span=[self._span(vector) for vector in vectors.T])
 
+    def _mask(self, names: tuple[str, ...]) -> NDArray[np.bool_]:
+        """Return the cells where some responses agree at the level that these share."""
+        level = self.alpha / len(names)
+        return self.explored & np.all([self.p[name] >= level for name in names], axis=0)
+
     def _region(self, mask: NDArray[np.bool_]) -> Region:
         table = pd.DataFrame(self.cells, columns=[factor.name for factor in self.factors])
-        return Region(self.factors, table, mask & self.explored, self.resolution, self.extent, self.explored)
+        return Region(self.factors, table, mask, self.resolution, self.extent, self.explored)
 
     def _span(self, direction: NDArray[np.float64]) -> float:
         """Return the compatible region's shadow on a direction, over that of the region explored."""
         shadow = self.cells @ direction
-        belonging = shadow[self.region().mask]
+        belonging = shadow[self._mask(tuple(self.goals))]
         return float(np.ptp(belonging) / np.ptp(shadow[self.explored])) if belonging.size else 0.0
 
     def _order(self) -> Iterator[tuple[str, ...]]:

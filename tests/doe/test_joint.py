@@ -157,3 +157,18 @@ def test_what_cannot_be_fitted_together_is_refused() -> None:
         joint_fit({"a": goal(1.0, 1.0), "b": Goal(Plane((1.0, 1.0), design=other), Sample(0.0, 1.0, 5))})
     with pytest.raises(DesignError, match="target's spread"):
         joint_fit({"a": Goal(Plane((1.0, 1.0)), Sample(0.0, 0.0, 5))})
+
+
+def test_of_two_crossings_the_one_with_the_smaller_chi2_is_chosen() -> None:
+    @dataclass(frozen=True)
+    class Bowl(Plane):
+        """x^2 + y^2 in coded units."""
+
+        def evaluate(self, coded):
+            points = np.atleast_2d(coded)
+            return np.sum(points**2, axis=1), np.zeros(len(points))
+
+    bowl = Goal(Bowl((0.0, 0.0)), Sample(1.0, 0.1 * np.sqrt(LARGE), LARGE))
+    # The circle of radius 1 meets x = 0.6 at y = +-0.8; a third plane prefers the lower one by a little.
+    fit = joint_fit({"a": bowl, "b": goal(1.0, 0.0, target=0.6), "c": goal(0.0, 0.1, target=-0.08, se=1.0)})
+    np.testing.assert_allclose(fit.coded_point, [0.6, -0.8], atol=1e-3)
