@@ -73,7 +73,7 @@ def _plane_chart(
         add_points(figure, *point_in(plane, target.truth), "hidden truth", PURPLE, "star", 16)
     add_points(figure, *point_in(plane, optimum.point), "chosen", VERMILION, "diamond", 13)
     caption = "Where each response agrees with its target, and where all do (green)."
-    return Chart(f"joint-{x}-{y}", caption + plane.held_text, figure, tall=True)
+    return Chart(f"joint-{x}-{y}", caption + plane.held_text, figure, height="tall")
 
 
 def _translucent(color: str) -> str:
