@@ -94,6 +94,51 @@ def calibrate(
         raise typer.Exit(FAILED_RUN)
 
 
+@app.command(epilog="Example: [bold]dem-warp discover mygrain.toml mygrain-measured.csv --out out/lacks[/]")
+def discover(
+    study: Annotated[Path, typer.Argument(metavar="STUDY.toml", help="Study file with its conditions.")],
+    measured: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="[MEASURED.csv]", help="Measured heaps; left out: only the library waves are run."
+        ),
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder of the results, new or empty.")] = None,
+    bank: Annotated[
+        Path | None, typer.Option(help="Library waves run earlier for this study; left out: they are run.")
+    ] = None,
+    photographs_only: Annotated[
+        bool, typer.Option("--photographs-only", help="Look only at what photographs show.")
+    ] = False,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the bootstraps and of the fresh runs.")] = 1,
+    scale: Scale = None,
+    device: Device = None,
+    workers: Workers = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on in the folder of an earlier run.")] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Find the effect that a model lacks: calibrate, test the gap, name what explains it, show it closed."""
+    with clear_errors():
+        from experiments.commands.choices import chosen_device, chosen_study, default_folder
+        from experiments.commands.discover import Job, run_search
+        from experiments.report.discovery import results_of, verdict_line
+
+        device = chosen_device(device)
+        chosen = chosen_study(study, scale, device)
+        folder = out or default_folder(chosen, "discover")
+        job = Job(chosen, measured, folder, bank, photographs_only, device, workers, seed)
+    with clear_errors(resume=f"the same command with --out {folder} --resume"):
+        messages.print(f"{chosen.name}, on {device}", chosen.note, sep="\n", markup=False)
+        ended = run_search(job, resume, CaseProgress)
+    if ended.discovery is None:
+        messages.print(f"Library waves: {ended.page}")
+        return
+    if as_json:
+        typer.echo(json.dumps(results_of(ended.discovery, ended.terms), allow_nan=False))
+    messages.print(verdict_line(ended.discovery, ended.terms), markup=False)
+    messages.print(f"Report: {ended.page}")
+
+
 @app.command(epilog="Example: [bold]dem-warp heap --scale bench --set E=0.48 --set F=0.45 --seed 7[/]")
 def heap(
     study: StudyFile = None,

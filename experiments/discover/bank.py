@@ -75,6 +75,8 @@ class Bank:
         Natural units; NaN in rows that failed.
     reasons : (n,) array of str
         Why a case failed, empty where it did not.
+    study : str
+        Fingerprint of the study whose heaps these are; empty where it is not known.
     """
 
     space: SearchSpace
@@ -85,6 +87,7 @@ class Bank:
     condition: np.ndarray
     values: np.ndarray
     reasons: np.ndarray
+    study: str = ""
 
     def __post_init__(self) -> None:
         if self.values.shape != (len(self.theta), len(self.observables)):
@@ -114,6 +117,7 @@ class Bank:
             condition=self.condition.astype(np.int16),
             values=self.values.astype(np.float32),
             reasons=self.reasons,
+            study=np.array(self.study),
         )
 
 
@@ -133,13 +137,18 @@ def load_bank(path: Path) -> Bank:
         space = SearchSpace(**{name: tuple(value) for name, value in document.items()}, mechanisms=ranges)
         names = tuple(str(name) for name in columns.pop("observables"))
         columns["values"] = columns["values"].astype(float)
-        return Bank(space, names, **columns)
+        made_for = str(columns.pop("study", ""))
+        return Bank(space, names, **columns, study=made_for)
     except (KeyError, TypeError, ValueError, OSError) as error:
         raise InputError("must be a bank that this program wrote", str(error), str(path)) from error
 
 
 def make_bank(
-    space: SearchSpace, observables: Sequence[str], points: Sequence[Point], outcomes: Outcomes
+    space: SearchSpace,
+    observables: Sequence[str],
+    points: Sequence[Point],
+    outcomes: Outcomes,
+    study: str = "",
 ) -> Bank:
     """Table of finished library waves.
 
@@ -162,6 +171,7 @@ def make_bank(
         condition=np.array([space.conditions.index(point.condition) for point in points]),
         values=np.asarray(outcomes.values, dtype=float),
         reasons=np.array(outcomes.reasons, dtype=np.str_),
+        study=study,
     )
 
 

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
+from typing import Any
 
 from experiments.errors import InputError
 
@@ -124,10 +126,20 @@ def read_settings(path: Path) -> Settings:
         document = json.loads(path.read_text(encoding="utf-8"))
     except json.JSONDecodeError as error:
         raise InputError("must be a JSON object", str(error), str(path)) from None
+    return settings_of(document, str(path))
+
+
+def settings_of(document: Mapping[str, Any], place: str) -> Settings:
+    """Build settings from their values by name; what is left out has its default.
+
+    Raises
+    ------
+    InputError
+        For an unknown name or a value out of its range, with its place.
+    """
     known = {field.name for field in fields(Settings)}
     for name in document:
         if name not in known:
-            raise InputError(f"must be one of {', '.join(sorted(known))}", name, str(path))
-    if document.get("resolvable") is not None:
-        document["resolvable"] = tuple(document["resolvable"])
-    return Settings(**document)
+            raise InputError(f"must be one of {', '.join(sorted(known))}", name, place)
+    named = document.get("resolvable")
+    return Settings(**{**document, "resolvable": None if named is None else tuple(named)})

@@ -7,12 +7,15 @@ the maximum. A row of coded parameters is all factors, then the sizes of the mec
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from experiments.discover.library import Mechanism
 from experiments.discover.simulator import Point
 from experiments.errors import InputError
+from experiments.study import Study
 
 
 @dataclass(frozen=True)
@@ -74,6 +77,18 @@ class SearchSpace:
             raise InputError(
                 "are named once each", names, "conditions, factors and mechanisms of SearchSpace"
             )
+
+    @classmethod
+    def of(cls, study: Study, library: Sequence[Mechanism]) -> SearchSpace:
+        """Collect what varies in a search with a study and mechanisms of its library."""
+        return cls(
+            tuple(factor.name for factor in study.factors),
+            tuple(factor.low for factor in study.factors),
+            tuple(factor.high for factor in study.factors),
+            tuple(condition.name for condition in study.conditions),
+            tuple(condition.held_out for condition in study.conditions),
+            tuple(MechanismRange(one.name, one.null, one.maximum) for one in library),
+        )
 
     @property
     def names(self) -> tuple[str, ...]:

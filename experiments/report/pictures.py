@@ -92,7 +92,7 @@ def heap_row(study: Study, heaps: Mapping[str, CaseResult]) -> np.ndarray:
     numpy.ndarray
         Picture (rows, columns, 3), blue-green-red.
     """
-    drawn = [_drawn(study, result) for result in heaps.values()]
+    drawn = [drawn_heap(study, result) for result in heaps.values()]
     coarsest = max(picture.meters_per_pixel for _, picture, _ in drawn)
     width = sum(image.shape[1] * picture.meters_per_pixel / coarsest for _, picture, image in drawn)
     panels = []
@@ -114,8 +114,14 @@ def heap_row(study: Study, heaps: Mapping[str, CaseResult]) -> np.ndarray:
     return np.hstack(row)
 
 
-def _drawn(study: Study, result: CaseResult) -> tuple[tuple[HeapAngle, int], Snapshot, np.ndarray]:
-    """Measure and draw a heap in the view nearest to the mean over all: angle and view, picture, overlay."""
+def drawn_heap(study: Study, result: CaseResult) -> tuple[tuple[HeapAngle, int], Snapshot, np.ndarray]:
+    """Measure and draw a heap in the view nearest to the mean over all: angle and view, picture, overlay.
+
+    Raises
+    ------
+    imaging.PictureError
+        When there is no heap to measure.
+    """
     angle = measure_heap(study, result)
     view = int(np.argmin([abs(seen.mean - angle.mean) for seen in angle.views]))
     picture = snapshot(
@@ -131,7 +137,7 @@ def _drawn(study: Study, result: CaseResult) -> tuple[tuple[HeapAngle, int], Sna
 
 def _picture(case: Mapping[str, Any], study: Study, result: CaseResult, kept: tuple[str, ...]) -> HeapPicture:
     """Draw a heap in the view whose angle is nearest to the mean over all views."""
-    (angle, view), _, image = _drawn(study, result)
+    (angle, view), _, image = drawn_heap(study, result)
     values = "".join(f", {name} = {trimmed(case[name], 3)}" for name in kept)
     return HeapPicture(
         title=f"{STAGE_NAMES[case['stage']]}, run {case['run']}, heap {case['replicate']}",

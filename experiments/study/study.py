@@ -27,6 +27,7 @@ from experiments.calibrate.settings import (
 from experiments.errors import StudyError
 from experiments.study.card import with_material
 from experiments.study.conditions import BASE, Condition, ConditionSections, under_condition
+from experiments.study.discover_section import DiscoverSection
 from experiments.study.factor_section import (
     FactorSection,
     FactorTable,
@@ -98,6 +99,8 @@ class Study(Physics):
     """The conditions as written."""
     campaign: CampaignSettings = CampaignSettings()
     """Every decision of the campaign."""
+    discover: DiscoverSection = DiscoverSection()
+    """What a search for a missing effect looks for."""
 
     _document: dict[str, Any] = PrivateAttr(default_factory=dict)
     _places: Places = PrivateAttr(default_factory=lambda: Places(BUCKWHEAT, {}))

@@ -35,6 +35,11 @@ def verdict_sentence(found: Discovery, terms: Terms) -> str:
     return _SENTENCES[found.verdict](found, terms)
 
 
+def verdict_line(found: Discovery, terms: Terms) -> str:
+    """Headline and sentence."""
+    return f"{headline(found, terms)}. {verdict_sentence(found, terms)}"
+
+
 def tied(found: Discovery) -> list[Candidate]:
     """Candidates of a tie: of as many mechanisms as the chosen one, all of them among those named."""
     count = len(found.chosen.mechanisms) if found.chosen else 1

@@ -1,0 +1,224 @@
+"""A search for what a model lacks, in a folder: the bank, the analysis of measured heaps, its page."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from dem_warp import Progress, simulate
+from experiments.cases import open_folder, require_unused
+from experiments.discover.bank import Bank
+from experiments.discover.data.file import read_measured
+from experiments.discover.discovery import Discovery, Fit
+from experiments.discover.engine import EngineSimulator
+from experiments.discover.measured import Measured
+from experiments.discover.observables import OBSERVABLES, PHOTOGRAPHED
+from experiments.discover.outcome_table import OutcomeTable
+from experiments.discover.search import Search, drive
+from experiments.discover.simulator import Outcomes, Point
+from experiments.report import HeapPicture
+from experiments.report.discovery import Terms, write_discovery
+from experiments.report.discovery.pictures import photograph, simulated_heap
+from experiments.report.writer import source_commit
+from experiments.study import Study
+
+Watch = Callable[[str], AbstractContextManager[Callable[[Progress], None] | None]]
+"""Opens the display of one wave, by its title, and hands out what its progress is reported to."""
+
+OUTCOMES, BANK, SETTINGS = "outcomes.sqlite", "bank.npz", "settings.json"
+"""Files of a search's folder beside the report: what was simulated, the library waves, the rules."""
+
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Job:
+    """What a command was asked for.
+
+    Attributes
+    ----------
+    study : Study
+    measured : Path or None
+        File of the measured heaps; None: only the bank is made.
+    folder : Path
+        Where everything goes.
+    bank : Path or None
+        A bank made earlier; None: that of the folder, or a new one.
+    photographs_only : bool
+        Whether only what photographs show is looked at.
+    device, workers
+        Of the simulator.
+    seed : int
+        Of the bootstraps and of the fresh runs.
+    """
+
+    study: Study
+    measured: Path | None
+    folder: Path
+    bank: Path | None = None
+    photographs_only: bool = False
+    device: str | None = None
+    workers: int | None = None
+    seed: int = 1
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How a search ended."""
+
+    discovery: Discovery | None
+    """None where only the bank was made."""
+    terms: Terms
+    page: Path
+    """The report, or the bank."""
+
+
+class _Watched:
+    """The engine, with a display for every wave.
+
+    Parameters
+    ----------
+    search, job
+        What is simulated, and where.
+    watch
+        Opens the display of a wave.
+    """
+
+    observables = EngineSimulator.observables
+
+    def __init__(self, search: Search, job: Job, watch: Watch) -> None:
+        table = OutcomeTable(job.folder / OUTCOMES)
+        self.engine = EngineSimulator(
+            search.study, search.library, table, job.device, job.workers, progress=self._report
+        )
+        self.title = "library waves"
+        self.walls: list[dict[str, Any]] = []
+        self._watch = watch
+        self._listener: Callable[[Progress], None] | None = None
+
+    def __enter__(self) -> _Watched:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.engine.close()
+
+    def __call__(self, points: Sequence[Point]) -> Outcomes:
+        """Observables of every point."""
+        started, before = time.perf_counter(), len(self.engine.table)
+        with self._watch(self.title) as self._listener:
+            outcomes = self.engine(points)
+        seconds, simulated = time.perf_counter() - started, len(self.engine.table) - before
+        self.walls.append({"wave": self.title, "simulated": simulated, "seconds": round(seconds, 1)})
+        return outcomes
+
+    def _report(self, progress: Progress) -> None:
+        if self._listener is not None:
+            self._listener(progress)
+
+
+def run_search(job: Job, resume: bool = False, watch: Watch = lambda title: nullcontext()) -> Ended:
+    """Look for what a study lacks, and write the report.
+
+    Nothing is written before study, data and bank have been read without an error.
+
+    Parameters
+    ----------
+    job
+        What is wanted.
+    resume
+        Go on in the folder of an earlier run: what it has simulated is not simulated again.
+    watch
+        Display of each wave.
+
+    Raises
+    ------
+    InputError
+        When the study cannot be searched, the data or the bank break a rule, or the folder is in use.
+    """
+    if not resume:
+        require_unused(job.folder, "; --resume goes on in it")
+    search = Search.of(job.study)
+    terms = Terms.of(search.library, OBSERVABLES, job.study.factor_sections)
+    bank = _known_bank(job, search)
+    measured = _measured(job)
+    _, changes = open_folder(job.folder, job.study, resume)
+    for change in changes:
+        _log.warning("The study has changed since the earlier run: %s", change)
+    search.settings.write(job.folder / SETTINGS)
+    with _Watched(search, job, watch) as simulator:
+        if bank is None:
+            bank = search.make_bank(simulator)
+            bank.save(job.folder / BANK)
+        if measured is None:
+            return Ended(None, terms, job.folder / BANK)
+        simulator.title, started = "fresh runs", time.perf_counter()
+        found = drive(search.analysis(measured, bank, job.seed), simulator)
+        walls = [*simulator.walls, {"wave": "analysis, its waves included", "seconds": _since(started)}]
+        pictures = heaps_side_by_side(simulator.engine, found, terms, measured, job)
+    page = write_discovery(found, job.study, terms, job.folder, pictures, _provenance(job, walls))
+    return Ended(found, terms, page)
+
+
+def heaps_side_by_side(
+    engine: EngineSimulator, found: Discovery, terms: Terms, measured: Measured, job: Job
+) -> list[HeapPicture]:
+    """Draw a measured heap, where there is a photograph, that of the base, and that with the mechanism."""
+    if found.base is None:
+        return []
+    training = [name for name in measured.conditions if name in _training(job.study)]
+    condition = next((name for name in training if measured.pictures.get(name)), training[0])
+    models = {"Calibrated base": found.base}
+    if found.chosen is not None:
+        models[f"With {terms.titles(found.chosen.mechanisms)}"] = found.chosen
+    cases = [engine.case(_point(fit, condition, job.seed)) for fit in models.values()]
+    results = simulate(cases, device=job.device, workers=job.workers)
+    photographs = measured.pictures.get(condition, ())[:1]
+    pictures = [photograph(path, condition, job.study.measurement.fit) for path in photographs]
+    under = job.study.under(condition)
+    for title, result in zip(models, results, strict=True):
+        pictures.append(simulated_heap(title, condition, under, result))
+    return [picture for picture in pictures if picture is not None]
+
+
+def _known_bank(job: Job, search: Search) -> Bank | None:
+    """The bank that is named, that of the folder, or that which lies beside the study; None: to be made."""
+    beside = job.study.file.with_name(f"bank-{job.study.scale}.npz" if job.study.scale else BANK)
+    if job.bank is not None:
+        return search.read_bank(job.bank)
+    return next((search.read_bank(path) for path in (job.folder / BANK, beside) if path.is_file()), None)
+
+
+def _measured(job: Job) -> Measured | None:
+    if job.measured is None:
+        return None
+    measured = read_measured(job.measured, job.study)
+    return measured.only(PHOTOGRAPHED) if job.photographs_only else measured
+
+
+def _training(study: Study) -> list[str]:
+    return [condition.name for condition in study.conditions if not condition.held_out]
+
+
+def _point(fit: Fit, condition: str, seed: int) -> Point:
+    sizes = zip(fit.mechanisms, (size.value for size in fit.sizes), strict=True)
+    return Point(fit.theta, tuple(sorted(sizes)), condition, seed)
+
+
+def _provenance(job: Job, walls: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    return {
+        "device": job.device,
+        "workers": job.workers,
+        "commit": source_commit(),
+        "photographs only": job.photographs_only,
+        "data": job.measured.name if job.measured else None,
+        "waves": list(walls),
+    }
+
+
+def _since(started: float) -> float:
+    return round(time.perf_counter() - started, 1)
