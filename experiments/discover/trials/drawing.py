@@ -213,7 +213,8 @@ def _pairs(plan: Plan, resolvable: Sequence[Effect], rng: np.random.Generator) -
 
 
 def _strong(part: str, kind: Kind, effect: Effect, rng: np.random.Generator) -> _Draft:
-    return _of(part, kind, effect, rng.uniform(STRONG, effect.strongest))
+    """Draw an effect above the limit, uniform in its logarithm: as many close above it as far from it."""
+    return _of(part, kind, effect, float(np.exp(rng.uniform(np.log(STRONG), np.log(effect.strongest)))))
 
 
 def _somewhere(part: str, kind: Kind, effect: Effect, rng: np.random.Generator, least: float) -> _Draft:

@@ -7,18 +7,19 @@ that the statistics of a round take every core; the simulator stays in this proc
 from __future__ import annotations
 
 import multiprocessing
+import os
 import traceback
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from typing import Protocol
 
+from experiments.discover.analysis import Analysis
 from experiments.discover.discovery import Discovery
 from experiments.discover.simulator import Outcomes, Point, Simulator
 
-Analysis = Generator[list[Point], Outcomes, Discovery]
-"""An analysis under way."""
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 @dataclass(frozen=True)
@@ -117,19 +118,35 @@ def process_crew(begin: Callable[[str], Analysis], workers: int) -> Iterator[Pro
     context = multiprocessing.get_context("spawn")
     pipes, processes = [], []
     try:
-        for _ in range(workers):
-            mine, theirs = context.Pipe()
-            process = context.Process(target=_serve, args=(theirs, begin), daemon=True)
-            process.start()
-            theirs.close()
-            pipes.append(mine)
-            processes.append(process)
+        with _one_thread_each():
+            for _ in range(workers):
+                mine, theirs = context.Pipe()
+                process = context.Process(target=_serve, args=(theirs, begin), daemon=True)
+                process.start()
+                theirs.close()
+                pipes.append(mine)
+                processes.append(process)
         yield ProcessCrew(pipes)
     finally:
         for pipe in pipes:
             pipe.close()
         for process in processes:
             process.join()
+
+
+@contextmanager
+def _one_thread_each() -> Iterator[None]:
+    """Let processes that are started meanwhile use one thread of linear algebra: there is one a core."""
+    before = {name: os.environ.get(name) for name in _THREADS}
+    os.environ |= dict.fromkeys(_THREADS, "1")
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
 
 
 def _serve(pipe: Connection, begin: Callable[[str], Analysis]) -> None:

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import matplotlib as mpl
 import matplotlib.pyplot as plt
@@ -13,28 +11,22 @@ import numpy as np
 import pandas as pd
 
 from experiments.benchmarks.tables import markdown_table
+from experiments.discover.trials.declaration import Declaration, read_declaration
+from experiments.discover.trials.drawing import STRONG
 from experiments.discover.trials.findings import EVERYTHING, PHOTOGRAPHS, read_findings
+from experiments.discover.trials.folder import DECLARED, FINDINGS, LABELS, PAGE, RUNS, SEALED
 from experiments.discover.trials.score import (
     Aim,
     aims,
     by_mechanism,
     by_outsider,
     confusion,
+    declared_aim,
     power_curve,
     scored,
 )
 from experiments.discover.trials.truth import read_labels, read_sealed, revealed
 from experiments.files import write_text
-
-SEALED, LABELS, FINDINGS, DECLARED, RUNS, PAGE = (
-    "sealed.csv",
-    "labels.json",
-    "findings.csv",
-    "declared.json",
-    "runs.csv",
-    "README.md",
-)
-"""Files of a record: the seals and what was declared beforehand, then the labels, findings and runs."""
 
 RECORD = Path(__file__).parents[1] / "record" / "trials"
 """Where the record of the full trials lies."""
@@ -76,7 +68,7 @@ def write_page(folder: Path) -> Path:
     """
     sealed = read_sealed(folder / SEALED)
     labels = revealed(read_labels(folder / LABELS), sealed)
-    declared = json.loads((folder / DECLARED).read_text(encoding="utf-8"))
+    declared = read_declaration(folder / DECLARED)
     table = scored(read_findings([folder / FINDINGS]), labels, sealed)
     parts = [_INTRODUCTION, _runs(folder / RUNS), _declared(declared)]
     for view, title in TITLES.items():
@@ -95,25 +87,30 @@ def _runs(path: Path) -> str:
     return f"## Runs\n\n{text}\n\n{markdown_table(totals)}"
 
 
-def _declared(declared: Mapping[str, Any]) -> str:
+def _declared(declared: Declaration) -> str:
     table = pd.DataFrame(
         {
-            "mechanism": effect["name"],
-            "null": effect["null"],
-            "maximum": effect["maximum"],
-            "gamma80": effect["gamma80"] or np.nan,
-            "resolvable": "yes" if effect["resolvable"] else "no",
-            "not told from": ", ".join(effect["kin"]),
+            "mechanism": effect.name,
+            "null": effect.null,
+            "maximum": effect.maximum,
+            "gamma80, from the null": effect.gamma80 if effect.resolvable else np.nan,
+            "share of the range": effect.gamma80 / abs(effect.maximum - effect.null),
+            "resolvable": "yes" if effect.resolvable else "no",
+            "not told from": ", ".join(effect.kin),
         }
-        for effect in declared["library"]
+        for effect in declared.library
+    ).replace(np.inf, np.nan)
+    scale = f", scale {declared.scale}" if declared.scale else ""
+    stated = (
+        f"{declared.study}{scale}, {declared.plan.replicates} heaps a condition; declared and sealed on "
+        f"{declared.drawn_on}; settings of the analysis {declared.settings.sha256}. A mechanism is "
+        f"resolvable whose range holds more than {STRONG:g} gamma80; no other may be named."
     )
-    facts = {key: declared[key] for key in ("study", "scale", "seed", "settings_sha256", "sealed_on")}
-    stated = "; ".join(f"{key.replace('_', ' ')} {value}" for key, value in facts.items())
-    return f"## Declared beforehand\n\n{stated}.\n\n{markdown_table(table)}"
+    return f"## Declared beforehand\n\n{stated}\n\n{markdown_table(table)}\n{_aims([declared_aim(declared.library)])}"
 
 
-def _view(rows: pd.DataFrame, view: str, title: str, declared: Mapping[str, Any], folder: Path) -> str:
-    unresolvable = [effect["name"] for effect in declared["library"] if not effect["resolvable"]]
+def _view(rows: pd.DataFrame, view: str, title: str, declared: Declaration, folder: Path) -> str:
+    unresolvable = [effect.name for effect in declared.library if not effect.resolvable]
     _draw_power(power_curve(rows), folder / f"power-{view}.png")
     _draw_confusion(confusion(rows), folder / f"confusion-{view}.png")
     parts = [
@@ -163,7 +160,8 @@ def _draw_confusion(counts: pd.DataFrame, path: Path) -> None:
     axes.imshow(shares, cmap="Blues", vmin=0.0, vmax=1.2, aspect="auto")
     for (row, column), count in np.ndenumerate(counts.to_numpy()):
         if count:
-            axes.text(column, row, str(count), ha="center", va="center", fontsize=8)
+            ink = "white" if shares[row, column] > 0.6 else "black"
+            axes.text(column, row, str(count), ha="center", va="center", fontsize=8, color=ink)
     axes.set_xticks(range(counts.shape[1]), [str(name) for name in counts.columns], rotation=90, fontsize=8)
     axes.set_yticks(range(counts.shape[0]), [str(name) for name in counts.index], fontsize=8)
     axes.set(xlabel="verdict", ylabel="truth")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +12,7 @@ import pandas as pd
 from scipy.stats import binomtest
 
 from experiments.discover.discovery import Verdict
-from experiments.discover.trials.drawing import STRONG
+from experiments.discover.trials.drawing import STRONG, Effect
 from experiments.discover.trials.findings import CRASH
 from experiments.discover.trials.truth import Kind, Label, Sealed
 
@@ -128,14 +128,22 @@ def share(column: pd.Series) -> Share:
 def confusion(table: pd.DataFrame) -> pd.DataFrame:
     """Count answers (columns) by truth (rows).
 
-    The trials of a mechanism are those above 1.5 gamma80 where there are any; weak ones have their own row.
+    A mechanism's row has its trials above 1.5 gamma80; the weaker ones of all are one row. Two names are one
+    column, as are the verdicts without a name.
     """
-    weak = (table["kind"] == Kind.SINGLE) & (table["strength"] <= STRONG)
-    truth = table["truth"].where(table["kind"] == Kind.SINGLE, table["kind"])
-    truth = truth.mask(weak, truth + " (weak)")
-    naming = table["verdict"].isin(NAMING)
-    answer = table["verdict"].mask(naming, table["named"].str.replace(" ", " + "))
-    return pd.crosstab(truth, answer, rownames=["truth"], colnames=["answer"])
+    strong = (table["kind"] == Kind.SINGLE) & (table["strength"] > STRONG)
+    weak = (table["kind"] == Kind.SINGLE) & ~strong
+    truth = table["truth"].where(strong, table["kind"].mask(weak, "weak single"))
+    names, naming = table["named"].str.split(), table["verdict"].isin(NAMING)
+    answer = table["verdict"].mask(naming, table["named"]).mask(naming & (names.str.len() > 1), "two names")
+    counts = pd.crosstab(truth, answer, rownames=["truth"], colnames=["answer"])
+    return counts.reindex(index=_names_first(counts.index), columns=_names_first(counts.columns))
+
+
+def _names_first(labels: Iterable[str]) -> list[str]:
+    """Sort labels: mechanisms by name, then kinds of trials or verdicts."""
+    others = ["weak single", *Kind, "two names", *Verdict, CRASH]
+    return sorted(labels, key=lambda label: (others.index(label) if label in others else -1, label))
 
 
 def power_curve(table: pd.DataFrame) -> pd.DataFrame:
@@ -224,6 +232,26 @@ def aims(table: pd.DataFrame, unresolvable: Sequence[str]) -> tuple[Aim, ...]:
         *_pair_aims(table[table["kind"] == Kind.PAIR]),
         Aim("analyses that crashed", "none", str(crashes), crashes.count == 0 if len(table) else None),
     )
+
+
+MUST_RESOLVE = (
+    "contact_cohesion",
+    "liquid_bridges",
+    "size_spread",
+    "plate_tilt",
+    "vibration",
+    "rolling_torque",
+)
+"""Mechanisms that must be resolvable at half of their range; that of rolling is missing from the base."""
+
+
+def declared_aim(library: Sequence[Effect]) -> Aim:
+    """Hold what was declared beforehand against the mechanisms that must be resolvable."""
+    seen = {effect.name for effect in library if effect.gamma80 <= 0.5 * abs(effect.maximum - effect.null)}
+    missing = [name for name in MUST_RESOLVE if name not in seen]
+    found = f"not {', '.join(missing)}" if missing else "every one"
+    question = f"resolvable at half of their range: {', '.join(MUST_RESOLVE)}"
+    return Aim(question, "every one", found, not missing)
 
 
 def _null_aims(nulls: pd.DataFrame) -> tuple[Aim, ...]:

@@ -2,23 +2,33 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from doe.factors import Factor
+from experiments.discover.analysis import Analysis
 from experiments.discover.discovery import Data, Discovery, Effort, Verdict
 from experiments.discover.observables import OBSERVABLES, PHOTOGRAPHED
+from experiments.discover.settings import Settings
 from experiments.discover.simulator import Outcomes, Point
 from experiments.discover.trials.camera import Camera
+from experiments.discover.trials.declaration import (
+    Declaration,
+    declared_effects,
+    read_declaration,
+    with_names,
+)
+from experiments.discover.trials.desk import Desk, OutOfTime, TimedSimulator, job_name, keep
 from experiments.discover.trials.drawing import STRONG, Effect, Plan, draw
-from experiments.discover.trials.findings import EVERYTHING, Finding, findings_table
+from experiments.discover.trials.findings import EVERYTHING, PHOTOGRAPHS, read_findings
+from experiments.discover.trials.folder import Folder
 from experiments.discover.trials.heaps import cases_of
-from experiments.discover.trials.lockstep import Analysis, Crash, LocalCrew, in_step, process_crew
-from experiments.discover.trials.score import Share, aims, confusion, covered, power_curve, removed, scored
+from experiments.discover.trials.lockstep import Crash, LocalCrew, in_step, process_crew
 from experiments.discover.trials.truth import (
     Kind,
     Label,
@@ -30,6 +40,7 @@ from experiments.discover.trials.truth import (
     write_sealed,
 )
 from experiments.errors import InputError
+from tests.experiments.discover import synthetic
 
 FACTORS = (Factor("mu", 0.2, 0.6), Factor("e", 0.1, 0.5))
 LIBRARY = (
@@ -93,7 +104,7 @@ def test_the_name_of_a_trial_says_nothing_of_its_kind() -> None:
     assert abs(sum(first) - 200 * 3 / 19) < 21
 
 
-def test_labels_are_held_to_their_seals(tmp_path) -> None:
+def test_labels_are_held_to_their_seals(tmp_path: Path) -> None:
     labels, sealed = zip(*draw_trials(), strict=True)
     write_labels(tmp_path / "labels.json", labels)
     write_sealed(tmp_path / "sealed.csv", sealed)
@@ -224,111 +235,68 @@ def test_waves_of_many_analyses_run_in_one_call_and_come_home(crew: str) -> None
         assert found[name].reason == expected_reason(int(name))
 
 
-def label_of(kind: Kind, *names: str, strength: float = 2.0) -> Label:
-    sizes = tuple((name, 1.0) for name in names)
-    return Label("", kind, (0.3, 0.3), sizes, (strength,) * len(names), seed=1, salt="")
+def test_a_batch_after_the_deadline_is_not_begun() -> None:
+    points = [Point((float(i),), (("b" if i % 2 else "a", 1.0),), "base", i) for i in range(10)]
+    echo = Echo()
+    outcomes = TimedSimulator(echo, deadline=math.inf, batch=4)(points)
+    assert echo.calls == 3
+    np.testing.assert_array_equal(outcomes.values[:, 0], np.arange(10.0))
+    with pytest.raises(OutOfTime):
+        TimedSimulator(echo, deadline=-math.inf)(points)
+    assert echo.calls == 3
 
 
-@pytest.mark.parametrize(
-    ("label", "verdict", "named", "judgement"),
-    [
-        (label_of(Kind.NULL), Verdict.NONE, "", ""),
-        (label_of(Kind.NULL), Verdict.NAMED, "drag", "wrong"),
-        (label_of(Kind.SINGLE, "drag"), Verdict.NAMED, "drag", "right"),
-        (label_of(Kind.SINGLE, "drag"), Verdict.NAMED, "twist", "wrong"),
-        (label_of(Kind.SINGLE, "drag"), Verdict.NAMED, "drag twist", "wrong"),
-        (label_of(Kind.SINGLE, "drag"), Verdict.INCOMPLETE, "twist", "wrong"),
-        (label_of(Kind.SINGLE, "drag"), Verdict.TIE, "drag twist", "tied"),
-        (label_of(Kind.SINGLE, "drag"), Verdict.TIE, "spread twist", ""),
-        (label_of(Kind.SINGLE, "drag"), Verdict.UNKNOWN, "", ""),
-        (label_of(Kind.PAIR, "drag", "twist"), Verdict.NAMED, "drag twist", "right"),
-        (label_of(Kind.PAIR, "drag", "twist"), Verdict.INCOMPLETE, "drag", ""),
-        (label_of(Kind.PAIR, "drag", "twist"), Verdict.NAMED, "drag spread", "wrong"),
-        (label_of(Kind.WITHHELD, "drag"), Verdict.UNKNOWN, "", ""),
-        (label_of(Kind.WITHHELD, "drag"), Verdict.NAMED, "twist", "wrong"),
-        (label_of(Kind.STRANGER, "swollen"), Verdict.INCOMPLETE, "drag", "wrong"),
-    ],
-)
-def test_a_verdict_is_judged_by_what_it_names(
-    label: Label, verdict: Verdict, named: str, judgement: str
-) -> None:
-    table = findings_table([Finding("t", EVERYTHING, str(verdict), named)])
-    [row] = scored(table, {"t": label}, [Sealed("t", "alone", (), "")]).to_dict("records")
-    assert [name for name in ("right", "tied", "wrong") if row[name]] == ([judgement] if judgement else [])
-
-
-def test_shares_have_the_intervals_of_clopper_and_pearson() -> None:
-    # 0 of n: 1 - (0.05 / 2)^(1/n).
-    assert Share(0, 42).interval == pytest.approx((0.0, 1.0 - 0.025 ** (1 / 42)))
-    assert Share(42, 42).interval == pytest.approx((0.025 ** (1 / 42), 1.0))
-    assert str(Share(0, 0)) == "no trials"
-
-
-def ideal_trials() -> tuple[pd.DataFrame, dict[str, Label]]:
-    """Findings of an analysis that is right wherever it can be."""
-    labels: dict[str, Label] = {f"null-{i}": label_of(Kind.NULL) for i in range(100)}
-    labels |= {
-        f"{name}-{i}": label_of(Kind.SINGLE, name, strength=1.6 + i / 10)
-        for name in "abcdefgh"
-        for i in range(15)
+def test_what_is_declared_comes_back_with_its_hash(tmp_path: Path) -> None:
+    settings = Settings(draws=500)
+    library = declared_effects(synthetic.emulator(), settings, replicates=8)
+    # The synthetic world has a mechanism and its twin, which no data tell apart.
+    assert {effect.name for effect in library if not effect.resolvable} == {"alpha", "twin"}
+    assert {effect.name: effect.kin for effect in library if effect.kin} == {
+        "alpha": ("twin",),
+        "twin": ("alpha",),
     }
-    labels |= {f"outside-{i}": label_of(Kind.STRANGER, "swollen") for i in range(60)}
-    labels |= {f"pair-{i}": label_of(Kind.PAIR, "a", "b") for i in range(30)}
-    return findings_table(ideal(name, label) for name, label in labels.items()), labels
-
-
-def ideal(trial: str, label: Label) -> Finding:
-    if label.kind is Kind.NULL:
-        return Finding(trial, EVERYTHING, "none")
-    if label.kind is Kind.STRANGER:
-        return Finding(trial, EVERYTHING, "unknown", alarm=True)
-    held_out = {"held_out_before": 112.0, "held_out_after": 22.0, "held_out_degrees": 12.0}
-    missed = int(trial.rpartition("-")[2]) % 10 == 0  # a 90 % interval misses one in ten
-    low, high = (1.1, 1.2) if missed else (0.9, 1.1)
-    return Finding(trial, EVERYTHING, "named", " ".join(label.mechanisms), True, 1.0, low, high, **held_out)
-
-
-def test_an_analysis_that_is_right_passes_every_aim() -> None:
-    findings, labels = ideal_trials()
-    table = scored(findings, labels, [Sealed(name, "all", (), "") for name in labels])
-    found = aims(table, unresolvable=["twist"])
-    assert [aim.question for aim in found if aim.passed is not True] == []
-    assert removed(table) == pytest.approx(0.9)
-    assert covered(table).value == pytest.approx(1.0 - 2 / 15)
-    assert confusion(table).to_numpy().sum() == len(labels)
-    curve = power_curve(table)
-    assert curve["trials"].sum() == 120
-    assert (curve["right"] == 1.0).all()
-
-
-@pytest.mark.parametrize(
-    ("of", "verdict", "named", "failed"),
-    [
-        (Kind.NULL, "named", "a", {"nothing hidden: alarms", "nothing hidden: wrong names"}),
-        (
-            Kind.STRANGER,
-            "named",
-            "twist",
-            {"outside the library: unknown", "names that were declared not resolvable"},
-        ),
-        (Kind.PAIR, "named", "a c", {"two mechanisms: both named", "two mechanisms: no wrong name"}),
-        (Kind.PAIR, "crash", "", {"two mechanisms: both named", "analyses that crashed"}),
-    ],
-)
-def test_an_analysis_that_is_wrong_fails_the_aims_that_it_misses(
-    of: Kind, verdict: str, named: str, failed: set[str]
-) -> None:
-    findings, labels = ideal_trials()
-    hit = findings["trial"].map(lambda name: labels[name].kind is of)
-    findings = findings.assign(
-        verdict=findings["verdict"].mask(hit, verdict),
-        named=findings["named"].mask(hit, named),
-        alarm=findings["alarm"] | hit,
+    settings = with_names(settings, library)
+    assert settings.resolvable == ("beta", "gamma", "delta", "epsilon", "zeta")
+    declaration = Declaration("Grain", "bench", "2026-01-01", PLAN, settings, library, STRANGERS)
+    path = tmp_path / "declared.json"
+    declaration.write(path)
+    assert read_declaration(path) == declaration
+    path.write_text(
+        path.read_text(encoding="utf-8").replace('"draws": 500', '"draws": 501'), encoding="utf-8"
     )
-    table = scored(findings, labels, [Sealed(name, "all", (), "") for name in labels])
-    assert {aim.question for aim in aims(table, ["twist"]) if aim.passed is False} == failed
+    with pytest.raises(InputError, match="settings must have the hash"):
+        read_declaration(path)
 
 
-def test_without_trials_nothing_passes() -> None:
-    table = scored(findings_table([]), {}, [])
-    assert [aim.question for aim in aims(table, []) if aim.passed] == []
+def test_trials_of_a_known_world_end_as_they_should(tmp_path: Path) -> None:
+    """Nothing hidden, a mechanism, the same withheld, and the same by photographs alone, in step."""
+    hidden: dict[str, dict[str, float]] = {
+        "alone-001": {},
+        "alone-002": {"beta": 1.0},
+        "outside-001": {"beta": 1.0},
+    }
+    desk = Desk(
+        synthetic.emulator(),
+        Settings(draws=500, resolvable=("beta", "gamma")),
+        {
+            trial: synthetic.measure(sizes, seed, replicates=8)
+            for seed, (trial, sizes) in enumerate(hidden.items())
+        },
+        {"alone-001": (), "alone-002": (), "outside-001": ("beta",)},
+    )
+    simulator = synthetic.SyntheticSimulator(synthetic.space())
+    folder = Folder(tmp_path)
+    jobs = [job_name(trial, EVERYTHING) for trial in hidden] + [job_name("alone-002", PHOTOGRAPHS)]
+    for turn in in_step(jobs, LocalCrew(desk), simulator):
+        keep(folder, turn.ended)
+    found = read_findings([folder.findings]).set_index(["trial", "view"])
+    assert found["verdict"].to_dict() == {
+        ("alone-001", EVERYTHING): "none",
+        ("alone-002", EVERYTHING): "named",
+        ("outside-001", EVERYTHING): "unknown",
+        ("alone-002", PHOTOGRAPHS): "named",
+    }
+    named = found.loc[("alone-002", EVERYTHING)]
+    assert named["named"] == "beta"
+    assert named["size_low"] < 1.0 < named["size_high"]
+    assert all(folder.discovery(job).is_file() for job in jobs)

@@ -1,0 +1,68 @@
+"""What the trials cost, before they run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import pandas as pd
+
+from experiments.discover.bank import load_bank
+from experiments.discover.settings import Settings
+from experiments.discover.trials.declaration import Declaration
+from experiments.discover.trials.truth import Sealed
+
+PER_CASE = 0.007
+"""Seconds of an H200 that a case of 400 grains of three spheres takes, with 1000 and more at once."""
+
+
+def planned_cases(sealed: Sequence[Sealed], declared: Declaration, bank: Path) -> pd.DataFrame:
+    """Cases of the bank, of the trials' heaps, and of their analyses.
+
+    Parameters
+    ----------
+    sealed
+        The trials.
+    declared
+        Their declaration.
+    bank
+        File of the bank.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns: what, trials, cases, and the most that there can be where it depends on what is found; GPU
+        seconds of these. An analysis without a gap asks for no case; one with a gap is taken to need one
+        round of the shortlist, and at the most all rounds, of single mechanisms and of pairs.
+    """
+    finished = load_bank(bank)
+    conditions = len(finished.space.conditions)
+    cases = len(finished.reasons)
+    rows = [{"what": "bank", "trials": 0, "cases": cases, "at most": cases}]
+    likely, most = search_cases(declared.settings, conditions)
+    for part in dict.fromkeys(trial.part for trial in sealed):
+        count = sum(trial.part == part for trial in sealed)
+        heaps = count * declared.plan.replicates * conditions
+        with_gap = count - (declared.plan.nulls if part == "alone" else 0)
+        rows.append({"what": f"heaps, {part}", "trials": count, "cases": heaps, "at most": heaps})
+        rows.append(
+            {
+                "what": f"analyses, {part}",
+                "trials": count,
+                "cases": with_gap * likely,
+                "at most": with_gap * most,
+            }
+        )
+    table = pd.DataFrame(rows)
+    return table.assign(seconds=table["cases"] * PER_CASE, **{"seconds at most": table["at most"] * PER_CASE})
+
+
+def search_cases(settings: Settings, conditions: int) -> tuple[int, int]:
+    """Cases that an analysis with a gap asks for: likely, and at the most.
+
+    Every round runs the shortlist and the base around their optima; at the end the base and the chosen model
+    run side by side.
+    """
+    a_round = settings.refinement_points * settings.refinement_repeats * conditions * (settings.shortlist + 1)
+    end = 2 * settings.direct_runs * conditions
+    return a_round + end, 2 * settings.refinement_rounds * a_round + end

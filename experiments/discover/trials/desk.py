@@ -1,0 +1,146 @@
+"""Where analyses begin and end: the data they get, the time they have, what is written down of them."""
+
+from __future__ import annotations
+
+import json
+import time
+import zlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from experiments.discover.analysis import Analysis, analyse
+from experiments.discover.data.file import read_measured
+from experiments.discover.discovery import Discovery
+from experiments.discover.emulator import Emulator
+from experiments.discover.measured import Measured
+from experiments.discover.observables import PHOTOGRAPHED
+from experiments.discover.settings import Settings
+from experiments.discover.simulator import Outcomes, Point, Simulator
+from experiments.discover.trials.findings import (
+    PHOTOGRAPHS,
+    Finding,
+    findings_table,
+    read_findings,
+    write_findings,
+)
+from experiments.discover.trials.folder import Folder
+from experiments.discover.trials.lockstep import Crash
+from experiments.discover.trials.truth import Sealed
+from experiments.errors import InputError
+from experiments.files import write_text
+from experiments.study import Study
+
+BATCH = 8192
+"""Points between two looks at the clock."""
+
+
+class OutOfTime(Exception):  # noqa: N818  (an ending that is foreseen, not an error)
+    """The time is up; what was simulated is kept."""
+
+
+class TimedSimulator:
+    """A simulator that stops between two batches when its time is up.
+
+    Parameters
+    ----------
+    simulator
+        Runs the batches; keeps what it has run.
+    deadline
+        On the clock of ``time.monotonic`` [s].
+    batch
+        Points at a time.
+    """
+
+    def __init__(self, simulator: Simulator, deadline: float, batch: int = BATCH) -> None:
+        self.observables = simulator.observables
+        self._simulator, self._deadline, self._batch = simulator, deadline, batch
+
+    def __call__(self, points: Sequence[Point]) -> Outcomes:
+        """Observables of every point.
+
+        Points with the same mechanisms come into the same batch, as these run one compiled kernel.
+
+        Raises
+        ------
+        OutOfTime
+            When the deadline passes before all have run.
+        """
+        order = sorted(range(len(points)), key=lambda i: tuple(name for name, _ in points[i].sizes))
+        values = np.full((len(points), len(self.observables)), np.nan)
+        reasons = [""] * len(points)
+        for start in range(0, len(order), self._batch):
+            if time.monotonic() > self._deadline:
+                raise OutOfTime
+            some = order[start : start + self._batch]
+            outcomes = self._simulator([points[i] for i in some])
+            values[some] = np.asarray(outcomes.values)
+            for i, reason in zip(some, outcomes.reasons, strict=True):
+                reasons[i] = reason
+        return Outcomes(values, tuple(reasons))
+
+
+@dataclass(frozen=True, eq=False)
+class Desk:
+    """Begins analyses by the name of their job, ``TRIAL.VIEW``; goes to other processes as a whole.
+
+    Attributes
+    ----------
+    emulator : Emulator
+    settings : Settings
+    measured : dict of Measured
+        By trial.
+    withheld : dict of tuple of str
+        By trial: mechanisms that the analysis must do without.
+    """
+
+    emulator: Emulator
+    settings: Settings
+    measured: Mapping[str, Measured]
+    withheld: Mapping[str, tuple[str, ...]]
+
+    def __call__(self, job: str) -> Analysis:
+        """Begin an analysis."""
+        trial, _, view = job.partition(".")
+        measured = self.measured[trial]
+        if view == PHOTOGRAPHS:
+            measured = measured.only(PHOTOGRAPHED)
+        emulator = self.emulator.without(*self.withheld[trial])
+        return analyse(measured, emulator, self.settings, zlib.crc32(job.encode()))
+
+
+def job_name(trial: str, view: str) -> str:
+    """Name of the analysis of a trial in a view."""
+    return f"{trial}.{view}"
+
+
+def read_data(
+    folder: Folder, trials: Sequence[Sealed], study: Study
+) -> tuple[dict[str, Measured], dict[str, Crash]]:
+    """Read the measured heaps of trials; where the reader refuses a file, its analysis has crashed."""
+    measured, refused = {}, {}
+    for trial in trials:
+        try:
+            measured[trial.trial] = read_measured(folder.measured(trial.trial), study)
+        except InputError as error:
+            refused[trial.trial] = Crash(str(error))
+    return measured, refused
+
+
+def keep(folder: Folder, ended: Mapping[str, Discovery | Crash]) -> None:
+    """Write down how analyses ended: each in full, and a row of the table of findings."""
+    if not ended:
+        return
+    for job, end in ended.items():
+        if isinstance(end, Discovery):
+            write_text(folder.discovery(job), json.dumps(end.to_dict(), allow_nan=False) + "\n")
+    fresh = findings_table(_finding(job, end) for job, end in ended.items())
+    known = read_findings([folder.findings]) if folder.findings.exists() else fresh.iloc[:0]
+    write_findings(folder.findings, pd.concat([known, fresh]) if len(known) else fresh)
+
+
+def _finding(job: str, end: Discovery | Crash) -> Finding:
+    trial, _, view = job.partition(".")
+    return Finding.of(trial, view, end)

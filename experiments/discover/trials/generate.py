@@ -1,0 +1,177 @@
+"""The generator of the trials, apart from the analysis: it draws and seals truths, and simulates their heaps.
+
+    python -m experiments.discover.trials.generate seal out/trials --bank bank.npz
+    python -m experiments.discover.trials.generate measure out/trials --part alone --device cuda
+
+The first writes what is known beforehand (``declared.json``, ``sealed.csv``) into FOLDER/record, to be
+published before the second runs, and the labels into FOLDER/hidden, where no analysis looks. The second
+writes the file of measured heaps of every trial into FOLDER/data; interrupted, it goes on where it was.
+"""
+
+from __future__ import annotations
+
+import secrets
+import time
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+
+from experiments.discover.emulator import read_emulator
+from experiments.discover.engine import EngineSimulator
+from experiments.discover.library import library_for
+from experiments.discover.outcome_table import OutcomeTable
+from experiments.discover.settings import Settings, read_settings
+from experiments.discover.simulator import Outcomes, Simulator
+from experiments.discover.trials.declaration import (
+    Declaration,
+    declared_effects,
+    read_declaration,
+    with_names,
+)
+from experiments.discover.trials.drawing import Effect, Plan, draw
+from experiments.discover.trials.folder import Folder, Run
+from experiments.discover.trials.heaps import cases_of, write_heaps
+from experiments.discover.trials.truth import (
+    Label,
+    read_labels,
+    read_sealed,
+    revealed,
+    write_labels,
+    write_sealed,
+)
+from experiments.study import Study, load_study
+from experiments.study.toml_files import read_toml
+
+STUDY = Path(__file__).parents[2] / "studies" / "trial" / "study.toml"
+"""The study that the trials are about."""
+
+STRANGERS = Path(__file__).parent / "strangers"
+"""Effects that the library never has, written as its mechanisms are."""
+
+STEP_SHARE = 0.8
+"""The generator's time step is this part of the study's."""
+
+PIXEL_SHARE = 1.3
+"""Its pictures have this many times the pixels of the study's."""
+
+app = typer.Typer(help="Draw, seal and simulate blind trials.")
+
+
+def generators_study(scale: str) -> Study:
+    """The trial study with the generator's own time step and camera."""
+    study = load_study(STUDY, scale or None)
+    changes: dict[str, Any] = {
+        "numerics": {"time_step_fraction": STEP_SHARE * study.numerics.time_step_fraction},
+        "measurement": {"pixels": round(PIXEL_SHARE * study.measurement.pixels)},
+    }
+    return load_study(STUDY, scale or None, changes)
+
+
+def seal_trials(
+    folder: Folder, emulator_file: Path, scale: str, plan: Plan, settings: Settings, seed: int
+) -> None:
+    """Declare what the trials should show, draw the truths, and write seals and labels.
+
+    Parameters
+    ----------
+    folder
+        Of the trials.
+    emulator_file
+        Bank of the study at the scale.
+    scale
+        Of the study; empty for the study as written.
+    plan, settings
+        Of the trials, and of the analysis.
+    seed
+        Of the drawing, which must not be known to whoever knows the plan.
+    """
+    study = load_study(STUDY, scale or None)
+    library = declared_effects(read_emulator(emulator_file), settings, plan.replicates)
+    strangers = tuple(Effect(m.name, m.null, m.maximum) for m in library_for(study, STRANGERS))
+    declaration = Declaration(
+        study=study.name,
+        scale=scale,
+        drawn_on=time.strftime("%Y-%m-%d"),
+        plan=plan,
+        settings=with_names(settings, library),
+        library=library,
+        strangers=strangers,
+    )
+    rng = np.random.default_rng(seed)
+    trials = draw(plan, study.factors, library, strangers, rng, lambda: rng.bytes(16).hex())
+    declaration.write(folder.declared)
+    write_sealed(folder.sealed, [sealed for _, sealed in trials])
+    write_labels(folder.hidden_labels, [label for label, _ in trials])
+
+
+def measure_trials(
+    folder: Folder, labels: list[Label], declaration: Declaration, simulator: Simulator
+) -> None:
+    """Simulate all heaps of some trials in one call, and write each trial's file.
+
+    Parameters
+    ----------
+    folder
+        Of the trials.
+    labels
+        Truths of the trials.
+    declaration
+        What was declared.
+    simulator
+        Knows the library and the strangers.
+    """
+    conditions = [condition.name for condition in load_study(STUDY, declaration.scale or None).conditions]
+    waves = [cases_of(label, conditions, declaration.plan.replicates) for label in labels]
+    outcomes = simulator([point for wave in waves for point in wave])
+    start = 0
+    for label, wave in zip(labels, waves, strict=True):
+        end = start + len(wave)
+        own = Outcomes(outcomes.values[start:end], outcomes.reasons[start:end])
+        write_heaps(folder.measured(label.trial), label, wave, own)
+        start = end
+
+
+@app.command()
+def seal(
+    folder: Annotated[Path, typer.Argument(help="Folder of the trials.")],
+    bank: Annotated[Path, typer.Option(help="Bank of the trial study.")],
+    scale: Annotated[str, typer.Option(help="Scale of the trial study; left out: as written.")] = "",
+    plan: Annotated[Path | None, typer.Option(help="TOML file with numbers of trials.")] = None,
+    settings: Annotated[Path | None, typer.Option(help="JSON file of the analysis' settings.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of the drawing; left out: a secret one.")] = None,
+) -> None:
+    """Draw the truths; write their seals, to be published, and their labels, to be kept."""
+    numbers = Plan(**read_toml(plan, "a plan of trials")[1]) if plan else Plan()
+    rules = read_settings(settings) if settings else Settings()
+    place = Folder(folder)
+    seal_trials(place, bank, scale, numbers, rules, secrets.randbits(63) if seed is None else seed)
+    print(f"{len(read_sealed(place.sealed))} trials sealed: {place.sealed}")
+
+
+@app.command()
+def measure(
+    folder: Annotated[Path, typer.Argument(help="Folder of the trials.")],
+    part: Annotated[str | None, typer.Option(help="Trials of one part; left out: all.")] = None,
+    device: Annotated[str | None, typer.Option(help="cpu, cuda or cuda:N.")] = None,
+    workers: Annotated[int | None, typer.Option(help="Processes.")] = None,
+) -> None:
+    """Simulate and measure the heaps of the trials."""
+    place = Folder(folder)
+    declaration = read_declaration(place.declared)
+    sealed = [trial for trial in read_sealed(place.sealed) if part in (None, trial.part)]
+    labels = list(revealed(read_labels(place.hidden_labels), sealed).values())
+    study = generators_study(declaration.scale)
+    library = (*library_for(study), *library_for(study, STRANGERS))
+    table = OutcomeTable(place.hidden / "outcomes.sqlite")
+    with (
+        EngineSimulator(study, library, table, device, workers) as simulator,
+        Run(place, f"heaps, {part or 'all'}", device, table),
+    ):
+        measure_trials(place, labels, declaration, simulator)
+    print(f"{len(labels)} trials measured: {place.data}")
+
+
+if __name__ == "__main__":
+    app()

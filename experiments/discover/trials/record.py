@@ -1,0 +1,54 @@
+"""Reveal the labels, score the findings, and write the record of the trials.
+
+    python -m experiments.discover.trials.record out/trials
+    python -m experiments.discover.trials.record --page-only
+
+The first takes over what was published, found and, now, hidden; the second writes the page again from the
+files of the record.
+"""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from experiments.discover.trials.folder import DECLARED, FINDINGS, LABELS, RUNS, SEALED, Folder
+from experiments.discover.trials.page import RECORD, write_page
+from experiments.errors import InputError
+from experiments.files import replacing
+
+
+def gather(folder: Folder, record: Path) -> None:
+    """Take a folder's files over into a record, the labels among them.
+
+    Raises
+    ------
+    InputError
+        When one is missing.
+    """
+    files = [folder.record / name for name in (DECLARED, SEALED, FINDINGS, RUNS)]
+    for source in (*files, folder.hidden / LABELS):
+        if not source.is_file():
+            raise InputError("trials that are revealed have run", "no such file", str(source))
+        with replacing(record / source.name) as temporary:
+            shutil.copyfile(source, temporary)
+
+
+def main(
+    folder: Annotated[Path | None, typer.Argument(help="Folder of the trials.")] = None,
+    page_only: Annotated[bool, typer.Option("--page-only", help="Write the page again.")] = False,
+    out: Annotated[Path, typer.Option(help="The record.")] = RECORD,
+) -> None:
+    """Write the record of the trials."""
+    if (folder is None) != page_only:
+        raise typer.BadParameter("give the folder of the trials, or --page-only")
+    if folder is not None:
+        gather(Folder(folder), out)
+    print(write_page(out))
+
+
+if __name__ == "__main__":
+    typer.run(main)

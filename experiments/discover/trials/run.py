@@ -1,0 +1,134 @@
+"""Analyse the trials: all of a part side by side, their waves in one batch.
+
+    python -m experiments.discover.trials.run out/trials --bank bank.npz --part alone --seconds 480
+    python -m experiments.discover.trials.run out/trials --bank bank.npz --plan-only
+
+It sees the measured heaps and the seals, never the labels. After ``--seconds`` it stops between two batches;
+called again, it goes on: analyses that have ended are not begun again, and the others take what was simulated
+from the table of outcomes. The exit code is 3 while some have not ended.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from experiments.benchmarks.tables import markdown_table
+from experiments.discover.emulator import read_emulator
+from experiments.discover.engine import EngineSimulator
+from experiments.discover.library import library_for
+from experiments.discover.outcome_table import OutcomeTable
+from experiments.discover.trials.cost import planned_cases
+from experiments.discover.trials.declaration import read_declaration
+from experiments.discover.trials.desk import Desk, OutOfTime, TimedSimulator, job_name, keep, read_data
+from experiments.discover.trials.findings import EVERYTHING, PHOTOGRAPHS, read_findings
+from experiments.discover.trials.folder import Folder, Run
+from experiments.discover.trials.generate import STUDY
+from experiments.discover.trials.lockstep import Round, in_step, process_crew
+from experiments.discover.trials.truth import Sealed, read_sealed
+from experiments.study import load_study
+
+UNFINISHED = 3
+"""Exit code while analyses have not ended."""
+
+
+def open_jobs(folder: Folder, trials: Sequence[Sealed], view: str) -> dict[str, Sealed]:
+    """Analyses of trials that have not ended, by name."""
+    ended = read_findings([folder.findings] if folder.findings.exists() else [])
+    done = {job_name(row.trial, row.view) for row in ended.itertuples()}
+    jobs = {job_name(trial.trial, view): trial for trial in trials}
+    return {name: trial for name, trial in jobs.items() if name not in done}
+
+
+def run_trials(
+    folder: Folder,
+    trials: Sequence[Sealed],
+    bank: Path,
+    view: str = EVERYTHING,
+    device: str | None = None,
+    workers: int | None = None,
+    seconds: float = math.inf,
+) -> None:
+    """Analyse trials in one view, those that have not ended; report every round.
+
+    Parameters
+    ----------
+    folder
+        Of the trials.
+    trials
+        Some of those that were sealed.
+    bank
+        File of the bank of the trial study.
+    view
+        What the analyses get to see.
+    device, workers
+        Of the simulator; there are as many processes for analyses.
+    seconds
+        Time before no further batch is begun.
+
+    Raises
+    ------
+    OutOfTime
+        When analyses have not ended by then.
+    """
+    deadline = time.monotonic() + seconds
+    declaration = read_declaration(folder.declared)
+    study = load_study(STUDY, declaration.scale or None)
+    jobs = open_jobs(folder, trials, view)
+    measured, refused = read_data(folder, list(jobs.values()), study)
+    keep(folder, {job_name(trial, view): crash for trial, crash in refused.items()})
+    names = [name for name, trial in jobs.items() if trial.trial in measured]
+    withheld = {trial.trial: trial.withheld for trial in trials}
+    desk = Desk(read_emulator(bank), declaration.settings, measured, withheld)
+    table = OutcomeTable(folder.root / "outcomes.sqlite")
+    with (
+        EngineSimulator(study, library_for(study), table, device, workers) as engine,
+        process_crew(desk, workers or os.cpu_count() or 1) as crew,
+        Run(folder, f"analyses, {view}", device, table),
+    ):
+        for turn in in_step(names, crew, TimedSimulator(engine, deadline)):
+            keep(folder, turn.ended)
+            _report(turn)
+
+
+def _report(turn: Round) -> None:
+    ended = f"round {turn.number}: {len(turn.ended)} analyses ended"
+    print(f"{ended}, {turn.running} want {turn.cases} cases", flush=True)
+
+
+def main(
+    folder: Annotated[Path, typer.Argument(help="Folder of the trials.")],
+    bank: Annotated[Path, typer.Option(help="Bank of the trial study.")],
+    part: Annotated[str | None, typer.Option(help="Trials of one part; left out: all.")] = None,
+    first: Annotated[int | None, typer.Option(help="So many trials of each part; left out: all.")] = None,
+    photographs: Annotated[bool, typer.Option("--photographs", help="With photographs only.")] = False,
+    device: Annotated[str | None, typer.Option(help="cpu, cuda or cuda:N.")] = None,
+    workers: Annotated[int | None, typer.Option(help="Processes.")] = None,
+    seconds: Annotated[float, typer.Option(help="Begin no batch after this time.")] = math.inf,
+    plan_only: Annotated[bool, typer.Option("--plan-only", help="Count the cases, run nothing.")] = False,
+) -> None:
+    """Analyse the trials that have not been."""
+    place = Folder(folder)
+    sealed = read_sealed(place.sealed)
+    if plan_only:
+        print(markdown_table(planned_cases(sealed, read_declaration(place.declared), bank)))
+        return
+    trials = [trial for trial in sealed if part in (None, trial.part)]
+    if first is not None:
+        trials = [trial for trial in trials if int(trial.trial.rpartition("-")[2]) <= first]
+    view = PHOTOGRAPHS if photographs else EVERYTHING
+    try:
+        run_trials(place, trials, bank, view, device, workers, seconds)
+    except OutOfTime:
+        print(f"time is up; {len(open_jobs(place, trials, view))} analyses have not ended: run it again")
+        raise typer.Exit(UNFINISHED) from None
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -1,0 +1,151 @@
+"""The score of the trials counts what it says, and its page shows it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from experiments.discover.discovery import Verdict
+from experiments.discover.settings import Settings
+from experiments.discover.trials.declaration import Declaration
+from experiments.discover.trials.drawing import Effect, Plan
+from experiments.discover.trials.findings import EVERYTHING, Finding, findings_table, write_findings
+from experiments.discover.trials.page import write_page
+from experiments.discover.trials.score import Share, aims, confusion, covered, power_curve, removed, scored
+from experiments.discover.trials.truth import Kind, Label, Sealed, write_labels, write_sealed
+
+
+def label_of(kind: Kind, *names: str, strength: float = 2.0) -> Label:
+    sizes = tuple((name, 1.0) for name in names)
+    return Label("", kind, (0.3, 0.3), sizes, (strength,) * len(names), seed=1, salt="")
+
+
+@pytest.mark.parametrize(
+    ("label", "verdict", "named", "judgement"),
+    [
+        (label_of(Kind.NULL), Verdict.NONE, "", ""),
+        (label_of(Kind.NULL), Verdict.NAMED, "drag", "wrong"),
+        (label_of(Kind.SINGLE, "drag"), Verdict.NAMED, "drag", "right"),
+        (label_of(Kind.SINGLE, "drag"), Verdict.NAMED, "twist", "wrong"),
+        (label_of(Kind.SINGLE, "drag"), Verdict.NAMED, "drag twist", "wrong"),
+        (label_of(Kind.SINGLE, "drag"), Verdict.INCOMPLETE, "twist", "wrong"),
+        (label_of(Kind.SINGLE, "drag"), Verdict.TIE, "drag twist", "tied"),
+        (label_of(Kind.SINGLE, "drag"), Verdict.TIE, "spread twist", ""),
+        (label_of(Kind.SINGLE, "drag"), Verdict.UNKNOWN, "", ""),
+        (label_of(Kind.PAIR, "drag", "twist"), Verdict.NAMED, "drag twist", "right"),
+        (label_of(Kind.PAIR, "drag", "twist"), Verdict.INCOMPLETE, "drag", ""),
+        (label_of(Kind.PAIR, "drag", "twist"), Verdict.NAMED, "drag spread", "wrong"),
+        (label_of(Kind.WITHHELD, "drag"), Verdict.UNKNOWN, "", ""),
+        (label_of(Kind.WITHHELD, "drag"), Verdict.NAMED, "twist", "wrong"),
+        (label_of(Kind.STRANGER, "swollen"), Verdict.INCOMPLETE, "drag", "wrong"),
+    ],
+)
+def test_a_verdict_is_judged_by_what_it_names(
+    label: Label, verdict: Verdict, named: str, judgement: str
+) -> None:
+    table = findings_table([Finding("t", EVERYTHING, str(verdict), named)])
+    [row] = scored(table, {"t": label}, [Sealed("t", "alone", (), "")]).to_dict("records")
+    assert [name for name in ("right", "tied", "wrong") if row[name]] == ([judgement] if judgement else [])
+
+
+def test_shares_have_the_intervals_of_clopper_and_pearson() -> None:
+    # 0 of n: 1 - (0.05 / 2)^(1/n).
+    assert Share(0, 42).interval == pytest.approx((0.0, 1.0 - 0.025 ** (1 / 42)))
+    assert Share(42, 42).interval == pytest.approx((0.025 ** (1 / 42), 1.0))
+    assert str(Share(0, 0)) == "no trials"
+
+
+def ideal_trials() -> tuple[pd.DataFrame, dict[str, Label]]:
+    """Findings of an analysis that is right wherever it can be."""
+    labels: dict[str, Label] = {f"null-{i}": label_of(Kind.NULL) for i in range(100)}
+    labels |= {
+        f"{name}-{i}": label_of(Kind.SINGLE, name, strength=1.6 + i / 10)
+        for name in "abcdefgh"
+        for i in range(15)
+    }
+    labels |= {f"outside-{i}": label_of(Kind.STRANGER, "swollen") for i in range(60)}
+    labels |= {f"pair-{i}": label_of(Kind.PAIR, "a", "b") for i in range(30)}
+    return findings_table(ideal(name, label) for name, label in labels.items()), labels
+
+
+def ideal(trial: str, label: Label) -> Finding:
+    if label.kind is Kind.NULL:
+        return Finding(trial, EVERYTHING, "none")
+    if label.kind is Kind.STRANGER:
+        return Finding(trial, EVERYTHING, "unknown", alarm=True)
+    held_out = {"held_out_before": 112.0, "held_out_after": 22.0, "held_out_degrees": 12.0}
+    missed = int(trial.rpartition("-")[2]) % 10 == 0  # a 90 % interval misses one in ten
+    low, high = (1.1, 1.2) if missed else (0.9, 1.1)
+    return Finding(trial, EVERYTHING, "named", " ".join(label.mechanisms), True, 1.0, low, high, **held_out)
+
+
+def test_an_analysis_that_is_right_passes_every_aim() -> None:
+    findings, labels = ideal_trials()
+    table = scored(findings, labels, [Sealed(name, "all", (), "") for name in labels])
+    found = aims(table, unresolvable=["twist"])
+    assert [aim.question for aim in found if aim.passed is not True] == []
+    assert removed(table) == pytest.approx(0.9)
+    assert covered(table).value == pytest.approx(1.0 - 2 / 15)
+    assert confusion(table).to_numpy().sum() == len(labels)
+    curve = power_curve(table)
+    assert curve["trials"].sum() == 120
+    assert (curve["right"] == 1.0).all()
+
+
+@pytest.mark.parametrize(
+    ("of", "verdict", "named", "failed"),
+    [
+        (Kind.NULL, "named", "a", {"nothing hidden: alarms", "nothing hidden: wrong names"}),
+        (
+            Kind.STRANGER,
+            "named",
+            "twist",
+            {"outside the library: unknown", "names that were declared not resolvable"},
+        ),
+        (Kind.PAIR, "named", "a c", {"two mechanisms: both named", "two mechanisms: no wrong name"}),
+        (Kind.PAIR, "crash", "", {"two mechanisms: both named", "analyses that crashed"}),
+    ],
+)
+def test_an_analysis_that_is_wrong_fails_the_aims_that_it_misses(
+    of: Kind, verdict: str, named: str, failed: set[str]
+) -> None:
+    findings, labels = ideal_trials()
+    hit = findings["trial"].map(lambda name: labels[name].kind is of)
+    findings = findings.assign(
+        verdict=findings["verdict"].mask(hit, verdict),
+        named=findings["named"].mask(hit, named),
+        alarm=findings["alarm"] | hit,
+    )
+    table = scored(findings, labels, [Sealed(name, "all", (), "") for name in labels])
+    assert {aim.question for aim in aims(table, ["twist"]) if aim.passed is False} == failed
+
+
+def test_without_trials_nothing_passes() -> None:
+    table = scored(findings_table([]), {}, [])
+    assert [aim.question for aim in aims(table, []) if aim.passed] == []
+
+
+def test_the_page_is_written_from_the_record_alone(tmp_path: Path) -> None:
+    findings, labels = ideal_trials()
+    labels = {name: Label(**{**vars(label), "trial": name}) for name, label in labels.items()}
+    library = tuple(Effect(name, 0.0, 10.0, 1.0) for name in "abcdefgh")
+    declaration = Declaration("Grain", "", "2026-01-01", Plan(), Settings(), library, ())
+    declaration.write(tmp_path / "declared.json")
+    write_sealed(
+        tmp_path / "sealed.csv", [Sealed(name, "all", (), label.hash) for name, label in labels.items()]
+    )
+    write_labels(tmp_path / "labels.json", list(labels.values()))
+    write_findings(tmp_path / "findings.csv", findings)
+    (tmp_path / "runs.csv").write_text(
+        "what,machine,warp,date,cases,seconds\nheaps,GPU,1.19,2026-01-01,40,3.5\n"
+    )
+    text = write_page(tmp_path).read_text(encoding="utf-8")
+    assert text.count("| pass |") == len(aims(scored(findings, labels, []), []))
+    # The mechanisms of this library are not those that must be resolvable.
+    assert text.count("FAIL") == 1
+    assert {path.name for path in tmp_path.glob("*.png")} == {
+        "confusion-everything.png",
+        "power-everything.png",
+    }
