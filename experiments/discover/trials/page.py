@@ -106,7 +106,8 @@ def _declared(declared: Declaration) -> str:
         f"{declared.drawn_on}; settings of the analysis {declared.settings.sha256}. A mechanism is "
         f"resolvable whose range holds more than {STRONG:g} gamma80; no other may be named."
     )
-    return f"## Declared beforehand\n\n{stated}\n\n{markdown_table(table)}\n{_aims([declared_aim(declared.library)])}"
+    aim = _aims([declared_aim(declared.library)])
+    return f"## Declared beforehand\n\n{stated}\n\n{markdown_table(table)}\n{aim}"
 
 
 def _view(rows: pd.DataFrame, view: str, title: str, declared: Declaration, folder: Path) -> str:

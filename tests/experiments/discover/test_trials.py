@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import synthetic
 
 from doe.factors import Factor
 from experiments.discover.analysis import Analysis
@@ -40,7 +41,6 @@ from experiments.discover.trials.truth import (
     write_sealed,
 )
 from experiments.errors import InputError
-from tests.experiments.discover import synthetic
 
 FACTORS = (Factor("mu", 0.2, 0.6), Factor("e", 0.1, 0.5))
 LIBRARY = (
