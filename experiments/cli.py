@@ -147,6 +147,9 @@ def heap(
         typer.Option("--set", metavar="NAME=VALUE", help="Value of a factor."),
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of sizes, places and orientations.")] = 1,
+    scene: Annotated[
+        str | None, typer.Option(metavar="NAME", help="A further scene of the study, [response-scene.NAME].")
+    ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder of the results, new or empty.")] = None,
     scale: Scale = None,
     device: Device = None,
@@ -154,19 +157,21 @@ def heap(
 ) -> None:
     """Simulate one heap: heap.vtp (ParaView), snapshot.png with the fitted flanks, angle.json.
 
-    A study of a hopper, a drum or a draw-down gives what that test measures instead of the angle.
+    A study of a hopper, a drum or a draw-down gives what that test measures instead of the angle; so does
+    --scene with a further scene of the study.
     """
     with clear_errors():
+        from experiments.calibrate.settings import TARGET_SCENE
         from experiments.cases import require_unused, simulate_heap, write_heap
         from experiments.commands.choices import chosen_device, chosen_study, default_folder
 
         device = chosen_device(device)
         chosen = chosen_study(study, scale, device)
         values = chosen.natural_settings(_assignments(settings or []), "--set")
-        folder = out or default_folder(chosen, f"heap-{seed}")
+        folder = out or default_folder(chosen, f"{scene or 'heap'}-{seed}")
         require_unused(folder)
-        with CaseProgress("heap") as progress:
-            simulated = simulate_heap(chosen, values, seed, device, progress)
+        with CaseProgress(scene or "heap") as progress:
+            simulated = simulate_heap(chosen, values, seed, device, progress, scene or TARGET_SCENE)
         write_heap(simulated, folder)
     if as_json:
         typer.echo(json.dumps(simulated.to_dict(), allow_nan=False))

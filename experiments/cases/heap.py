@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from dem_warp import CaseResult, Progress, simulate
+from experiments.calibrate.settings import TARGET_SCENE
 from experiments.cases.execute import heap_angle_or_reason
 from experiments.files import replacing, write_text
 from experiments.study import Study
@@ -34,11 +35,13 @@ class Heap:
     """Its angle; None when the case failed, there is no measurable heap, or the test leaves none."""
     reason: str
     """Why the case or the measurement failed; empty when neither did."""
+    scene: str = TARGET_SCENE
+    """Name of its scene."""
 
     @property
     def units(self) -> dict[str, str]:
         """Unit of every observable that the scene tells of."""
-        told = self.study.scene.observables
+        told = self.study.scenes[self.scene].observables
         return {name: told[name].unit for name in self.result.observables if name in told}
 
     def to_dict(self) -> dict[str, Any]:
@@ -47,6 +50,7 @@ class Heap:
         return {
             "study": self.study.name,
             "scale": self.study.scale,
+            "scene": self.scene,
             "settings": self.settings,
             "units": {factor.name: factor.unit for factor in self.study.factors},
             "seed": self.seed,
@@ -67,6 +71,7 @@ def simulate_heap(
     seed: int,
     device: str | None = None,
     progress: Callable[[Progress], None] | None = None,
+    scene: str = TARGET_SCENE,
 ) -> Heap:
     """Simulate one case and measure its heap.
 
@@ -82,15 +87,17 @@ def simulate_heap(
         ``"cpu"``, ``"cuda"``, ``"cuda:1"``; None: the engine's choice.
     progress
         Called with the engine's progress.
+    scene
+        Name of the scene: the study's own, or a further one that its responses are measured in.
 
     Raises
     ------
     StudyError
-        When there is no such factor, or a value leaves what is physical.
+        When there is no such factor or scene, or a value leaves what is physical.
     """
-    [result] = simulate([study.case(settings, seed)], device=device, workers=1, on_progress=progress)
+    [result] = simulate([study.case(settings, seed, scene)], device=device, workers=1, on_progress=progress)
     values = {factor.name: settings.get(factor.name, factor.center) for factor in study.factors}
-    return Heap(study, values, seed, result, *heap_angle_or_reason(study, result))
+    return Heap(study, values, seed, result, *heap_angle_or_reason(study, result, scene), scene)
 
 
 def heap_picture(study: Study, result: CaseResult, angle: HeapAngle | None, view: int = 0) -> np.ndarray:

@@ -11,10 +11,12 @@ from types import SimpleNamespace
 
 import pandas as pd
 import pytest
+from typer.testing import CliRunner
 
 from dem_warp import CaseResult, Hopper
 from experiments.calibrate import Outcome
 from experiments.cases import Store, execute, run_cases
+from experiments.cli import app
 from experiments.commands import run
 from experiments.commands.run import Desk
 from experiments.study import Study, load_study
@@ -52,6 +54,19 @@ def test_heap_and_bin_are_simulated_together(study: Study, tmp_path: Path) -> No
     assert math.isnan(outflow["angle"])
     assert 0.0 < outflow["discharge_time"] < outflow["simulated_time"]
     assert outflow["filled_mass"] == pytest.approx(outflow["fallen_mass"] + outflow["mass_left"], rel=1e-6)
+
+
+def test_one_case_of_a_further_scene_is_shown_alone(study: Study, tmp_path: Path) -> None:
+    command = ["heap", str(study.file), "--scene", "bin", "--device", "cpu", "--out", str(tmp_path / "one")]
+    shown = CliRunner().invoke(app, [*command, "--json"])
+    found = json.loads(shown.stdout)
+    assert (shown.exit_code, found["scene"], found["angle"]) == (0, "bin", None)
+    assert found["observable_units"]["discharge_time"] == "s"
+    command[command.index("bin")] = "bim"
+    refused = CliRunner().invoke(app, [*command[:-1], str(tmp_path / "other")])
+    assert refused.exit_code == 2
+    assert "did you mean 'bin'" in refused.stderr
+    assert not (tmp_path / "other").exists()
 
 
 class Engine:
