@@ -13,7 +13,7 @@ from dem_warp import DrawDown, Drum, Hopper, LiftedCylinder
 from experiments.calibrate.settings import MeasuredResponse, MeasuredTarget, Response, TwinTarget
 from experiments.cases import Store, execute, run_cases
 from experiments.errors import StudyError
-from experiments.study import load_study
+from experiments.study import BUCKWHEAT, load_study
 from experiments.study.target_section import DIMENSIONS
 from experiments.study.units import UNITS
 
@@ -151,6 +151,15 @@ def test_a_further_scene_has_a_name_of_its_own(write_study: WriteStudy) -> None:
     with pytest.raises(StudyError, match="'target' is the study's own") as caught:
         load_study(write_study(add=scene))
     assert caught.value.place.endswith("response-scene.target")
+
+
+@pytest.mark.parametrize("scale", [None, "paper", "bench"])
+def test_the_study_from_a_curve_to_a_point_hides_the_same_truth_at_every_scale(scale: str | None) -> None:
+    study = load_study(BUCKWHEAT.with_name("curve_to_point.toml"), scale)
+    assert [response.scene for response in study.responses] == ["target", "bin"]
+    assert study.target.truth == {"E": 0.42, "F": 0.27, "G": 0.05}
+    assert isinstance(study.case({}, seed=1, scene="bin").scene, Hopper)
+    assert {f.name for f in study.factors} == set("EFGH")
 
 
 @pytest.mark.parametrize("scene", [LiftedCylinder, Hopper, Drum, DrawDown])
