@@ -10,9 +10,11 @@ import pandas as pd
 import pytest
 
 from experiments.benchmarks.paper_disagreement import disagreement_page
-from experiments.discover.discovery import Verdict
+from experiments.discover.discovery import Discovery, Verdict
 from experiments.discover.paper_tables import (
     CENTRE,
+    READING,
+    base_q,
     concluded,
     physical_emulator,
     physical_heaps,
@@ -64,15 +66,15 @@ def test_the_tables_are_31_runs_at_27_settings_with_table_6_held_out() -> None:
     assert held_out == [name for name in heaps.conditions if name.startswith("composite")]
 
 
-def test_a_shift_of_frictions_moves_every_setting_along_the_surface() -> None:
-    emulator = tables_emulator(replay(smooth, 2, 1e-6), None)
-    settings = published_settings().drop_duplicates("condition").set_index("condition")
-    shift = np.array([0.3, -0.7])
-    moved = settings.assign(E=settings["E"] + 0.3 * HALF["E"], F=settings["F"] - 0.7 * HALF["F"])
-    found = [emulator.surfaces[name].predict(shift[None], ())[0, 0] for name in settings.index]
-    # The runs are exact but for 1e-6 degrees, which the regression may raise some ten times.
-    np.testing.assert_allclose(found, smooth(moved), atol=1e-4, rtol=0)
-    np.testing.assert_allclose(emulator.space.natural_theta(shift), [0.3 * HALF["E"], -0.7 * HALF["F"]])
+def test_another_reading_moves_all_angles_alike() -> None:
+    base = replay(smooth, 2, NOISE)
+    emulator = tables_emulator(base, None)
+    means = base.runs.set_index(["stage", "run"])["angle"]
+    for run in (("screening", 3), ("climb", 6), ("composite", 8)):
+        surfaces = emulator.surfaces[f"{run[0]}-{run[1]}"]
+        read = surfaces.predict(np.array([[-0.4]]), ())[0, 0]
+        assert read == pytest.approx(means[run] - 0.4 * READING, abs=1e-9)
+        assert surfaces.error(np.array([-0.4]), ())[0, 0] == pytest.approx(base.heap_variance[run[0]] / 2.0)
 
 
 def test_a_mechanism_runs_from_the_study_as_written_to_its_variant_with_the_noise_of_both() -> None:
@@ -85,11 +87,11 @@ def test_a_mechanism_runs_from_the_study_as_written_to_its_variant_with_the_nois
         {},
     )
     emulator = tables_emulator(base, found)
-    variance = base.noise().mean_sq
+    variance = base.heap_variance["screening"]
     mean = base.runs.set_index(["stage", "run"])["angle"]["screening", 4]
     surfaces = emulator.surfaces["screening-4"]
     for size in (0.0, 0.4, 1.0):
-        x = np.array([0.0, 0.0, size])
+        x = np.array([0.0, size])
         expected = mean + size * (-4.0 + 1.0)  # F is high in this run
         assert surfaces.predict(x[None], ("rolling-none",))[0, 0] == pytest.approx(expected, abs=1e-9)
         # Three heaps of the base, one with and one without the mechanism.
@@ -121,12 +123,28 @@ def test_the_physical_test_is_one_number_with_the_published_moments() -> None:
     np.testing.assert_allclose(heaps.mean(CENTRE), [target.mean], rtol=1e-12)
     np.testing.assert_allclose(np.sqrt(heaps.covariance(CENTRE)), [[target.sd]], rtol=1e-12)
     assert heaps.heap_count(CENTRE) == target.n
-    space = physical_emulator(tables_emulator(replay(smooth, 2, NOISE), None)).space
-    assert (space.conditions, space.held_out, len(space.factors)) == ((CENTRE,), (False,), 2)
+
+
+def test_the_model_of_the_physical_test_is_the_surface_of_table_6() -> None:
+    found = Sensitivities(
+        {"base": replay(smooth), "rolling-none": replay(lambda cases: smooth(cases) + 2.0 + cases["E"])}, {}
+    )
+    emulator = physical_emulator(replay(smooth, 2, 1e-6), found)
+    space = emulator.space
+    assert (space.conditions, space.held_out, space.factors) == ((CENTRE,), (False,), ("E", "F"))
+    coded_point = np.array([0.5, -1.0])
+    natural = pd.DataFrame([dict(zip(space.factors, space.natural_theta(coded_point), strict=True), G=0.055)])
+    surfaces = emulator.surfaces[CENTRE]
+    # The fit is a quadratic, and so are the runs but for 1e-6 degrees; a mechanism adds its mean shift.
+    bare = surfaces.predict(coded_point[None], ())[0, 0]
+    assert bare == pytest.approx(float(smooth(natural).iloc[0]), abs=1e-4)
+    with_it = surfaces.predict(np.append(coded_point, 1.0)[None], ("rolling-none",))[0, 0]
+    settings = published_settings().query("stage == 'composite'").drop_duplicates("condition")
+    assert with_it - bare == pytest.approx(2.0 + settings["E"].mean(), abs=1e-9)
 
 
 def effect(cases: pd.DataFrame) -> pd.Series:
-    """What an effect adds [deg]: most where the plate is rough, nothing like a shift of the two frictions."""
+    """What an effect adds [deg]: most where the plate is rough, nothing like a shift of all angles."""
     return 8.0 * (cases["F"] - 0.1) * (cases["E"] > 0.4)
 
 
@@ -148,19 +166,32 @@ def incomplete() -> tuple[Replay, Sensitivities]:
     return replay(lacking, 3, NOISE, 9), Sensitivities(replays, {})
 
 
-def test_an_effect_of_the_tables_is_named_and_the_measured_angle_can_name_none(incomplete) -> None:
-    emulator = tables_emulator(*incomplete)
-    found = concluded(published_heaps(), emulator, RULES)
+@pytest.fixture(scope="module")
+def found(incomplete) -> Discovery:
+    """What the tables say of those runs."""
+    return concluded(published_heaps(), tables_emulator(*incomplete), RULES)
+
+
+def test_an_effect_of_the_tables_is_named_and_the_measured_angle_can_name_none(incomplete, found) -> None:
     assert (found.verdict, found.named) == (Verdict.NAMED, ("clump-keeled",))
     assert found.chosen is not None
     [size] = found.chosen.sizes
     assert size.low < 0.6 < size.high
-    physical = concluded(physical_heaps(), physical_emulator(emulator), RULES)
+    physical = concluded(physical_heaps(), physical_emulator(*incomplete), RULES)
     assert (physical.verdict, physical.named) == (Verdict.NOT_IDENTIFIABLE, ())
-    page = disagreement_page(found, physical)
+    page = disagreement_page(found, physical, tables_emulator(*incomplete), RULES)
     assert "**Verdict: named.**" in page
     assert "**Verdict: not identifiable.** 1 measured mean" in page
     assert "nine spheres in a pyramid of hollow faces" in page
+
+
+def test_the_noise_of_a_variant_lowers_every_q(incomplete, found) -> None:
+    emulator = tables_emulator(*incomplete)
+    assert found.base is not None
+    at_sizes = [base_q(emulator, ["size-equal"], [size], RULES) for size in (0.0, 0.5, 1.0)]
+    # The fit ends within some 1e-4 coded units of the optimum, where Q is flat.
+    assert at_sizes[0] == pytest.approx(found.base.q, rel=1e-5)
+    assert at_sizes == sorted(at_sizes, reverse=True)
 
 
 def test_runs_that_agree_lack_nothing(incomplete) -> None:
