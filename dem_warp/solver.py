@@ -1,9 +1,8 @@
 """The sequence of launches that moves a batch on, captured once as a graph and replayed."""
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -48,8 +47,8 @@ for more lanes a grain, which shorten a step."""
 
 MOST_LANES = 16
 
-FAR = 1.0e3
-"""Distance from which nothing touches a wall [m]."""
+WEIGHED_TOGETHER = 64
+"""Worlds whose walls are weighed at once, at the most: what a step changes of them is kept meanwhile."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +69,7 @@ class WorldView:
     masses : (n,) array
         [kg]
     load : callable
-        Force [N], (3,), that the grains put on a wall, by its number; see `Solver.wall_load`.
+        Force [N], (3,), that the grains put on a wall, by its number; see `Solver.wall_loads`.
     """
 
     step: int
@@ -339,50 +338,57 @@ class Solver:
         place = (world * self.layout.wall_count + wall) * FRAMES + step % FRAMES
         return self.model.frame[place : place + 1]
 
-    def wall_load(self, world: int, wall: int) -> np.ndarray:
-        """Force that the grains put on a wall [N], (3,), whatever the contact law.
+    def wall_loads(self, wall: int) -> np.ndarray:
+        """Force that the grains of each running world put on one of its walls [N], whatever the contact law.
 
         It is the momentum that grains and wall would exchange in the next step if there were no other wall,
         over the length of the step: the forces between grains cancel in the sum. Nothing is changed. To be
-        called between `advance` and all that changes the world.
-        """
-        n, lanes, setup = self.layout.grain_count, self.lanes, self.worlds[world]
-        rows = slice(world * n, (world + 1) * n)
-        probed: Any = wp.array([world], dtype=int, device=self.device)
-        inputs = [
-            lanes, n, self.model, probed, self.grains[0], self.hood, self.alive, self.flags, self.grains[1],
-        ]  # fmt: skip
-        with unchanged(self._changed_by_step(world)), self._alone(world, wall):
-            self._launch(self._step_kernels.step, self._whole_warps(n * lanes), inputs)
-        step = self.grains[0].step[world : world + 1].numpy()
-        free = (self.alive[rows].numpy() > 0) & (self.model.release_step[rows].numpy() <= step)
-        start, end = (grains.velocity[rows].numpy()[free].astype(float) for grains in self.grains)
-        gained = start[:, 3] @ (end[:, :3] - start[:, :3]) / setup.time_step
-        return start[:, 3].sum() * np.array(setup.gravity) - gained
+        called after `advance` and before a wall moves.
 
-    def _changed_by_step(self, world: int) -> list[Any]:
-        """What a step writes of a world, beside the second copy of its grains."""
-        held, count = int(self.hood.list[world : world + 1].numpy()[0]), self.layout.world_count
+        Parameters
+        ----------
+        wall : int
+            Its number.
+
+        Returns
+        -------
+        (worlds, 3) array
+            0 for a world that was stopped.
+        """
+        loads = np.zeros((self.layout.world_count, 3))
+        walls = self.layout.world_count * self.layout.wall_count
+        self._launch(self._wall_kernels.leave_alone, walls, [wall, self.model, self.grains[0]])
+        for first in range(0, len(loads), WEIGHED_TOGETHER):
+            group = slice(first, min(first + WEIGHED_TOGETHER, len(loads)))
+            if running := [w for w in self._running if group.start <= w < group.stop]:
+                self._weigh(group, running, loads)
+        self._place_walls(0)
+        return loads
+
+    def _weigh(self, group: slice, running: Sequence[int], loads: np.ndarray) -> None:
+        """Work out the loads of some running worlds of a group."""
+        n, count, grains = self.layout.grain_count, self.layout.world_count, self.grains
+        slots, members = len(running) * n, wp.array(list(running), dtype=int, device=self.device)  # type: ignore[var-annotated]
         lists = [
             array.reshape((2, count, -1)) for array in (self.hood.history, self.hood.memory) if array.size
         ]
-        others = [array.reshape((count, -1)) for array in (self.hood.travel, self.alive, self.flags)]
-        return [array[held, world] for array in lists] + [array[world] for array in others]
-
-    @contextmanager
-    def _alone(self, world: int, wall: int) -> Iterator[None]:
-        """Take the other walls of a world out of reach in the present step."""
-        frames = [self._frame(world, other) for other in range(self.layout.wall_count) if other != wall]
-        with unchanged(frames):
-            for frame in frames:
-                away = np.array(frame.numpy())
-                away["origin"] -= FAR * away["axis"]
-                frame.assign(away)
-            yield
+        others = [array.reshape((count, -1))[group] for array in (self.hood.travel, self.alive, self.flags)]
+        inputs = [
+            self.lanes, slots, self.model, members, grains[0], self.hood, self.alive, self.flags, grains[1],
+        ]  # fmt: skip
+        with unchanged([array[number, group] for array in lists for number in range(2)] + others):
+            self._launch(self._step_kernels.step, self._whole_warps(slots * self.lanes), inputs)
+        start, end = (array.velocity.reshape((count, n))[group].numpy().astype(float) for array in grains)
+        release = self.model.release_step.reshape((count, n))[group].numpy()
+        free = (others[1].numpy() > 0) & (release <= grains[0].step[group].numpy()[:, None])
+        for w in running:
+            i, setup = w - group.start, self.worlds[w]
+            masses, gained = start[i, free[i], 3], end[i, free[i], :3] - start[i, free[i], :3]
+            loads[w] = masses.sum() * np.array(setup.gravity) - masses @ gained / setup.time_step
 
     def view(self, worlds: Sequence[int]) -> list[WorldView]:
         """What scenes need of some worlds, copied from the device."""
-        n = self.layout.grain_count
+        n, loads = self.layout.grain_count, cache(self.wall_loads)
         grains = self.grains[0]
         steps, alive = grains.step.numpy(), self.alive.numpy().reshape(-1, n) > 0
         release = self.model.release_step.numpy().reshape(-1, n)
@@ -397,7 +403,7 @@ class Solver:
                 positions[w],
                 velocities[w, :, :3],
                 velocities[w, :, 3],
-                partial(self.wall_load, w),
+                partial(_load_of, loads, w),
             )
             for w in worlds
         ]
@@ -415,3 +421,8 @@ class Solver:
             "velocities": grains.velocity[rows].numpy()[slots, :3],
             "spins": grains.spin[rows].numpy()[slots, :3],
         }
+
+
+def _load_of(loads: Callable[[int], np.ndarray], world: int, wall: int) -> np.ndarray:
+    """One world's part of what is worked out for all at once."""
+    return loads(wall)[world]

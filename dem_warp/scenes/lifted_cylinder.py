@@ -37,8 +37,9 @@ LIFT_OBSERVABLES = {
     "grains_lost": Observable("1", "grains that left the plate, or rose with the tube"),
     "wall_drag": Observable(
         "1",
-        "part of the grains' weight that hangs on the tube when all that was poured rests in it: what a "
-        "balance under the plate does not show",
+        "part of the grains' weight that hangs on the tube while it is drawn, the mean of the looks from the "
+        "start of the lift until t75, or the tube is clear: what a balance that it hangs on shows beyond its "
+        "own weight",
     ),
     "centre_height": Observable(
         "m", "height of the heap's centre of mass above the plate; absent where every grain was lost"
@@ -209,10 +210,13 @@ class Lift(Course):
         Of the grains that filled the tube [kg].
     surface : list of float
         Time since the start of the lift [s], and level of the surface [m], when last looked at.
+    drags : list of float
+        Parts of the grains' weight that hung on the tube.
     """
 
     mass: float = 0.0
     surface: list[float] = field(default_factory=list)
+    drags: list[float] = field(default_factory=list)
 
 
 class LiftController(PouredController[Lift]):
@@ -229,10 +233,7 @@ class LiftController(PouredController[Lift]):
 
     def begin(self, view: WorldView, kept: np.ndarray) -> Mapping[int, Motion]:
         """Lift the tube, and let the drive shake the plate."""
-        alive = view.masses[view.alive].astype(float).sum()
         self.course.mass = float(view.masses[kept].astype(float).sum())
-        weight = alive * self.scene.gravity[2]
-        self.course.observables["wall_drag"] = float(view.load(TUBE)[2] / weight)
         self.course.surface = [0.0, self.course.observables["fill_height"]]
         self.course.enter("lift", view)
         return self.scene.lift
@@ -249,10 +250,12 @@ class LiftController(PouredController[Lift]):
 
     def _lifted(self, view: WorldView) -> Decision:
         elapsed = view.time - self.course.phase_start
-        self._time_fall(view, elapsed)
         rise = self.scene.lift_speed * elapsed
         positions = view.positions[view.alive]
         top = positions[:, 2].max() + self.reach if len(positions) else 0.0
+        if "t75" not in self.course.observables and (rise <= top or not self.course.drags):
+            self.course.drags.append(float(view.load(TUBE)[2] / (self.course.mass * self.scene.gravity[2])))
+        self._time_fall(view, elapsed)
         if self.scene.duration is not None and view.time < self.scene.duration:
             return Decision()
         calm = elapsed >= self.scene.vibration_time and rise > top
@@ -290,6 +293,7 @@ class LiftController(PouredController[Lift]):
         rested = elapsed if course.slow_since is None else course.slow_since - course.phase_start
         course.observables |= {
             "time_to_rest": float(rested),
+            "wall_drag": float(np.mean(course.drags)),
             "simulated_time": view.time,
             "grains_lost": course.observables["grain_count"] - float(np.count_nonzero(view.alive)),
         }

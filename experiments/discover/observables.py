@@ -116,23 +116,23 @@ OBSERVABLES = (
         "wall_drag",
         "weight on the tube",
         "1",
-        "part of the grains' weight that the tube carries before the lift: 1 - load on the plate / weight",
+        "part of the grains' weight that hangs on the tube while it is drawn, the mean until t75",
         Instrument.BALANCE,
     ),
     Observable(
         "t75",
         "time to three quarters",
         "s",
-        "from the start of the lift until the mean height of the grains within the tube's cross-section "
-        "is 75 % of that of the filling; until the heap rests, where it stays higher",
+        "from the start of the lift until the surface of the grains within the tube's cross-section has come "
+        "to 75 % of the filling's height; until the heap rests, where it stays higher",
         Instrument.FILM,
     ),
     Observable(
         "t55",
         "time to 55 %",
         "s",
-        "from the start of the lift until the mean height of the grains within the tube's cross-section "
-        "is 55 % of that of the filling; until the heap rests, where it stays higher",
+        "from the start of the lift until the surface of the grains within the tube's cross-section has come "
+        "to 55 % of the filling's height; until the heap rests, where it stays higher",
         Instrument.FILM,
     ),
     Observable(
@@ -154,7 +154,7 @@ PHOTOGRAPHED = tuple(observable.name for observable in OBSERVABLES if observable
 FALLS = ("t75", "t55")
 """Those that a surface which stays high does not have: the time until the heap rests stands for them."""
 
-VERSION = 1
+VERSION = 2
 """Of the definitions; values measured by other ones are measured again."""
 
 
