@@ -22,7 +22,7 @@ class Instrument(StrEnum):
     PHOTOGRAPH = "photograph"
     """One picture of the heap from the side, with a scale."""
     BALANCE = "balance"
-    """A balance under the plate, or under what lies on a part of it."""
+    """A balance that the tube hangs on, or under what lies on a part of the plate."""
     RULER = "ruler"
     """A ruler along the tube."""
     FILM = "film"
