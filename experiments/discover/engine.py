@@ -4,33 +4,20 @@ from __future__ import annotations
 
 import hashlib
 import json
-import multiprocessing
-import os
-import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor
-from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache, partial
+from collections.abc import Callable, Sequence
+from functools import lru_cache
 
 import numpy as np
 
-from dem_warp import Case, CaseResult, Progress, simulate
-from dem_warp.device import resolve_device
-from dem_warp.processes import end_with_parent
+from dem_warp import Case, Progress
 from dem_warp.provenance import engine_fingerprint
-from dem_warp.simulation import batches
 from experiments.discover.library import Mechanism, with_mechanisms
-from experiments.discover.observables import NAMES, VERSION, measure
-from experiments.discover.outcome_table import Outcome, OutcomeTable
+from experiments.discover.observables import NAMES, VERSION
+from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.simulator import Outcomes, Point
+from experiments.discover.wave import WaveRunner
 from experiments.errors import StudyError
 from experiments.study import Study
-
-WORLDS = 1024
-"""Worlds that a GPU runs at once: enough to fill it, few enough that a killed run loses little."""
-
-SAVE_EVERY = 5.0
-"""Time between two savings of what has been measured [s]."""
 
 
 class EngineSimulator:
@@ -39,7 +26,7 @@ class EngineSimulator:
     All points of a call are simulated in as few launches as possible; they are measured in processes of their
     own while the next are simulated, and kept. A point whose case a study refuses has that as its reason.
 
-    Use it as a context, or call `close`, to end the measuring processes.
+    Use it as a context, or call `close`, to end its processes.
 
     Parameters
     ----------
@@ -53,8 +40,8 @@ class EngineSimulator:
         ``"cpu"``, ``"cuda"``, ``"cuda:1"``; None: the engine's choice.
     workers
         Processes that simulate, on the CPU, and that measure; None: one a core.
-    worlds
-        Worlds that a GPU runs at once.
+    worlds, drivers
+        Worlds of one launch, and launches at once; None: the choice of `WaveRunner`.
     progress
         Called with the progress of all points of a call that are not kept yet.
     """
@@ -68,11 +55,12 @@ class EngineSimulator:
         table: OutcomeTable,
         device: str | None = None,
         workers: int | None = None,
-        worlds: int = WORLDS,
+        worlds: int | None = None,
+        drivers: int | None = None,
         progress: Callable[[Progress], None] | None = None,
     ) -> None:
-        self.study, self.table, self.workers, self.worlds = study, table, workers, worlds
-        self._device, self._progress = device, progress
+        self.study, self.table = study, table
+        self._runner = WaveRunner(study.measurement, table, device, workers, worlds, drivers, progress)
         self._library = {mechanism.name: mechanism for mechanism in library}
         self._factors = [factor.name for factor in study.factors]
         self._conditions = [condition.name for condition in study.conditions]
@@ -85,10 +73,8 @@ class EngineSimulator:
         self.close()
 
     def close(self) -> None:
-        """End the measuring processes."""
-        if "_pool" in self.__dict__:
-            self._pool.shutdown(cancel_futures=True)
-            del self.__dict__["_pool"]
+        """End its processes."""
+        self._runner.close()
 
     def __call__(self, points: Sequence[Point]) -> Outcomes:
         """Observables of every point, in order.
@@ -109,7 +95,7 @@ class EngineSimulator:
                 keys.append(f"refused: {error}")
                 refused[keys[-1]] = (np.full(len(NAMES), np.nan), error.rule)
         found = self.table.load(list(cases)) | refused
-        found |= self._simulate({key: case for key, case in cases.items() if key not in found})
+        found |= self._runner.run({key: case for key, case in cases.items() if key not in found})
         values = np.array([found[key][0] for key in keys]).reshape(len(keys), len(NAMES))
         return Outcomes(values, tuple(found[key][1] for key in keys))
 
@@ -149,110 +135,3 @@ class EngineSimulator:
     def _extend(self, names: tuple[str, ...], condition: str) -> Study:
         mechanisms = [self._library[name] for name in names]
         return with_mechanisms(self.study, mechanisms).under(condition)
-
-    # ---- simulating and measuring --------------------------------------------------------------------------
-
-    @cached_property
-    def _pool(self) -> ProcessPoolExecutor:
-        # Processes, as measuring holds Python's lock; spawned, as a process with a GPU must not be forked.
-        context = multiprocessing.get_context("spawn")
-        count = self.workers or os.cpu_count()
-        return ProcessPoolExecutor(count, context, end_with_parent)
-
-    def _simulate(self, cases: Mapping[str, Case]) -> dict[str, Outcome]:
-        """Simulate and measure cases, and keep the outcomes."""
-        measured = _Measured(self.table)
-        clock = _Clock(len(cases), self._progress)
-        try:
-            for keys in self._launches(cases):
-                simulate(
-                    [cases[key] for key in keys],
-                    device=self._device,
-                    workers=self.workers,
-                    on_result=partial(self._take, measured, keys),
-                    on_progress=partial(clock.report, len(keys)),
-                )
-                clock.done += len(keys)
-            return measured.finish()
-        except BaseException:
-            self.close()
-            raise
-        finally:
-            measured.keep()
-
-    def _launches(self, cases: Mapping[str, Case]) -> Iterator[list[str]]:
-        """Keys of the cases that run at once; on a CPU all of them, which then are spread over its cores."""
-        keys = list(cases)
-        if not keys:
-            return
-        if resolve_device(self._device) == "cpu":
-            yield keys
-            return
-        for members in batches(list(cases.values()), one_each=False):
-            for start in range(0, len(members), self.worlds):
-                yield [keys[i] for i in members[start : start + self.worlds]]
-
-    def _take(self, measured: _Measured, keys: Sequence[str], index: int, result: CaseResult) -> None:
-        measured.add(keys[index], self._pool.submit(measure, self.study.measurement, result))
-
-
-@dataclass
-class _Clock:
-    """Progress of all launches of a call, from that of each."""
-
-    total: int
-    listener: Callable[[Progress], None] | None
-    done: int = 0
-    started: float = field(default_factory=time.perf_counter)
-
-    def report(self, count: int, progress: Progress) -> None:
-        if self.listener is None:
-            return
-        whole = replace(
-            progress,
-            done=self.done + progress.done,
-            total=self.total,
-            fraction=(self.done + progress.fraction * count) / self.total,
-            seconds=time.perf_counter() - self.started,
-        )
-        self.listener(whole)
-
-
-class _Measured:
-    """Outcomes as they come from the measuring processes; what has come is kept now and then."""
-
-    def __init__(self, table: OutcomeTable) -> None:
-        self._table = table
-        self._waiting: dict[str, Future[Outcome]] = {}
-        self._outcomes: dict[str, Outcome] = {}
-        self._saved = time.monotonic()
-
-    def add(self, key: str, outcome: Future[Outcome]) -> None:
-        """Await an outcome."""
-        self._waiting[key] = outcome
-        self._keep_in_time()
-
-    def finish(self) -> dict[str, Outcome]:
-        """Wait for all, and return them."""
-        for outcome in list(self._waiting.values()):
-            outcome.result()
-            self._keep_in_time()
-        self.keep()
-        return self._outcomes
-
-    def keep(self) -> None:
-        """Save what has been measured since."""
-        ready = [key for key, outcome in self._waiting.items() if _is_measured(outcome)]
-        fresh = {key: self._waiting.pop(key).result() for key in ready}
-        if fresh:
-            self._table.save(fresh)
-            self._outcomes |= fresh
-        self._saved = time.monotonic()
-
-    def _keep_in_time(self) -> None:
-        if time.monotonic() - self._saved > SAVE_EVERY:
-            self.keep()
-
-
-def _is_measured(outcome: Future[Outcome]) -> bool:
-    return outcome.done() and not outcome.cancelled() and outcome.exception() is None

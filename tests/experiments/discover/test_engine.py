@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dem_warp import Progress, simulate
-from experiments.discover import engine
+from experiments.discover import wave
 from experiments.discover.engine import EngineSimulator
 from experiments.discover.library import library_for
 from experiments.discover.observables import NAMES, measure
@@ -67,15 +67,27 @@ def test_points_are_answered_by_heaps_measured_and_kept(
     def never(*args: object, **kwargs: object) -> None:
         raise AssertionError("what is kept is not simulated again")
 
-    monkeypatch.setattr(engine, "simulate", never)
+    monkeypatch.setattr(wave, "simulate", never)
     again = build(study, table)(POINTS)
     np.testing.assert_array_equal(again.values, outcomes.values[:3])
+
+
+def test_several_launches_at_once_give_the_same(study: Study, table: OutcomeTable) -> None:
+    seen: list[Progress] = []
+    with EngineSimulator(
+        study, library_for(study), table, "cpu", workers=1, worlds=1, drivers=2, progress=seen.append
+    ) as several:
+        outcomes = several(POINTS[:2])
+    assert [progress.done for progress in seen] == [1, 2]
+    alone = simulate([study.under(p.condition).case({"E": p.theta[0]}, p.seed) for p in POINTS[:2]], "cpu", 1)
+    expected = [measure(study.measurement, result)[0] for result in alone]
+    np.testing.assert_array_equal(outcomes.values, expected)
 
 
 def test_a_run_that_was_killed_keeps_what_it_had_measured(
     study: Study, table: OutcomeTable, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(engine, "SAVE_EVERY", 0.0)
+    monkeypatch.setattr(wave, "SAVE_EVERY", 0.0)
 
     def kill(progress: Progress) -> None:
         if progress.done == 2:

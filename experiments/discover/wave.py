@@ -1,0 +1,218 @@
+"""Waves of cases: simulated in as few launches as possible, measured beside, kept as they come."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import time
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from dataclasses import dataclass, field
+from functools import cached_property, partial
+
+from dem_warp import Case, CaseResult, Progress, simulate
+from dem_warp.device import resolve_device
+from dem_warp.processes import end_with_parent
+from dem_warp.simulation import batches
+from experiments.discover.observables import measure
+from experiments.discover.outcome_table import Outcome, OutcomeTable
+from experiments.study.study import MeasurementSection
+
+WORLDS = 1024
+"""Worlds that one launch on a GPU holds: enough to fill it, few enough that a killed run loses little."""
+
+DRIVERS = 3
+"""Launches at once on a GPU, each driven by a process of its own: while one's controllers decide on the host,
+the GPU works for the others."""
+
+SAVE_EVERY = 5.0
+"""Time between two savings of what has been measured [s]."""
+
+
+class WaveRunner:
+    """Simulates and measures waves of cases; its processes stay for the next wave until it is closed.
+
+    Parameters
+    ----------
+    settings
+        How pictures are taken and read.
+    table
+        Where outcomes are kept.
+    device
+        ``"cpu"``, ``"cuda"``, ``"cuda:1"``; None: the engine's choice.
+    workers
+        Processes that simulate, on the CPU, and that measure; None: one a core.
+    worlds
+        Worlds of one launch; None: `WORLDS` on a GPU, and on the CPU all: a launch there spreads them over
+        its cores.
+    drivers
+        Launches at once; None: `DRIVERS` on a GPU, one on the CPU.
+    progress
+        Called with the progress of a wave.
+    """
+
+    def __init__(
+        self,
+        settings: MeasurementSection,
+        table: OutcomeTable,
+        device: str | None = None,
+        workers: int | None = None,
+        worlds: int | None = None,
+        drivers: int | None = None,
+        progress: Callable[[Progress], None] | None = None,
+    ) -> None:
+        self._settings, self._table, self._progress = settings, table, progress
+        self._device, self._workers, self._worlds, self._drivers = device, workers, worlds, drivers
+
+    def close(self) -> None:
+        """End its processes."""
+        for name in ("_measurers", "_driven"):
+            if pool := self.__dict__.pop(name, None):
+                pool.shutdown(cancel_futures=True)
+
+    def run(self, cases: Mapping[str, Case]) -> dict[str, Outcome]:
+        """Simulate and measure cases by their keys in the table, and keep the outcomes."""
+        if not cases:
+            return {}
+        measured = _Measured(self._table)
+        clock = _Clock(len(cases), self._progress)
+        launches = self._launches(cases)
+        launch_all = self._drive if min(len(launches), self._driver_count) > 1 else self._launch
+        try:
+            launch_all(launches, cases, measured, clock)
+            return measured.finish()
+        except BaseException:
+            self.close()
+            raise
+        finally:
+            measured.keep()
+
+    @cached_property
+    def _measurers(self) -> ProcessPoolExecutor:
+        # Processes, as measuring holds Python's lock.
+        return _processes(self._workers or os.cpu_count())
+
+    @cached_property
+    def _driven(self) -> ProcessPoolExecutor:
+        return _processes(self._driver_count)
+
+    @cached_property
+    def _on_cpu(self) -> bool:
+        return resolve_device(self._device) == "cpu"
+
+    @property
+    def _driver_count(self) -> int:
+        return self._drivers or (1 if self._on_cpu else DRIVERS)
+
+    def _launches(self, cases: Mapping[str, Case]) -> list[list[str]]:
+        """Keys of the cases of each launch: all, or such as share what kernels are compiled for."""
+        keys = list(cases)
+        if self._on_cpu and self._worlds is None:
+            return [keys]
+        worlds = self._worlds or WORLDS
+        return [
+            [keys[i] for i in group[start : start + worlds]]
+            for group in batches(list(cases.values()), one_each=False)
+            for start in range(0, len(group), worlds)
+        ]
+
+    def _launch(
+        self, launches: Sequence[list[str]], cases: Mapping[str, Case], measured: _Measured, clock: _Clock
+    ) -> None:
+        """Simulate launch after launch in this process."""
+        for keys in launches:
+            simulate(
+                [cases[key] for key in keys],
+                device=self._device,
+                workers=self._workers,
+                on_result=partial(self._take, measured, keys),
+                on_progress=partial(clock.report, len(keys)),
+            )
+            clock.pass_launch(len(keys))
+
+    def _drive(
+        self, launches: Sequence[list[str]], cases: Mapping[str, Case], measured: _Measured, clock: _Clock
+    ) -> None:
+        """Simulate several launches at once, each in a process."""
+        begun = {
+            self._driven.submit(simulate, [cases[key] for key in keys], self._device, 1): keys
+            for keys in launches
+        }
+        for ended in as_completed(begun):
+            keys = begun[ended]
+            for index, result in enumerate(ended.result()):
+                self._take(measured, keys, index, result)
+            clock.pass_launch(len(keys))
+
+    def _take(self, measured: _Measured, keys: Sequence[str], index: int, result: CaseResult) -> None:
+        measured.add(keys[index], self._measurers.submit(measure, self._settings, result))
+
+
+def _processes(count: int | None) -> ProcessPoolExecutor:
+    """Processes that end with this one; spawned, as a process with a GPU must not be forked."""
+    return ProcessPoolExecutor(count, multiprocessing.get_context("spawn"), end_with_parent)
+
+
+@dataclass
+class _Clock:
+    """Progress of all launches of a call, from that of each."""
+
+    total: int
+    listener: Callable[[Progress], None] | None
+    done: int = 0
+    started: float = field(default_factory=time.perf_counter)
+
+    def report(self, count: int, progress: Progress) -> None:
+        """Tell how far a launch of some cases is."""
+        done, fraction = self.done + progress.done, (self.done + progress.fraction * count) / self.total
+        self._tell(done, fraction, progress.phase_counts)
+
+    def pass_launch(self, count: int) -> None:
+        """Tell that a launch of some cases has ended."""
+        self.done += count
+        self._tell(self.done, self.done / self.total, {})
+
+    def _tell(self, done: int, fraction: float, phases: dict[str, int]) -> None:
+        if self.listener:
+            seconds = time.perf_counter() - self.started
+            self.listener(Progress(done, self.total, fraction, phases, seconds))
+
+
+class _Measured:
+    """Outcomes as they come from the measuring processes; what has come is kept now and then."""
+
+    def __init__(self, table: OutcomeTable) -> None:
+        self._table = table
+        self._waiting: dict[str, Future[Outcome]] = {}
+        self._outcomes: dict[str, Outcome] = {}
+        self._saved = time.monotonic()
+
+    def add(self, key: str, outcome: Future[Outcome]) -> None:
+        """Await an outcome."""
+        self._waiting[key] = outcome
+        self._keep_in_time()
+
+    def finish(self) -> dict[str, Outcome]:
+        """Wait for all, and return them."""
+        for outcome in list(self._waiting.values()):
+            outcome.result()
+            self._keep_in_time()
+        self.keep()
+        return self._outcomes
+
+    def keep(self) -> None:
+        """Save what has been measured since."""
+        ready = [key for key, outcome in self._waiting.items() if _is_measured(outcome)]
+        fresh = {key: self._waiting.pop(key).result() for key in ready}
+        if fresh:
+            self._table.save(fresh)
+            self._outcomes |= fresh
+        self._saved = time.monotonic()
+
+    def _keep_in_time(self) -> None:
+        if time.monotonic() - self._saved > SAVE_EVERY:
+            self.keep()
+
+
+def _is_measured(outcome: Future[Outcome]) -> bool:
+    return outcome.done() and not outcome.cancelled() and outcome.exception() is None
