@@ -15,6 +15,9 @@ _SCHEMA = "CREATE TABLE IF NOT EXISTS outcome (key TEXT PRIMARY KEY, numbers BLO
 _AT_ONCE = 500
 """Keys that one query asks for; SQLite takes some thousand."""
 
+_PATIENCE = 60.0
+"""Time that a process waits for others that write to the file [s]."""
+
 Outcome = tuple[np.ndarray, str]
 """Observables of a case, and why it has none; empty where it has."""
 
@@ -76,7 +79,7 @@ class OutcomeTable:
 
     def _open(self) -> sqlite3.Connection:
         try:
-            file = sqlite3.connect(self.path)
+            file = sqlite3.connect(self.path, _PATIENCE)
             file.execute(_SCHEMA)
         except sqlite3.DatabaseError as error:
             raise StoreError("must be a table of outcomes", str(error), str(self.path)) from error
