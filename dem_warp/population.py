@@ -12,6 +12,11 @@ from dem_warp.materials import Material
 SIZE_LIMIT = 3.0
 """Sizes are drawn within this many standard deviations of their mean."""
 
+SIZE_VARIANCE = 1.0 - 2.0 * SIZE_LIMIT * math.exp(-0.5 * SIZE_LIMIT**2) / (
+    math.sqrt(2.0 * math.pi) * math.erf(SIZE_LIMIT / math.sqrt(2.0))
+)
+"""Variance of a standard normal variable that is cut at SIZE_LIMIT."""
+
 FRACTION_TOLERANCE = 1e-6
 """Fractions add up to 1 within this, so that decimals may be rounded."""
 
@@ -85,6 +90,24 @@ class DrawnGrains:
     def bounding_radii(self) -> np.ndarray:
         """Distance of the farthest point of each grain from its centre [m], (n,)."""
         return np.array([clump.bounding_radius for clump in self.clumps])[self.shapes] * self.sizes
+
+
+def size_of_mean_mass(size: float, size_sd: float) -> float:
+    """Mean of the sizes whose spread leaves the mean mass at that of a grain of one size.
+
+    The mass goes as the cube of the size, whose mean over a distribution symmetric about m, of variance v, is
+    m^3 + 3 m v; this is Cardano's real root of m^3 + 3 m v = size^3.
+
+    Parameters
+    ----------
+    size
+        The size that has the mean mass, positive.
+    size_sd
+        Standard deviation of the sizes before they are cut.
+    """
+    variance, half = SIZE_VARIANCE * size_sd**2, 0.5 * size**3
+    root = math.cbrt(half + math.sqrt(half**2 + variance**3))
+    return root - variance / root
 
 
 @dataclass(frozen=True)

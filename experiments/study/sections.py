@@ -14,7 +14,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 from dem_warp.case import Case, Numerics
 from dem_warp.clumps import ClumpShape
 from dem_warp.materials import Interaction, Material
-from dem_warp.population import FRACTION_TOLERANCE, GrainPopulation, ShapeMixture
+from dem_warp.population import FRACTION_TOLERANCE, GrainPopulation, ShapeMixture, size_of_mean_mass
 from experiments.study.mechanisms import MechanismsSection
 from experiments.study.scene_sections import SceneSection
 from experiments.study.schema import Density, Length, Number, Pressure, Section
@@ -85,6 +85,9 @@ class GrainSection(MaterialSection, ShapeSection):
     """Several shapes by name, instead of a clump or a sphere."""
     size_mean: Number = Field(default=1.0, gt=0.0)
     """Mean size, as a multiple of the shape."""
+    size_mean_of: Literal["sizes", "masses"] = "sizes"
+    """Whether that is the mean of the sizes, as a ruler gives it, or the size of a grain of mean mass, as a
+    balance does: then a wider spread leaves the mass of a number of grains as it is."""
     size_sd: Number = Field(default=0.05, ge=0.0)
     """Standard deviation of the size."""
     elongation: Number = Field(default=0.0, ge=0.0)
@@ -123,9 +126,10 @@ class GrainSection(MaterialSection, ShapeSection):
 
     def population(self) -> GrainPopulation:
         """Build the engine's population."""
-        return GrainPopulation(
-            shape=self.shape(), material=self.material(), size_mean=self.size_mean, size_sd=self.size_sd
-        )
+        mean, spread = self.size_mean, self.size_sd
+        if self.size_mean_of == "masses":
+            mean = size_of_mean_mass(mean, spread)
+        return GrainPopulation(shape=self.shape(), material=self.material(), size_mean=mean, size_sd=spread)
 
 
 # The integrals over a shape take milliseconds, and every case of a campaign needs them.

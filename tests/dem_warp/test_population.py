@@ -10,7 +10,7 @@ from worlds import BALL, BOOT, GRAIN, PYRAMID, small_case
 from dem_warp import CaseResult, GrainPopulation, ShapeMixture
 from dem_warp.clumps import stack_spheres
 from dem_warp.device import resolve_device
-from dem_warp.population import DrawnGrains
+from dem_warp.population import SIZE_VARIANCE, DrawnGrains, size_of_mean_mass
 from dem_warp.scenes.rain import CrossSection, Rain, place_rain
 
 BOTH = ShapeMixture((PYRAMID, BOOT), (0.3, 0.7))
@@ -62,6 +62,20 @@ def test_a_seed_draws_the_same_grains_and_the_sizes_of_one_shape():
     np.testing.assert_array_equal(drawn.sizes, again.sizes)
     assert not np.array_equal(drawn.shapes, other.shapes)
     np.testing.assert_array_equal(drawn.sizes, replace(mixed(), shape=PYRAMID).draw(50, 5).sizes)
+
+
+@pytest.mark.parametrize("spread", [0.0, 0.05, 0.25])
+def test_a_spread_about_the_mean_mass_leaves_the_mass(spread):
+    population = GrainPopulation(BALL, GRAIN, size_mean=size_of_mean_mass(1.1, spread), size_sd=spread)
+    sizes = population.draw_sizes(200 * COUNT, np.random.default_rng(1))
+    # Four standard errors of the two means.
+    assert np.mean(sizes**3) == pytest.approx(
+        1.1**3, abs=4.0 * np.std(sizes**3) / np.sqrt(len(sizes)) + 1e-14
+    )
+    deviations = (sizes - sizes.mean()) ** 2
+    assert np.mean(deviations) == pytest.approx(
+        SIZE_VARIANCE * spread**2, abs=4.0 * np.std(deviations) / np.sqrt(len(sizes)) + 1e-14
+    )
 
 
 def test_a_shape_of_fraction_0_is_as_good_as_absent():
