@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import pandas as pd
 
-from experiments.discover.bank import load_bank
+from experiments.discover.bank import Bank
 from experiments.discover.settings import Settings
 from experiments.discover.trials.declaration import Declaration
 from experiments.discover.trials.truth import Sealed
@@ -16,7 +15,7 @@ PER_CASE = 0.007
 """Seconds of an H200 that a case of 400 grains of three spheres takes, with 1000 and more at once."""
 
 
-def planned_cases(sealed: Sequence[Sealed], declared: Declaration, bank: Path) -> pd.DataFrame:
+def planned_cases(sealed: Sequence[Sealed], declared: Declaration, bank: Bank) -> pd.DataFrame:
     """Cases of the bank, of the trials' heaps, and of their analyses.
 
     Parameters
@@ -26,7 +25,7 @@ def planned_cases(sealed: Sequence[Sealed], declared: Declaration, bank: Path) -
     declared
         Their declaration.
     bank
-        File of the bank.
+        Of the study.
 
     Returns
     -------
@@ -35,9 +34,8 @@ def planned_cases(sealed: Sequence[Sealed], declared: Declaration, bank: Path) -
         seconds of these. An analysis without a gap asks for no case; one with a gap is taken to need one
         round of the shortlist, and at the most all rounds, of single mechanisms and of pairs.
     """
-    finished = load_bank(bank)
-    conditions = len(finished.space.conditions)
-    cases = len(finished.reasons)
+    conditions = len(bank.space.conditions)
+    cases = len(bank.reasons)
     rows = [{"what": "bank", "trials": 0, "cases": cases, "at most": cases}]
     likely, most = search_cases(declared.settings, conditions)
     for part in dict.fromkeys(trial.part for trial in sealed):

@@ -1,6 +1,6 @@
 """The generator of the trials, apart from the analysis: it draws and seals truths, and simulates their heaps.
 
-    python -m experiments.discover.trials.generate seal out/trials --bank bank.npz
+    python -m experiments.discover.trials.generate seal out/trials
     python -m experiments.discover.trials.generate measure out/trials --part alone --device cuda
 
 The first writes what is known beforehand (``declared.json``, ``sealed.csv``) into FOLDER/record, to be
@@ -18,11 +18,12 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from experiments.discover.emulator import read_emulator
+from experiments.discover.bank import Bank
+from experiments.discover.emulator import fit_emulator
 from experiments.discover.engine import EngineSimulator
 from experiments.discover.library import library_for
 from experiments.discover.outcome_table import OutcomeTable
-from experiments.discover.settings import Settings, read_settings
+from experiments.discover.search import Search
 from experiments.discover.simulator import Outcomes, Simulator
 from experiments.discover.trials.declaration import (
     Declaration,
@@ -59,6 +60,11 @@ PIXEL_SHARE = 1.3
 app = typer.Typer(help="Draw, seal and simulate blind trials.")
 
 
+def bank_beside(scale: str) -> Path:
+    """Bank that is shipped for a scale of the trial study."""
+    return STUDY.with_name(f"bank-{scale}.npz" if scale else "bank.npz")
+
+
 def generators_study(scale: str) -> Study:
     """The trial study with the generator's own time step and camera."""
     study = load_study(STUDY, scale or None)
@@ -69,33 +75,31 @@ def generators_study(scale: str) -> Study:
     return load_study(STUDY, scale or None, changes)
 
 
-def seal_trials(
-    folder: Folder, emulator_file: Path, scale: str, plan: Plan, settings: Settings, seed: int
-) -> None:
+def seal_trials(folder: Folder, search: Search, bank: Bank, plan: Plan, seed: int) -> None:
     """Declare what the trials should show, draw the truths, and write seals and labels.
 
     Parameters
     ----------
     folder
         Of the trials.
-    emulator_file
-        Bank of the study at the scale.
-    scale
-        Of the study; empty for the study as written.
-    plan, settings
-        Of the trials, and of the analysis.
+    search
+        Of the trial study, at some scale.
+    bank
+        Of that study.
+    plan
+        Numbers of trials.
     seed
         Of the drawing, which must not be known to whoever knows the plan.
     """
-    study = load_study(STUDY, scale or None)
-    library = declared_effects(read_emulator(emulator_file), settings, plan.replicates)
+    study = search.study
+    library = declared_effects(fit_emulator(bank), search.settings, plan.replicates)
     strangers = tuple(Effect(m.name, m.null, m.maximum) for m in library_for(study, STRANGERS))
     declaration = Declaration(
         study=study.name,
-        scale=scale,
+        scale=study.scale or "",
         drawn_on=time.strftime("%Y-%m-%d"),
         plan=plan,
-        settings=with_names(settings, library),
+        settings=with_names(search.settings, library),
         library=library,
         strangers=strangers,
     )
@@ -136,17 +140,16 @@ def measure_trials(
 @app.command()
 def seal(
     folder: Annotated[Path, typer.Argument(help="Folder of the trials.")],
-    bank: Annotated[Path, typer.Option(help="Bank of the trial study.")],
+    bank: Annotated[Path | None, typer.Option(help="Bank of the trial study; left out: its own.")] = None,
     scale: Annotated[str, typer.Option(help="Scale of the trial study; left out: as written.")] = "",
     plan: Annotated[Path | None, typer.Option(help="TOML file with numbers of trials.")] = None,
-    settings: Annotated[Path | None, typer.Option(help="JSON file of the analysis' settings.")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the drawing; left out: a secret one.")] = None,
 ) -> None:
     """Draw the truths; write their seals, to be published, and their labels, to be kept."""
     numbers = Plan(**read_toml(plan, "a plan of trials")[1]) if plan else Plan()
-    rules = read_settings(settings) if settings else Settings()
-    place = Folder(folder)
-    seal_trials(place, bank, scale, numbers, rules, secrets.randbits(63) if seed is None else seed)
+    place, search = Folder(folder), Search.of(load_study(STUDY, scale or None))
+    waves = search.read_bank(bank or bank_beside(scale))
+    seal_trials(place, search, waves, numbers, secrets.randbits(63) if seed is None else seed)
     print(f"{len(read_sealed(place.sealed))} trials sealed: {place.sealed}")
 
 

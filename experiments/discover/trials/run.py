@@ -1,7 +1,7 @@
 """Analyse the trials: all of a part side by side, their waves in one batch.
 
-    python -m experiments.discover.trials.run out/trials --bank bank.npz --part alone --seconds 480
-    python -m experiments.discover.trials.run out/trials --bank bank.npz --plan-only
+    python -m experiments.discover.trials.run out/trials --part alone --device cuda --seconds 480
+    python -m experiments.discover.trials.run out/trials --plan-only
 
 It sees the measured heaps and the seals, never the labels. After ``--seconds`` it stops between two batches;
 called again, it goes on: analyses that have ended are not begun again, and the others take what was simulated
@@ -20,16 +20,17 @@ from typing import Annotated
 import typer
 
 from experiments.benchmarks.tables import markdown_table
-from experiments.discover.emulator import read_emulator
+from experiments.discover.bank import load_bank
+from experiments.discover.emulator import fit_emulator
 from experiments.discover.engine import EngineSimulator
-from experiments.discover.library import library_for
 from experiments.discover.outcome_table import OutcomeTable
+from experiments.discover.search import Search
 from experiments.discover.trials.cost import planned_cases
 from experiments.discover.trials.declaration import read_declaration
 from experiments.discover.trials.desk import Desk, OutOfTime, TimedSimulator, job_name, keep, read_data
 from experiments.discover.trials.findings import EVERYTHING, PHOTOGRAPHS, read_findings
 from experiments.discover.trials.folder import Folder, Run
-from experiments.discover.trials.generate import STUDY
+from experiments.discover.trials.generate import STUDY, bank_beside
 from experiments.discover.trials.lockstep import Round, in_step, process_crew
 from experiments.discover.trials.truth import Sealed, read_sealed
 from experiments.study import load_study
@@ -49,7 +50,7 @@ def open_jobs(folder: Folder, trials: Sequence[Sealed], view: str) -> dict[str, 
 def run_trials(
     folder: Folder,
     trials: Sequence[Sealed],
-    bank: Path,
+    bank: Path | None = None,
     view: str = EVERYTHING,
     device: str | None = None,
     workers: int | None = None,
@@ -64,7 +65,7 @@ def run_trials(
     trials
         Some of those that were sealed.
     bank
-        File of the bank of the trial study.
+        File of the bank of the trial study; None: its own.
     view
         What the analyses get to see.
     device, workers
@@ -79,16 +80,17 @@ def run_trials(
     """
     deadline = time.monotonic() + seconds
     declaration = read_declaration(folder.declared)
-    study = load_study(STUDY, declaration.scale or None)
+    search = Search.of(load_study(STUDY, declaration.scale or None))
+    emulator = fit_emulator(search.read_bank(bank or bank_beside(declaration.scale)))
     jobs = open_jobs(folder, trials, view)
-    measured, refused = read_data(folder, list(jobs.values()), study)
+    measured, refused = read_data(folder, list(jobs.values()), search.study)
     keep(folder, {job_name(trial, view): crash for trial, crash in refused.items()})
     names = [name for name, trial in jobs.items() if trial.trial in measured]
     withheld = {trial.trial: trial.withheld for trial in trials}
-    desk = Desk(read_emulator(bank), declaration.settings, measured, withheld)
+    desk = Desk(emulator, declaration.settings, measured, withheld)
     table = OutcomeTable(folder.root / "outcomes.sqlite")
     with (
-        EngineSimulator(study, library_for(study), table, device, workers) as engine,
+        EngineSimulator(search.study, search.library, table, device, workers) as engine,
         process_crew(desk, workers or os.cpu_count() or 1) as crew,
         Run(folder, f"analyses, {view}", device, table),
     ):
@@ -104,7 +106,7 @@ def _report(turn: Round) -> None:
 
 def main(
     folder: Annotated[Path, typer.Argument(help="Folder of the trials.")],
-    bank: Annotated[Path, typer.Option(help="Bank of the trial study.")],
+    bank: Annotated[Path | None, typer.Option(help="Bank of the trial study; left out: its own.")] = None,
     part: Annotated[str | None, typer.Option(help="Trials of one part; left out: all.")] = None,
     first: Annotated[int | None, typer.Option(help="So many trials of each part; left out: all.")] = None,
     photographs: Annotated[bool, typer.Option("--photographs", help="With photographs only.")] = False,
@@ -117,7 +119,9 @@ def main(
     place = Folder(folder)
     sealed = read_sealed(place.sealed)
     if plan_only:
-        print(markdown_table(planned_cases(sealed, read_declaration(place.declared), bank)))
+        declaration = read_declaration(place.declared)
+        waves = load_bank(bank or bank_beside(declaration.scale))
+        print(markdown_table(planned_cases(sealed, declaration, waves)))
         return
     trials = [trial for trial in sealed if part in (None, trial.part)]
     if first is not None:
