@@ -13,11 +13,12 @@ from multiprocessing.queues import Queue
 import numpy as np
 
 from dem_warp.processes import end_with_parent
-from experiments.discover.engine import WORLDS, EngineSimulator
+from experiments.discover.engine import EngineSimulator
 from experiments.discover.library import Mechanism
 from experiments.discover.observables import NAMES
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.simulator import Outcomes, Point
+from experiments.discover.wave import WORLDS
 from experiments.study import Study
 
 Make = Callable[[str], EngineSimulator]

@@ -106,7 +106,9 @@ class Run:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         seconds, cases = time.perf_counter() - self._started, len(self._table) - self._before
-        name, warp, date = machine(resolve_device(self._device)).rsplit(", ", 2)
+        devices = (self._device or "").split(",")
+        name, warp, date = machine(resolve_device(devices[0] or None)).rsplit(", ", 2)
+        name = f"{len(devices)} x {name}" if len(devices) > 1 else name
         new = not self._path.exists()
         self._path.parent.mkdir(parents=True, exist_ok=True)
         with self._path.open("a", newline="", encoding="utf-8") as file:

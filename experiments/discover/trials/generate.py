@@ -20,7 +20,7 @@ import typer
 
 from experiments.discover.bank import Bank
 from experiments.discover.emulator import fit_emulator
-from experiments.discover.engine import EngineSimulator
+from experiments.discover.fleet import engine_on
 from experiments.discover.library import library_for
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.search import Search
@@ -157,7 +157,7 @@ def seal(
 def measure(
     folder: Annotated[Path, typer.Argument(help="Folder of the trials.")],
     part: Annotated[str | None, typer.Option(help="Trials of one part; left out: all.")] = None,
-    device: Annotated[str | None, typer.Option(help="cpu, cuda or cuda:N.")] = None,
+    device: Annotated[str | None, typer.Option(help="cpu, cuda, or several, as cuda:0,cuda:1.")] = None,
     workers: Annotated[int | None, typer.Option(help="Processes.")] = None,
 ) -> None:
     """Simulate and measure the heaps of the trials."""
@@ -169,7 +169,7 @@ def measure(
     library = (*library_for(study), *library_for(study, STRANGERS))
     table = OutcomeTable(place.hidden / "outcomes.sqlite")
     with (
-        EngineSimulator(study, library, table, device, workers) as simulator,
+        engine_on(device, study, library, table, workers) as simulator,
         Run(place, f"heaps, {part or 'all'}", device, table),
     ):
         measure_trials(place, labels, declaration, simulator)

@@ -22,7 +22,7 @@ import typer
 from experiments.benchmarks.tables import markdown_table
 from experiments.discover.bank import load_bank
 from experiments.discover.emulator import fit_emulator
-from experiments.discover.engine import EngineSimulator
+from experiments.discover.fleet import engine_on
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.search import Search
 from experiments.discover.trials.cost import planned_cases
@@ -90,7 +90,7 @@ def run_trials(
     desk = Desk(emulator, declaration.settings, measured, withheld)
     table = OutcomeTable(folder.root / "outcomes.sqlite")
     with (
-        EngineSimulator(search.study, search.library, table, device, workers) as engine,
+        engine_on(device, search.study, search.library, table, workers) as engine,
         process_crew(desk, workers or os.cpu_count() or 1) as crew,
         Run(folder, f"analyses, {view}", device, table),
     ):
@@ -110,7 +110,7 @@ def main(
     part: Annotated[str | None, typer.Option(help="Trials of one part; left out: all.")] = None,
     first: Annotated[int | None, typer.Option(help="So many trials of each part; left out: all.")] = None,
     photographs: Annotated[bool, typer.Option("--photographs", help="With photographs only.")] = False,
-    device: Annotated[str | None, typer.Option(help="cpu, cuda or cuda:N.")] = None,
+    device: Annotated[str | None, typer.Option(help="cpu, cuda, or several, as cuda:0,cuda:1.")] = None,
     workers: Annotated[int | None, typer.Option(help="Processes.")] = None,
     seconds: Annotated[float, typer.Option(help="Begin no batch after this time.")] = math.inf,
     plan_only: Annotated[bool, typer.Option("--plan-only", help="Count the cases, run nothing.")] = False,
