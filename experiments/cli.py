@@ -18,6 +18,7 @@ from experiments.commands.console import FAILED_RUN, CaseProgress, clear_errors,
 if TYPE_CHECKING:
     from experiments.calibrate.results import StageResult
     from experiments.cases import Heap
+    from experiments.commands.discover import Job
 
 app = typer.Typer(
     name="dem-warp",
@@ -127,7 +128,7 @@ def discover(
         chosen = chosen_study(study, scale, device)
         folder = out or default_folder(chosen, "discover")
         job = Job(chosen, measured, folder, bank, photographs_only, device, workers, seed)
-    with clear_errors(resume=f"the same command with --out {folder} --resume"):
+    with clear_errors(resume=_resume_search(job, scale)):
         messages.print(f"{chosen.name}, on {device}", chosen.note, sep="\n", markup=False)
         ended = run_search(job, resume, CaseProgress)
     if ended.discovery is None:
@@ -317,6 +318,14 @@ def _resume_command(
     words += [*([f"--scale {scale}"] if scale else []), f"--device {device}"]
     if given := [flag for flag, wanted in flags.items() if wanted]:
         words += [*given, f"--paper-replicates {replicates}"]
+    return " ".join([*words, "--resume"])
+
+
+def _resume_search(job: Job, scale: str | None) -> str:
+    words = ["dem-warp discover", str(job.study.file), *([str(job.measured)] if job.measured else [])]
+    words += [f"--out {job.folder}", *([f"--bank {job.bank}"] if job.bank else [])]
+    words += ["--photographs-only"] if job.photographs_only else []
+    words += [*([f"--scale {scale}"] if scale else []), f"--device {job.device} --seed {job.seed}"]
     return " ".join([*words, "--resume"])
 
 

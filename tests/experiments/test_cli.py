@@ -20,7 +20,7 @@ from imaging import save_picture
 
 WriteStudy = Callable[..., Path]
 
-COMMANDS = ("calibrate", "heap", "angle", "clump", "new")
+COMMANDS = ("calibrate", "heap", "angle", "clump", "new", "discover")
 
 
 def dem_warp(*arguments: object) -> tuple[int, str, str]:
