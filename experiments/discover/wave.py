@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, field
 from functools import cached_property, partial
+from multiprocessing.queues import Queue
 
 from dem_warp import Case, CaseResult, Progress, simulate
 from dem_warp.device import resolve_device
@@ -22,8 +23,14 @@ WORLDS = 1024
 """Worlds that one launch on a GPU holds: enough to fill it, few enough that a killed run loses little."""
 
 DRIVERS = 3
-"""Launches at once on a GPU, each driven by a process of its own: while one's controllers decide on the host,
-the GPU works for the others."""
+"""Launches at once on each GPU, each driven by a process of its own: while one's controllers decide on the
+host, the GPU works for the others."""
+
+_CONTEXT = multiprocessing.get_context("spawn")
+"""How processes begin: a process with a GPU must not be forked. They end with this one."""
+
+_mine: list[str] = []
+"""The device of this process, where it drives one."""
 
 SAVE_EVERY = 5.0
 """Time between two savings of what has been measured [s]."""
@@ -39,14 +46,14 @@ class WaveRunner:
     table
         Where outcomes are kept.
     device
-        ``"cpu"``, ``"cuda"``, ``"cuda:1"``; None: the engine's choice.
+        ``"cpu"``, ``"cuda"``, ``"cuda:1"``, or several, as ``"cuda:0,cuda:1"``; None: the engine's choice.
     workers
         Processes that simulate, on the CPU, and that measure; None: one a core.
     worlds
         Worlds of one launch; None: `WORLDS` on a GPU, and on the CPU all: a launch there spreads them over
         its cores.
     drivers
-        Launches at once; None: `DRIVERS` on a GPU, one on the CPU.
+        Launches at once; None: `DRIVERS` on each GPU, one on the CPU.
     progress
         Called with the progress of a wave.
     """
@@ -62,7 +69,8 @@ class WaveRunner:
         progress: Callable[[Progress], None] | None = None,
     ) -> None:
         self._settings, self._table, self._progress = settings, table, progress
-        self._device, self._workers, self._worlds, self._drivers = device, workers, worlds, drivers
+        self._devices = [resolve_device(name) for name in (device.split(",") if device else [None])]
+        self._workers, self._worlds, self._drivers = workers, worlds, drivers
 
     def close(self) -> None:
         """End its processes."""
@@ -90,19 +98,22 @@ class WaveRunner:
     @cached_property
     def _measurers(self) -> ProcessPoolExecutor:
         # Processes, as measuring holds Python's lock.
-        return _processes(self._workers or os.cpu_count())
+        return ProcessPoolExecutor(self._workers or os.cpu_count(), _CONTEXT, end_with_parent)
 
     @cached_property
     def _driven(self) -> ProcessPoolExecutor:
-        return _processes(self._driver_count)
+        devices = _CONTEXT.Queue()
+        for number in range(self._driver_count):
+            devices.put(self._devices[number % len(self._devices)])
+        return ProcessPoolExecutor(self._driver_count, _CONTEXT, _begin_driving, (devices,))
 
-    @cached_property
+    @property
     def _on_cpu(self) -> bool:
-        return resolve_device(self._device) == "cpu"
+        return self._devices[0] == "cpu"
 
     @property
     def _driver_count(self) -> int:
-        return self._drivers or (1 if self._on_cpu else DRIVERS)
+        return self._drivers or (1 if self._on_cpu else DRIVERS * len(self._devices))
 
     def _launches(self, cases: Mapping[str, Case]) -> list[list[str]]:
         """Keys of the cases of each launch: all, or such as share what kernels are compiled for."""
@@ -123,7 +134,7 @@ class WaveRunner:
         for keys in launches:
             simulate(
                 [cases[key] for key in keys],
-                device=self._device,
+                device=self._devices[0],
                 workers=self._workers,
                 on_result=partial(self._take, measured, keys),
                 on_progress=partial(clock.report, len(keys)),
@@ -134,10 +145,7 @@ class WaveRunner:
         self, launches: Sequence[list[str]], cases: Mapping[str, Case], measured: _Measured, clock: _Clock
     ) -> None:
         """Simulate several launches at once, each in a process."""
-        begun = {
-            self._driven.submit(simulate, [cases[key] for key in keys], self._device, 1): keys
-            for keys in launches
-        }
+        begun = {self._driven.submit(_simulate_here, [cases[key] for key in keys]): keys for keys in launches}
         for ended in as_completed(begun):
             keys = begun[ended]
             for index, result in enumerate(ended.result()):
@@ -148,9 +156,15 @@ class WaveRunner:
         measured.add(keys[index], self._measurers.submit(measure, self._settings, result))
 
 
-def _processes(count: int | None) -> ProcessPoolExecutor:
-    """Processes that end with this one; spawned, as a process with a GPU must not be forked."""
-    return ProcessPoolExecutor(count, multiprocessing.get_context("spawn"), end_with_parent)
+def _begin_driving(devices: Queue[str]) -> None:
+    """Take a device, for good: a process that changes between two would hold memory on both."""
+    end_with_parent()
+    _mine.append(devices.get())
+
+
+def _simulate_here(cases: Sequence[Case]) -> list[CaseResult]:
+    """Simulate on the device of this process."""
+    return simulate(cases, _mine[0], 1)
 
 
 @dataclass

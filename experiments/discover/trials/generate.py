@@ -20,7 +20,7 @@ import typer
 
 from experiments.discover.bank import Bank
 from experiments.discover.emulator import fit_emulator
-from experiments.discover.fleet import engine_on
+from experiments.discover.engine import EngineSimulator
 from experiments.discover.library import library_for
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.search import Search
@@ -169,7 +169,7 @@ def measure(
     library = (*library_for(study), *library_for(study, STRANGERS))
     table = OutcomeTable(place.hidden / "outcomes.sqlite")
     with (
-        engine_on(device, study, library, table, workers) as simulator,
+        EngineSimulator(study, library, table, device, workers) as simulator,
         Run(place, f"heaps, {part or 'all'}", device, table),
     ):
         measure_trials(place, labels, declaration, simulator)

@@ -22,7 +22,7 @@ import typer
 from experiments.benchmarks.tables import markdown_table
 from experiments.discover.bank import load_bank
 from experiments.discover.emulator import fit_emulator
-from experiments.discover.fleet import engine_on
+from experiments.discover.engine import EngineSimulator
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.search import Search
 from experiments.discover.trials.cost import planned_cases
@@ -90,7 +90,7 @@ def run_trials(
     desk = Desk(emulator, declaration.settings, measured, withheld)
     table = OutcomeTable(folder.root / "outcomes.sqlite")
     with (
-        engine_on(device, search.study, search.library, table, workers) as engine,
+        EngineSimulator(search.study, search.library, table, device, workers) as engine,
         process_crew(desk, workers or os.cpu_count() or 1) as crew,
         Run(folder, f"analyses, {view}", device, table),
     ):
