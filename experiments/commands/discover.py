@@ -160,7 +160,9 @@ def run_search(job: Job, resume: bool = False, watch: Watch = lambda title: null
         found = drive(search.analysis(measured, bank, job.seed), simulator)
         walls = [*simulator.walls, {"wave": "analysis, its waves included", "seconds": _since(started)}]
         pictures = heaps_side_by_side(simulator.engine, found, terms, measured, job)
-    page = write_discovery(found, job.study, terms, job.folder, pictures, _provenance(job, walls))
+    page = write_discovery(
+        found, job.study, terms, search.settings, job.folder, pictures, _provenance(job, walls)
+    )
     return Ended(found, terms, page)
 
 

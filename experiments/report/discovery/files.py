@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from experiments.calibrate.export import jsonable
 from experiments.discover.discovery import Discovery
+from experiments.discover.settings import Settings
 from experiments.files import write_text
 from experiments.report.discovery.page import render_discovery
 from experiments.report.discovery.study_file import write_study_files
@@ -24,6 +26,7 @@ def write_discovery(
     found: Discovery,
     study: Study,
     terms: Terms,
+    settings: Settings,
     folder: Path,
     pictures: Sequence[HeapPicture] = (),
     provenance: Mapping[str, Any] | None = None,
@@ -38,6 +41,8 @@ def write_discovery(
         The study that was analysed.
     terms
         What the names mean.
+    settings
+        The rules of the analysis.
     folder
         Folder of the files; it is made when it is missing.
     pictures
@@ -59,11 +64,12 @@ def write_discovery(
             "document": study.document,
         },
         **results_of(found, terms),
+        "settings": asdict(settings),
         "provenance": jsonable(made_by),
     }
     text = json.dumps(results, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
     files = [path.name for path in write_study_files(found, study, terms, folder)]
-    page = render_discovery(found, study, terms, pictures, files, made_by)
+    page = render_discovery(found, study, terms, settings, pictures, files, made_by)
     for name, table in frames(found).items():
         write_text(folder / "tables" / f"{name}.csv", table.to_csv(index=False))
     write_text(folder / "results.json", text)

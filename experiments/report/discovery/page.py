@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
-from experiments.discover.discovery import Discovery
+from experiments.discover.discovery import Discovery, Verdict
+from experiments.discover.settings import Settings
 from experiments.report.discovery import charts, tables
 from experiments.report.discovery.terms import Terms, percent
-from experiments.report.discovery.verdict import SETTLED, changes, headline, next_step, verdict_sentence
+from experiments.report.discovery.verdict import (
+    SETTLED,
+    changes,
+    headline,
+    next_step,
+    reason_sentence,
+    verdict_sentence,
+)
 from experiments.report.numbers import capital, trimmed
 from experiments.report.page import environment, flat, study_facts
 from experiments.report.pictures import HeapPicture
@@ -53,6 +61,7 @@ def render_discovery(
     found: Discovery,
     study: Study,
     terms: Terms,
+    settings: Settings,
     pictures: Sequence[HeapPicture] = (),
     files: Sequence[str] = (),
     provenance: Mapping[str, Any] | None = None,
@@ -67,6 +76,8 @@ def render_discovery(
         The study that was analysed.
     terms
         What the names mean.
+    settings
+        The rules of the analysis.
     pictures
         Heaps to show side by side.
     files
@@ -74,6 +85,9 @@ def render_discovery(
     provenance
         What made the numbers: names and values, nested as they come.
     """
+    if found.verdict is Verdict.NOT_IDENTIFIABLE:
+        # A fit with nothing left to test it by would fill the page with zeros.
+        found = replace(found, base=None, gap=None, drifts=(), candidates=(), power=(), confounding=None)
     page = environment().get_template("page.html.j2")
     return page.render(
         kind="report on a disagreement",
@@ -83,16 +97,20 @@ def render_discovery(
         terms=terms,
         headline=headline(found, terms),
         sentence=verdict_sentence(found, terms),
+        reason=reason_sentence(found),
         settled=found.verdict in SETTLED,
         cards=_cards(found, terms),
         explained=found.named,
         next_step=next_step(found, terms),
-        changes=changes(found, terms),
-        sections=[section for section in _sections(found, terms) if pictures or section.name != "heaps"],
+        changes=changes(found, terms, settings),
+        sections=[
+            section for section in _sections(found, terms, settings) if pictures or section.name != "heaps"
+        ],
         pictures=pictures,
         files=files,
         facts=study_facts(study),
         provenance=flat(provenance or {}),
+        rules=flat(asdict(settings)),
         document=flat(study.document),
         plotly=Markup(get_plotlyjs()),
     )
@@ -128,11 +146,11 @@ def _cards(found: Discovery, terms: Terms) -> list[Card]:
     return cards
 
 
-def _sections(found: Discovery, terms: Terms) -> list[Section]:
+def _sections(found: Discovery, terms: Terms, settings: Settings) -> list[Section]:
     """Build the sections that this discovery has something for."""
     built = {
         "gap": _gap(found, terms),
-        "candidates": _candidates(found, terms),
+        "candidates": _candidates(found, terms, settings),
         "before_after": _before_after(found),
         "compared": _compared(found, terms),
         "heaps": Section("heaps"),
@@ -153,13 +171,13 @@ def _gap(found: Discovery, terms: Terms) -> Section | None:
     return Section("gap", shown, {"maps": charts.residual_maps(found, terms)})
 
 
-def _candidates(found: Discovery, terms: Terms) -> Section | None:
+def _candidates(found: Discovery, terms: Terms, settings: Settings) -> Section | None:
     if not found.candidates:
         return None
     drawn = {"explained": [charts.explained_chart(found, terms)]}
     if found.confounding:
         drawn["confounding"] = [charts.confounding_chart(found.confounding, terms)]
-    return Section("candidates", {"candidates": tables.candidates_table(found, terms)}, drawn)
+    return Section("candidates", {"candidates": tables.candidates_table(found, terms, settings)}, drawn)
 
 
 def _before_after(found: Discovery) -> Section | None:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from experiments.discover.discovery import BeforeAfter, Candidate, Discovery, Interval, Power, Verdict
+from experiments.discover.settings import Settings
 from experiments.report.discovery.terms import Terms, percent, spaced
 from experiments.report.numbers import capital, fixed, p_value, trimmed
 
@@ -35,6 +36,11 @@ def verdict_sentence(found: Discovery, terms: Terms) -> str:
     return _SENTENCES[found.verdict](found, terms)
 
 
+def reason_sentence(found: Discovery) -> str:
+    """The rule that gave the verdict, as a sentence."""
+    return f"{capital(found.reason).rstrip('.')}."
+
+
 def verdict_line(found: Discovery, terms: Terms) -> str:
     """Headline and sentence."""
     return f"{headline(found, terms)}. {verdict_sentence(found, terms)}"
@@ -47,9 +53,9 @@ def tied(found: Discovery) -> list[Candidate]:
     return [one for one in found.candidates if len(one.mechanisms) == count and set(one.mechanisms) <= names]
 
 
-def changes(found: Discovery, terms: Terms) -> list[str]:
+def changes(found: Discovery, terms: Terms, settings: Settings) -> list[str]:
     """Say what would change the verdict, a sentence each."""
-    return [sentence for part in _CHANGES[found.verdict] for sentence in part(found, terms)]
+    return [sentence for part in _CHANGES[found.verdict] for sentence in part(found, terms, settings)]
 
 
 def next_step(found: Discovery, terms: Terms) -> str:
@@ -71,7 +77,7 @@ def next_step(found: Discovery, terms: Terms) -> str:
 
 def _none(found: Discovery, terms: Terms) -> str:
     if found.base is None or found.gap is None:
-        return found.reason
+        return reason_sentence(found)
     return (
         "Fitted as well as it can be, the model agrees with the data within their noise:"
         f" Q = {trimmed(found.base.q, 3)} at {fixed(found.base.degrees_of_freedom, 0)} degrees of freedom,"
@@ -82,7 +88,7 @@ def _none(found: Discovery, terms: Terms) -> str:
 def _added(found: Discovery, terms: Terms) -> str:
     """``Adding X at a removed c % of the excess; held out, Q fell from d to e``."""
     if found.chosen is None:
-        return found.reason
+        return reason_sentence(found)
     sizes = terms.sizes(found.chosen.mechanisms, found.chosen.sizes)
     text = f"Adding {terms.titles(found.chosen.mechanisms)} at {sizes}"
     training, held_out = _set(found, held_out=False), _set(found, held_out=True)
@@ -107,7 +113,7 @@ def _tie(found: Discovery, terms: Terms) -> str:
 
 def _unknown(found: Discovery, terms: Terms) -> str:
     if found.base is None:
-        return found.reason
+        return reason_sentence(found)
     text = (
         f"The model disagrees with the data (Q = {trimmed(found.base.q, 3)} at"
         f" {fixed(found.base.degrees_of_freedom, 0)} degrees of freedom, p {_p(found.base.p_value)}),"
@@ -132,10 +138,10 @@ def _incomplete(found: Discovery, terms: Terms) -> str:
 
 
 def _not_identifiable(found: Discovery, terms: Terms) -> str:
-    return found.reason
+    return reason_sentence(found)
 
 
-def _smaller_effects(found: Discovery, terms: Terms) -> Iterator[str]:
+def _smaller_effects(found: Discovery, terms: Terms, settings: Settings) -> Iterator[str]:
     visible = [power for power in found.power if power.resolvable]
     hidden = [power for power in found.power if not power.resolvable]
     if visible:
@@ -147,15 +153,19 @@ def _smaller_effects(found: Discovery, terms: Terms) -> Iterator[str]:
         yield f"{_cannot_be_seen(hidden, terms)}: whether they act here is left open."
 
 
-def _margins(found: Discovery, terms: Terms) -> Iterator[str]:
+def _margins(found: Discovery, terms: Terms, settings: Settings) -> Iterator[str]:
     model = found.chosen.mechanisms if found.chosen else ()
     chosen = next((c for c in found.candidates if c.mechanisms == model), None)
     if chosen is None:
         return
     weakest = min(chosen.size_over_se)
-    text = f"Data that took the size ({fixed(weakest, 1)} standard errors from its null) to less than three"
+    least = settings.least_ratio if len(model) == 1 else settings.pair_ratio
+    text = (
+        f"Data that took the size ({fixed(weakest, 1)} standard errors from its null) below {least:g} of them"
+    )
     if chosen.held_out_gain:
-        text += f", or the held-out gain (now {_gain(chosen.held_out_gain)}) to an interval that holds zero"
+        gain = _gain(chosen.held_out_gain, settings)
+        text += f", or the held-out gain (now {gain}) to an interval that holds zero"
     yield text + ", would withdraw the name."
     room = chosen.q_limit - chosen.q
     if room > 0.0:
@@ -165,38 +175,38 @@ def _margins(found: Discovery, terms: Terms) -> Iterator[str]:
         )
 
 
-def _rivals(found: Discovery, terms: Terms) -> Iterator[str]:
+def _rivals(found: Discovery, terms: Terms, settings: Settings) -> Iterator[str]:
     refused = [c for c in found.candidates if not c.admitted and c.objection]
     for rival in refused[:SHOWN_RIVALS]:
         yield f"{capital(terms.titles(rival.mechanisms))} was refused: {rival.objection.rstrip('.')}."
 
 
-def _unresolved(found: Discovery, terms: Terms) -> Iterator[str]:
+def _unresolved(found: Discovery, terms: Terms, settings: Settings) -> Iterator[str]:
     hidden = [p for p in found.power if not p.resolvable and p.mechanism not in found.named]
     if hidden:
         yield f"{_cannot_be_seen(hidden, terms)}, so they can neither name nor exclude it."
 
 
-def _outside(found: Discovery, terms: Terms) -> Iterator[str]:
+def _outside(found: Discovery, terms: Terms, settings: Settings) -> Iterator[str]:
     yield (
         "An effect outside the library that moves the same observables in the same proportions would be taken"
         " for this one: its further experiment, below, is what tells them apart."
     )
 
 
-def _settle_by_experiment(found: Discovery, terms: Terms) -> Iterator[str]:
+def _settle_by_experiment(found: Discovery, terms: Terms, settings: Settings) -> Iterator[str]:
     if found.next_experiment:
         yield f"The condition “{found.next_experiment.condition}” would settle it (see the next experiment)."
 
 
-def _widen(found: Discovery, terms: Terms) -> Iterator[str]:
+def _widen(found: Discovery, terms: Terms, settings: Settings) -> Iterator[str]:
     yield (
         "A mechanism that is added to the library (one file) and explains the map of residuals would be named"
         " from the same data."
     )
 
 
-def _more_data(found: Discovery, terms: Terms) -> Iterator[str]:
+def _more_data(found: Discovery, terms: Terms, settings: Settings) -> Iterator[str]:
     measured = int(np.isfinite(found.data.means[~np.array(found.data.held_out)]).sum())
     yield (
         f"The training conditions give {measured} mean value{'' if measured == 1 else 's'} for"
@@ -214,7 +224,7 @@ _SENTENCES: dict[Verdict, Callable[[Discovery, Terms], str]] = {
     Verdict.NOT_IDENTIFIABLE: _not_identifiable,
 }
 
-_CHANGES: dict[Verdict, tuple[Callable[[Discovery, Terms], Iterator[str]], ...]] = {
+_CHANGES: dict[Verdict, tuple[Callable[[Discovery, Terms, Settings], Iterator[str]], ...]] = {
     Verdict.NONE: (_smaller_effects,),
     Verdict.NAMED: (_margins, _rivals, _unresolved, _outside),
     Verdict.TIE: (_settle_by_experiment, _rivals, _unresolved),
@@ -241,8 +251,9 @@ def _q(interval: Interval) -> str:
     return f"{value} ({low} to {high})"
 
 
-def _gain(gain: Interval) -> str:
-    return f"{fixed(gain.value, 1)}, 90 % interval {fixed(gain.low, 1)} to {fixed(gain.high, 1)}"
+def _gain(gain: Interval, settings: Settings) -> str:
+    coverage = percent(settings.held_out_coverage)
+    return f"{fixed(gain.value, 1)}, {coverage} interval {fixed(gain.low, 1)} to {fixed(gain.high, 1)}"
 
 
 def _p(value: float) -> str:

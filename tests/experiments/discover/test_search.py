@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from experiments.discover.bank import Bank
-from experiments.discover.observables import NAMES
-from experiments.discover.search import Search
+from experiments.discover.discovery import Verdict
+from experiments.discover.measured import Measured
+from experiments.discover.observables import NAMES, OBSERVABLES
+from experiments.discover.search import Search, drive
 from experiments.discover.simulator import Outcomes, Point
 from experiments.errors import InputError, StudyError
+from experiments.report.discovery import Terms, verdict_line, write_discovery
 from experiments.study import Study, load_study
 
 TRIAL = Path(__file__).parents[3] / "experiments" / "studies" / "trial" / "study.toml"
@@ -22,20 +25,38 @@ def trial(**changes: Any) -> Study:
     return load_study(TRIAL, "bench", changes)
 
 
-class Drawn:
-    """Answers points with numbers, as quickly as that."""
+class Linear:
+    """A world that is linear in factors and sizes, with normal noise: a simulator that takes no time."""
 
     observables = NAMES
 
-    def __call__(self, points: list[Point]) -> Outcomes:
-        rng = np.random.default_rng(1)
-        return Outcomes(1.0 + rng.random((len(points), len(NAMES))), ("",) * len(points))
+    def __init__(self, search: Search) -> None:
+        self.space = search.space
+        rng = np.random.default_rng(3)
+        conditions, width = len(self.space.conditions), len(NAMES)
+        self._slopes = rng.standard_normal((conditions, len(self.space.factors), width))
+        self._signatures = {
+            name: 8.0 * rng.standard_normal(width) + 3.0 * rng.standard_normal((conditions, width))
+            for name in self.space.names
+        }
+
+    def __call__(self, points: Sequence[Point]) -> Outcomes:
+        rows = np.array([self._row(point) for point in points]).reshape(len(points), len(NAMES))
+        return Outcomes(1.0 + 0.1 * rows, ("",) * len(points))
+
+    def _row(self, point: Point) -> np.ndarray:
+        condition = self.space.conditions.index(point.condition)
+        row = self.space.coded_theta(np.array(point.theta)) @ self._slopes[condition]
+        for name, size in point.sizes:
+            row = row + self._signatures[name][condition] * size / self.space.mechanism(name).maximum
+        return np.asarray(row + 0.5 * np.random.default_rng(point.seed).standard_normal(len(NAMES)))
 
 
 @pytest.fixture(scope="module")
 def bank(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("bank") / "bank.npz"
-    Search.of(trial()).make_bank(Drawn()).save(path)
+    search = Search.of(trial())
+    search.make_bank(Linear(search)).save(path)
     return path
 
 
@@ -69,8 +90,8 @@ def test_a_study_that_holds_everything_out_cannot_be_searched() -> None:
 
 
 def test_a_bank_comes_back_as_it_was_made(bank: Path) -> None:
-    read = Search.of(trial()).read_bank(bank)
-    made: Bank = Search.of(trial()).make_bank(Drawn())
+    search = Search.of(trial())
+    read, made = search.read_bank(bank), search.make_bank(Linear(search))
     assert (read.space, read.observables, read.study) == (made.space, made.observables, made.study)
     # Kept as float32.
     np.testing.assert_allclose(read.values, made.values, rtol=1e-7)
@@ -102,3 +123,43 @@ def test_no_bank_at_all_is_said_so(tmp_path: Path) -> None:
     path.write_bytes(b"no archive")
     with pytest.raises(InputError, match="bank"):
         Search.of(trial()).read_bank(path)
+
+
+@pytest.mark.parametrize("hidden", [(), (("plate_tilt", 3.0),)])
+def test_the_page_tells_what_was_hidden_in_a_known_world(
+    hidden: tuple[tuple[str, float], ...], tmp_path: Path
+) -> None:
+    search = Search.of(trial())
+    world = Linear(search)
+    theta = tuple(factor.center for factor in search.study.factors)
+    heaps = {
+        name: world([Point(theta, hidden, name, 100 * at + seed) for seed in range(6)]).values
+        for at, name in enumerate(search.space.conditions)
+    }
+    measured = Measured(search.space.conditions, NAMES, heaps)
+    found = drive(search.analysis(measured, search.make_bank(world), seed=1), world)
+    terms = Terms.of(search.library, OBSERVABLES, search.study.factor_sections)
+    page = write_discovery(found, search.study, terms, search.settings, tmp_path)
+    assert found.named == tuple(name for name, _ in hidden)
+    assert sorted(path.name for path in tmp_path.glob("*.toml")) == [
+        f"study-with-{name}.toml" for name, _ in hidden
+    ]
+    said = "Missing: tilt of the plate" if hidden else "Nothing is missing"
+    assert said in page.read_text(encoding="utf-8")
+    if found.chosen is not None:
+        [size] = found.chosen.sizes
+        # Six heaps a condition against a signature of tens of their standard deviations.
+        assert size.value == pytest.approx(3.0, rel=0.05)
+        assert [both.held_out for both in found.before_after] == [False, True]
+
+
+def test_one_angle_is_not_identifiable_and_said_so(tmp_path: Path) -> None:
+    search = Search.of(trial())
+    world = Linear(search)
+    measured = Measured(("base",), ("flank_angle",), {"base": np.array([[1.0], [1.1], [0.9]])})
+    found = drive(search.analysis(measured, search.make_bank(world), seed=1), world)
+    terms = Terms.of(search.library, OBSERVABLES, search.study.factor_sections)
+    assert found.verdict is Verdict.NOT_IDENTIFIABLE
+    page = write_discovery(found, search.study, terms, search.settings, tmp_path)
+    assert "These data cannot tell" in page.read_text(encoding="utf-8")
+    assert verdict_line(found, terms).endswith(".")

@@ -15,6 +15,7 @@ from experiments.commands.run import check_runs
 from experiments.discover.discovery import Discovery, Interval, Verdict
 from experiments.discover.library import library_for
 from experiments.discover.observables import OBSERVABLES
+from experiments.discover.settings import Settings
 from experiments.report.discovery import Terms, write_discovery
 from experiments.study import Study, load_study
 
@@ -44,7 +45,7 @@ def test_the_files_hold_the_same_numbers(
     trial: Study, trial_terms: Terms, discovered: Discovered, tmp_path: Path
 ) -> None:
     found = found_on(trial, discovered, Verdict.NAMED)
-    page = write_discovery(found, trial, trial_terms, tmp_path, provenance={"device": "cpu"})
+    page = write_discovery(found, trial, trial_terms, Settings(), tmp_path, provenance={"device": "cpu"})
     assert page.read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
     results = json.loads((tmp_path / "results.json").read_text(encoding="utf-8"))
     assert results["discovery"] == json.loads(json.dumps(found.to_dict()))
@@ -66,7 +67,7 @@ def test_the_study_with_the_mechanism_loads_and_can_be_calibrated(
     assert found.chosen is not None
     size = Interval(0.4 * most, 0.5 * most, 1.2 * most)
     found = replace(found, chosen=replace(found.chosen, sizes=(size,)))
-    write_discovery(found, trial, trial_terms, tmp_path)
+    write_discovery(found, trial, trial_terms, Settings(), tmp_path)
     study = load_study(tmp_path / "study-with-contact_cohesion.toml")
     check_runs(study)
     added = study.factors[-1]
@@ -87,7 +88,7 @@ def test_the_study_with_the_mechanism_loads_and_can_be_calibrated(
 def test_a_tie_gives_a_study_for_each(
     trial: Study, trial_terms: Terms, discovered: Discovered, tmp_path: Path
 ) -> None:
-    write_discovery(found_on(trial, discovered, Verdict.TIE), trial, trial_terms, tmp_path)
+    write_discovery(found_on(trial, discovered, Verdict.TIE), trial, trial_terms, Settings(), tmp_path)
     names = sorted(path.name for path in tmp_path.glob("study-with-*.toml"))
     assert names == ["study-with-contact_cohesion.toml", "study-with-liquid_bridges.toml"]
     for name in names:
@@ -98,5 +99,5 @@ def test_a_tie_gives_a_study_for_each(
 def test_nothing_named_writes_no_study(
     verdict: Verdict, trial: Study, trial_terms: Terms, discovered: Discovered, tmp_path: Path
 ) -> None:
-    write_discovery(found_on(trial, discovered, verdict), trial, trial_terms, tmp_path)
+    write_discovery(found_on(trial, discovered, verdict), trial, trial_terms, Settings(), tmp_path)
     assert list(tmp_path.glob("*.toml")) == []

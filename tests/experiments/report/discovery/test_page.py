@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from experiments.discover.discovery import Discovery, Verdict
+from experiments.discover.settings import Settings
 from experiments.report import HeapPicture
 from experiments.report.discovery import Terms, render_discovery, verdict_sentence
 from experiments.study import Study
@@ -24,7 +25,9 @@ def test_every_verdict_has_a_page_that_is_whole(
 ) -> None:
     found = discovered(verdict)
     picture = HeapPicture("Heap", "A heap.", np.zeros((8, 12, 3), np.uint8))
-    text = render_discovery(found, whole_study, terms, [picture], ["study-with.toml"], {"device": "cpu"})
+    text = render_discovery(
+        found, whole_study, terms, Settings(), [picture], ["study-with.toml"], {"device": "cpu"}
+    )
     page = read_page(text)
     assert page.mismatches == []
     assert [name for name, count in Counter(page.ids).items() if count > 1] == []
@@ -70,7 +73,7 @@ def test_the_maps_show_the_residuals_of_both_models(
     discovered: Discovered, whole_study: Study, terms: Terms, read_page: type
 ) -> None:
     found = discovered(Verdict.NAMED)
-    page = read_page(render_discovery(found, whole_study, terms))
+    page = read_page(render_discovery(found, whole_study, terms, Settings()))
     assert found.base is not None
     assert found.chosen is not None
     for name, fit in (("residuals-before", found.base), ("residuals-after", found.chosen)):
@@ -87,7 +90,7 @@ def test_only_what_was_measured_is_compared(
     discovered: Discovered, whole_study: Study, terms: Terms, read_page: type
 ) -> None:
     found = discovered(Verdict.NAMED)
-    page = read_page(render_discovery(found, whole_study, terms))
+    page = read_page(render_discovery(found, whole_study, terms, Settings()))
     drawn = {name: chart for name, chart in page.charts.items() if name.startswith("compared-")}
     assert len(drawn) == len(found.data.observables)
     for name, chart in drawn.items():
@@ -102,7 +105,7 @@ def test_candidates_stand_in_their_order_with_their_judgement(
     discovered: Discovered, whole_study: Study, terms: Terms, read_page: type
 ) -> None:
     found = discovered(Verdict.NAMED)
-    rows = read_page(render_discovery(found, whole_study, terms)).rows("candidates")
+    rows = read_page(render_discovery(found, whole_study, terms, Settings())).rows("candidates")
     for row, candidate in zip(rows, found.candidates, strict=True):
         assert row[1][0] == terms.titles(candidate.mechanisms)
         assert row[2][1] == 100.0 * candidate.explained
