@@ -111,27 +111,30 @@ def _block(measured: Measured, emulator: Emulator, condition: str, inflation: np
 
 
 def _inflation(measured: Measured, emulator: Emulator, notes: list[str]) -> np.ndarray:
-    out = np.ones(len(emulator.observables))
+    """Square root of the measured over the model's variance where that is too large to be chance."""
+    count = len(emulator.observables)
+    squares, freedom, known = np.zeros(count), np.zeros(count), np.zeros(count)
     centre = np.zeros(len(emulator.space.factors))
-    for column, name in enumerate(emulator.observables):
-        if name not in measured.observables:
-            continue
-        ratios, freedoms, known = [], [], []
-        for condition in measured.conditions:
-            count = int(measured.counts(condition)[measured.observables.index(name)])
-            if count < 2 or condition not in emulator.surfaces:
-                continue
-            noise = emulator.surfaces[condition].noise
-            index = measured.observables.index(name)
-            ratios.append(measured.covariance(condition)[index, index] / noise.variance(centre)[column])
-            freedoms.append(count - 1)
-            known.append(noise.degrees_of_freedom)
-        if not freedoms:
-            continue
-        ratio = float(np.average(ratios, weights=freedoms))
-        if ratio > stats.f.isf(SCATTER_LEVEL, sum(freedoms), sum(known)):
-            out[column] = np.sqrt(ratio)
-            notes.append(
-                f"replicates of {name} scatter {out[column]:.1f} times as much as the model's, and count so"
-            )
-    return out
+    pairs = [
+        (column, measured.observables.index(name))
+        for column, name in enumerate(emulator.observables)
+        if name in measured.observables
+    ]
+    for condition in (name for name in measured.conditions if name in emulator.surfaces):
+        noise = emulator.surfaces[condition].noise
+        variance, counts = noise.variance(centre), measured.counts(condition)
+        rows = measured.values[condition] - measured.mean(condition)
+        for column, own in pairs:
+            if counts[own] >= 2:
+                squares[column] += np.nansum(rows[:, own] ** 2) / variance[column]
+                freedom[column] += counts[own] - 1
+                known[column] += noise.degrees_of_freedom
+    ratio = squares / np.maximum(freedom, 1.0)
+    limit = stats.f.isf(SCATTER_LEVEL, np.maximum(freedom, 1.0), np.maximum(known, 1.0))
+    wide = (freedom > 0) & (ratio > limit)
+    notes += [
+        f"replicates of {emulator.observables[i]} scatter {np.sqrt(ratio[i]):.1f} times as much as the model's,"
+        " and count so"
+        for i in np.flatnonzero(wide)
+    ]
+    return np.where(wide, np.sqrt(ratio), 1.0)

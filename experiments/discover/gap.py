@@ -90,6 +90,15 @@ def _own_p(drawn: np.ndarray) -> np.ndarray:
     return np.asarray((len(drawn) + 1.0 - stats.rankdata(drawn, method="min")) / len(drawn))
 
 
+def holm(p_values: np.ndarray) -> np.ndarray:
+    """P values adjusted for being many (Holm 1979), same shape (n,)."""
+    order = np.argsort(p_values)
+    adjusted = np.maximum.accumulate(p_values[order] * np.arange(len(order), 0, -1)).clip(max=1.0)
+    out = np.empty_like(adjusted)
+    out[order] = adjusted
+    return out
+
+
 def condition_fits(fitted: Fitted) -> list[Fitted]:
     """Calibrate a model to one training condition at a time, where that has more means than parameters."""
     enough = [block for block in fitted.stack.blocks if len(block.mean) > len(fitted.x)]

@@ -6,14 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 from scipy import stats
-from statsmodels.stats.multitest import multipletests
 
 from experiments.discover.decision import Assessment, objections
 from experiments.discover.discovery import Candidate, Data, Drift, Fit, Interval, Power
 from experiments.discover.emulator import Emulator
 from experiments.discover.evidence import Block, Evidence
 from experiments.discover.fitting import AT_BOUND, Fitted, size_interval
-from experiments.discover.gap import GapTest, condition_fits, drift_p
+from experiments.discover.gap import GapTest, condition_fits, drift_p, holm
 from experiments.discover.held_out import forecast
 from experiments.discover.ranking import Signatures, Visibility, projector
 from experiments.discover.settings import Settings
@@ -102,7 +101,7 @@ def _residual_map(fitted: Fitted, evidence: Evidence) -> tuple[np.ndarray, np.nd
         raw.append((told.measured - told.predicted) / np.sqrt(np.diag(told.covariance)))
         blocks.append(block)
     whole = np.concatenate(raw)
-    p_values = multipletests(2.0 * stats.norm.sf(np.abs(whole)), method="holm")[1]
+    p_values = holm(2.0 * stats.norm.sf(np.abs(whole)))
     start = 0
     for block in blocks:
         row, end = emulator.space.conditions.index(block.condition), start + len(block.mean)

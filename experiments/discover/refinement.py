@@ -21,7 +21,7 @@ from experiments.discover.noise import repeat_deviations
 
 LENGTH = 0.7
 """Length over which the emulator's error changes, in half ranges: what a quadratic leaves over."""
-AMPLITUDES = 4.0 ** np.arange(-1, 6)
+AMPLITUDES = 2.0 ** np.arange(8)
 """Variances of that error tried, in units of what the emulator states."""
 LEAST_AMPLITUDE = 0.01
 """Least stated variance of that error, in units of the noise of one run."""

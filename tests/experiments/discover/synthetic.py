@@ -100,13 +100,20 @@ def _signature(name: str, condition: str) -> tuple[np.ndarray, np.ndarray]:
         nudge = np.random.default_rng([15, CONDITIONS.index(condition)]).standard_normal(len(OBSERVABLES))
         return direct + 0.05 * nudge, turned
     number = (*MECHANISMS, "stranger").index(name)
-    common, own = (
-        np.random.default_rng([13, number]),
-        np.random.default_rng([14, number, CONDITIONS.index(condition)]),
-    )
+    common = np.random.default_rng([13, number])
+    own = np.random.default_rng([14, number, CONDITIONS.index(condition)])
+    # Mechanisms act through a few ways to change a heap, so their signatures are alike.
+    ways = _ways(condition)
     size = len(OBSERVABLES)
-    direct = 3.0 * common.standard_normal(size) + 2.0 * own.standard_normal(size)
+    direct = 2.0 * common.standard_normal(len(ways)) @ ways + 0.8 * own.standard_normal(size)
     return direct, 0.4 * common.standard_normal((3, size))
+
+
+@cache
+def _ways(condition: str) -> np.ndarray:
+    common, own = np.random.default_rng(16), np.random.default_rng([17, CONDITIONS.index(condition)])
+    size = (4, len(OBSERVABLES))
+    return common.standard_normal(size) + 0.5 * own.standard_normal(size)
 
 
 @cache
