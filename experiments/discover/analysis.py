@@ -33,7 +33,7 @@ from experiments.discover.laboratory import Laboratory, Request
 from experiments.discover.measured import Measured
 from experiments.discover.model import Model, Stack
 from experiments.discover.next_experiment import propose
-from experiments.discover.ranking import Signatures, Visibility, signatures, visibilities
+from experiments.discover.ranking import Signatures, Visibility, alike, signatures, visibilities
 from experiments.discover.records import (
     candidate_record,
     data_record,
@@ -136,15 +136,14 @@ def _search(parts: _Parts, base: _Base) -> Analysis:
 
 def _nothing_fits(singles: Sequence[Assessment], settings: Settings) -> bool:
     """Whether even the best single mechanism leaves a gap: only then two are asked for."""
-    best = min(singles, key=lambda one: one.fitted.score, default=None)
+    best = min(singles, key=lambda one: one.score, default=None)
     return best is not None and best.gap.p < settings.fit_level
 
 
 def _pairs(
     parts: _Parts, base: _Base, singles: Sequence[Assessment]
 ) -> Generator[list[Point], Outcomes, list[Assessment]]:
-    ranked = sorted(singles, key=lambda one: one.fitted.score)[: parts.settings.pair_candidates]
-    names = [one.mechanisms[0] for one in ranked]
+    names = [one.mechanisms[0] for one in singles[: parts.settings.pair_candidates]]
     contenders: Contenders = parts.contenders(list(combinations(names, 2)))
     contenders = yield from simulate_again(contenders, parts.laboratory, parts.settings)
     return parts.assess(base, contenders)
@@ -182,13 +181,17 @@ class _Parts:
                 base.fitted,
                 one.fitted,
                 self.evidence.held_out,
-                settings.held_out_coverage,
+                settings.fit_level,
                 settings.draws,
                 self.seed,
             )
             share = explained_share(base.fitted, one.fitted)
-            out.append(Assessment(one.fitted, gap, gain, share, one.simulated, set(names) <= resolvable))
-        return sorted(out, key=lambda one: one.fitted.score)
+            same = frozenset[str]()
+            if len(names) == 1:
+                same = alike(base.seen, names[0], float(one.fitted.sizes[0]), settings.tie_margin)
+            may = set(names) <= resolvable
+            out.append(Assessment(one.fitted, gap, gain, share, one.simulated, may, same))
+        return sorted(out, key=lambda one: one.score)
 
     def discovery(
         self,
@@ -229,7 +232,7 @@ class _Parts:
         """For the two best explanations, where there are two; else for the best against the base."""
         if decision.verdict in (Verdict.NONE, Verdict.NOT_IDENTIFIABLE) or not assessments:
             return None
-        ranked = sorted((one.fitted for one in assessments), key=lambda one: one.score)
+        ranked = [one.fitted for one in sorted(assessments, key=lambda one: one.score)]
         second = ranked[1] if len(ranked) > 1 else base.fitted
         most = max(int(np.max(block.replicates)) for block in self.evidence.training)
         return propose(ranked[0], second, most)

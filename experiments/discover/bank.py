@@ -161,7 +161,7 @@ def make_bank(
         raise InputError("has at most one mechanism in a case", "two", "points of a bank")
     names = space.names
     sizes = [point.sizes[0] if point.sizes else None for point in points]
-    coded = [0.0 if entry is None else _coded_size(space, *entry) for entry in sizes]
+    coded = [0.0 if entry is None else space.coded_size(*entry) for entry in sizes]
     return Bank(
         space,
         tuple(observables),
@@ -173,8 +173,3 @@ def make_bank(
         reasons=np.array(outcomes.reasons, dtype=np.str_),
         study=study,
     )
-
-
-def _coded_size(space: SearchSpace, name: str, size: float) -> float:
-    mechanism = space.mechanism(name)
-    return (size - mechanism.null) / (mechanism.maximum - mechanism.null)

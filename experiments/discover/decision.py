@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.discover.discovery import Interval, Verdict
+from experiments.discover.discovery import Verdict
 from experiments.discover.fitting import Fitted
 from experiments.discover.gap import GapTest
+from experiments.discover.held_out import Gain
 from experiments.discover.settings import Settings
 
 
@@ -22,7 +23,7 @@ class Assessment:
     fitted : Fitted
     gap : GapTest
         Of the data with the candidate in the model.
-    gain : Interval or None
+    gain : Gain or None
         Of the held-out log score over the base.
     explained : float
         Share of the base's excess that it removes.
@@ -30,19 +31,27 @@ class Assessment:
         Whether fresh runs around its optimum stand behind it.
     resolvable : bool
         Whether all its mechanisms may be named.
+    alike : frozenset of str
+        Mechanisms that these data cannot tell from it at its size.
     """
 
     fitted: Fitted
     gap: GapTest
-    gain: Interval | None
+    gain: Gain | None
     explained: float
     simulated: bool
     resolvable: bool
+    alike: frozenset[str] = frozenset()
 
     @property
     def mechanisms(self) -> tuple[str, ...]:
         """Its mechanisms."""
         return self.fitted.mechanisms
+
+    @property
+    def score(self) -> float:
+        """Minus twice the log-likelihood of all data, the held-out ones by forecast; up to a constant."""
+        return self.fitted.score - (0.0 if self.gain is None else 2.0 * self.gain.interval.value)
 
     @property
     def ratios(self) -> np.ndarray:
@@ -91,10 +100,10 @@ def objections(assessment: Assessment, settings: Settings) -> list[str]:
         found.append(f"its size is {ratio:.1f} standard errors, less than {least:g}")
     if gain is None:
         found.append("no held-out condition was measured")
-    elif gain.low <= 0.0:
+    elif gain.interval.value <= max(gain.promised, 0.0):
         found.append(
-            f"the held-out conditions gain {gain.value:.1f} ({gain.low:.1f} to {gain.high:.1f}), which may be"
-            " nothing"
+            f"it predicts the held-out conditions no better (log score {gain.interval.value:+.1f}, promised"
+            f" at least {gain.promised:+.1f})"
         )
     return found
 
@@ -102,8 +111,9 @@ def objections(assessment: Assessment, settings: Settings) -> list[str]:
 def decide(assessments: Sequence[Assessment], settings: Settings) -> Decision:
     """Choose among candidates of equally many mechanisms.
 
-    The one of the best score (a likelihood) is named if it passes every rule, is resolvable and no other
-    comes within the tie margin. Whatever comes within the margin of one that passes makes a tie.
+    The one of the best score is named if it passes every rule, is resolvable, and no other comes within the
+    tie margin or looks the same. Single mechanisms within it are a tie if one of them passes. Of two pairs
+    within it neither is named: where two pairs fit, so may what the library does not have.
 
     Parameters
     ----------
@@ -112,29 +122,33 @@ def decide(assessments: Sequence[Assessment], settings: Settings) -> Decision:
     """
     if not assessments:
         return Decision(Verdict.UNKNOWN, (), "nothing in the library could explain the gap", None)
-    order = sorted(range(len(assessments)), key=lambda index: assessments[index].fitted.score)
+    order = sorted(range(len(assessments)), key=lambda index: assessments[index].score)
     best = assessments[order[0]]
-    close = [i for i in order if assessments[i].fitted.score - best.fitted.score < settings.tie_margin]
+    close = [
+        i
+        for i in order
+        if assessments[i].score - best.score < settings.tie_margin
+        or set(assessments[i].mechanisms) <= best.alike
+    ]
     passing = [i for i in close if not objections(assessments[i], settings)]
-    if passing and len(close) > 1:
-        return _tied(assessments, close, passing[0])
-    if passing and not best.resolvable:
-        reason = (
-            f"{_title(best)} explains the data, but they could not tell it from others: it may not be named"
-        )
-        return Decision(Verdict.UNKNOWN, (), reason, None)
-    if passing:
-        return _named(assessments, order[0], order[1:])
     failed = objections(best, settings)
-    incomplete = _incomplete(best, len(close), failed, settings)
-    if incomplete is not None:
-        return Decision(Verdict.INCOMPLETE, best.mechanisms, incomplete, order[0])
-    return Decision(
-        Verdict.UNKNOWN,
-        (),
-        f"{_title(best)} comes closest, but {failed[0]}; nothing else in the library does",
-        None,
-    )
+    titles = ", ".join(_title(assessments[i]) for i in close)
+    if passing and len(close) > 1:
+        if len(best.mechanisms) > 1:
+            return Decision(Verdict.UNKNOWN, (), f"no one pair stands out: {titles}", None)
+        names = tuple(assessments[i].mechanisms[0] for i in close)
+        margin = assessments[close[-1]].score - best.score
+        return Decision(
+            Verdict.TIE, names, f"{titles} explain the data alike, within {margin:.1f} of Q", passing[0]
+        )
+    if passing and best.resolvable:
+        return _named(assessments, order[0], order[1:])
+    if passing:
+        failed = ["the data could not tell it from others, so it may not be named"]
+    elif _is_incomplete(best, len(close), failed, settings):
+        reason = f"{_title(best)} explains {best.explained:.0%} of the excess, but {failed[0]}"
+        return Decision(Verdict.INCOMPLETE, best.mechanisms, reason, order[0])
+    return Decision(Verdict.UNKNOWN, (), f"{_title(best)} comes closest, but {failed[0]}", None)
 
 
 def _named(assessments: Sequence[Assessment], chosen: int, others: Sequence[int]) -> Decision:
@@ -146,28 +160,16 @@ def _named(assessments: Sequence[Assessment], chosen: int, others: Sequence[int]
     )
     if others:
         second = assessments[others[0]]
-        behind = second.fitted.score - best.fitted.score
+        behind = second.score - best.score
         reason += f", and the next, {_title(second)}, is {behind:.0f} behind in Q"
     return Decision(Verdict.NAMED, best.mechanisms, reason, chosen)
 
 
-def _tied(assessments: Sequence[Assessment], close: Sequence[int], chosen: int) -> Decision:
-    titles = ", ".join(_title(assessments[i]) for i in close)
-    names = tuple(dict.fromkeys(name for i in close for name in assessments[i].mechanisms))
-    common = [name for name in names if all(name in assessments[i].mechanisms for i in close)]
-    if common:
-        reason = f"{' and '.join(common)} is in every explanation that fits, beside one more: {titles}"
-        return Decision(Verdict.INCOMPLETE, tuple(common), reason, chosen)
-    margin = max(assessments[i].fitted.score for i in close) - min(assessments[i].fitted.score for i in close)
-    return Decision(Verdict.TIE, names, f"{titles} explain the data alike, within {margin:.1f} of Q", chosen)
-
-
-def _incomplete(best: Assessment, close: int, failed: Sequence[str], settings: Settings) -> str | None:
-    """The reason to name a mechanism although something is left, or None."""
-    only_the_fit = best.gap.p < settings.fit_level and len(failed) == 1 and best.resolvable
-    if not only_the_fit or close > 1 or best.explained < settings.incomplete_share:
-        return None
-    return f"{_title(best)} explains {best.explained:.0%} of the excess beyond doubt, but {failed[0]}"
+def _is_incomplete(best: Assessment, close: int, failed: Sequence[str], settings: Settings) -> bool:
+    """Whether a single mechanism is to be named although the data still disagree a little."""
+    only_the_fit = best.gap.p < settings.fit_level and len(failed) == 1
+    alone = close == 1 and len(best.mechanisms) == 1 and best.resolvable
+    return only_the_fit and alone and best.explained >= settings.incomplete_share
 
 
 def _title(assessment: Assessment) -> str:

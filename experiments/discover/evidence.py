@@ -133,8 +133,8 @@ def _inflation(measured: Measured, emulator: Emulator, notes: list[str]) -> np.n
     limit = stats.f.isf(SCATTER_LEVEL, np.maximum(freedom, 1.0), np.maximum(known, 1.0))
     wide = (freedom > 0) & (ratio > limit)
     notes += [
-        f"replicates of {emulator.observables[i]} scatter {np.sqrt(ratio[i]):.1f} times as much as the model's,"
-        " and count so"
+        f"replicates of {emulator.observables[i]} scatter {np.sqrt(ratio[i]):.1f} times as much as the"
+        " model's, and count so"
         for i in np.flatnonzero(wide)
     ]
     return np.where(wide, np.sqrt(ratio), 1.0)

@@ -12,6 +12,9 @@ from experiments.discover.bank import sobol
 from experiments.discover.model import Model, Stack
 
 ITERATIONS = 40
+SCOUTING = 6
+"""Steps after which only the best starts go on."""
+FINALISTS = 3
 CONVERGED = 1e-4
 """Longest step of a fit that has arrived, in coded units."""
 AT_BOUND = 1e-3
@@ -92,6 +95,7 @@ def minimise(
     starts: np.ndarray,
     lower: np.ndarray,
     upper: np.ndarray,
+    iterations: int = ITERATIONS,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Least squares within bounds from many starts at once (Levenberg and Marquardt, active bounds frozen).
 
@@ -103,6 +107,8 @@ def minimise(
     starts : (n, parameters) array
     lower, upper : (parameters,) or (n, parameters) array
         Equal ends fix a parameter.
+    iterations : int
+        Most steps.
 
     Returns
     -------
@@ -113,7 +119,7 @@ def minimise(
     damping = np.full(len(x), 1e-2)
     residual = (target - stack.predict(x)) @ whitening.T
     q = (residual**2).sum(axis=1)
-    for _ in range(ITERATIONS):
+    for _ in range(iterations):
         slopes = np.einsum("ij,njk->nik", whitening, stack.jacobian(x))
         descent = np.einsum("nik,ni->nk", slopes, residual)
         frozen = ((x <= lower) & (descent < 0.0)) | ((x >= upper) & (descent > 0.0))
@@ -152,13 +158,11 @@ def fit(stack: Stack, starts: np.ndarray | None = None, count: int = 8) -> Fitte
     lower, upper = model.lower, model.upper
     tried = [model.start[None], lower + sobol(count, len(lower), 0) * (upper - lower)]
     x = np.concatenate(tried if starts is None else [np.atleast_2d(starts), *tried])
-    best, target = x[0], stack.target
-    for _ in range(3):
-        whitening = whiten(stack.covariance(best))
-        x, q = minimise(stack, whitening, target, x, lower, upper)
-        best = x[np.argmin(q)]
-        x = best[None]
-    return weigh(stack, best)
+    for iterations in (SCOUTING, ITERATIONS, ITERATIONS):
+        whitening = whiten(stack.covariance(x[0]))
+        x, q = minimise(stack, whitening, stack.target, x, lower, upper, iterations)
+        x = x[np.argsort(q)[:FINALISTS]]
+    return weigh(stack, x[0])
 
 
 def weigh(stack: Stack, x: np.ndarray) -> Fitted:

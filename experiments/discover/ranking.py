@@ -115,9 +115,20 @@ def _bias(fitted: Fitted, project: np.ndarray, theta: np.ndarray, name: str) -> 
 def _apart(seen: Signatures, index: int, rival: int) -> float:
     """Squared visible length of a signature of coded size 1 that its rival cannot take up, less its bias."""
     own, other = seen.visible[index], seen.visible[rival]
-    taken = float(own @ other) / max(float(other @ other), LEAST_LENGTH**2)
+    # A size that is not negative takes up nothing of an opposite signature.
+    taken = max(float(own @ other), 0.0) / max(float(other @ other), LEAST_LENGTH**2)
     left = own - taken * other
     return max(float(left @ left) - float(seen.bias[index]) - taken**2 * float(seen.bias[rival]), 0.0)
+
+
+def alike(seen: Signatures, name: str, size: float, margin: float) -> frozenset[str]:
+    """Mechanisms whose Q, refitted, would be less than the margin above that of one of a coded size.
+
+    What fresh runs then show between them is their own noise.
+    """
+    index = seen.names.index(name)
+    others = (rival for rival in range(len(seen.names)) if rival != index)
+    return frozenset(seen.names[rival] for rival in others if size**2 * _apart(seen, index, rival) < margin)
 
 
 @dataclass(frozen=True)
@@ -157,7 +168,7 @@ def visibilities(base: Fitted, seen: Signatures, settings: Settings) -> tuple[Vi
     quantile = float(stats.norm.ppf(settings.power))
     project = projector(base.sensitivities) @ base.whitening
     theta = base.x[: len(base.model.emulator.space.factors)]
-    correlations = np.abs(seen.correlations) - np.eye(len(seen.names))
+    correlations = np.maximum(seen.correlations, 0.0) - np.eye(len(seen.names))
     least_apart = quantile + float(np.sqrt(quantile**2 + settings.tie_margin))
     out = []
     for index, name in enumerate(seen.names):

@@ -149,7 +149,7 @@ def candidate_record(
         degrees_of_freedom=fitted.freedom,
         q_limit=assessment.gap.q_limit,
         explained=assessment.explained,
-        held_out_gain=assessment.gain,
+        held_out_gain=None if assessment.gain is None else assessment.gain.interval,
         simulated=assessment.simulated,
         admitted=not found,
         objection=found[0] if found else "",

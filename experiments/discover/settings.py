@@ -29,15 +29,16 @@ class Settings:
     false_alarm : float
         Probability that a model that lacks nothing is said to lack something.
     fit_level : float
-        A model whose disagreement with the data has a smaller p value is not admitted.
+        A model whose disagreement with the data has a smaller p value is not admitted, nor one whose held-out
+        gain is as far below what it promises.
     least_ratio : float
         Least size over standard error of a mechanism that is named.
     pair_ratio : float
-        The same for each of two mechanisms named together: there are many more pairs to choose among.
+        The same for each of two mechanisms named together: there are many more pairs to choose among, and two
+        wrong ones make up for much.
     tie_margin : float
-        Mechanisms within so much of the best in Q (plus the logarithm of the determinant) are a tie.
-    held_out_coverage : float
-        Coverage of the interval of the held-out gain, which must lie above zero.
+        Mechanisms within so much of the best are a tie: in Q plus the logarithm of the determinant, less
+        twice the held-out gain, which is minus twice a log-likelihood.
     incomplete_share : float
         Least share of the excess that a mechanism explains which is named although something is left.
     power : float
@@ -69,10 +70,9 @@ class Settings:
     false_alarm: float = 0.025
     fit_level: float = 0.025
     least_ratio: float = 3.0
-    pair_ratio: float = 3.5
-    tie_margin: float = 5.0
-    held_out_coverage: float = 0.5
-    incomplete_share: float = 0.95
+    pair_ratio: float = 5.0
+    tie_margin: float = 6.0
+    incomplete_share: float = 0.97
     power: float = 0.8
     systematic: float = 0.1
     draws: int = 4000
@@ -86,7 +86,7 @@ class Settings:
     resolvable: tuple[str, ...] | None = None
 
     def __post_init__(self) -> None:
-        for name in ("false_alarm", "fit_level", "held_out_coverage", "incomplete_share", "power"):
+        for name in ("false_alarm", "fit_level", "incomplete_share", "power"):
             if not 0.0 < getattr(self, name) < 1.0:
                 raise InputError("must lie between 0 and 1", getattr(self, name), f"Settings.{name}")
         least = {"bank_points": 10, "bank_repeats": 2, "bank_mechanism_points": 4, "draws": 100}

@@ -126,6 +126,11 @@ class SearchSpace:
         mechanism = self.mechanism(name)
         return mechanism.null + float(coded) * (mechanism.maximum - mechanism.null)
 
+    def coded_size(self, name: str, natural: float) -> float:
+        """Size of a mechanism in coded units."""
+        mechanism = self.mechanism(name)
+        return (natural - mechanism.null) / (mechanism.maximum - mechanism.null)
+
     def point(self, coded: np.ndarray, mechanisms: tuple[str, ...], condition: str, seed: int) -> Point:
         """Return the case of one row of coded parameters."""
         theta = self.natural_theta(coded[: len(self.factors)])

@@ -1,0 +1,194 @@
+"""The analysis as a whole on a synthetic world: every verdict, its guards, and data with something wrong."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from synthetic import CONDITIONS, OBSERVABLES, SETTINGS, SyntheticSimulator, emulator, measure, space
+
+from experiments.discover.analysis import analyse
+from experiments.discover.discovery import Discovery, Verdict
+from experiments.discover.emulator import Emulator
+from experiments.discover.measured import CLOGGED, Measured
+from experiments.discover.simulator import Outcomes, Point
+from experiments.errors import InputError
+
+ALONE = emulator().without("twin")
+"""The library without the mechanism that cannot be told from another."""
+
+
+def _run(measured: Measured, known: Emulator = ALONE, lost: int = 0) -> tuple[Discovery, list[list[Point]]]:
+    """Drive an analysis; the first ``lost`` cases of each wave leave no heap."""
+    waves, simulator = [], SyntheticSimulator(space())
+    analysis = analyse(measured, known, SETTINGS, seed=5)
+    try:
+        points = next(analysis)
+        while True:
+            waves.append(points)
+            values = simulator(points).values
+            values[:lost] = np.nan
+            points = analysis.send(
+                Outcomes(values, tuple("clogged" if i < lost else "" for i in range(len(points))))
+            )
+    except StopIteration as end:
+        return end.value, waves
+
+
+@cache
+def _named() -> tuple[Discovery, list[list[Point]]]:
+    return _run(measure({"delta": 0.6}, 3))
+
+
+def test_a_complete_model_lacks_nothing_and_costs_no_run() -> None:
+    found, waves = _run(measure({}, 3))
+    assert found.verdict == Verdict.NONE
+    assert found.named == ()
+    assert waves == []
+
+
+def test_a_hidden_mechanism_is_named_with_its_size() -> None:
+    found, _ = _named()
+    assert found.verdict == Verdict.NAMED
+    assert found.named == ("delta",)
+    assert found.chosen is not None
+    size = found.chosen.sizes[0]
+    assert size.low <= size.value <= size.high
+    # Five standard errors, of which the 90 % interval is 3.3 wide.
+    assert size.value == pytest.approx(0.6, abs=5.0 / 3.3 * (size.high - size.low))
+
+
+def test_the_gap_shrinks_on_conditions_that_took_no_part() -> None:
+    found, waves = _named()
+    training, held_out = found.before_after
+    assert (training.held_out, held_out.held_out) == (False, True)
+    for side in (training, held_out):
+        assert side.runs == SETTINGS.direct_runs
+        assert side.before.value > side.after.high
+        assert side.removed.value > 0.8
+    assert len(waves[-1]) == 2 * SETTINGS.direct_runs * len(CONDITIONS)
+
+
+def test_every_case_of_an_analysis_has_its_own_seed() -> None:
+    _, waves = _named()
+    seeds = [point.seed for wave in waves for point in wave]
+    assert len(set(seeds)) == len(seeds)
+    assert {point.condition for point in waves[0]} == set(CONDITIONS)
+
+
+def test_the_same_data_give_the_same_discovery() -> None:
+    first, _ = _named()
+    second, _ = _run(measure({"delta": 0.6}, 3))
+    assert first.to_dict() == second.to_dict()
+
+
+def test_mechanisms_that_act_alike_are_a_tie_with_an_experiment_to_follow() -> None:
+    found, _ = _run(measure({"alpha": 0.4}, 4), emulator())
+    assert found.verdict == Verdict.TIE
+    assert set(found.named) == {"alpha", "twin"}
+    assert found.next_experiment is not None
+    assert set(found.next_experiment.separates) == {"alpha", "twin"}
+
+
+def test_two_mechanisms_at_once_are_both_named() -> None:
+    found, _ = _run(measure({"alpha": 0.6, "delta": 0.8}, 5))
+    assert found.verdict == Verdict.NAMED
+    assert set(found.named) == {"alpha", "delta"}
+
+
+def test_what_the_library_lacks_is_unknown() -> None:
+    found, _ = _run(measure({"stranger": 1.0}, 6))
+    assert found.verdict == Verdict.UNKNOWN
+    assert found.named == ()
+    assert found.before_after == ()
+    assert all(not candidate.admitted for candidate in found.candidates)
+
+
+def test_one_angle_a_condition_cannot_tell_a_mechanism_from_friction() -> None:
+    found, _ = _run(measure({"delta": 1.0}, 3).only(["flank_angle"]))
+    assert found.verdict == Verdict.NOT_IDENTIFIABLE
+    assert "4 measured means, 3 factors" in found.reason
+
+
+def test_photographs_alone_are_analysed_too() -> None:
+    found, _ = _run(measure({"delta": 1.2}, 3).only(OBSERVABLES[:6]))
+    assert found.verdict == Verdict.NAMED
+    assert found.named == ("delta",)
+    assert np.isnan(found.data.means[:, 6:]).all()
+
+
+def test_without_a_held_out_condition_nothing_is_named() -> None:
+    found, _ = _run(measure({"delta": 0.6}, 3, conditions=CONDITIONS[:4]))
+    assert found.verdict == Verdict.UNKNOWN
+    assert "no held-out condition was measured" in found.reason
+    assert "condition fast-wide was not measured" in found.notes
+
+
+def test_one_replicate_a_condition_is_enough_for_a_verdict() -> None:
+    found, _ = _run(measure({}, 8, replicates=1))
+    assert found.verdict == Verdict.NONE
+
+
+def test_an_observable_without_variance_and_a_clogged_tube_are_no_crash() -> None:
+    whole = measure({}, 9)
+    values = {name: rows.copy() for name, rows in whole.values.items()}
+    values["base"][:, 2] = values["base"][:, 2].mean()
+    values["wide"][0] = np.nan
+    values["fast"][:] = np.nan
+    reasons = {"wide": (CLOGGED, "", "", "", ""), "fast": (CLOGGED,) * 5}
+    found, _ = _run(Measured(CONDITIONS, OBSERVABLES, values, reasons))
+    assert found.verdict == Verdict.NONE
+    assert "condition fast left no heap to compare: left out" in found.notes
+    assert found.data.replicates[CONDITIONS.index("wide")].max() == 4
+
+
+def test_nothing_but_clogged_tubes_is_a_verdict_with_its_reason() -> None:
+    whole = measure({}, 9)
+    values = {name: np.full_like(rows, np.nan) for name, rows in whole.values.items()}
+    reasons = {name: (CLOGGED,) * len(rows) for name, rows in whole.values.items()}
+    found, _ = _run(Measured(CONDITIONS, OBSERVABLES, values, reasons))
+    assert found.verdict == Verdict.NOT_IDENTIFIABLE
+    assert found.reason == "no training condition left a heap to compare"
+
+
+def test_replicates_that_scatter_too_much_widen_the_error_instead_of_an_alarm() -> None:
+    found, _ = _run(measure({}, 10, noise=4.0))
+    assert found.verdict == Verdict.NONE
+    assert any("scatter 4." in note or "scatter 3." in note for note in found.notes)
+
+
+def test_an_observable_that_nobody_simulates_is_left_out_with_a_note() -> None:
+    whole = measure({}, 3)
+    values = {name: np.column_stack([rows, rows[:, 0]]) for name, rows in whole.values.items()}
+    found, _ = _run(Measured(CONDITIONS, (*OBSERVABLES, "colour"), values))
+    assert found.verdict == Verdict.NONE
+    assert "colour is not among the simulated observables: left out" in found.notes
+
+
+def test_fresh_runs_that_fail_are_counted_and_left_out() -> None:
+    found, _ = _run(measure({"delta": 0.6}, 3), lost=7)
+    assert found.named == ("delta",)
+    assert any("fresh runs left no heap" in note for note in found.notes)
+
+
+def test_what_is_declared_unresolvable_is_never_named() -> None:
+    others = tuple(name for name in ALONE.space.names if name != "delta")
+    analysis = analyse(measure({"delta": 0.6}, 3), ALONE, replace(SETTINGS, resolvable=others), seed=5)
+    simulator = SyntheticSimulator(space())
+    try:
+        points = next(analysis)
+        while True:
+            points = analysis.send(simulator(points))
+    except StopIteration as end:
+        found = end.value
+    assert found.verdict == Verdict.UNKNOWN
+    assert "delta" in found.reason
+
+
+def test_a_wave_needs_an_outcome_for_every_point() -> None:
+    analysis = analyse(measure({"delta": 0.6}, 3), ALONE, SETTINGS, seed=5)
+    next(analysis)
+    with pytest.raises(InputError, match="an outcome for each of"):
+        analysis.send(Outcomes(np.zeros((1, len(OBSERVABLES))), ("",)))

@@ -1,0 +1,166 @@
+"""The bank and its emulator: noise, surfaces, the errors that they state."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy import stats
+from synthetic import CONDITIONS, OBSERVABLES, SETTINGS, SyntheticSimulator, bank, emulator, space
+
+from experiments.discover.bank import Bank, bank_points, load_bank, make_bank
+from experiments.discover.emulator import fit_emulator
+from experiments.discover.fitting import whiten
+from experiments.discover.kriging import fit_kriging, krige
+from experiments.discover.noise import fit_noise, repeat_deviations
+from experiments.discover.simulator import Outcomes
+from experiments.errors import InputError
+
+
+def test_points_are_the_same_whenever_asked_and_every_case_has_its_own_seed() -> None:
+    points = bank_points(space(), SETTINGS, seed=4)
+    assert points == bank_points(space(), SETTINGS, seed=4)
+    assert len({point.seed for point in points}) == len(points)
+    assert len(points) == (128 * 2 + 7 * 64) * 5
+
+
+def test_a_bank_comes_back_from_its_file(tmp_path: Path) -> None:
+    bank().save(tmp_path / "bank.npz")
+    back = load_bank(tmp_path / "bank.npz")
+    assert back.space == bank().space
+    # Values are kept in single precision.
+    np.testing.assert_allclose(back.values, bank().values, rtol=2.0**-23)
+    np.testing.assert_array_equal(back.size, bank().size)
+
+
+def test_a_file_that_is_no_bank_is_refused_with_its_name(tmp_path: Path) -> None:
+    path = tmp_path / "photo.npz"
+    path.write_text("no bank")
+    with pytest.raises(InputError, match=r"photo\.npz: must be a bank"):
+        load_bank(path)
+
+
+def test_deviations_of_repeats_have_the_covariance_of_one_run() -> None:
+    rng = np.random.default_rng(1)
+    groups = np.repeat(np.arange(400), 3)
+    triangle = np.array([[1.0, 0.0], [0.8, 0.6]])
+    offsets = 50.0 * rng.standard_normal((400, 2))
+    values = offsets[groups] + rng.standard_normal((1200, 2)) @ triangle.T
+    _, deviations = repeat_deviations(groups, values)
+    assert len(deviations) == 800
+    # A variance from 800 deviations has a relative error of sqrt(2 / 800); four of those.
+    np.testing.assert_allclose(
+        deviations.T @ deviations / 800, triangle @ triangle.T, atol=4.0 * np.sqrt(2.0 / 800)
+    )
+
+
+def test_noise_finds_a_variance_that_changes_over_the_factors() -> None:
+    rng = np.random.default_rng(2)
+    theta = rng.uniform(-1.0, 1.0, (4000, 2))
+    deviations = rng.standard_normal((4000, 1)) * np.exp(0.5 * (0.3 + 0.8 * theta[:, :1]))
+    noise = fit_noise(theta, deviations, np.array([1e-9]))
+    # The information of a slope is n Var(theta) / 2 = 667; four standard errors.
+    np.testing.assert_allclose(noise.coefficients[:, 0], [0.3, 0.8, 0.0], atol=4.0 / np.sqrt(667.0))
+
+
+def test_the_inverse_of_an_estimated_covariance_is_unbiased() -> None:
+    rng = np.random.default_rng(3)
+    inverses = []
+    for _ in range(400):
+        noise = fit_noise(np.zeros((40, 1)), rng.standard_normal((40, 6)), np.full(6, 1e-9))
+        inverses.append(np.linalg.inv(noise.covariance(np.zeros(1)) * noise.inverse_bias(6)))
+    # Without the factor it would be 40 / 33; the identity in the correlation takes 2 %, the rest is 3 errors.
+    assert np.trace(np.mean(inverses, axis=0)) / 6.0 == pytest.approx(1.0, abs=0.04)
+
+
+def test_the_emulator_errs_as_much_as_it_says() -> None:
+    rng = np.random.default_rng(5)
+    simulator, known = SyntheticSimulator(space()), emulator()
+    squares = []
+    for name in ("beta", "gamma", "delta"):
+        for condition in CONDITIONS:
+            x = np.append(rng.uniform(-0.9, 0.9, 3), rng.uniform(0.1, 0.6))
+            truth = simulator.mean(known.space.natural_theta(x[:3]), {name: 2.0 * x[3]}, condition)
+            error = truth - known.surfaces[condition].predict(x[None], (name,))[0]
+            whitened = whiten(known.surfaces[condition].error(x, (name,))) @ error
+            squares.append(whitened @ whitened)
+    total, count = float(np.sum(squares)), len(squares) * len(OBSERVABLES)
+    # Errors of one condition hang together, so the count of independent ones is about that of the surfaces.
+    assert stats.chi2.ppf(1e-3, len(squares)) / len(squares) < total / count
+    assert total / count < stats.chi2.isf(1e-3, len(squares)) / len(squares)
+
+
+def test_kriging_goes_through_points_without_noise_and_forgets_far_from_them() -> None:
+    points = np.array([[0.0], [1.0], [2.5]])
+    known = krige(points, np.array([1.0, -1.0, 0.5]), np.full(3, 1e-10), 2.0, np.array([0.7]))
+    np.testing.assert_allclose(known.mean(points), [1.0, -1.0, 0.5], atol=1e-8)
+    np.testing.assert_allclose(known.variance(np.array([[0.0], [50.0]])), [0.0, 2.0], atol=1e-8)
+
+
+def test_kriging_leaves_one_out_as_if_it_were_fitted_without() -> None:
+    rng = np.random.default_rng(6)
+    points, values, noise = rng.uniform(-1, 1, (12, 2)), rng.standard_normal(12), np.full(12, 0.1)
+    length = np.array([0.8, 1.2])
+    whole = krige(points, values, noise, 1.5, length)
+    for left in range(12):
+        kept = np.arange(12) != left
+        rest = krige(points[kept], values[kept], noise[kept], 1.5, length)
+        alone = values[left] - rest.mean(points[left : left + 1])[0]
+        assert whole.leave_one_out[left] == pytest.approx(alone, abs=1e-9)
+
+
+def test_what_a_quadratic_cannot_follow_is_kriged() -> None:
+    points, simulator = (
+        bank_points(space(("alpha",)), SETTINGS, seed=1),
+        SyntheticSimulator(space(("alpha",))),
+    )
+    values = simulator(points).values
+    theta = space().coded_theta(np.array([point.theta for point in points]))
+    bump = 8.0 * np.exp(-8.0 * (theta[:, 0] - 0.3) ** 2)
+    values[:, 2] += bump * np.std(values[:, 2]) / 8.0
+    bent = fit_emulator(
+        make_bank(space(("alpha",)), OBSERVABLES, points, Outcomes(values, ("",) * len(points)))
+    )
+    assert all(2 in surfaces.base.kriging for surfaces in bent.surfaces.values())
+    grid = np.column_stack([np.linspace(-0.8, 0.8, 9), np.zeros((9, 2))])
+    truth = np.array([simulator.mean(space().natural_theta(row), {}, "base")[2] for row in grid])
+    truth += np.exp(-8.0 * (grid[:, 0] - 0.3) ** 2) * np.std(simulator(points).values[:, 2])
+    surfaces = bent.surfaces["base"]
+    flat = replace(surfaces, base=replace(surfaces.base, kriging={}))
+    kriged, quadratic = (np.abs(one.predict(grid, ())[:, 2] - truth).max() for one in (surfaces, flat))
+    assert kriged < 0.4 * quadratic
+
+
+def test_fitted_lengths_tell_a_flat_direction_from_a_steep_one() -> None:
+    rng = np.random.default_rng(8)
+    points = rng.uniform(-1.0, 1.0, (80, 2))
+    fitted = fit_kriging(
+        points, np.sin(4.0 * points[:, 0]) + 0.01 * rng.standard_normal(80), np.full(80, 1e-4)
+    )
+    assert fitted.length[1] > 3.0 * fitted.length[0]
+
+
+def _with_failures(failed: np.ndarray) -> Bank:
+    values, reasons = bank().values.copy(), bank().reasons.astype("<U20")
+    values[failed], reasons[failed] = np.nan, "the tube is clogged"
+    return replace(bank(), values=values, reasons=reasons)
+
+
+def test_clogged_cases_are_left_out_and_counted() -> None:
+    failed = np.zeros(len(bank().reasons), dtype=bool)
+    failed[::50] = True
+    known = fit_emulator(_with_failures(failed))
+    assert any(f"{failed.sum()} of {len(failed)} cases" in note for note in known.notes)
+
+
+def test_a_mechanism_that_always_clogs_leaves_the_library() -> None:
+    known = fit_emulator(_with_failures((bank().mechanism == 1) & (bank().condition == 2)))
+    assert "beta" not in known.space.names
+    assert any(note.startswith("beta has too few") for note in known.notes)
+
+
+def test_a_condition_that_always_clogs_is_an_error_with_its_name() -> None:
+    with pytest.raises(InputError, match="condition wide of the bank"):
+        fit_emulator(_with_failures(bank().condition == 2))

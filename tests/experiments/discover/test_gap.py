@@ -1,0 +1,116 @@
+"""Calibration and the test for a gap: sizes of errors, rates of false alarms, what could be seen."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import stats
+from synthetic import SETTINGS, emulator, measure, space
+
+from experiments.discover.evidence import gather
+from experiments.discover.fitting import Fitted, fit, size_interval
+from experiments.discover.gap import drift_p, find_gap, holm
+from experiments.discover.measured import Measured
+from experiments.discover.model import Model, Stack
+from experiments.discover.ranking import projector, signatures, visibilities
+
+NULLS = 100
+
+
+def _calibrated(measured: Measured, *mechanisms: str) -> Fitted:
+    known = emulator().without("twin")
+    evidence = gather(measured, known)
+    return fit(Stack(Model(known, mechanisms, 0.0), evidence.training))
+
+
+@pytest.fixture(scope="module")
+def nulls() -> list[tuple[float, float]]:
+    """Q and p of data sets that lack nothing."""
+    out = []
+    for seed in range(NULLS):
+        fitted = _calibrated(measure({}, seed))
+        gap = find_gap(fitted, signatures(fitted), 0.025, 1000, seed)
+        out.append((fitted.q, gap.p))
+    return out
+
+
+def test_false_alarms_come_at_the_nominal_rate(nulls: list[tuple[float, float]]) -> None:
+    alarms = sum(p < 0.025 for _, p in nulls)
+    # All that a rate of 2.5 % gives but for a probability of 1 in 1000.
+    assert alarms <= stats.binom.isf(1e-3, NULLS, 0.025)
+
+
+def test_p_values_of_a_complete_model_are_uniform(nulls: list[tuple[float, float]]) -> None:
+    assert stats.kstest([p for _, p in nulls], "uniform").pvalue > 1e-3
+
+
+def test_q_has_its_degrees_of_freedom(nulls: list[tuple[float, float]]) -> None:
+    freedom = 4 * 12 - 3
+    # Mean of 100 chi2 of 45: four standard errors, and 3 % for the emulator's noise, which all share.
+    tolerance = 4.0 * np.sqrt(2.0 * freedom / NULLS) + 0.03 * freedom
+    assert np.mean([q for q, _ in nulls]) == pytest.approx(freedom, abs=tolerance)
+
+
+def test_intervals_of_sizes_cover_the_truth() -> None:
+    covered, count = 0, 60
+    for seed in range(count):
+        name = ("alpha", "beta", "gamma", "delta")[seed % 4]
+        fitted = _calibrated(measure({name: 0.4}, seed), name)
+        low, high = size_interval(fitted, 0)
+        covered += low <= 0.2 <= high
+    # 90 % intervals, all but 1 in 1000 either way.
+    assert stats.binom.ppf(1e-3, count, 0.9) <= covered <= count
+
+
+def test_a_strong_effect_is_a_gap_and_points_at_itself() -> None:
+    fitted = _calibrated(measure({"delta": 1.0}, 3))
+    gap = find_gap(fitted, signatures(fitted), 0.025, 1000, 0)
+    assert gap.found
+    assert gap.mechanism == "delta"
+
+
+def test_a_projector_takes_out_what_calibration_can() -> None:
+    rng = np.random.default_rng(0)
+    slopes = rng.standard_normal((20, 3))
+    project = projector(slopes)
+    np.testing.assert_allclose(project @ slopes, 0.0, atol=1e-12)
+    np.testing.assert_allclose(project @ project, project, atol=1e-12)
+    assert np.trace(project) == pytest.approx(17.0)
+
+
+def test_gamma80_is_found_with_80_percent_probability() -> None:
+    known = emulator().without("twin")
+    fitted = _calibrated(measure({}, 1, theta=tuple(space().natural_theta(np.zeros(3)))))
+    visible = {one.name: one for one in visibilities(fitted, signatures(fitted), SETTINGS)}["beta"]
+    size = known.space.natural_size("beta", visible.gamma80)
+    found, count = 0, 40
+    for seed in range(count):
+        one = _calibrated(
+            measure({"beta": size}, seed, theta=tuple(space().natural_theta(np.zeros(3)))), "beta"
+        )
+        found += one.sizes[0] / one.size_errors[0] >= SETTINGS.least_ratio
+    assert stats.binom.ppf(1e-3, count, 0.8) <= found <= stats.binom.isf(1e-3, count, 0.8)
+
+
+def test_twins_are_confounded_and_not_resolvable() -> None:
+    evidence = gather(measure({}, 1), emulator())
+    fitted = fit(Stack(Model(emulator(), (), 0.0), evidence.training))
+    seen = signatures(fitted)
+    alpha, twin = seen.names.index("alpha"), seen.names.index("twin")
+    assert seen.correlations[alpha, twin] > 0.98
+    resolvable = {one.name: one.resolvable for one in visibilities(fitted, seen, SETTINGS)}
+    assert not resolvable["alpha"]
+    assert not resolvable["twin"]
+    assert resolvable["delta"]
+
+
+def test_holm_by_hand() -> None:
+    # Sorted: 0.01 x 4, 0.02 x 3, 0.03 x 2, 0.9 x 1, never falling.
+    np.testing.assert_allclose(holm(np.array([0.03, 0.9, 0.01, 0.02])), [0.06, 0.9, 0.04, 0.06])
+
+
+def test_a_drift_beyond_its_errors_is_told_from_one_within() -> None:
+    values, errors = np.array([1.0, 1.1, 0.9]), np.array([0.1, 0.1, 0.1])
+    # chi2 = 2 with 2 degrees of freedom.
+    assert drift_p(values, errors) == pytest.approx(np.exp(-1.0))
+    assert drift_p(5.0 * values, errors) < 1e-6
