@@ -18,6 +18,7 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
+from experiments.commands.console import clear_errors
 from experiments.discover.bank import Bank
 from experiments.discover.emulator import fit_emulator
 from experiments.discover.engine import EngineSimulator
@@ -42,6 +43,7 @@ from experiments.discover.trials.truth import (
     write_labels,
     write_sealed,
 )
+from experiments.errors import InputError
 from experiments.study import Study, load_study
 from experiments.study.toml_files import read_toml
 
@@ -90,7 +92,16 @@ def seal_trials(folder: Folder, search: Search, bank: Bank, plan: Plan, seed: in
         Numbers of trials.
     seed
         Of the drawing, which must not be known to whoever knows the plan.
+
+    Raises
+    ------
+    InputError
+        When the folder has sealed trials.
     """
+    if folder.sealed.exists():
+        raise InputError(
+            "trials are sealed once: name a folder without any", "sealed trials", str(folder.sealed)
+        )
     study = search.study
     library = declared_effects(fit_emulator(bank), search.settings, plan.replicates)
     strangers = tuple(Effect(m.name, m.null, m.maximum) for m in library_for(study, STRANGERS))
@@ -146,11 +157,12 @@ def seal(
     seed: Annotated[int | None, typer.Option(help="Seed of the drawing; left out: a secret one.")] = None,
 ) -> None:
     """Draw the truths; write their seals, to be published, and their labels, to be kept."""
-    numbers = Plan(**read_toml(plan, "a plan of trials")[1]) if plan else Plan()
-    place, search = Folder(folder), Search.of(load_study(STUDY, scale or None))
-    waves = search.read_bank(bank or bank_beside(scale))
-    seal_trials(place, search, waves, numbers, secrets.randbits(63) if seed is None else seed)
-    print(f"{len(read_sealed(place.sealed))} trials sealed: {place.sealed}")
+    with clear_errors():
+        numbers = Plan(**read_toml(plan, "a plan of trials")[1]) if plan else Plan()
+        place, search = Folder(folder), Search.of(load_study(STUDY, scale or None))
+        waves = search.read_bank(bank or bank_beside(scale))
+        seal_trials(place, search, waves, numbers, secrets.randbits(63) if seed is None else seed)
+        print(f"{len(read_sealed(place.sealed))} trials sealed: {place.sealed}")
 
 
 @app.command()
@@ -161,19 +173,20 @@ def measure(
     workers: Annotated[int | None, typer.Option(help="Processes.")] = None,
 ) -> None:
     """Simulate and measure the heaps of the trials."""
-    place = Folder(folder)
-    declaration = read_declaration(place.declared)
-    sealed = [trial for trial in read_sealed(place.sealed) if part in (None, trial.part)]
-    labels = list(revealed(read_labels(place.hidden_labels), sealed).values())
-    study = generators_study(declaration.scale)
-    library = (*library_for(study), *library_for(study, STRANGERS))
-    table = OutcomeTable(place.hidden / "outcomes.sqlite")
-    with (
-        EngineSimulator(study, library, table, device, workers) as simulator,
-        Run(place, f"heaps, {part or 'all'}", device, table),
-    ):
-        measure_trials(place, labels, declaration, simulator)
-    print(f"{len(labels)} trials measured: {place.data}")
+    with clear_errors("the same command"):
+        place = Folder(folder)
+        declaration = read_declaration(place.declared)
+        sealed = [trial for trial in read_sealed(place.sealed) if part in (None, trial.part)]
+        labels = list(revealed(read_labels(place.hidden_labels), sealed).values())
+        study = generators_study(declaration.scale)
+        library = (*library_for(study), *library_for(study, STRANGERS))
+        table = OutcomeTable(place.hidden / "outcomes.sqlite")
+        with (
+            EngineSimulator(study, library, table, device, workers) as simulator,
+            Run(place, f"heaps, {part or 'all'}", device, table),
+        ):
+            measure_trials(place, labels, declaration, simulator)
+        print(f"{len(labels)} trials measured: {place.data}")
 
 
 if __name__ == "__main__":

@@ -15,6 +15,7 @@ from typing import Annotated
 
 import typer
 
+from experiments.commands.console import clear_errors
 from experiments.discover.trials.folder import DECLARED, FINDINGS, LABELS, RUNS, SEALED, Folder
 from experiments.discover.trials.page import RECORD, write_page
 from experiments.errors import InputError
@@ -45,9 +46,10 @@ def main(
     """Write the record of the trials."""
     if (folder is None) != page_only:
         raise typer.BadParameter("give the folder of the trials, or --page-only")
-    if folder is not None:
-        gather(Folder(folder), out)
-    print(write_page(out))
+    with clear_errors():
+        if folder is not None:
+            gather(Folder(folder), out)
+        print(write_page(out))
 
 
 if __name__ == "__main__":

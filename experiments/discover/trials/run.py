@@ -20,6 +20,7 @@ from typing import Annotated
 import typer
 
 from experiments.benchmarks.tables import markdown_table
+from experiments.commands.console import clear_errors
 from experiments.discover.bank import load_bank
 from experiments.discover.emulator import fit_emulator
 from experiments.discover.engine import EngineSimulator
@@ -99,6 +100,19 @@ def run_trials(
             _report(turn)
 
 
+def chosen(trials: Sequence[Sealed], part: str | None, first: int | None) -> list[Sealed]:
+    """Pick the trials of a part, None for all, and of each part so many, by their numbers."""
+    picked = [trial for trial in trials if part in (None, trial.part)]
+    return [trial for trial in picked if first is None or int(trial.trial.rpartition("-")[2]) <= first]
+
+
+def plan_page(folder: Folder, bank: Path | None) -> str:
+    """Table of what the trials will cost, as Markdown."""
+    declaration = read_declaration(folder.declared)
+    waves = load_bank(bank or bank_beside(declaration.scale))
+    return markdown_table(planned_cases(read_sealed(folder.sealed), declaration, waves))
+
+
 def _report(turn: Round) -> None:
     ended = f"round {turn.number}: {len(turn.ended)} analyses ended"
     print(f"{ended}, {turn.running} want {turn.cases} cases", flush=True)
@@ -116,22 +130,17 @@ def main(
     plan_only: Annotated[bool, typer.Option("--plan-only", help="Count the cases, run nothing.")] = False,
 ) -> None:
     """Analyse the trials that have not been."""
-    place = Folder(folder)
-    sealed = read_sealed(place.sealed)
-    if plan_only:
-        declaration = read_declaration(place.declared)
-        waves = load_bank(bank or bank_beside(declaration.scale))
-        print(markdown_table(planned_cases(sealed, declaration, waves)))
-        return
-    trials = [trial for trial in sealed if part in (None, trial.part)]
-    if first is not None:
-        trials = [trial for trial in trials if int(trial.trial.rpartition("-")[2]) <= first]
-    view = PHOTOGRAPHS if photographs else EVERYTHING
-    try:
-        run_trials(place, trials, bank, view, device, workers, seconds)
-    except OutOfTime:
-        print(f"time is up; {len(open_jobs(place, trials, view))} analyses have not ended: run it again")
-        raise typer.Exit(UNFINISHED) from None
+    with clear_errors("the same command"):
+        place, view = Folder(folder), PHOTOGRAPHS if photographs else EVERYTHING
+        if plan_only:
+            print(plan_page(place, bank))
+            return
+        trials = chosen(read_sealed(place.sealed), part, first)
+        try:
+            run_trials(place, trials, bank, view, device, workers, seconds)
+        except OutOfTime:
+            print(f"time is up; {len(open_jobs(place, trials, view))} analyses have not ended: run it again")
+            raise typer.Exit(UNFINISHED) from None
 
 
 if __name__ == "__main__":
