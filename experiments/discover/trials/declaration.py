@@ -91,12 +91,11 @@ def declared_effects(emulator: Emulator, settings: Settings, replicates: int) ->
     """
     found = _found(analyse(perfect_data(emulator, replicates), emulator, settings, seed=0))
     ranges = {mechanism.name: mechanism for mechanism in emulator.space.mechanisms}
-    kin = _kin(found)
-    effects = []
+    kin, effects = _kin(found), []
     for power in found.power:
         span = ranges[power.mechanism]
-        gamma80 = abs(power.gamma80 - span.null) if power.resolvable else math.inf
-        effects.append(Effect(span.name, span.null, span.maximum, gamma80, kin[span.name]))
+        gamma80 = abs(power.gamma80 - span.null)
+        effects.append(Effect(span.name, span.null, span.maximum, gamma80, power.resolvable, kin[span.name]))
     return tuple(effects)
 
 

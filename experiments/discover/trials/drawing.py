@@ -19,7 +19,7 @@ WEAK = 0.3
 """Least effect of a weak trial, in gamma80."""
 
 UPPER = 0.5
-"""Strangers, and mechanisms whose gamma80 nobody stated, have at least this part of their range."""
+"""Strangers have at least this part of their range."""
 
 
 @dataclass(frozen=True)
@@ -70,16 +70,18 @@ class Effect:
     null, maximum : float
         Its range.
     gamma80 : float
-        Distance from the null that is found with 80 % probability; infinite where it was declared that the
-        mechanism is not resolvable.
+        Distance from the null that is found with 80 % probability; infinite where the range has none.
+    told_apart : bool
+        Whether the data tell it, at the end of its range, from every other.
     kin : tuple of str
-        Mechanisms that no data of these conditions could tell from it.
+        Mechanisms that look like it after calibration.
     """
 
     name: str
     null: float
     maximum: float
     gamma80: float = math.inf
+    told_apart: bool = True
     kin: tuple[str, ...] = ()
 
     @property
@@ -89,8 +91,8 @@ class Effect:
 
     @property
     def resolvable(self) -> bool:
-        """Whether strong trials of it can be drawn."""
-        return self.strongest > STRONG
+        """Whether it may be named: it is told apart, and its range has strong effects."""
+        return self.told_apart and self.strongest > STRONG
 
     def size(self, strength: float) -> float:
         """Size with an effect of so many gamma80."""
@@ -178,7 +180,9 @@ def _alone(plan: Plan, library: Sequence[Effect], rng: np.random.Generator) -> I
                 _of("alone", Kind.SINGLE, effect, rng.uniform(WEAK, STRONG)) for _ in range(plan.weak)
             )
         else:
-            yield from (_somewhere("alone", Kind.SINGLE, effect, rng, 0.0) for _ in range(plan.unresolved))
+            yield from (
+                _somewhere("alone", Kind.UNRESOLVED, effect, rng, 0.0) for _ in range(plan.unresolved)
+            )
 
 
 def _outside(

@@ -93,10 +93,11 @@ def _declared(declared: Declaration) -> str:
             "mechanism": effect.name,
             "null": effect.null,
             "maximum": effect.maximum,
-            "gamma80, from the null": effect.gamma80 if effect.resolvable else np.nan,
-            "share of the range": effect.gamma80 / abs(effect.maximum - effect.null),
+            "gamma80, from the null": effect.gamma80,
+            "of the range": effect.gamma80 / abs(effect.maximum - effect.null),
+            "told apart": "yes" if effect.told_apart else "no",
             "resolvable": "yes" if effect.resolvable else "no",
-            "not told from": ", ".join(effect.kin),
+            "looks like": ", ".join(effect.kin),
         }
         for effect in declared.library
     ).replace(np.inf, np.nan)
@@ -104,7 +105,8 @@ def _declared(declared: Declaration) -> str:
     stated = (
         f"{declared.study}{scale}, {declared.plan.replicates} heaps a condition; declared and sealed on "
         f"{declared.drawn_on}; settings of the analysis {declared.settings.sha256}. A mechanism is "
-        f"resolvable whose range holds more than {STRONG:g} gamma80; no other may be named."
+        f"resolvable that is told from every other, and whose range holds more than {STRONG:g} gamma80; no "
+        "other may be named."
     )
     aim = _aims([declared_aim(declared.library)])
     return f"## Declared beforehand\n\n{stated}\n\n{markdown_table(table)}\n{aim}"
@@ -122,7 +124,7 @@ def _view(rows: pd.DataFrame, view: str, title: str, declared: Declaration, fold
         f"![answers by truth](confusion-{view}.png)\n",
         "### Strong effects, by mechanism\n",
         markdown_table(by_mechanism(rows).reset_index()),
-        "### Outside the library\n",
+        "### Effects that may not be named\n",
         markdown_table(by_outsider(rows).reset_index()),
     ]
     return "\n".join(parts)

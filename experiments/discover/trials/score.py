@@ -103,7 +103,7 @@ def scored(findings: pd.DataFrame, labels: Mapping[str, Label], sealed: Sequence
 def _judged(finding: dict[Hashable, Any], label: Label) -> dict[str, object]:
     truth, named = set(label.mechanisms), set(str(finding["named"]).split())
     naming = finding["verdict"] in NAMING
-    known = label.kind in (Kind.SINGLE, Kind.PAIR)
+    known = label.kind in (Kind.SINGLE, Kind.UNRESOLVED, Kind.PAIR)
     return {
         "kind": str(label.kind),
         "truth": " ".join(label.mechanisms),
@@ -142,7 +142,7 @@ def confusion(table: pd.DataFrame) -> pd.DataFrame:
 
 def _names_first(labels: Iterable[str]) -> list[str]:
     """Sort labels: mechanisms by name, then kinds of trials or verdicts."""
-    others = ["weak single", *Kind, "two names", *Verdict, CRASH]
+    others = ["weak single", *map(str, Kind), "two names", *map(str, Verdict), CRASH]
     return sorted(labels, key=lambda label: (others.index(label) if label in others else -1, label))
 
 
@@ -187,9 +187,9 @@ def by_mechanism(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def by_outsider(table: pd.DataFrame) -> pd.DataFrame:
-    """For each effect outside the library: its trials and how they ended."""
-    outside = table[table["kind"].isin([Kind.WITHHELD, Kind.STRANGER])]
-    hidden = outside["truth"] + np.where(outside["kind"] == Kind.WITHHELD, " (withheld)", "")
+    """For each effect that may not be named: its trials and how they ended."""
+    outside = table[table["kind"].isin([Kind.UNRESOLVED, Kind.WITHHELD, Kind.STRANGER])]
+    hidden = outside["truth"] + " (" + outside["kind"] + ")"
     return pd.crosstab(hidden, outside["verdict"], rownames=["effect"], colnames=[None])
 
 
@@ -247,7 +247,7 @@ MUST_RESOLVE = (
 
 def declared_aim(library: Sequence[Effect]) -> Aim:
     """Hold what was declared beforehand against the mechanisms that must be resolvable."""
-    seen = {effect.name for effect in library if effect.gamma80 <= 0.5 * abs(effect.maximum - effect.null)}
+    seen = {effect.name for effect in library if effect.resolvable and effect.strongest >= 2.0}
     missing = [name for name in MUST_RESOLVE if name not in seen]
     found = f"not {', '.join(missing)}" if missing else "every one"
     question = f"resolvable at half of their range: {', '.join(MUST_RESOLVE)}"

@@ -63,7 +63,8 @@ def test_every_kind_of_trial_is_drawn_as_planned() -> None:
     # Three mechanisms are resolvable (cohesion, bridges, spread), two are not.
     expected = {
         Kind.NULL: 3,
-        Kind.SINGLE: 3 * 4 + 2 * 2,
+        Kind.SINGLE: 3 * 4,
+        Kind.UNRESOLVED: 2 * 2,
         Kind.WITHHELD: 3 * 2,
         Kind.STRANGER: 2,
         Kind.PAIR: 6,
