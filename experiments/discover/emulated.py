@@ -12,7 +12,7 @@ from experiments.discover.simulator import Outcomes, Point
 
 
 class EmulatedSimulator:
-    """Answers points by the emulator's means and its noise near the base.
+    """Answers points by the emulator's means and its noise.
 
     It shows whether the rules hold where the emulator is the truth, and not whether it is.
 
@@ -41,9 +41,10 @@ class EmulatedSimulator:
         theta = space.coded_theta(np.array(point.theta))
         sizes = [space.coded_size(name, size) for name, size in point.sizes]
         names = tuple(name for name, _ in point.sizes)
-        triangle = np.linalg.cholesky(surfaces.noise.covariance(theta))
+        x = np.array([*theta, *sizes])
+        triangle = np.linalg.cholesky(surfaces.noise_covariance(x, names))
         scatter = triangle @ np.random.default_rng(point.seed).standard_normal(len(triangle))
-        return np.asarray(surfaces.predict(np.array([[*theta, *sizes]]), names)[0] + scatter)
+        return np.asarray(surfaces.predict(x[None], names)[0] + scatter)
 
 
 def emulated_heaps(

@@ -26,16 +26,13 @@ class Correction:
         One an observable.
     correlation : (observables, observables) array
         Of their errors.
-    noise : (observables, observables) array
-        Covariance of one run around the optimum.
-    noise_df : int
-        Its degrees of freedom.
+    noise_ratio : (observables,) array
+        Standard deviations of one run around the optimum over those of the emulator.
     """
 
     parts: tuple[Kriging, ...]
     correlation: np.ndarray
-    noise: np.ndarray
-    noise_df: int
+    noise_ratio: np.ndarray
 
     def mean(self, x: np.ndarray) -> np.ndarray:
         """What is added to the emulator, (n, observables)."""
@@ -90,18 +87,13 @@ class Model:
 
     def noise(self, x: np.ndarray, block: Block) -> np.ndarray:
         """Covariance of the noise of the means of a block, at one row of coded parameters, (k, k)."""
-        known = self.emulator.surfaces[block.condition].noise
-        covariance, freedom = (
-            known.covariance(x[: len(self.emulator.space.factors)]),
-            known.degrees_of_freedom,
-        )
+        surfaces = self.emulator.surfaces[block.condition]
+        covariance = surfaces.noise_covariance(x, self.mechanisms)
         if block.condition in self.corrections:
-            correction = self.corrections[block.condition]
-            covariance, freedom = correction.noise, correction.noise_df
-        count = len(block.columns)
-        # The inverse of an estimated covariance is too large on average (Wishart).
-        unbiased = freedom / max(freedom - count - 1.0, 1.0)
-        return block.scatter(covariance[np.ix_(block.columns, block.columns)]) * unbiased
+            ratio = self.corrections[block.condition].noise_ratio
+            covariance = ratio[:, None] * covariance * ratio
+        covariance = block.scatter(covariance[np.ix_(block.columns, block.columns)])
+        return covariance * surfaces.noise.inverse_bias(len(block.columns))
 
     def error(self, x: np.ndarray, block: Block) -> np.ndarray:
         """Covariance of the error of the prediction of a block, with what is systematic, (k, k)."""

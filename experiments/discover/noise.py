@@ -84,6 +84,29 @@ def fit_noise(theta: np.ndarray, deviations: np.ndarray, floor: np.ndarray) -> N
     return Noise(coefficients, shrunk, len(deviations))
 
 
+def fit_growth(size: np.ndarray, ratios: np.ndarray) -> np.ndarray:
+    """Fit exp(growth x size) to the mean of squared deviations over the variance that they have at size 0.
+
+    Parameters
+    ----------
+    size : (n,) array
+        Coded sizes.
+    ratios : (n, observables) array
+
+    Returns
+    -------
+    (observables,) array
+        Maximum of the gamma likelihood, with the prior of a slope, by Fisher scoring.
+    """
+    growth = np.zeros(ratios.shape[1])
+    information = 0.5 * np.sum(size**2) + SLOPE_SD**-2
+    for _ in range(NEWTON_STEPS):
+        surplus = ratios / np.exp(size[:, None] * growth) - 1.0
+        step = (0.5 * size @ surplus - growth * SLOPE_SD**-2) / information
+        growth = growth + np.clip(step, -1.0, 1.0)
+    return np.asarray(growth)
+
+
 def repeat_deviations(groups: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Deviations of repeated runs from their means, independent and of the covariance of one run.
 

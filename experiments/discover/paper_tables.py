@@ -230,7 +230,7 @@ def _addition(signature: pd.Series, noise: Noise) -> Addition:
     coefficients[0] = signature["shift"]
     gram_inverse[0, 0] = signature["spread"] / variance[0] if signature["lost"] else signature["share"]
     base_terms = np.zeros((2 + factors, (1 + factors) * (2 + factors) // 2))
-    return Addition(_exact(coefficients), base_terms, gram_inverse, variance)
+    return Addition(_exact(coefficients), base_terms, gram_inverse, np.zeros(1), variance)
 
 
 def _exact(coefficients: np.ndarray) -> Polynomial:

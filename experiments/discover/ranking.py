@@ -162,14 +162,13 @@ def visibilities(base: Fitted, seen: Signatures, settings: Settings) -> tuple[Vi
     """Power of the data for every mechanism, from the calibrated base.
 
     A mechanism is found where its visible effect is ``least_ratio`` standard deviations and what the power
-    asks beyond. It is told from a rival where the difference in Q, which is d^2 +- 2 d for models d apart,
-    passes the tie margin with that power.
+    asks beyond. It may be told from a rival if at its largest size that is more likely than a tie: the
+    difference in Q of models d apart is d^2 +- 2 d.
     """
     quantile = float(stats.norm.ppf(settings.power))
     project = projector(base.sensitivities) @ base.whitening
     theta = base.x[: len(base.model.emulator.space.factors)]
     correlations = np.maximum(seen.correlations, 0.0) - np.eye(len(seen.names))
-    least_apart = quantile + float(np.sqrt(quantile**2 + settings.tie_margin))
     out = []
     for index, name in enumerate(seen.names):
         effects = secants(base.model.emulator, base.stack.blocks, theta, name, SIZES) @ project.T
@@ -179,7 +178,7 @@ def visibilities(base: Fitted, seen: Signatures, settings: Settings) -> tuple[Vi
         closest = int(np.argmax(correlations[index])) if len(seen.names) > 1 else index
         apart = float(np.sqrt(squares.max() if closest == index else _apart(seen, index, closest)))
         rival = seen.names[closest] if closest != index else ""
-        resolvable = np.isfinite(gamma80) and (apart >= least_apart or not rival)
+        resolvable = np.isfinite(gamma80) and (apart**2 >= settings.tie_margin or not rival)
         if settings.resolvable is not None:
             resolvable = name in settings.resolvable
         share = float(seen.shares[index])

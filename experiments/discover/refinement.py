@@ -99,8 +99,6 @@ def correct(model: Model, runs: Runs, centre: np.ndarray) -> Model:
     amplitude = _likeliest(list(local.values()))
     corrections = {}
     for name, part in local.items():
-        known = model.emulator.surfaces[name].noise
-        sd = np.sqrt(ratio)
         parts = [
             krige(
                 part.x,
@@ -111,8 +109,8 @@ def correct(model: Model, runs: Runs, centre: np.ndarray) -> Model:
             )
             for j in range(len(ratio))
         ]
-        noise = known.covariance(centre[:factors]) * sd[:, None] * sd
-        corrections[name] = Correction(tuple(parts), known.correlation, noise, known.degrees_of_freedom)
+        correlation = model.emulator.surfaces[name].noise.correlation
+        corrections[name] = Correction(tuple(parts), correlation, np.sqrt(ratio))
     return replace(model, corrections=corrections)
 
 
@@ -132,10 +130,9 @@ def _local(
 ) -> _Local:
     here = runs.conditions == condition
     x = runs.x[here]
-    noise = (
-        model.emulator.surfaces[condition].noise.variance(centre[: len(model.emulator.space.factors)]) * ratio
-    )
-    stated = np.diag(model.emulator.surfaces[condition].error(centre, model.mechanisms))
+    surfaces = model.emulator.surfaces[condition]
+    noise = np.diag(surfaces.noise_covariance(centre, model.mechanisms)) * ratio
+    stated = np.diag(surfaces.error(centre, model.mechanisms))
     prior = np.maximum(stated, LEAST_AMPLITUDE * noise)
     missed = runs.values[here] - model.predict(x, condition)
     return _Local(x, missed, noise, prior, squared_exponential(x / length, x / length))
@@ -154,14 +151,14 @@ def _likeliest(parts: Sequence[_Local]) -> float:
 
 
 def _noise_ratio(model: Model, runs: Runs, conditions: Sequence[str]) -> np.ndarray:
-    """Variance of fresh repeats over the bank's, an observable, pooled over conditions, (observables,)."""
+    """Variance of fresh repeats over the emulator's, pooled over conditions, (observables,)."""
     total, count = np.full(len(model.emulator.observables), NOISE_WEIGHT), NOISE_WEIGHT
-    factors = len(model.emulator.space.factors)
     for name in conditions:
         here = np.flatnonzero(runs.conditions == name)
         _, groups = np.unique(runs.x[here], axis=0, return_inverse=True)
         rows, deviations = repeat_deviations(groups.reshape(-1), runs.values[here])
-        known = model.emulator.surfaces[name].noise.variance(runs.x[here][rows][:, :factors])
-        total = total + (deviations**2 / known).sum(axis=0)
+        for x, deviation in zip(runs.x[here][rows], deviations, strict=True):
+            known = np.diag(model.emulator.surfaces[name].noise_covariance(x, model.mechanisms))
+            total = total + deviation**2 / known
         count += len(rows)
     return total / count

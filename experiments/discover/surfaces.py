@@ -15,13 +15,15 @@ import numpy as np
 from scipy import stats
 
 from experiments.discover.kriging import Kriging, fit_kriging
-from experiments.discover.noise import Noise, fit_noise, repeat_deviations
+from experiments.discover.noise import Noise, fit_growth, fit_noise, repeat_deviations
 from experiments.errors import InputError
 
 FAILURE_LEVEL = 0.005
 """A polynomial fails if leave-one-out errors as large as its own have this probability under noise alone."""
 MISFIT_LEVEL = 0.05
 """Errors of a larger probability are noise: a variance of the misfit would be chance."""
+BETTER = 0.97
+"""Kriging is kept where it lowers the mean square of what is left out to less than this."""
 LEAST_SIZE = 0.05
 """Runs of smaller coded sizes say too little of what a mechanism adds to be divided by their size."""
 
@@ -82,13 +84,16 @@ class Addition:
     base_terms : (terms, base terms) array
         Errors of the base's coefficients come through as minus this matrix times them.
     gram_inverse : (terms, terms) array
+    growth : (observables,) array
+        Logarithm of the variance of one run at the largest size over that without the mechanism.
     variance : (observables,) array
-        Of the residuals of its runs.
+        Of one run, mean over the mechanism's runs.
     """
 
     polynomial: Polynomial
     base_terms: np.ndarray
     gram_inverse: np.ndarray
+    growth: np.ndarray
     variance: np.ndarray
 
 
@@ -125,6 +130,15 @@ class Surfaces:
             if part.kriging:
                 values += size[:, None] * part.missed(np.column_stack([theta, size]))
         return np.asarray(values)
+
+    def noise_covariance(self, x: np.ndarray, mechanisms: tuple[str, ...]) -> np.ndarray:
+        """Covariance of one run at one row of coded parameters, (observables, observables)."""
+        theta = x[: len(x) - len(mechanisms)]
+        growth = np.zeros(len(self.base.misfit))
+        for name, size in zip(mechanisms, x[len(theta) :], strict=True):
+            growth = growth + size * self.additions[name].growth
+        sd = np.exp(0.5 * growth)
+        return np.asarray(sd[:, None] * self.noise.covariance(theta) * sd)
 
     def error(self, x: np.ndarray, mechanisms: tuple[str, ...]) -> np.ndarray:
         """Covariance of the prediction's error at one row of coded parameters, (observables, observables)."""
@@ -194,30 +208,41 @@ def fit_surfaces(
 
 
 def _fit_addition(base: Surfaces, theta: np.ndarray, size: np.ndarray, values: np.ndarray) -> Addition:
-    terms = added(theta, size)
+    terms, points = added(theta, size), np.column_stack([theta, size])
     difference = values - base.predict(theta, ())
-    variance = base.noise.variance(theta)
-    polynomial = _fit_polynomial(
-        terms, np.column_stack([theta, size]), difference, variance, base.noise.degrees_of_freedom, size
+    noise = base.noise.variance(theta)
+    inverse = np.linalg.pinv(terms)
+    coefficients = inverse @ difference
+    leverage = np.einsum("ij,ji->i", terms, inverse)[:, None]
+    left_out = (difference - terms @ coefficients) / (1.0 - leverage)
+    # A heap with a mechanism scatters more: an excess of the residuals is noise unless it is smooth.
+    growth = fit_growth(size, left_out**2 * (1.0 - leverage) / noise)
+    freedom, kept = len(size) - terms.shape[1], size >= LEAST_SIZE
+    suspect = (left_out**2 * (1.0 - leverage) / noise).mean(axis=0) > stats.f.isf(
+        FAILURE_LEVEL, freedom, base.noise.degrees_of_freedom
     )
-    residual = difference - terms @ polynomial.coefficients
+    kriging = {}
+    for column in np.flatnonzero(suspect):
+        scatter = noise[:, column] * np.exp(size * growth[column])
+        missed = (difference - terms @ coefficients)[kept, column] / size[kept]
+        fitted = fit_kriging(points[kept], missed, scatter[kept] / size[kept] ** 2)
+        alone = fitted.leave_one_out * size[kept]
+        if np.mean(alone**2 / scatter[kept]) < BETTER * np.mean(left_out[kept, column] ** 2 / scatter[kept]):
+            kriging[int(column)] = fitted
+            growth[column] = fit_growth(size[kept], (alone**2 / noise[kept, column])[:, None])[0]
     return Addition(
-        polynomial,
-        polynomial.pseudo_inverse @ quadratic(theta),
-        polynomial.pseudo_inverse @ polynomial.pseudo_inverse.T,
-        np.maximum((residual**2).sum(axis=0) / (len(size) - terms.shape[1]), variance.mean(axis=0)),
+        Polynomial(coefficients, inverse, np.zeros(len(growth)), kriging),
+        inverse @ quadratic(theta),
+        inverse @ inverse.T,
+        growth,
+        (noise * np.exp(size[:, None] * growth)).mean(axis=0),
     )
 
 
 def _fit_polynomial(
-    terms: np.ndarray,
-    points: np.ndarray,
-    values: np.ndarray,
-    noise: np.ndarray,
-    noise_df: int,
-    size: np.ndarray | None = None,
+    terms: np.ndarray, points: np.ndarray, values: np.ndarray, noise: np.ndarray, noise_df: int
 ) -> Polynomial:
-    """Least squares, leave-one-out, and kriging (with a size: of what is missed over it) where they fail."""
+    """Least squares and leave-one-out; what is smooth in the rest is kriged where they fail."""
     inverse = np.linalg.pinv(terms)
     coefficients = inverse @ values
     residual = values - terms @ coefficients
@@ -227,15 +252,10 @@ def _fit_polynomial(
     ratio = excess.mean(axis=0) / noise.mean(axis=0)
     beyond = ratio > stats.f.isf(MISFIT_LEVEL, freedom, noise_df)
     misfit = np.where(beyond, excess.mean(axis=0) - noise.mean(axis=0), 0.0)
-    scale = np.ones(len(terms)) if size is None else size
-    kept = scale >= LEAST_SIZE
-    # What is missed of a mechanism grows with its size: the variance is stated over the square of the size.
-    misfit = misfit / np.mean(scale**2)
     kriging = {}
     for column in np.flatnonzero(ratio > stats.f.isf(FAILURE_LEVEL, freedom, noise_df)):
-        missed, scatter = residual[kept, column] / scale[kept], noise[kept, column] / scale[kept] ** 2
-        fitted = fit_kriging(points[kept], missed, scatter)
-        left = (fitted.leave_one_out * scale[kept]) ** 2
-        if left.mean() < excess[kept, column].mean():
+        fitted = fit_kriging(points, residual[:, column], noise[:, column])
+        left_out = residual[:, column] / (1.0 - leverage[:, 0])
+        if np.mean(fitted.leave_one_out**2) < BETTER * np.mean(left_out**2):
             kriging[int(column)] = fitted
     return Polynomial(coefficients, inverse, misfit, kriging)

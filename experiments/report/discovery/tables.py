@@ -7,7 +7,7 @@ import pandas as pd
 
 from experiments.discover.discovery import BeforeAfter, Candidate, Discovery, Fit, Interval
 from experiments.discover.settings import Settings
-from experiments.report.discovery.terms import GAP, Terms, condition_name, percent
+from experiments.report.discovery.terms import GAP, Terms, condition_name
 from experiments.report.numbers import MISSING, fixed, interval, trimmed
 from experiments.report.tables import Column, Table, make_table
 
@@ -106,8 +106,8 @@ def candidates_table(found: Discovery, terms: Terms, settings: Settings) -> Tabl
     note = (
         "Q: squared residuals of the training conditions in standard deviations, after factors and size were"
         " fitted together; its limit is what 2.5 % of data sets exceed that the model itself makes. Held-out"
-        " gain: rise of the log score of the conditions that took no part in any fit, with its"
-        f" {percent(settings.held_out_coverage)} interval."
+        " gain: rise of the log score of the conditions that took no part in any fit, with its 90 %"
+        " interval."
     )
     marks = [
         "chosen" if candidate.admitted and set(candidate.mechanisms) <= set(found.named) else ""

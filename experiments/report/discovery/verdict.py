@@ -164,8 +164,8 @@ def _margins(found: Discovery, terms: Terms, settings: Settings) -> Iterator[str
         f"Data that took the size ({fixed(weakest, 1)} standard errors from its null) below {least:g} of them"
     )
     if chosen.held_out_gain:
-        gain = _gain(chosen.held_out_gain, settings)
-        text += f", or the held-out gain (now {gain}) to an interval that holds zero"
+        gain = _gain(chosen.held_out_gain)
+        text += f", or the held-out gain (now {gain}) to nothing"
     yield text + ", would withdraw the name."
     room = chosen.q_limit - chosen.q
     if room > 0.0:
@@ -251,9 +251,8 @@ def _q(interval: Interval) -> str:
     return f"{value} ({low} to {high})"
 
 
-def _gain(gain: Interval, settings: Settings) -> str:
-    coverage = percent(settings.held_out_coverage)
-    return f"{fixed(gain.value, 1)}, {coverage} interval {fixed(gain.low, 1)} to {fixed(gain.high, 1)}"
+def _gain(gain: Interval) -> str:
+    return f"{fixed(gain.value, 1)}, 90 % interval {fixed(gain.low, 1)} to {fixed(gain.high, 1)}"
 
 
 def _p(value: float) -> str:
