@@ -45,9 +45,7 @@ class Trial:
 
 
 TRIALS = {
-    "cpu": Trial(
-        "bench", 64, "Here at bench scale: 400 grains, shear modulus / 400, {} heaps of each kind."
-    ),
+    "cpu": Trial("bench", 64, "Here at bench scale: 400 grains, shear modulus / 400, {} heaps of each kind."),
     "cuda": Trial(
         "soft", 20, "Here at the paper's size with its shear modulus / 100, {} heaps of each kind."
     ),

@@ -42,6 +42,8 @@ class Plan:
         Of two resolvable mechanisms, both strong.
     replicates : int
         Heaps a condition.
+    mechanisms : tuple of str
+        Those of the library that are hidden; none: all. The analysis knows the whole library.
     """
 
     nulls: int = 100
@@ -52,9 +54,13 @@ class Plan:
     strangers: int = 7
     pairs: int = 30
     replicates: int = 8
+    mechanisms: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "mechanisms", tuple(self.mechanisms))  # a list, where it comes from a file
         for field in fields(self):
+            if field.name == "mechanisms":
+                continue
             least = 2 if field.name == "replicates" else 0
             if (count := getattr(self, field.name)) < least:
                 raise InputError(f"is at least {least}", count, f"Plan.{field.name}")
@@ -148,8 +154,12 @@ def draw(
     Raises
     ------
     InputError
-        When pairs are asked for and fewer than two mechanisms are resolvable.
+        When the plan names what is not in the library, or pairs are asked for and fewer than two mechanisms
+        are resolvable.
     """
+    if foreign := set(plan.mechanisms) - {effect.name for effect in library}:
+        raise InputError("are mechanisms of the library", sorted(foreign), "Plan.mechanisms")
+    library = [effect for effect in library if not plan.mechanisms or effect.name in plan.mechanisms]
     drafts = [*_alone(plan, library, rng), *_outside(plan, library, strangers, rng)]
     drafts += _pairs(plan, [effect for effect in library if effect.resolvable], rng)
     trials = []

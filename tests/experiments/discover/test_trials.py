@@ -58,6 +58,14 @@ def draw_trials(seed: int = 1, plan: Plan = PLAN) -> tuple[tuple[Label, Sealed],
     return draw(plan, FACTORS, LIBRARY, STRANGERS, np.random.default_rng(seed), lambda: "salt")
 
 
+def test_a_plan_may_hide_some_of_the_library_only() -> None:
+    trials = draw_trials(plan=replace(PLAN, mechanisms=["cohesion", "spread"]))
+    hidden = {name for label, _ in trials if label.kind != Kind.STRANGER for name, _ in label.sizes}
+    assert hidden == {"cohesion", "spread"}
+    with pytest.raises(InputError, match="mechanisms of the library"):
+        draw_trials(plan=replace(PLAN, mechanisms=["cohesoin"]))
+
+
 def test_every_kind_of_trial_is_drawn_as_planned() -> None:
     kinds = [label.kind for label, _ in draw_trials()]
     # Three mechanisms are resolvable (cohesion, bridges, spread), two are not.
