@@ -74,7 +74,7 @@ class Settings:
     tie_margin: float = 6.0
     incomplete_share: float = 0.97
     power: float = 0.8
-    systematic: float = 0.1
+    systematic: float = 0.2
     draws: int = 4000
     shortlist_share: float = 0.3
     shortlist: int = 4
