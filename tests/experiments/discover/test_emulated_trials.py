@@ -8,9 +8,8 @@ import pytest
 from scipy import stats
 from synthetic import SETTINGS, emulator, space
 
-from experiments.discover.emulated import EmulatedSimulator, emulated_heaps
+from experiments.discover.emulated import emulated_heaps
 from experiments.discover.emulated_trials import draw_truths, run_trial, summary
-from experiments.discover.simulator import Outcomes
 from experiments.discover.trials.declaration import declared_effects, with_names
 from experiments.discover.trials.drawing import STRONG
 
@@ -65,15 +64,3 @@ def test_emulated_heaps_scatter_about_the_emulator_as_its_noise_says() -> None:
     np.testing.assert_allclose(
         np.sqrt(np.diag(heaps.covariance("wide"))) / sd, 1.0, atol=4.0 / np.sqrt(800.0)
     )
-
-
-def test_the_emulated_simulator_answers_in_the_columns_of_the_bank() -> None:
-    simulator = EmulatedSimulator(KNOWN)
-    point = space().point(np.array([0.0, 0.0, 0.0]), (), "base", 7)
-    first, second = _rows(simulator([point, point]))
-    assert len(first) == len(simulator.observables)
-    np.testing.assert_array_equal(first, second)
-
-
-def _rows(outcomes: Outcomes) -> np.ndarray:
-    return outcomes.values

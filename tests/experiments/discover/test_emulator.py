@@ -11,6 +11,7 @@ from scipy import stats
 from synthetic import CONDITIONS, OBSERVABLES, SETTINGS, SyntheticSimulator, bank, emulator, space
 
 from experiments.discover.bank import Bank, bank_points, load_bank, make_bank
+from experiments.discover.emulated import EmulatedSimulator
 from experiments.discover.emulator import fit_emulator
 from experiments.discover.fitting import whiten
 from experiments.discover.kriging import fit_kriging, krige
@@ -164,3 +165,11 @@ def test_a_mechanism_that_always_clogs_leaves_the_library() -> None:
 def test_a_condition_that_always_clogs_is_an_error_with_its_name() -> None:
     with pytest.raises(InputError, match="condition wide of the bank"):
         fit_emulator(_with_failures(bank().condition == 2))
+
+
+def test_the_emulated_simulator_answers_in_the_columns_of_the_bank() -> None:
+    simulator = EmulatedSimulator(emulator())
+    point = space().point(np.zeros(3), (), "base", 7)
+    first, second = simulator([point, point]).values
+    assert len(first) == len(simulator.observables)
+    np.testing.assert_array_equal(first, second)
