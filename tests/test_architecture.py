@@ -42,6 +42,7 @@ COMES_WITH = {
     "contourpy": "matplotlib",
     "markupsafe": "jinja2",
     "pydantic_core": "pydantic",
+    "threadpoolctl": "scikit-learn",
 }
 
 MAX_FILE_LINES = 450

@@ -43,6 +43,7 @@ from experiments.discover.records import (
 )
 from experiments.discover.settings import Settings
 from experiments.discover.simulator import Outcomes, Point
+from experiments.discover.threads import steps_in_one_thread
 
 Analysis = Generator[list[Point], Outcomes, Discovery]
 
@@ -60,6 +61,7 @@ class _Base:
     visible: tuple[Visibility, ...]
 
 
+@steps_in_one_thread
 def analyse(measured: Measured, emulator: Emulator, settings: Settings, seed: int) -> Analysis:
     """Analyse measured heaps.
 

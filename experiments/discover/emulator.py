@@ -11,6 +11,7 @@ import numpy as np
 from experiments.discover.bank import Bank, load_bank
 from experiments.discover.space import SearchSpace
 from experiments.discover.surfaces import Surfaces, added, fit_surfaces
+from experiments.discover.threads import in_one_thread
 from experiments.errors import InputError
 
 RESOLUTION = 1e-3
@@ -48,6 +49,7 @@ class Emulator:
         return replace(self, space=self.space.without(*mechanisms))
 
 
+@in_one_thread
 def fit_emulator(bank: Bank) -> Emulator:
     """Fit every surface to a bank.
 
