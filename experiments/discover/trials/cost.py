@@ -14,6 +14,8 @@ from experiments.discover.trials.truth import Sealed
 PER_CASE = 0.007
 """Seconds of an H200 that a case of 400 grains of three spheres takes, with 1000 and more at once."""
 
+_LIKELY_RIVALS = 2
+
 
 def planned_cases(sealed: Sequence[Sealed], declared: Declaration, bank: Bank) -> pd.DataFrame:
     """Cases of the bank, of the trials' heaps, and of their analyses.
@@ -31,8 +33,8 @@ def planned_cases(sealed: Sequence[Sealed], declared: Declaration, bank: Bank) -
     -------
     pandas.DataFrame
         Columns: what, trials, cases, and the most that there can be where it depends on what is found; GPU
-        seconds of these. An analysis without a gap asks for no case; one with a gap is taken to need one
-        round of the shortlist, and at the most all rounds, of single mechanisms and of pairs.
+        seconds of these. An analysis without a gap asks for no case; one with a gap is taken to run the base
+        and two rivals once, and at the most the whole shortlist in every round, of singles and of pairs.
     """
     conditions = len(bank.space.conditions)
     cases = len(bank.reasons)
@@ -58,9 +60,10 @@ def planned_cases(sealed: Sequence[Sealed], declared: Declaration, bank: Bank) -
 def search_cases(settings: Settings, conditions: int) -> tuple[int, int]:
     """Cases that an analysis with a gap asks for: likely, and at the most.
 
-    Every round runs the shortlist and the base around their optima; at the end the base and the chosen model
-    run side by side.
+    Every round runs the base and its rivals around their optima; at the end the base and the chosen model run
+    side by side.
     """
-    a_round = settings.refinement_points * settings.refinement_repeats * conditions * (settings.shortlist + 1)
+    one_model = settings.refinement_points * settings.refinement_repeats * conditions
+    most_rounds = 2 * settings.refinement_rounds * (settings.shortlist + 1) * one_model
     end = 2 * settings.direct_runs * conditions
-    return a_round + end, 2 * settings.refinement_rounds * a_round + end
+    return (_LIKELY_RIVALS + 1) * one_model + end, most_rounds + end

@@ -33,7 +33,7 @@ from experiments.errors import InputError
 from experiments.files import write_text
 from experiments.study import Study
 
-BATCH = 8192
+BATCH = 16384
 """Points between two looks at the clock."""
 
 
