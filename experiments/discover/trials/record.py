@@ -30,10 +30,11 @@ def gather(folder: Folder, record: Path) -> None:
     InputError
         When one is missing.
     """
-    files = [folder.record / name for name in (DECLARED, SEALED, FINDINGS, RUNS)]
-    for source in (*files, folder.hidden / LABELS):
+    files = [*(folder.record / name for name in (DECLARED, SEALED, FINDINGS, RUNS)), folder.hidden / LABELS]
+    for source in files:
         if not source.is_file():
             raise InputError("trials that are revealed have run", "no such file", str(source))
+    for source in files:
         with replacing(record / source.name) as temporary:
             shutil.copyfile(source, temporary)
 

@@ -12,9 +12,12 @@ from experiments.discover.settings import Settings
 from experiments.discover.trials.declaration import Declaration
 from experiments.discover.trials.drawing import Effect, Plan
 from experiments.discover.trials.findings import EVERYTHING, Finding, findings_table, write_findings
+from experiments.discover.trials.folder import Folder
 from experiments.discover.trials.page import write_page
+from experiments.discover.trials.record import gather
 from experiments.discover.trials.score import Share, aims, confusion, covered, power_curve, removed, scored
 from experiments.discover.trials.truth import Kind, Label, Sealed, write_labels, write_sealed
+from experiments.errors import InputError
 
 
 def label_of(kind: Kind, *names: str, strength: float = 2.0) -> Label:
@@ -149,3 +152,11 @@ def test_the_page_is_written_from_the_record_alone(tmp_path: Path) -> None:
         "confusion-everything.png",
         "power-everything.png",
     }
+
+
+def test_trials_that_have_not_run_leave_a_record_as_it_is(tmp_path: Path) -> None:
+    folder = Folder(tmp_path / "trials")
+    write_sealed(folder.sealed, [])
+    with pytest.raises(InputError, match="trials that are revealed have run"):
+        gather(folder, tmp_path / "record")
+    assert not (tmp_path / "record").exists()
