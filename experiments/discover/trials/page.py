@@ -28,7 +28,7 @@ from experiments.discover.trials.score import (
 from experiments.discover.trials.truth import read_labels, read_sealed, revealed
 from experiments.files import write_text
 
-RECORD = Path(__file__).parents[1] / "record" / "trials"
+RECORD = Path(__file__).parents[1] / "record"
 """Where the record of the full trials lies."""
 
 TITLES = {EVERYTHING: "With every observable", PHOTOGRAPHS: "With photographs only"}
