@@ -121,11 +121,14 @@ def process_crew(begin: Callable[[str], Analysis], workers: int) -> Iterator[Pro
         with _one_thread_each():
             for _ in range(workers):
                 mine, theirs = context.Pipe()
-                process = context.Process(target=_serve, args=(theirs, begin), daemon=True)
+                process = context.Process(target=_serve, args=(theirs,), daemon=True)
                 process.start()
                 theirs.close()
                 pipes.append(mine)
                 processes.append(process)
+        # Not with the start, which waits until the process before has loaded its libraries and reads.
+        for pipe in pipes:
+            pipe.send(begin)
         yield ProcessCrew(pipes)
     finally:
         for pipe in pipes:
@@ -149,9 +152,12 @@ def _one_thread_each() -> Iterator[None]:
                 os.environ[name] = value
 
 
-def _serve(pipe: Connection, begin: Callable[[str], Analysis]) -> None:
-    """Run analyses until the other end of the pipe closes."""
-    crew = LocalCrew(begin)
+def _serve(pipe: Connection) -> None:
+    """Be told how analyses begin, and run them until the other end of the pipe closes."""
+    try:
+        crew = LocalCrew(pipe.recv())
+    except EOFError:
+        return
     while True:
         try:
             answers = pipe.recv()
