@@ -9,7 +9,7 @@ from scipy import stats
 from synthetic import SETTINGS, emulator, space
 
 from experiments.discover.emulated import emulated_heaps
-from experiments.discover.emulated_trials import draw_truths, run_trial, summary
+from experiments.discover.trials.emulated import draw_truths, run_trial, summary
 from experiments.discover.trials.declaration import declared_effects, with_names
 from experiments.discover.trials.drawing import STRONG
 

@@ -1,6 +1,6 @@
 """Trials of the decision rules on a bank alone, in seconds: the truth is drawn from the emulator.
 
-    python -m experiments.discover.emulated_trials bank.npz --count 8
+    python -m experiments.discover.trials.emulated bank.npz --count 8
 
 They tune and guard the rules without a simulation. What they cannot show is whether the emulator is right;
 the blind trials do that.
