@@ -9,9 +9,9 @@ from scipy import stats
 from synthetic import SETTINGS, emulator, space
 
 from experiments.discover.emulated import emulated_heaps
-from experiments.discover.trials.emulated import draw_truths, run_trial, summary
 from experiments.discover.trials.declaration import declared_effects, with_names
 from experiments.discover.trials.drawing import STRONG
+from experiments.discover.trials.emulated import draw_truths, run_trial, summary
 
 KNOWN = emulator().without("twin")
 
