@@ -132,7 +132,7 @@ def _cards(found: Discovery, terms: Terms) -> list[Card]:
             f"{found.base.degrees_of_freedom:.0f} degrees of freedom, limit {trimmed(found.base.q_limit, 3)}"
         )
         cards.append(Card("Q of the calibrated base", trimmed(found.base.q, 3), more))
-    if found.gap and found.gap.drop_mechanism:
+    if found.gap and found.gap.drop_mechanism and not found.chosen:
         more = f"{terms.title(found.gap.drop_mechanism)}; limit {trimmed(found.gap.drop_limit, 3)}"
         cards.append(Card("Largest fall of Q by one mechanism", trimmed(found.gap.largest_drop, 3), more))
     if found.chosen:
