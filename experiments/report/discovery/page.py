@@ -104,7 +104,7 @@ def render_discovery(
         next_step=next_step(found, terms),
         changes=changes(found, terms, settings),
         sections=[
-            section for section in _sections(found, terms, settings) if pictures or section.name != "heaps"
+            section for section in _sections(found, terms) if pictures or section.name != "heaps"
         ],
         pictures=pictures,
         files=files,
@@ -146,11 +146,11 @@ def _cards(found: Discovery, terms: Terms) -> list[Card]:
     return cards
 
 
-def _sections(found: Discovery, terms: Terms, settings: Settings) -> list[Section]:
+def _sections(found: Discovery, terms: Terms) -> list[Section]:
     """Build the sections that this discovery has something for."""
     built = {
         "gap": _gap(found, terms),
-        "candidates": _candidates(found, terms, settings),
+        "candidates": _candidates(found, terms),
         "before_after": _before_after(found),
         "compared": _compared(found, terms),
         "heaps": Section("heaps"),
@@ -171,13 +171,13 @@ def _gap(found: Discovery, terms: Terms) -> Section | None:
     return Section("gap", shown, {"maps": charts.residual_maps(found, terms)})
 
 
-def _candidates(found: Discovery, terms: Terms, settings: Settings) -> Section | None:
+def _candidates(found: Discovery, terms: Terms) -> Section | None:
     if not found.candidates:
         return None
     drawn = {"explained": [charts.explained_chart(found, terms)]}
     if found.confounding:
         drawn["confounding"] = [charts.confounding_chart(found.confounding, terms)]
-    return Section("candidates", {"candidates": tables.candidates_table(found, terms, settings)}, drawn)
+    return Section("candidates", {"candidates": tables.candidates_table(found, terms)}, drawn)
 
 
 def _before_after(found: Discovery) -> Section | None:

@@ -6,7 +6,6 @@ import numpy as np
 import pandas as pd
 
 from experiments.discover.discovery import BeforeAfter, Candidate, Discovery, Fit, Interval
-from experiments.discover.settings import Settings
 from experiments.report.discovery.terms import GAP, Terms, condition_name
 from experiments.report.numbers import MISSING, fixed, interval, trimmed
 from experiments.report.tables import Column, Table, make_table
@@ -72,7 +71,7 @@ def parameters_frame(found: Discovery) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def candidates_table(found: Discovery, terms: Terms, settings: Settings) -> Table:
+def candidates_table(found: Discovery, terms: Terms) -> Table:
     """Lay out the ranked candidates."""
     frame = pd.DataFrame(
         [
