@@ -114,8 +114,12 @@ def heap_row(study: Study, heaps: Mapping[str, CaseResult]) -> np.ndarray:
     return np.hstack(row)
 
 
-def drawn_heap(study: Study, result: CaseResult) -> tuple[tuple[HeapAngle, int], Snapshot, np.ndarray]:
-    """Measure and draw a heap in the view nearest to the mean over all: angle and view, picture, overlay.
+def drawn_heap(
+    study: Study, result: CaseResult, view: int | None = None
+) -> tuple[tuple[HeapAngle, int], Snapshot, np.ndarray]:
+    """Measure and draw a heap in one view: angle and view, picture, overlay.
+
+    Without a `view`, it is the one nearest to the mean over all.
 
     Raises
     ------
@@ -123,7 +127,8 @@ def drawn_heap(study: Study, result: CaseResult) -> tuple[tuple[HeapAngle, int],
         When there is no heap to measure.
     """
     angle = measure_heap(study, result)
-    view = int(np.argmin([abs(seen.mean - angle.mean) for seen in angle.views]))
+    if view is None:
+        view = int(np.argmin([abs(seen.mean - angle.mean) for seen in angle.views]))
     picture = snapshot(
         result.sphere_centers,
         result.sphere_radii,

@@ -92,7 +92,11 @@ def gap_chart(found: Discovery) -> Chart:
     """Draw the gap of fresh runs before and after, with its intervals."""
     figure = new_figure("Q of fresh runs (noise alone: the green line)")
     rows = ["held-out conditions" if both.held_out else "training conditions" for both in found.before_after]
-    for name, label, color in (("before", "base", BASE), ("after", "with the mechanism", ADDED)):
+    for name, label, color, aside in (
+        ("before", "base", BASE, 0.5 * DODGE),
+        ("after", "with the mechanism", ADDED, -0.5 * DODGE),
+    ):
+        places = [at + aside for at in range(len(rows))]
         ends = [getattr(both, name) for both in found.before_after]
         error = {
             "type": "data",
@@ -101,14 +105,21 @@ def gap_chart(found: Discovery) -> Chart:
             "arrayminus": [end.value - end.low for end in ends],
             "color": color,
         }
-        add_points(figure, [end.value for end in ends], rows, label, color, size=11, error_x=error)
+        add_points(figure, [end.value for end in ends], places, label, color, size=11, error_x=error)
     for at, both in enumerate(found.before_after):
         df = both.degrees_of_freedom
         figure.add_shape(
             type="line", x0=df, x1=df, y0=at - 0.35, y1=at + 0.35, line={"color": GREEN, "width": 3}
         )
     figure.update_xaxes(type="log", dtick=1 if _decades(found) > 1.0 else "D2")
-    figure.update_yaxes(ticks="", ticklabelstandoff=6, range=[-0.6, len(rows) - 0.4])
+    figure.update_yaxes(
+        ticks="",
+        ticklabelstandoff=6,
+        tickvals=list(range(len(rows))),
+        ticktext=rows,
+        range=[len(rows) - 0.4, -0.6],
+        showgrid=False,
+    )
     caption = "The gap before and after, from fresh direct runs, with 90 % bootstrap intervals."
     return Chart("gap-chart", caption, figure, height="low")
 

@@ -103,9 +103,7 @@ def render_discovery(
         explained=found.named,
         next_step=next_step(found, terms),
         changes=changes(found, terms, settings),
-        sections=[
-            section for section in _sections(found, terms) if pictures or section.name != "heaps"
-        ],
+        sections=[section for section in _sections(found, terms) if pictures or section.name != "heaps"],
         pictures=pictures,
         files=files,
         facts=study_facts(study),

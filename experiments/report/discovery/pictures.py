@@ -9,6 +9,9 @@ from experiments.report.pictures import HeapPicture, drawn_heap
 from experiments.study import Study
 from imaging import PictureError, measure_photograph, overlay, read_picture
 
+PIXELS = 800
+"""Width of a drawn heap."""
+
 
 def photograph(path: Path, condition: str, fit: str) -> HeapPicture | None:
     """Draw the fitted flanks on a photograph; None where it shows no heap."""
@@ -23,11 +26,11 @@ def photograph(path: Path, condition: str, fit: str) -> HeapPicture | None:
 
 
 def simulated_heap(title: str, condition: str, study: Study, result: CaseResult) -> HeapPicture | None:
-    """Draw a heap of a model in the view nearest to its mean angle; None where the case left none."""
+    """Draw a heap of a model as a photograph would show it, x to the right; None where the case left none."""
     if result.status != "finished":
         return None
     try:
-        (angle, view), _, image = drawn_heap(study, result)
+        (angle, view), _, image = drawn_heap(_in_large(study), result, view=0)
     except PictureError:
         return None
     seen = angle.views[view]
@@ -36,3 +39,8 @@ def simulated_heap(title: str, condition: str, study: Study, result: CaseResult)
         f" {seen.left:.1f}°, right {seen.right:.1f}°."
     )
     return HeapPicture(title, caption, image)
+
+
+def _in_large(study: Study) -> Study:
+    measurement = study.measurement.model_copy(update={"pixels": max(PIXELS, study.measurement.pixels)})
+    return study.model_copy(update={"measurement": measurement})

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from experiments.cli import app
+from experiments.commands.discover import OUTCOMES, Job, run_search
+from experiments.commands.run import check_runs
+from experiments.discover.observables import PHOTOGRAPHED
+from experiments.study import load_study
 
 TRIAL = Path(__file__).parents[3] / "experiments" / "studies" / "trial"
 STUDY = TRIAL / "study.toml"
-SHIPPED = TRIAL / "bank-bench.npz"
 DATA = Path(__file__).parent / "data"
 
 
@@ -59,3 +64,42 @@ def test_a_file_that_is_no_bank_is_an_error_and_leaves_nothing(tmp_path: Path) -
     assert code == 2
     assert "must be a bank" in err
     assert not (tmp_path / "out").exists()
+
+
+def test_heaps_that_lack_nothing_raise_no_alarm_with_a_balance_or_photographs_only(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    code, said, err = discover(DATA / "nothing-missing.csv", "--out", out)
+    assert (code, said) == (0, "")
+    assert "Nothing is missing. " in err
+    files = ["report.html", "results.json", "settings.json", "study.json", "tables"]
+    assert sorted(path.name for path in out.iterdir() if path.name != OUTCOMES) == files
+    code, said, _ = discover(
+        DATA / "nothing-missing.csv", "--out", out, "--resume", "--photographs-only", "--json"
+    )
+    found = json.loads(said)
+    assert code == 0
+    assert found["discovery"]["verdict"] == "none"
+    # Only what a photograph shows is left.
+    means = np.array(found["discovery"]["data"]["means"], dtype=float)
+    assert np.isfinite(means).sum(axis=1).tolist() == [len(PHOTOGRAPHED)] * len(means)
+
+
+def test_a_tilted_plate_is_found_on_the_real_engine(tmp_path: Path) -> None:
+    # Fewer fresh runs than the study's own: the tilt is many standard errors.
+    few = {"refinement_points": 2, "refinement_rounds": 1, "shortlist": 1, "direct_runs": 2}
+    study = load_study(STUDY, "bench", {"discover": {"settings": few}})
+    ended = run_search(Job(study, TRIAL / "tilted-bench.csv", tmp_path / "out", device="cpu"))
+    found = ended.discovery
+    assert found is not None
+    assert found.named == ("plate_tilt",)
+    assert found.chosen is not None
+    [size] = found.chosen.sizes
+    # Hidden: 4 degrees. Half a 90 % interval is 1.64 standard errors, so its full width holds 99.9 %.
+    width = size.high - size.low
+    assert size.value - width < 4.0 < size.value + width
+    training, held_out = found.before_after
+    assert training.after.value < training.before.value
+    assert held_out.after.value < held_out.before.value
+    again = load_study(tmp_path / "out" / "study-with-plate_tilt.toml")
+    check_runs(again)
+    assert again.factors[-1].name == "plate_tilt"
