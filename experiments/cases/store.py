@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import zipfile
 from dataclasses import fields
@@ -12,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from dem_warp import Case, CaseResult
-from dem_warp.provenance import engine_fingerprint
+from experiments.cases.key import case_key
 from experiments.errors import StoreError
 from experiments.files import replacing
 
@@ -37,10 +36,8 @@ class Store:
         self.folder = Path(folder)
 
     def key(self, case: Case) -> str:
-        """Key of a case: a hash of all that determines its result, the engine's own code included."""
-        determined_by = {"case": case.to_dict(), "engine": engine_fingerprint(), "format": FORMAT}
-        text = json.dumps(determined_by, sort_keys=True, separators=(",", ":"), allow_nan=False)
-        return hashlib.sha256(text.encode()).hexdigest()
+        """Key of a case: a hash of all that determines its result and how it is stored."""
+        return case_key(case, format=FORMAT)
 
     @property
     def unfinished(self) -> Path:

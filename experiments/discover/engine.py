@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Callable, Sequence
 from functools import lru_cache
 
 import numpy as np
 
 from dem_warp import Case, Progress
-from dem_warp.provenance import engine_fingerprint
+from experiments.cases.key import case_key
 from experiments.discover.library import Mechanism, with_mechanisms
 from experiments.discover.observables import NAMES, VERSION
 from experiments.discover.outcome_table import OutcomeTable
@@ -122,15 +120,8 @@ class EngineSimulator:
         return study.case(settings, point.seed)
 
     def key(self, case: Case) -> str:
-        """Key of a case: a hash of all that determines its observables, the engine's own code included."""
-        determined_by = {
-            "case": case.to_dict(),
-            "engine": engine_fingerprint(),
-            "measurement": self.study.measurement.model_dump(),
-            "observables": VERSION,
-        }
-        text = json.dumps(determined_by, sort_keys=True, separators=(",", ":"), allow_nan=False)
-        return hashlib.sha256(text.encode()).hexdigest()
+        """Key of a case: a hash of all that determines its observables."""
+        return case_key(case, measurement=self.study.measurement.model_dump(), observables=VERSION)
 
     def _extend(self, names: tuple[str, ...], condition: str) -> Study:
         mechanisms = [self._library[name] for name in names]

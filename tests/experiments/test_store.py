@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dem_warp import CaseResult
+from dem_warp import Case, CaseResult, ClumpShape
+from dem_warp.population import ShapeMixture
 from experiments.cases import Store, open_folder
-from experiments.cases import store as store_module
+from experiments.cases import key as key_module
 from experiments.errors import StoreError
 from experiments.files import replacing
 from experiments.study import Study, load_study
@@ -53,8 +54,50 @@ def test_another_engine_makes_another_key(
 ) -> None:
     store, case = Store(tmp_path), small_study.case({}, seed=1)
     key = store.key(case)
-    monkeypatch.setattr(store_module, "engine_fingerprint", lambda: "another")
+    monkeypatch.setattr(key_module, "engine_fingerprint", lambda: "another")
     assert store.key(case) != key
+
+
+def with_moved_spheres(case: Case, shape: ClumpShape, move: Callable[[float], float]) -> Case:
+    """The case, its grains of a shape whose spheres' coordinates and radii were moved."""
+    moved = dataclasses.replace(
+        shape, centers=np.vectorize(move)(shape.centers), radii=np.vectorize(move)(shape.radii)
+    )
+    return dataclasses.replace(case, grains=dataclasses.replace(case.grains, shape=moved))
+
+
+TRIPLET = ClumpShape.from_spheres([[0, 0, 0], [1.3e-3, 0, 0], [0.5e-3, 0.8e-3, 0]], [1e-3, 0.9e-3, 0.8e-3])
+
+
+@pytest.mark.parametrize("toward", [-np.inf, np.inf])
+def test_last_bits_of_a_shape_make_no_other_key(tmp_path: Path, small_study: Study, toward: float) -> None:
+    store, case = Store(tmp_path), small_study.case({}, seed=1)
+    exact = with_moved_spheres(case, TRIPLET, lambda x: x)
+    last_bit = with_moved_spheres(case, TRIPLET, lambda x: np.nextafter(x, toward))
+    assert exact.grains.shape != last_bit.grains.shape
+    assert store.key(exact) == store.key(last_bit)
+
+
+@pytest.mark.parametrize("place", [(0, 0), (1, 1), (2, 2)])
+def test_a_sphere_moved_by_a_billionth_of_the_size_makes_another_key(
+    tmp_path: Path, small_study: Study, place: tuple[int, int]
+) -> None:
+    store, case = Store(tmp_path), small_study.case({}, seed=1)
+    centers = TRIPLET.centers.copy()
+    centers[place] += 1e-9 * TRIPLET.bounding_radius
+    moved = dataclasses.replace(TRIPLET, centers=centers)
+    keys = [
+        store.key(dataclasses.replace(case, grains=dataclasses.replace(case.grains, shape=shape)))
+        for shape in (TRIPLET, moved, ShapeMixture((TRIPLET, moved), (0.5, 0.5)))
+    ]
+    assert len(set(keys)) == 3
+
+
+def test_a_shape_of_another_size_makes_another_key(tmp_path: Path, small_study: Study) -> None:
+    store, case = Store(tmp_path), small_study.case({}, seed=1)
+    exact = with_moved_spheres(case, TRIPLET, lambda x: x)
+    larger = with_moved_spheres(case, TRIPLET, lambda x: (1.0 + 1e-9) * x)
+    assert store.key(exact) != store.key(larger)
 
 
 def test_an_absent_case_is_absent(tmp_path: Path) -> None:
