@@ -22,9 +22,6 @@ from imaging import HeapAngle, PictureError, heap_angle
 RESULT_COLUMNS = ("status", "reason", "angle", "angle_se", "case_key")
 """Columns that `run_cases` adds, beside one for every observable of the scene."""
 
-REPEATABLE_STATUSES = frozenset({"finished", "diverged", "overflow"})
-"""Ends that the same case reaches every time: only these are stored, any other is tried again."""
-
 _log = logging.getLogger(__name__)
 
 
@@ -47,8 +44,9 @@ def run_cases(
         the name of its ``scene`` (without that column, all are of the study's own), and any further columns,
         which are carried over.
     store
-        Where results are kept; each is saved as it finishes. Checkpoints of the running cases are kept there
-        too: what an interrupted run had begun goes on where it was.
+        Where results are kept; each is saved as it ends, failed ones too: the same case fails again. A run
+        that the machine ends raises, and leaves no result of what was running. Checkpoints of the running
+        cases are kept there too: what an interrupted run had begun goes on where it was.
     device
         ``"cpu"``, ``"cuda"``, ``"cuda:1"``; None: the engine's choice.
     workers
@@ -175,8 +173,7 @@ def _simulate_missing(
 
     def keep(index: int, result: CaseResult) -> None:
         key = missing[index]
-        if result.status in REPEATABLE_STATUSES:
-            store.save(key, result)
+        store.save(key, result)
         outcomes[key] = pool.submit(measure, key, result)
 
     if missing:

@@ -8,7 +8,6 @@ import numpy as np
 
 from dem_warp import Case, CaseResult, simulate
 from experiments.cases import Store, measure_heap
-from experiments.cases.execute import REPEATABLE_STATUSES
 from experiments.study import Study
 from imaging import PictureError
 
@@ -33,8 +32,7 @@ def finished_cases(cases: Sequence[Case], device: str, store: Store | None = Non
     missing = [number for number, key in enumerate(keys) if not store.has(key)]
 
     def keep(index: int, result: CaseResult) -> None:
-        if result.status in REPEATABLE_STATUSES:
-            store.save(keys[missing[index]], result)
+        store.save(keys[missing[index]], result)
 
     fresh = simulate(
         [cases[number] for number in missing], device, on_result=keep, checkpoint=store.unfinished

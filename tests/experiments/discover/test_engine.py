@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from dem_warp import Progress, simulate
+from dem_warp import Case, CaseResult, Progress, simulate
 from experiments.discover import wave
 from experiments.discover.engine import EngineSimulator
 from experiments.discover.library import library_for
@@ -30,6 +30,23 @@ POINTS = [
     Point((0.5,), (), "wide", 2),
     Point((0.3,), (("rolling_torque", 0.1),), "base", 1),
 ]
+
+
+class Scripted:
+    """Stands in for the simulator: cases end, or the machine fails, as it is told."""
+
+    def __init__(self, endings: Sequence[CaseResult | Exception]) -> None:
+        self.endings = endings
+
+    def __call__(
+        self, cases: Sequence[Case], on_result: Callable[[int, CaseResult], None], **_: object
+    ) -> None:
+        assert self.endings, "nothing may be simulated again"
+        assert len(cases) >= len(self.endings)
+        for index, ending in enumerate(self.endings):
+            if isinstance(ending, Exception):
+                raise ending
+            on_result(index, ending)
 
 
 class KilledError(Exception):
@@ -64,10 +81,7 @@ def test_points_are_answered_by_heaps_measured_and_kept(
         np.testing.assert_array_equal(outcomes.values[0], outcomes.values[3])
         assert (outcomes.values[0] != outcomes.values[2]).any()
 
-    def never(*args: object, **kwargs: object) -> None:
-        raise AssertionError("what is kept is not simulated again")
-
-    monkeypatch.setattr(wave, "simulate", never)
+    monkeypatch.setattr(wave, "simulate", Scripted([]))
     again = build(study, table)(POINTS)
     np.testing.assert_array_equal(again.values, outcomes.values[:3])
 
@@ -102,6 +116,37 @@ def test_a_run_that_was_killed_keeps_what_it_had_measured(
         assert simulator(POINTS).finished.all()
     assert kept >= 1
     assert seen[-1].total == len(POINTS) - kept
+
+
+def test_cases_that_fail_are_kept_with_their_reasons_and_not_simulated_again(
+    study: Study, table: OutcomeTable, monkeypatch: pytest.MonkeyPatch, cone: Callable[..., CaseResult]
+) -> None:
+    reasons = ("the tube is clogged", "a grain was too fast", "a neighbour list overflowed")
+    statuses = ("failed", "diverged", "overflow")
+    endings = [cone(status=status, reason=why) for status, why in zip(statuses, reasons, strict=True)]
+    monkeypatch.setattr(wave, "simulate", Scripted(endings))
+    with build(study, table) as simulator:
+        assert simulator(POINTS).reasons == reasons
+    monkeypatch.setattr(wave, "simulate", Scripted([]))
+    again = build(study, table)(POINTS)
+    assert again.reasons == reasons
+    assert np.isnan(again.values).all()
+
+
+def test_a_case_that_the_machine_ended_is_no_outcome(
+    study: Study, table: OutcomeTable, monkeypatch: pytest.MonkeyPatch, cone: Callable[..., CaseResult]
+) -> None:
+    clogged = cone(status="failed", reason="the tube is clogged")
+    monkeypatch.setattr(wave, "simulate", Scripted([clogged, MemoryError()]))
+    with pytest.raises(MemoryError):
+        build(study, table)(POINTS)
+    # The first may have been measured by then, or not.
+    kept = len(table)
+    assert kept <= 1
+    monkeypatch.setattr(wave, "simulate", Scripted([clogged] * (len(POINTS) - kept)))
+    with build(study, table) as simulator:
+        assert simulator(POINTS).reasons == (clogged.reason,) * len(POINTS)
+    assert len(table) == len(POINTS)
 
 
 def test_what_the_study_refuses_is_an_outcome_with_its_reason(study: Study, table: OutcomeTable) -> None:
