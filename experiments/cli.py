@@ -40,6 +40,13 @@ Scale = Annotated[
     ),
 ]
 Device = Annotated[str | None, typer.Option(help="cpu, cuda or cuda:N. Left out: the GPU if there is one.")]
+Devices = Annotated[
+    str | None,
+    typer.Option(
+        "--device",
+        help="cpu, cuda, cuda:N or several GPUs, as cuda:0,cuda:1. Left out: the GPU if there is one.",
+    ),
+]
 Workers = Annotated[int | None, typer.Option(min=1, help="Processes on the CPU. Left out: one a core.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Write the result to standard output as JSON.")]
 
@@ -113,18 +120,18 @@ def discover(
     ] = False,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the bootstraps and of the fresh runs.")] = 1,
     scale: Scale = None,
-    device: Device = None,
+    device: Devices = None,
     workers: Workers = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on in the folder of an earlier run.")] = False,
     as_json: AsJson = False,
 ) -> None:
     """Find the effect that a model lacks: calibrate, test the gap, name what explains it, show it closed."""
     with clear_errors():
-        from experiments.commands.choices import chosen_device, chosen_study, default_folder
+        from experiments.commands.choices import chosen_devices, chosen_study, default_folder
         from experiments.commands.discover import Job, run_search
         from experiments.report.discovery import results_of, verdict_line
 
-        device = chosen_device(device)
+        device = chosen_devices(device)
         chosen = chosen_study(study, scale, device)
         folder = out or default_folder(chosen, "discover")
         job = Job(chosen, measured, folder, bank, photographs_only, device, workers, seed)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from dem_warp.device import resolve_device
+from experiments.discover.devices import resolve_devices
 from experiments.errors import InputError
 from experiments.study import Study, load_study, study_scales
 
@@ -21,6 +22,20 @@ def chosen_device(device: str | None) -> str:
         return resolve_device(device)
     except ValueError as error:
         raise InputError(str(error), device, "--device") from None
+
+
+def chosen_devices(devices: str | None) -> str:
+    """Names of the devices to run on, between commas: those asked for, or the GPU if there is one.
+
+    Raises
+    ------
+    InputError
+        When one is not there or is named twice, or the CPU stands beside a GPU.
+    """
+    try:
+        return ",".join(resolve_devices(devices))
+    except ValueError as error:
+        raise InputError(str(error), devices, "--device") from None
 
 
 def chosen_study(path: Path | None, scale: str | None, device: str) -> Study:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from dem_warp import Progress, simulate
+from dem_warp import Progress
 from experiments.cases import open_folder, require_unused
 from experiments.discover.bank import Bank
 from experiments.discover.data.file import read_measured
@@ -52,7 +52,7 @@ class Job:
     photographs_only : bool
         Whether only what photographs show is looked at.
     device, workers
-        Of the simulator.
+        Of the simulator; several devices stand between commas.
     seed : int
         Of the bootstraps and of the fresh runs.
     """
@@ -177,8 +177,7 @@ def heaps_side_by_side(
     models = {"Calibrated base": found.base}
     if found.chosen is not None:
         models[f"With {terms.titles(found.chosen.mechanisms)}"] = found.chosen
-    cases = [engine.case(_point(fit, condition, job.seed)) for fit in models.values()]
-    results = simulate(cases, device=job.device, workers=job.workers)
+    results = engine.heaps([_point(fit, condition, job.seed) for fit in models.values()])
     photographs = measured.pictures.get(condition, ())[:1]
     pictures = [photograph(path, condition, job.study.measurement.fit) for path in photographs]
     under = job.study.under(condition)

@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from dem_warp import Case, Progress
+from dem_warp import Case, CaseResult, Progress
 from experiments.cases.key import case_key
 from experiments.discover.library import Mechanism, with_mechanisms
 from experiments.discover.observables import NAMES, VERSION
@@ -35,7 +35,7 @@ class EngineSimulator:
     table
         Where outcomes are kept; what is there already is not simulated again.
     device
-        ``"cpu"``, ``"cuda"``, ``"cuda:1"``; None: the engine's choice.
+        One, or several GPUs, as `devices.resolve_devices` reads them; None: the engine's choice.
     workers
         Processes that simulate, on the CPU, and that measure; None: one a core.
     worlds, drivers
@@ -96,6 +96,16 @@ class EngineSimulator:
         found |= self._runner.run({key: case for key, case in cases.items() if key not in found})
         values = np.array([found[key][0] for key in keys]).reshape(len(keys), len(NAMES))
         return Outcomes(values, tuple(found[key][1] for key in keys))
+
+    def heaps(self, points: Sequence[Point]) -> list[CaseResult]:
+        """Simulate a few points for their heaps, of which the table keeps the observables only.
+
+        Raises
+        ------
+        StudyError, ValueError
+            As by `case`.
+        """
+        return self._runner.heaps([self.case(point) for point in points])
 
     def case(self, point: Point) -> Case:
         """Build the case of a point.

@@ -12,9 +12,9 @@ from functools import cached_property, partial
 from multiprocessing.queues import Queue
 
 from dem_warp import Case, CaseResult, Progress, simulate
-from dem_warp.device import resolve_device
 from dem_warp.processes import end_with_parent
 from dem_warp.simulation import batches
+from experiments.discover.devices import resolve_devices
 from experiments.discover.observables import measure
 from experiments.discover.outcome_table import Outcome, OutcomeTable
 from experiments.study.study import MeasurementSection
@@ -46,7 +46,7 @@ class WaveRunner:
     table
         Where outcomes are kept.
     device
-        ``"cpu"``, ``"cuda"``, ``"cuda:1"``, or several, as ``"cuda:0,cuda:1"``; None: the engine's choice.
+        One, or several GPUs, as `resolve_devices` reads them.
     workers
         Processes that simulate, on the CPU, and that measure; None: one a core.
     worlds
@@ -69,14 +69,21 @@ class WaveRunner:
         progress: Callable[[Progress], None] | None = None,
     ) -> None:
         self._settings, self._table, self._progress = settings, table, progress
-        self._devices = [resolve_device(name) for name in (device.split(",") if device else [None])]
-        self._workers, self._worlds, self._drivers = workers, worlds, drivers
+        self._devices = resolve_devices(device)
+        self._workers, self._worlds = workers, worlds
+        count = drivers or (1 if self._on_cpu else DRIVERS * len(self._devices))
+        self.drivers = [self._devices[number % len(self._devices)] for number in range(count)]
+        """Device of each process that drives launches."""
 
     def close(self) -> None:
         """End its processes."""
         for name in ("_measurers", "_driven"):
             if pool := self.__dict__.pop(name, None):
                 pool.shutdown(cancel_futures=True)
+
+    def heaps(self, cases: Sequence[Case]) -> list[CaseResult]:
+        """Simulate a few cases on the first device, measure nothing and keep nothing."""
+        return simulate(cases, device=self._devices[0], workers=self._workers)
 
     def run(self, cases: Mapping[str, Case]) -> dict[str, Outcome]:
         """Simulate and measure cases by their keys in the table, and keep the outcomes."""
@@ -85,7 +92,7 @@ class WaveRunner:
         measured = _Measured(self._table)
         clock = _Clock(len(cases), self._progress)
         launches = self._launches(cases)
-        launch_all = self._drive if min(len(launches), self._driver_count) > 1 else self._launch
+        launch_all = self._drive if min(len(launches), len(self.drivers)) > 1 else self._launch
         try:
             launch_all(launches, cases, measured, clock)
             return measured.finish()
@@ -103,17 +110,13 @@ class WaveRunner:
     @cached_property
     def _driven(self) -> ProcessPoolExecutor:
         devices = _CONTEXT.Queue()
-        for number in range(self._driver_count):
-            devices.put(self._devices[number % len(self._devices)])
-        return ProcessPoolExecutor(self._driver_count, _CONTEXT, _begin_driving, (devices,))
+        for device in self.drivers:
+            devices.put(device)
+        return ProcessPoolExecutor(len(self.drivers), _CONTEXT, _begin_driving, (devices,))
 
     @property
     def _on_cpu(self) -> bool:
         return self._devices[0] == "cpu"
-
-    @property
-    def _driver_count(self) -> int:
-        return self._drivers or (1 if self._on_cpu else DRIVERS * len(self._devices))
 
     def _launches(self, cases: Mapping[str, Case]) -> list[list[str]]:
         """Keys of the cases of each launch: all, or such as share what kernels are compiled for."""

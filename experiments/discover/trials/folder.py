@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 
-from dem_warp.device import resolve_device
 from experiments.benchmarks.tables import machine
+from experiments.discover.devices import resolve_devices
 from experiments.discover.outcome_table import OutcomeTable
 
 DECLARED, SEALED, LABELS, FINDINGS, RUNS, PAGE = (
@@ -106,8 +106,8 @@ class Run:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         seconds, cases = time.perf_counter() - self._started, len(self._table) - self._before
-        devices = (self._device or "").split(",")
-        name, warp, date = machine(resolve_device(devices[0] or None)).rsplit(", ", 2)
+        devices = resolve_devices(self._device)
+        name, warp, date = machine(devices[0]).rsplit(", ", 2)
         name = f"{len(devices)} x {name}" if len(devices) > 1 else name
         new = not self._path.exists()
         self._path.parent.mkdir(parents=True, exist_ok=True)

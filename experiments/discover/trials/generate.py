@@ -18,6 +18,7 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
+from experiments.commands.choices import chosen_devices
 from experiments.commands.console import clear_errors
 from experiments.discover.bank import Bank
 from experiments.discover.emulator import fit_emulator
@@ -169,12 +170,12 @@ def seal(
 def measure(
     folder: Annotated[Path, typer.Argument(help="Folder of the trials.")],
     part: Annotated[str | None, typer.Option(help="Trials of one part; left out: all.")] = None,
-    device: Annotated[str | None, typer.Option(help="cpu, cuda, or several, as cuda:0,cuda:1.")] = None,
+    device: Annotated[str | None, typer.Option(help="cpu, cuda, or several GPUs, as cuda:0,cuda:1.")] = None,
     workers: Annotated[int | None, typer.Option(help="Processes.")] = None,
 ) -> None:
     """Simulate and measure the heaps of the trials."""
     with clear_errors("the same command"):
-        place = Folder(folder)
+        place, device = Folder(folder), chosen_devices(device)
         declaration = read_declaration(place.declared)
         sealed = [trial for trial in read_sealed(place.sealed) if part in (None, trial.part)]
         labels = list(revealed(read_labels(place.hidden_labels), sealed).values())

@@ -20,6 +20,7 @@ from typing import Annotated
 import typer
 
 from experiments.benchmarks.tables import markdown_table
+from experiments.commands.choices import chosen_devices
 from experiments.commands.console import clear_errors
 from experiments.discover.bank import load_bank
 from experiments.discover.emulator import fit_emulator
@@ -124,7 +125,7 @@ def main(
     part: Annotated[str | None, typer.Option(help="Trials of one part; left out: all.")] = None,
     first: Annotated[int | None, typer.Option(help="So many trials of each part; left out: all.")] = None,
     photographs: Annotated[bool, typer.Option("--photographs", help="With photographs only.")] = False,
-    device: Annotated[str | None, typer.Option(help="cpu, cuda, or several, as cuda:0,cuda:1.")] = None,
+    device: Annotated[str | None, typer.Option(help="cpu, cuda, or several GPUs, as cuda:0,cuda:1.")] = None,
     workers: Annotated[int | None, typer.Option(help="Processes.")] = None,
     seconds: Annotated[float, typer.Option(help="Begin no batch after this time.")] = math.inf,
     plan_only: Annotated[bool, typer.Option("--plan-only", help="Count the cases, run nothing.")] = False,
@@ -137,7 +138,7 @@ def main(
             return
         trials = chosen(read_sealed(place.sealed), part, first)
         try:
-            run_trials(place, trials, bank, view, device, workers, seconds)
+            run_trials(place, trials, bank, view, chosen_devices(device), workers, seconds)
         except OutOfTime:
             print(f"time is up; {len(open_jobs(place, trials, view))} analyses have not ended: run it again")
             raise typer.Exit(UNFINISHED) from None

@@ -89,7 +89,7 @@ def test_points_are_answered_by_heaps_measured_and_kept(
 def test_several_launches_at_once_give_the_same(study: Study, table: OutcomeTable) -> None:
     seen: list[Progress] = []
     with EngineSimulator(
-        study, library_for(study), table, "cpu,cpu", workers=1, worlds=1, drivers=2, progress=seen.append
+        study, library_for(study), table, "cpu", workers=1, worlds=1, drivers=2, progress=seen.append
     ) as several:
         outcomes = several(POINTS[:2])
     assert [progress.done for progress in seen] == [1, 2]
