@@ -6,13 +6,14 @@ import logging
 import time
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from dem_warp import Progress
+from dem_warp.provenance import engine_fingerprint
 from experiments.cases import open_folder, require_unused
-from experiments.discover.bank import Bank
+from experiments.discover.bank import Bank, Maker
 from experiments.discover.data.file import read_measured
 from experiments.discover.discovery import Discovery, Fit
 from experiments.discover.engine import EngineSimulator
@@ -152,7 +153,7 @@ def run_search(job: Job, resume: bool = False, watch: Watch = lambda title: null
     search.settings.write(job.folder / SETTINGS)
     with _Watched(search, job, watch) as simulator:
         if bank is None:
-            bank = search.make_bank(simulator)
+            bank = search.make_bank(simulator, Maker.of_today(source_commit() or ""))
             bank.save(job.folder / BANK)
         if measured is None:
             return Ended(None, terms, job.folder / BANK)
@@ -161,7 +162,7 @@ def run_search(job: Job, resume: bool = False, watch: Watch = lambda title: null
         walls = [*simulator.walls, {"wave": "analysis, its waves included", "seconds": _since(started)}]
         pictures = heaps_side_by_side(simulator.engine, found, terms, measured, job)
     page = write_discovery(
-        found, job.study, terms, search.settings, job.folder, pictures, _provenance(job, walls)
+        found, job.study, terms, search.settings, job.folder, pictures, _provenance(job, bank, walls)
     )
     return Ended(found, terms, page)
 
@@ -210,11 +211,13 @@ def _point(fit: Fit, condition: str, seed: int) -> Point:
     return Point(fit.theta, tuple(sorted(sizes)), condition, seed)
 
 
-def _provenance(job: Job, walls: Sequence[dict[str, Any]]) -> dict[str, Any]:
+def _provenance(job: Job, bank: Bank, walls: Sequence[dict[str, Any]]) -> dict[str, Any]:
     return {
         "device": job.device,
         "workers": job.workers,
         "commit": source_commit(),
+        "engine": engine_fingerprint(),
+        "bank": asdict(bank.maker) if bank.maker else None,
         "photographs only": job.photographs_only,
         "data": job.measured.name if job.measured else None,
         "waves": list(walls),

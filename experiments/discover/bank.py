@@ -10,11 +10,13 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from datetime import date
 from pathlib import Path
 
 import numpy as np
 from scipy.stats import qmc
 
+from dem_warp.provenance import engine_fingerprint
 from experiments.discover.settings import Settings
 from experiments.discover.simulator import Outcomes, Point
 from experiments.discover.space import MechanismRange, SearchSpace
@@ -54,6 +56,41 @@ def bank_points(space: SearchSpace, settings: Settings, seed: int = 0) -> list[P
     return [space.point(row, names, c, int(s)) for (row, names, c), s in zip(cases, seeds, strict=True)]
 
 
+@dataclass(frozen=True)
+class Maker:
+    """What made the heaps of a bank.
+
+    Attributes
+    ----------
+    engine : str
+        Fingerprint of the engine.
+    day : str
+        As 2026-03-14.
+    commit : str
+        Commit of the source; empty where it is not known.
+    """
+
+    engine: str
+    day: str
+    commit: str = ""
+
+    def __post_init__(self) -> None:
+        try:
+            date.fromisoformat(self.day)
+        except ValueError:
+            raise InputError("is a date, as 2026-03-14", self.day, "Maker.day") from None
+
+    @classmethod
+    def of_today(cls, commit: str = "") -> Maker:
+        """This engine, today."""
+        return cls(engine_fingerprint(), date.today().isoformat(), commit)
+
+    @property
+    def is_another_engine(self) -> bool:
+        """Whether fresh runs are made by an engine of other sources."""
+        return self.engine != engine_fingerprint()
+
+
 @dataclass(frozen=True, eq=False)
 class Bank:
     """Finished library waves as a table, one row a case.
@@ -77,6 +114,8 @@ class Bank:
         Why a case failed, empty where it did not.
     study : str
         Fingerprint of the study whose heaps these are; empty where it is not known.
+    maker : Maker or None
+        What made them; None where it is not known.
     """
 
     space: SearchSpace
@@ -88,6 +127,7 @@ class Bank:
     values: np.ndarray
     reasons: np.ndarray
     study: str = ""
+    maker: Maker | None = None
 
     def __post_init__(self) -> None:
         if self.values.shape != (len(self.theta), len(self.observables)):
@@ -118,6 +158,7 @@ class Bank:
             values=self.values.astype(np.float32),
             reasons=self.reasons,
             study=np.array(self.study),
+            maker=np.array(json.dumps(asdict(self.maker) if self.maker else None)),
         )
 
 
@@ -138,7 +179,8 @@ def load_bank(path: Path) -> Bank:
         names = tuple(str(name) for name in columns.pop("observables"))
         columns["values"] = columns["values"].astype(float)
         made_for = str(columns.pop("study", ""))
-        return Bank(space, names, **columns, study=made_for)
+        made_by = json.loads(str(columns.pop("maker", "null")))
+        return Bank(space, names, **columns, study=made_for, maker=Maker(**made_by) if made_by else None)
     except (KeyError, TypeError, ValueError, OSError) as error:
         raise InputError("must be a bank that this program wrote", str(error), str(path)) from error
 
@@ -149,6 +191,7 @@ def make_bank(
     points: Sequence[Point],
     outcomes: Outcomes,
     study: str = "",
+    maker: Maker | None = None,
 ) -> Bank:
     """Table of finished library waves.
 
@@ -172,4 +215,5 @@ def make_bank(
         values=np.asarray(outcomes.values, dtype=float),
         reasons=np.array(outcomes.reasons, dtype=np.str_),
         study=study,
+        maker=maker,
     )

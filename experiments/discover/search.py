@@ -9,7 +9,7 @@ from pathlib import Path
 
 from experiments.cases.folder import describe
 from experiments.discover.analysis import Analysis, analyse
-from experiments.discover.bank import Bank, bank_points, load_bank, make_bank
+from experiments.discover.bank import Bank, Maker, bank_points, load_bank, make_bank
 from experiments.discover.discovery import Discovery
 from experiments.discover.emulator import fit_emulator
 from experiments.discover.library import Mechanism, library_for
@@ -75,10 +75,19 @@ class Search:
         text = json.dumps([document, described["clump_sha256"]], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
 
-    def make_bank(self, simulator: Simulator) -> Bank:
-        """Run the library waves, all in one call."""
+    def make_bank(self, simulator: Simulator, maker: Maker | None = None) -> Bank:
+        """Run the library waves, all in one call.
+
+        Parameters
+        ----------
+        simulator
+            Answers them.
+        maker
+            What it is; None for what is no engine.
+        """
         points = bank_points(self.space, self.settings)
-        return make_bank(self.space, simulator.observables, points, simulator(points), self.fingerprint)
+        outcomes = simulator(points)
+        return make_bank(self.space, simulator.observables, points, outcomes, self.fingerprint, maker)
 
     def read_bank(self, path: Path) -> Bank:
         """Read a bank that was made for this study.
@@ -110,6 +119,7 @@ class Search:
         foreign = [one.name for one in emulator.space.mechanisms if one not in known]
         lacking = [one.name for one in known if one not in bank.space.mechanisms]
         notes = [f"{name} is not in the bank, so it was not looked for" for name in lacking]
+        notes += _notes_on(bank.maker)
         emulator = replace(emulator.without(*foreign), notes=(*emulator.notes, *notes))
         return analyse(measured, emulator, self.settings, seed)
 
@@ -123,6 +133,15 @@ def drive(analysis: Analysis, simulator: Simulator) -> Discovery:
     except StopIteration as end:
         found: Discovery = end.value
         return found
+
+
+def _notes_on(maker: Maker | None) -> list[str]:
+    if maker is None:
+        return ["the bank does not say which engine made it"]
+    if not maker.is_another_engine:
+        return []
+    commit = f" (commit {maker.commit})" if maker.commit else ""
+    return [f"the bank was made on {maker.day} by another engine{commit} than the fresh runs"]
 
 
 def _wanted(study: Study) -> tuple[Mechanism, ...]:

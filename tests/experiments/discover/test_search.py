@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from experiments.discover.bank import Maker
 from experiments.discover.discovery import Verdict
 from experiments.discover.measured import Measured
 from experiments.discover.observables import NAMES, OBSERVABLES
@@ -116,6 +117,39 @@ def test_what_changes_no_heap_leaves_the_bank_in_use(bank: Path) -> None:
     assert kept.space.names == Search.of(trial()).space.names
     with pytest.raises(InputError, match="looked for"):
         Search.of(trial(discover={"mechanisms": ["shape"]})).read_bank(bank)
+
+
+@pytest.mark.parametrize(
+    ("maker", "said"),
+    [
+        (Maker.of_today("abc"), []),
+        (None, ["the bank does not say which engine made it"]),
+        (
+            Maker("0" * 64, "2026-03-14", "abc"),
+            ["the bank was made on 2026-03-14 by another engine (commit abc) than the fresh runs"],
+        ),
+    ],
+)
+def test_the_report_says_when_another_engine_made_the_bank(
+    maker: Maker | None, said: list[str], tmp_path: Path
+) -> None:
+    search = Search.of(trial())
+    world = Linear(search)
+    search.make_bank(world, maker).save(tmp_path / "bank.npz")
+    bank = search.read_bank(tmp_path / "bank.npz")
+    assert bank.maker == maker
+    measured = Measured(("base",), ("flank_angle",), {"base": np.array([[1.0], [1.1], [0.9]])})
+    notes = drive(search.analysis(measured, bank, seed=1), world).notes
+    assert [note for note in notes if "engine" in note] == said
+
+
+@pytest.mark.parametrize("scale", [None, "bench"])
+def test_the_shipped_banks_know_what_made_them(scale: str | None) -> None:
+    file = f"bank-{scale}.npz" if scale else "bank.npz"
+    maker = Search.of(load_study(TRIAL, scale)).read_bank(TRIAL.with_name(file)).maker
+    assert maker is not None
+    assert (maker.day, maker.commit) == ("2026-11-21", "443c9dcb3891")
+    assert len(maker.engine) == 64
 
 
 def test_no_bank_at_all_is_said_so(tmp_path: Path) -> None:
