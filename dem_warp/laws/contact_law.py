@@ -39,9 +39,9 @@ def contact_law(mechanisms: Mechanisms) -> Any:
     Raises
     ------
     ValueError
-        If several mechanisms stand in place of the rolling resistance.
+        If several mechanisms stand in place of the rolling resistance, or of the tangential spring.
     """
-    spring, friction = _spring(mechanisms), _friction(mechanisms)
+    spring, friction, slider = _spring(mechanisms), _friction(mechanisms), _slider(mechanisms)
     attraction, torque = _attraction(mechanisms), _torque(mechanisms)
     rolling = _rolling(mechanisms)
 
@@ -76,12 +76,16 @@ def contact_law(mechanisms: Mechanisms) -> Any:
             memory,
             first,
         )
-        tangential_force, displacement = coulomb_spring(
+        tangential_force, displacement = slider(
+            params,
+            contact,
             displacement,
             tangential_stiffness,
             params.tangential_damping * params.damping * wp.sqrt(tangential_stiffness * contact.mass),
             tangential_velocity,
             coefficient * support,
+            memory,
+            first,
         )
         limit = rolling(params, rolling_torque(params.rolling_friction, support, contact.lever))
         partner_torque = rolling_torque(params.rolling_friction, support, contact.partner_lever)
@@ -149,6 +153,21 @@ def _same_coefficient(
     return coefficient
 
 
+@wp.func
+def _one_spring(
+    params: Any,
+    contact: Any,
+    displacement: Any,
+    stiffness: Any,
+    damping_rate: Any,
+    velocity: Any,
+    limit: Any,
+    memory: Any,
+    first: int,
+):
+    return coulomb_spring(displacement, stiffness, damping_rate, velocity, limit)
+
+
 def _attraction(mechanisms: Mechanisms) -> Any:
     total = _no_attraction
     for own, offset, name in _places(mechanisms, "attraction"):
@@ -182,12 +201,39 @@ def _plus_torque(before: Any, own: Any, offset: int, name: str) -> Any:
 
 
 def _rolling(mechanisms: Mechanisms) -> Any:
-    laws = [mechanism for mechanism in mechanisms if mechanism.rolling is not None]
-    if len(laws) > 1:
-        raise ValueError(
-            f"mechanisms: at most one law of rolling resistance, got {[law.name for law in laws]}"
-        )
-    return laws[0].rolling if laws else _same_limit
+    _require_one(mechanisms, "rolling", "law of rolling resistance")
+    return next((m.rolling for m in mechanisms if m.rolling is not None), _same_limit)
+
+
+def _require_one(mechanisms: Mechanisms, hook: str, what: str) -> None:
+    names = [mechanism.name for mechanism in mechanisms if getattr(mechanism, hook) is not None]
+    if len(names) > 1:
+        raise ValueError(f"mechanisms: at most one {what}, got {names}")
+
+
+def _slider(mechanisms: Mechanisms) -> Any:
+    _require_one(mechanisms, "slider", "law in place of the tangential spring")
+    places = _places(mechanisms, "slider")
+    return _remembering_slider(*places[0]) if places else _one_spring
+
+
+def _remembering_slider(own: Any, offset: int, name: str) -> Any:
+    @wp.func(name=name)
+    def slider(
+        params: Any,
+        contact: Any,
+        displacement: Any,
+        stiffness: Any,
+        damping_rate: Any,
+        velocity: Any,
+        limit: Any,
+        memory: Any,
+        first: int,
+    ):
+        at = first + wp.static(offset)
+        return own(params, contact, displacement, stiffness, damping_rate, velocity, limit, memory, at)
+
+    return slider
 
 
 def _spring(mechanisms: Mechanisms) -> Any:

@@ -7,6 +7,7 @@ from dem_warp.laws.jkr import JKR
 from dem_warp.laws.kinetic_friction import KineticFriction
 from dem_warp.laws.linear_cohesion import LinearCohesion
 from dem_warp.laws.mechanism import Mechanism
+from dem_warp.laws.micro_slip import MicroSlip
 from dem_warp.laws.rate_weakening import RateWeakening
 from dem_warp.laws.twisting import Twisting
 from dem_warp.laws.wall_adhesion import WallAdhesion
@@ -22,6 +23,7 @@ _ALL: tuple[type[Mechanism], ...] = (
     RateWeakening,
     KineticFriction,
     HystereticSpring,
+    MicroSlip,
 )
 
 MECHANISMS: dict[str, type[Mechanism]] = {mechanism.name: mechanism for mechanism in _ALL}

@@ -36,6 +36,11 @@ class Mechanism:
     friction(params, contact, coefficient, spring, support, memory, at)
         Coefficient of friction in place of `coefficient`, knowing the force of the tangential spring [N], not
         yet limited, and the normal force [N] by which the surfaces push each other off.
+    slider(params, contact, displacement, stiffness, damping_rate, velocity, limit, memory, at)
+        Tangential force [N], no larger than `limit` [N], and displacement [m] of the spring for the next
+        step, in place of the base law's one spring. It is given the spring's displacement [m] after this
+        step, its stiffness [N/m] and damping [N s/m], and the tangential velocity [m/s]. One mechanism of a
+        build at the most has it.
     torque(params, contact, support, memory, at)
         Torque [N m] on the grain beside that of the contact force; the partner feels the opposite one.
     rolling(params, limit)
@@ -57,6 +62,7 @@ class Mechanism:
     spring: ClassVar[Any] = None
     attraction: ClassVar[Any] = None
     friction: ClassVar[Any] = None
+    slider: ClassVar[Any] = None
     torque: ClassVar[Any] = None
     rolling: ClassVar[Any] = None
 

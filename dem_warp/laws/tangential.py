@@ -21,6 +21,15 @@ def advance_displacement(displacement: Any, normal: Any, tangential_velocity: An
 
 
 @wp.func
+def limited(force: Any, limit: Any):
+    """A force [N], no larger than a limit."""
+    size = wp.length(force)
+    if size > limit:
+        force = force * (limit / size)
+    return force
+
+
+@wp.func
 def coulomb_spring(
     displacement: Any, stiffness: Any, damping_rate: Any, tangential_velocity: Any, limit: Any
 ):
@@ -38,8 +47,5 @@ def coulomb_spring(
         displacement = displacement * keep
         force = force * keep
     else:
-        force = force - tangential_velocity * damping_rate
-        size = wp.length(force)
-        if size > limit:
-            force = force * (limit / size)
+        force = limited(force - tangential_velocity * damping_rate, limit)
     return force, displacement

@@ -24,8 +24,9 @@ from experiments.benchmarks.problems.energy import energy
 from experiments.benchmarks.problems.friction_and_rolling import friction_and_rolling
 from experiments.benchmarks.problems.heap_angle import heap_angle
 from experiments.benchmarks.problems.janssen import janssen
+from experiments.benchmarks.problems.micro_slip import micro_slip
 from experiments.benchmarks.problems.normal_impact import elastic_impact, restitution
-from experiments.benchmarks.problems.oblique_impact import micro_slip, oblique_impact, spinning_impact
+from experiments.benchmarks.problems.oblique_impact import oblique_impact, spinning_impact
 from experiments.benchmarks.problems.page import summary, write_chapter, write_page
 from experiments.benchmarks.problems.rigid_body import rigid_body
 from experiments.benchmarks.problems.stability import stability

@@ -21,12 +21,21 @@ from dem_warp.laws.hysteretic_spring import HystereticSpring
 from dem_warp.laws.kinetic_friction import KineticFriction
 from dem_warp.laws.linear_cohesion import LinearCohesion
 from dem_warp.laws.mechanism import Mechanism
+from dem_warp.laws.micro_slip import MicroSlip
 from dem_warp.laws.rate_weakening import RateWeakening
 from dem_warp.laws.twisting import Twisting
 from dem_warp.model import WorldSetup
 from dem_warp.snapshot import put_snapshot, take_snapshot
 
-KINDS = (LinearCohesion, ElasticPlasticRolling, Twisting, RateWeakening, KineticFriction, HystereticSpring)
+KINDS = (
+    LinearCohesion,
+    ElasticPlasticRolling,
+    Twisting,
+    RateWeakening,
+    KineticFriction,
+    HystereticSpring,
+    MicroSlip,
+)
 ALL = (
     LinearCohesion(cohesion_energy_density=2e3),
     ElasticPlasticRolling(rolling_stiffness=2.25, rolling_damping=0.3),
@@ -34,6 +43,7 @@ ALL = (
     RateWeakening(weakening=0.2, weakening_speed=0.1),
     KineticFriction(friction_drop=0.2),
     HystereticSpring(plasticity=0.3),
+    MicroSlip(micro_slip=1.0),
 )
 
 
@@ -97,7 +107,7 @@ def test_what_a_contact_remembers_survives_rebuilds(settled):
 
 def balls() -> dict[str, WorldSetup]:
     """A ball on a plane under each of the laws."""
-    _, rolling, twisting, weakening, kinetic, spring = ALL
+    _, rolling, twisting, weakening, kinetic, spring, micro_slip = ALL
     never_turns = 1e3
     both = pair(0.2, 0.5, never_turns, mechanisms=only(weakening, kinetic))
     setups = {
@@ -105,6 +115,7 @@ def balls() -> dict[str, WorldSetup]:
         "twisting": ball_on_plane(pair(0.2, 0.5, mechanisms=only(twisting)), spin=(0.0, 0.0, 5.0)),
         "sliding": ball_on_plane(both, 20.0, velocity=(0.0, 0.1, 0.0)),
         "spring": ball_on_plane(pair(1.0, mechanisms=only(spring)), velocity=(0.0, 0.0, -0.1)),
+        "micro-slip": ball_on_plane(pair(1.0, 0.5, mechanisms=only(micro_slip)), velocity=(0.0, 0.05, -0.1)),
     }
     return {name: replace(setup, shapes=(BALL, PYRAMID)) for name, setup in setups.items()}
 
@@ -116,6 +127,7 @@ def test_each_law_is_the_same_in_the_production_precision():
         "twisting": ("spins", 2),
         "sliding": ("velocities", 1),
         "spring": ("velocities", 2),
+        "micro-slip": ("velocities", 1),
     }
     ends = {}
     for precision in ("mixed", "double"):

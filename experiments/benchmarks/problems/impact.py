@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from dem_warp.clumps import ClumpShape
+from dem_warp.laws.mechanism import Mechanism
 from dem_warp.materials import Material, rayleigh_time
 from dem_warp.model import ContactCoefficients, WorldSetup
 from dem_warp.walls import Plane
@@ -45,12 +46,13 @@ class Impact:
     clamp: bool = False
     partner: Partner | None = None
     plate: Material = RIGID
+    mechanisms: tuple[Mechanism, ...] = ()
 
     @cached_property
     def law(self) -> ContactCoefficients:
         """Coefficients of the contact."""
         hit = self.partner.material if self.partner else self.plate
-        return contact(self.material, hit, self.restitution, self.friction, clamp=self.clamp)
+        return contact(self.material, hit, self.restitution, self.friction, 0.0, self.clamp, self.mechanisms)
 
     @property
     def mass(self) -> float:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dem_warp.clumps import ClumpShape
+from dem_warp.laws.mechanism import Mechanism
 from dem_warp.materials import Interaction, Material
 from dem_warp.model import ContactCoefficients, Grains, WorldSetup
 from dem_warp.solver import Solver
@@ -37,10 +38,10 @@ STEEL = Material(density=7800.0, shear_modulus=70e9, poisson_ratio=0.30)
 
 def contact(
     a: Material, b: Material, restitution: float = 1.0, friction: float = 0.0, rolling: float = 0.0,
-    clamp: bool = False,
+    clamp: bool = False, mechanisms: tuple[Mechanism, ...] = (),
 ) -> ContactCoefficients:  # fmt: skip
     """Contact of two materials."""
-    return ContactCoefficients.of_pair(a, b, Interaction(restitution, friction, rolling), clamp)
+    return ContactCoefficients.of_pair(a, b, Interaction(restitution, friction, rolling), clamp, mechanisms)
 
 
 def bodies(
