@@ -103,9 +103,16 @@ def test_one_batch_holds_one_set_of_mechanisms():
         solve(oblique_impact(), with_mechanism(oblique_impact(), LinearCohesion()))
 
 
-def test_one_law_of_rolling_resistance_at_a_time():
-    kinds = tuple(type(name, (LinearCohesion,), {"name": name, "rolling": lambda *_: 0.0}) for name in "ab")
-    with pytest.raises(ValueError, match=r"at most one law of rolling resistance"):
+@pytest.mark.parametrize(
+    ("hook", "message"),
+    [
+        ("rolling", r"at most one law of rolling resistance, got \['a', 'b'\]"),
+        ("slider", r"at most one law in place of the tangential spring, got \['a', 'b'\]"),
+    ],
+)
+def test_what_a_mechanism_replaces_it_replaces_alone(hook, message):
+    kinds = tuple(type(name, (LinearCohesion,), {"name": name, hook: lambda *_: 0.0}) for name in "ab")
+    with pytest.raises(ValueError, match=message):
         contact_law(kinds)
 
 

@@ -71,7 +71,7 @@ force that are cut in unloading are those of C. Thornton, S. J. Cummins and P. W
 
 *The mechanism* `micro_slip` puts a row of eight springs in place of the one
 (`dem_warp/laws/micro_slip.py`). With it the simulator is within 5 % of theory in all three quantities, at
-every slip and in every fit of the row to the contact, which depends on how far the first step reaches into
+every slip and for five fits of the row to the contact, which depend on how far the first step reaches into
 it. At the production step, 14 steps an impact, the error of the step comes on top: rows of both laws show
 it."""
 
