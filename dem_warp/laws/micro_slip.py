@@ -121,10 +121,11 @@ class MicroSlip(Mechanism):
 
     Infinitely many springs are the theory of Cattaneo and Mindlin for any history of both forces along one
     line, and for an oblique impact that of Maw, Barber and Fawcett; on a path that turns, each spring is
-    dragged by its end. Eight, half of which the widest contact so far presses at the least, come to within 4 %
-    of that theory in the slip after the impact over the slip before. A spring of the rim that is but partly
-    pressed bears its part, and what parts lets go its force. The base law's tangential damping comes on top, and the sum stays within mu
-    F_n. In gross sliding the force is that of the base law. A contact remembers 26 values.
+    dragged by its end. Eight, half of which the widest contact so far presses at the least, come to within
+    4 % of that theory in the slip after the impact over the slip before. A spring of the rim that is but
+    partly pressed bears its part, and what parts lets go its force. The base law's tangential damping comes
+    on top, and the sum stays within mu F_n. In gross sliding the force is that of the base law. A contact
+    remembers 26 values.
 
     Source: V. L. Popov and M. Hess, Method of Dimensionality Reduction in Contact Mechanics and Friction,
     Springer (2015); R. D. Mindlin and H. Deresiewicz, Journal of Applied Mechanics 20 (1953) 327-344.
