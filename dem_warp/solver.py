@@ -10,7 +10,7 @@ import warp as wp
 
 from dem_warp.kernels.cells import cell_kernels
 from dem_warp.kernels.lanes import BLOCK, WARP
-from dem_warp.kernels.neighbours import neighbour_kernels
+from dem_warp.kernels.neighbours import list_lanes, neighbour_kernels
 from dem_warp.kernels.step import step_kernels
 from dem_warp.kernels.summation import MIN_LANES
 from dem_warp.kernels.walls import wall_kernels
@@ -125,6 +125,7 @@ class Solver:
         with wp.ScopedDevice(self.device):
             self._build_state([(found, capacity or listed) for found, listed in room])
         self._running = list(range(len(worlds)))
+        self._pace = np.array([(w.time_step, w.skin, np.linalg.norm(w.gravity)) for w in worlds]).T
         self._graphs: dict[tuple[int, int, int], Any] = {}
         self._place()
 
@@ -210,7 +211,8 @@ class Solver:
         self._launch(cells.open_buckets, self._whole_warps(spheres), [self.model, self.stale, self.cells])
         self._launch(cells.fill_buckets, spheres, [self.model, grains, self.stale, self.cells])
         self._launch(cells.search, spheres, [self.model, grains, self.stale, self.cells])
-        self._launch(lists.write_lists, spheres, [self.model, self.stale, self.cells, self.hood, self.flags])
+        threads = spheres * list_lanes(self.build)
+        self._launch(lists.write_lists, threads, [self.model, self.stale, self.cells, self.hood, self.flags])
         finish = [grains, self.cells, self.hood, self.stale, self.any_stale, self.rebuilds]
         self._launch(lists.finish, self.layout.world_count, finish)
 
@@ -258,14 +260,11 @@ class Solver:
 
         Grains gain speed by their weight for some chunks; what else sets them in motion, the lists allow for.
         """
-        fastest = self.fastest.numpy()
-        free = float(self.cycle_limit)
-        for w in self._running:
-            world = self.worlds[w]
-            falling = float(np.linalg.norm(world.gravity)) * chunks * CHUNK * world.time_step
-            path = (fastest[w] + falling) * world.time_step
-            free = min(free, SKIN_PER_CYCLE * world.skin / path) if path > 0 else free
-        return int(2 ** np.floor(np.log2(max(free, SHORTEST_CYCLE))))
+        time_step, skin, gravity = self._pace[:, self._running]
+        speed = self.fastest.numpy()[self._running] + gravity * chunks * CHUNK * time_step
+        with np.errstate(divide="ignore"):
+            free = float(np.min(SKIN_PER_CYCLE * skin / (speed * time_step)))
+        return int(2 ** np.floor(np.log2(np.clip(free, SHORTEST_CYCLE, self.cycle_limit))))
 
     def advance(self, chunks: int = 1) -> None:
         """Take `chunks` times CHUNK steps in every running world."""

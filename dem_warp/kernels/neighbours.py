@@ -21,6 +21,15 @@ from dem_warp.types import SPHERE_BITS, Build, WorldFlag, device_structs
 NEIGHBOUR_OVERFLOW = wp.constant(int(WorldFlag.NEIGHBOUR_OVERFLOW))
 
 
+LIST_LANES = 8
+"""Threads that share out the partners of a sphere on a GPU: about half as many as there are."""
+
+
+def list_lanes(build: Build) -> int:
+    """Threads a sphere that `write_lists` is to be launched with."""
+    return LIST_LANES if build.cooperative else 1
+
+
 @functools.cache
 def neighbour_kernels(build: Build) -> SimpleNamespace:
     """The end of a rebuild, after the search: `write_lists` and `finish`."""
@@ -31,78 +40,78 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
     pack = packing(precision)
     spheres_each = wp.constant(build.sphere_count)
     memory_each = wp.constant(memory_size(build.mechanisms))
+    lanes = wp.constant(list_lanes(build))
     module = wp.get_module(f"dem_warp_neighbours_{build.name}")
     wp.set_module_options({"enable_backward": False}, module)
 
     @wp.func
-    def sort_found(cells: Cells, i: int, count: int):
-        """Sorts the partners of sphere `i`, which are few, by insertion."""
-        first = i * cells.found_capacity
-        for n in range(1, count):
-            partner = cells.found[first + n]
-            k = int(n)
-            while k > 0 and cells.found[first + k - 1] > partner:
-                cells.found[first + k] = cells.found[first + k - 1]
-                k -= 1
-            cells.found[first + k] = partner
+    def place_of(array: wp.array(dtype=int), first: int, count: int, value: int, guess: int) -> int:
+        """Index of the first of `count` sorted numbers that is not less than a value; walks from a guess."""
+        place = wp.min(guess, count)
+        while place > 0 and array[first + place - 1] >= value:
+            place -= 1
+        while place < count and array[first + place] < value:
+            place += 1
+        return place
 
     @wp.func
-    def first_of_sphere(entry: wp.array(dtype=int), first: int, count: int, s: int) -> int:
-        """Index of the first entry of own sphere `s` or a later one, by bisection."""
-        low = int(0)
-        high = int(count)
-        while low < high:
-            middle = (low + high) // 2
-            if (entry[first + middle] >> SPHERE_BITS) < s:
-                low = middle + 1
-            else:
-                high = middle
-        return low
+    def rank_of(array: wp.array(dtype=int), first: int, count: int, value: int) -> int:
+        """How many of `count` numbers are less than a value."""
+        rank = int(0)
+        for k in range(count):
+            rank += wp.where(array[first + k] < value, 1, 0)
+        return rank
 
-    @wp.kernel(module=module)
+    @wp.kernel(module=module, grid_stride=False)
     def write_lists(
         model: Model, stale: wp.array(dtype=int), cells: Cells, hood: Neighbours, flags: wp.array(dtype=int)
     ):
-        """A sphere's part of its grain's new list; histories come over from the old, both being sorted."""
-        i = wp.tid()
+        """A sphere's part of its grain's new list, shared out to some lanes on a GPU.
+
+        A partner's place is found by counting, as they are few. Histories come over from the old list.
+        """
+        thread = wp.tid()
+        i = thread // lanes
+        lane = thread - i * lanes
         g = i // spheres_each
         s = i - g * spheres_each
         w = g // model.grain_count
         if stale[w] == 0 or cells.rank[i] < 0:
             return
-        # empty for the next time; every sphere of the bucket writes the same
-        cells.bucket_size[cells.bucket[i]] = 0
         world = model.world[w]
         before = int(0)
         for k in range(s):
             before += wp.min(cells.found_count[g * spheres_each + k], world.most_found)
         own = wp.min(cells.found_count[i], world.most_found)
-        if cells.found_count[i] > world.most_found or before + own > world.most_listed:
-            wp.atomic_or(flags, w, NEIGHBOUR_OVERFLOW)
-            own = wp.clamp(own, 0, wp.max(world.most_listed - before, 0))
-        sort_found(cells, i, own)
         grain_total = model.shape.shape[0]
         old_row = hood.list[w] * grain_total + g
         new_row = (1 - hood.list[w]) * grain_total + g
         old_count = hood.count[old_row]
         old_first = old_row * hood.capacity
-        old = first_of_sphere(hood.entry, old_first, old_count, s)
-        for k in range(own):
-            entry = (s << SPHERE_BITS) | cells.found[i * cells.found_capacity + k]
-            slot = new_row * hood.capacity + before + k
-            while old < old_count and hood.entry[old_first + old] < entry:
-                old += 1
-            history = vec4(real(0.0), real(0.0), real(0.0), real(-1.0))
-            if old < old_count and hood.entry[old_first + old] == entry:
-                history = pack.load_vec4(hood.history, old_first + old)
-                for m in range(memory_each):
-                    remembered = hood.memory[(old_first + old) * memory_each + m]
-                    hood.memory[slot * memory_each + m] = remembered
-            hood.entry[slot] = entry
-            pack.store_vec4(hood.history, slot, history)
-        if s == model.shape_sphere_count[model.shape[g]] - 1:
-            hood.count[new_row] = wp.min(before + own, world.most_listed)
-            hood.travel[g] = real(0.0)
+        found = i * cells.found_capacity
+        for k in range(lane, own, lanes):
+            partner = cells.found[found + k]
+            place = before + rank_of(cells.found, found, own, partner)
+            if place < world.most_listed:
+                entry = (s << SPHERE_BITS) | partner
+                slot = new_row * hood.capacity + place
+                history = vec4(real(0.0), real(0.0), real(0.0), real(-1.0))
+                old = place_of(hood.entry, old_first, old_count, entry, place)
+                if old < old_count and hood.entry[old_first + old] == entry:
+                    history = pack.load_vec4(hood.history, old_first + old)
+                    for m in range(memory_each):
+                        remembered = hood.memory[(old_first + old) * memory_each + m]
+                        hood.memory[slot * memory_each + m] = remembered
+                hood.entry[slot] = entry
+                pack.store_vec4(hood.history, slot, history)
+        if lane == 0:
+            # empty for the next time; every sphere of the bucket writes the same
+            cells.bucket_size[cells.bucket[i]] = 0
+            if cells.found_count[i] > world.most_found or before + own > world.most_listed:
+                wp.atomic_or(flags, w, NEIGHBOUR_OVERFLOW)
+            if s == model.shape_sphere_count[model.shape[g]] - 1:
+                hood.count[new_row] = wp.min(before + own, world.most_listed)
+                hood.travel[g] = real(0.0)
 
     @wp.kernel(module=module)
     def finish(
