@@ -38,6 +38,9 @@ SHORTEST_CYCLE, LONGEST_CYCLE = 2, 64
 SKIN_PER_CYCLE = 0.1
 """Part of the skin that the fastest grain of a world may use up between two looks at the neighbour list."""
 
+SHORT_CYCLE, SKIN_PER_SHORT_CYCLE = 8, 0.25
+"""Steps up to which it may use up more: so few hardly pay for the look."""
+
 LOOK_CHUNKS = 16
 """Chunks after which the length of a cycle is chosen anew, from how fast the grains have become."""
 
@@ -230,7 +233,8 @@ class Solver:
         self._launch(watch.mark_stale, total, inputs)
         wp.capture_if(self.any_stale, self._rebuild_together, steps=steps, read=read)
         threads = total * WARP if self.device.is_cuda else total
-        self._launch(watch.select_near, threads, [*seen, self.hood, self.fastest])
+        self._launch(watch.heed_neighbours, threads, [self.model, self.alive, self.idle, self.hood])
+        self._launch(watch.select_near, threads, [steps, *seen, self.hood, self.fastest])
 
     def _look_back(self, read: int) -> None:
         """Find out how fast the grains have become, and whether all contacts were met."""
@@ -263,8 +267,9 @@ class Solver:
         time_step, skin, gravity = self._pace[:, self._running]
         speed = self.fastest.numpy()[self._running] + gravity * chunks * CHUNK * time_step
         with np.errstate(divide="ignore"):
-            free = float(np.min(SKIN_PER_CYCLE * skin / (speed * time_step)))
-        return int(2 ** np.floor(np.log2(np.clip(free, SHORTEST_CYCLE, self.cycle_limit))))
+            free = float(np.min(skin / (speed * time_step)))
+        length = max(SKIN_PER_CYCLE * free, min(SKIN_PER_SHORT_CYCLE * free, SHORT_CYCLE), SHORTEST_CYCLE)
+        return int(2 ** np.floor(np.log2(min(length, self.cycle_limit))))
 
     def advance(self, chunks: int = 1) -> None:
         """Take `chunks` times CHUNK steps in every running world."""

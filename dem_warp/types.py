@@ -226,6 +226,9 @@ def device_structs(precision: Precision) -> SimpleNamespace:
     class Near:  # what a step looks at; written anew every few steps
         count: wp.array(dtype=int)  # (grains,)
         item: wp.array(dtype=wp.vec2i)  # entries that may touch soon, and their slots, (grains * capacity,)
+        speed: wp.array(dtype=float)  # of a grain's fastest point [m/s], (grains,)
+        wall_speed: wp.array(dtype=float)  # and of any wall [m/s], (worlds,)
+        pace: wp.array(dtype=float)  # speed that a grain may reach, struck by others [m/s], (grains,)
         path: wp.array(dtype=real)  # farthest that a grain may come meanwhile [m], (grains,)
         wall_path: wp.array(dtype=real)  # and any wall [m], (worlds,)
         travel: wp.array(dtype=real)  # of a grain when this was written [m], (grains,)

@@ -1,6 +1,6 @@
 """Between two rebuilds: how fast a world is, whether its neighbour lists still hold, and what is near.
 
-All is done for some steps ahead. From the speeds of a grain and of the fastest one, which may strike it,
+All is done for some steps ahead. From the speeds of a grain and of its neighbours, which may strike it,
 follows how far it may come in that time, so that only the entries of a list that are nearer than the paths of
 the two can touch: the step looks at these alone. Afterwards it is seen whether all kept to it; a world whose
 grains did not is flagged.
@@ -21,7 +21,10 @@ HEADROOM = 4.0
 """Speed that a grain is allowed to reach, over what it has: an impact makes a falling grain spin."""
 
 STRUCK = 2.0
-"""Speed that a grain is allowed to reach when it is struck, over that of the fastest one."""
+"""Speed that a grain is allowed to reach when it is struck, over that of its fastest neighbour."""
+
+SHAKEN = 0.25
+"""The same over that of the fastest grain or wall of its world, which may strike it through others."""
 
 EXPECTED = 1.5
 """Speed that a grain is expected to reach, over what it has."""
@@ -37,7 +40,7 @@ LATE_REBUILD = wp.constant(int(WorldFlag.LATE_REBUILD))
 
 @functools.cache
 def watch_kernels(build: Build) -> SimpleNamespace:
-    """`mark_stale`, `join` and `select_near` before some steps, `find_fastest` after them."""
+    """What is launched before some steps, in this order, and `find_fastest` after them."""
     precision = build.precision
     real = precision.real
     types = device_structs(precision)
@@ -62,12 +65,11 @@ def watch_kernels(build: Build) -> SimpleNamespace:
         )
 
     @wp.func
-    def farthest(world: World, speed: float, fastest: float, ahead: int) -> real:
-        """How far a grain may come in some steps [m], at its own speed or at that of one that strikes it."""
+    def farthest(world: World, pace: float, ahead: int) -> real:
+        """How far a grain that may be struck to reach a speed, and falls besides, comes in some steps [m]."""
         time = real(ahead) * world.time_step
         falling = real(HEADROOM) * wp.length(world.gravity) * time
-        reached = real(wp.max(float(HEADROOM) * speed, float(STRUCK) * fastest)) + falling
-        return wp.clamp(reached * time, real(LEAST_PATH) * world.skin, real(0.5) * world.skin)
+        return wp.clamp((real(pace) + falling) * time, real(LEAST_PATH) * world.skin, real(0.5) * world.skin)
 
     @wp.func
     def wall_path(model: Model, world: World, grains: Grains, w: int, i: int, steps: int) -> real:
@@ -100,7 +102,7 @@ def watch_kernels(build: Build) -> SimpleNamespace:
         stale: wp.array(dtype=int),
         any_stale: wp.array(dtype=int),
     ):
-        """Sets the paths, and marks a world in which a grain or a wall may use up its half of the skin."""
+        """Sets the speeds, and marks a world in which a grain or a wall may use up its half of the skin."""
         g = wp.tid()
         w = g // model.grain_count
         if idle[w] != 0:
@@ -108,14 +110,18 @@ def watch_kernels(build: Build) -> SimpleNamespace:
         world = model.world[w]
         if g % model.grain_count == 0:
             hood.near.wall_path[w] = real(0.0)
+            hood.near.wall_speed[w] = 0.0
             for i in range(walls_each):
                 path = wall_path(model, world, grains, w, i, ahead)
                 hood.near.wall_path[w] = wp.max(hood.near.wall_path[w], path)
+                speed = float(wall_path(model, world, grains, w, i, 1) / world.time_step)
+                hood.near.wall_speed[w] = wp.max(hood.near.wall_speed[w], speed)
                 whole = wall_path(model, world, grains, w, i, grains.step[w] + ahead - hood.rebuilt[w])
                 if real(2.0) * whole > world.skin:
                     stale[w] = 1
                     any_stale[0] = 1
-        hood.near.path[g] = farthest(world, speed_of(model, grains, g), fastest[w], ahead)
+        hood.near.speed[g] = speed_of(model, grains, g)
+        hood.near.pace[g] = wp.max(float(HEADROOM) * hood.near.speed[g], float(SHAKEN) * fastest[w])
         if alive[g] > 0 and uses_up(model, world, grains, hood, g, ahead, real(0.5)):
             stale[w] = 1
             any_stale[0] = 1
@@ -141,7 +147,41 @@ def watch_kernels(build: Build) -> SimpleNamespace:
                 stale[w] = 1
 
     @wp.kernel(module=module, grid_stride=False)
+    def heed_neighbours(
+        # model
+        model: Model,
+        # state in
+        alive: wp.array(dtype=int),
+        idle: wp.array(dtype=int),
+        # state in and out
+        hood: Neighbours,
+    ):
+        """Raises the pace of a grain for the neighbours that may strike it; a warp a grain on a GPU."""
+        thread = wp.tid()
+        g = thread // lanes
+        lane = thread - g * lanes
+        w = g // model.grain_count
+        if idle[w] != 0 or alive[g] <= 0:
+            return
+        row = hood.list[w] * model.shape.shape[0] + g
+        fastest = float(0.0)
+        for k in range(lane, hood.count[row], lanes):
+            partner = hood.entry[row * hood.capacity + k] & SPHERE_MASK
+            speed = hood.near.wall_speed[w]
+            if partner < model.grain_count * spheres_each:
+                j = w * model.grain_count + partner // spheres_each
+                speed = hood.near.speed[j]
+                if wp.static(not build.cooperative):
+                    # this list alone has the two of them
+                    hood.near.pace[j] = wp.max(hood.near.pace[j], float(STRUCK) * hood.near.speed[g])
+            fastest = wp.max(fastest, speed)
+        fastest = largest_of_warp(fastest)
+        if lane == 0:
+            hood.near.pace[g] = wp.max(hood.near.pace[g], float(STRUCK) * fastest)
+
+    @wp.kernel(module=module, grid_stride=False)
     def select_near(
+        ahead: int,
         # model
         model: Model,
         # state in
@@ -160,7 +200,7 @@ def watch_kernels(build: Build) -> SimpleNamespace:
         if idle[w] != 0:
             return
         world = model.world[w]
-        margin = world.reach + hood.near.path[g]
+        own = farthest(world, hood.near.pace[g], ahead)
         step = grains.step[w]
         row = hood.list[w] * model.shape.shape[0] + g
         count = hood.count[row]
@@ -176,14 +216,17 @@ def watch_kernels(build: Build) -> SimpleNamespace:
                 partner = entry & SPHERE_MASK
                 path = hood.near.wall_path[w]
                 if partner < model.grain_count * spheres_each:
-                    path = hood.near.path[w * model.grain_count + partner // spheres_each]
-                is_near = contacts.nears(model, world, grains, w, g, entry, margin + path, step)
+                    path = farthest(
+                        world, hood.near.pace[w * model.grain_count + partner // spheres_each], ahead
+                    )
+                is_near = contacts.nears(model, world, grains, w, g, entry, world.reach + own + path, step)
             bits = lanes_with(is_near)
             if is_near:
                 hood.near.item[found + bit_count(bits & ((1 << lane) - 1))] = wp.vec2i(entry, slot)
             found += bit_count(bits)
         if lane == 0:
             hood.near.count[g] = found - g * hood.capacity
+            hood.near.path[g] = own
             hood.near.travel[g] = hood.travel[g]
             if g % model.grain_count == 0:
                 fastest[w] = 0.0
@@ -229,5 +272,10 @@ def watch_kernels(build: Build) -> SimpleNamespace:
             wp.atomic_max(fastest, w, speed)
 
     return SimpleNamespace(
-        mark_stale=mark_stale, join=join, select_near=select_near, find_fastest=find_fastest, module=module
+        mark_stale=mark_stale,
+        join=join,
+        heed_neighbours=heed_neighbours,
+        select_near=select_near,
+        find_fastest=find_fastest,
+        module=module,
     )
