@@ -96,6 +96,15 @@ class FlankLine:
     dof: float
     rms: float
 
+    def from_position(self, start: float) -> FlankLine:
+        """The same line, positions counted from another one."""
+        return replace(
+            self,
+            intercept=self.intercept + self.slope * start,
+            start=self.start - start,
+            stop=self.stop - start,
+        )
+
 
 def fit_flanks(outline: Outline, settings: FitSettings, place: str) -> tuple[FlankLine, FlankLine]:
     """Fit a line to the left and to the right flank of an outline; `place` names it in errors."""

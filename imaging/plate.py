@@ -42,6 +42,10 @@ class PlateLine:
         """Angle between the plate and the picture's rows [degrees], positive where it falls to the right."""
         return float(np.degrees(np.arctan(self.slope)))
 
+    def in_part(self, left: int, top: int) -> PlateLine:
+        """The same line in a part of the picture that begins at this column and row."""
+        return replace(self, row=self.row + self.slope * left - top)
+
     def level(self, column: FloatArray, row: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Distance along the plate and height over it [pixels] of points in the picture."""
         cosine, sine = np.cos(np.arctan(self.slope)), np.sin(np.arctan(self.slope))

@@ -63,6 +63,13 @@ class ReposeAngle:
             return sum(dof for _, dof in parts)
         return total**2 / sum(variance**2 / dof for variance, dof in parts)
 
+    def in_part(self, left: int, top: int) -> ReposeAngle:
+        """The same measurement in a part of the picture that begins at this column and row."""
+        outline = self.outline.in_part(left, top)
+        start = float(self.outline.position[0] - outline.position[0])
+        left_line, right_line = (line.from_position(start) for line in (self.left_line, self.right_line))
+        return ReposeAngle(left_line, right_line, self.fit, outline)
+
     def interval(self, level: float = 0.95) -> tuple[float, float]:
         """Confidence interval of the mean [degrees]."""
         return confidence_interval(self, level)

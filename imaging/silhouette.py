@@ -6,7 +6,7 @@ a point (column, row) is the middle of that pixel.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -48,6 +48,11 @@ class Outline:
     height: FloatArray
     plate: PlateLine
     meters_per_pixel: float | None = None
+
+    def in_part(self, left: int, top: int) -> Outline:
+        """The same outline in a part of the picture that begins at this column and row."""
+        start = left / np.cos(np.arctan(self.plate.slope))
+        return replace(self, position=self.position - start, plate=self.plate.in_part(left, top))
 
     def mirrored(self) -> Outline:
         """The same heap seen in a mirror."""

@@ -24,7 +24,7 @@ from experiments.discover.search import Search, drive
 from experiments.discover.simulator import Outcomes, Point
 from experiments.report import HeapPicture
 from experiments.report.discovery import Terms, write_discovery
-from experiments.report.discovery.pictures import photograph, simulated_heap
+from experiments.report.discovery.pictures import photograph, simulated_heaps
 from experiments.report.writer import source_commit
 from experiments.study import Study
 
@@ -180,11 +180,9 @@ def heaps_side_by_side(
         models[f"With {terms.titles(found.chosen.mechanisms)}"] = found.chosen
     results = engine.heaps([_point(fit, condition, job.seed) for fit in models.values()])
     photographs = measured.pictures.get(condition, ())[:1]
-    pictures = [photograph(path, condition, job.study.measurement.fit) for path in photographs]
-    under = job.study.under(condition)
-    for title, result in zip(models, results, strict=True):
-        pictures.append(simulated_heap(title, condition, under, result))
-    return [picture for picture in pictures if picture is not None]
+    taken = [photograph(path, condition, job.study.measurement.fit) for path in photographs]
+    drawn = simulated_heaps(dict(zip(models, results, strict=True)), condition, job.study.under(condition))
+    return [picture for picture in taken if picture is not None] + drawn
 
 
 def _known_bank(job: Job, search: Search) -> Bank | None:

@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 
+import cv2
 import numpy as np
 import pytest
 
@@ -20,6 +21,7 @@ from imaging import (
     snapshot,
 )
 from imaging.geometry import Frame, Spheres
+from imaging.synthetic import Camera, DrawnHeap, draw
 
 
 @pytest.mark.parametrize("backend", ["raster", "pyvista"])
@@ -78,6 +80,20 @@ def test_lines_are_drawn_where_they_were_measured(heap) -> None:
         column, row = view.outline.plate.picture_point(middle, line.intercept + line.slope * middle)
         assert changed[round(float(row[0])), round(float(column[0]))]
     assert not changed[0].any()
+
+
+@pytest.mark.parametrize("tilt", [0.0, -4.0])
+def test_a_measurement_lies_in_a_part_where_it_lay_in_the_whole(tilt: float) -> None:
+    image = draw(DrawnHeap(32.0, 27.0, grain=8.0), Camera(plate=(90, 90, 90), tilt=tilt))
+    angle = measure(image)
+    drawn = overlay(image, angle)
+    left, top = 20, 15
+    part = angle.in_part(left, top)
+    assert (part.left, part.right, part.se) == (angle.left, angle.right, angle.se)
+    # The strokes' width follows that of the picture: the part is filled up to the width of the whole.
+    filled = cv2.copyMakeBorder(image[top:, left:], 0, top, 0, left, cv2.BORDER_REPLICATE)
+    changed = (overlay(filled, part) != filled).any(axis=2)[:-top, :-left]
+    np.testing.assert_array_equal(changed, (drawn != image).any(axis=2)[top:, left:])
 
 
 def test_overlay_of_another_scale_is_refused(heap) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from experiments.discover.discovery import Confounding, Discovery, Fit
+from experiments.report.discovery.tables import shown_candidates
 from experiments.report.discovery.terms import Terms, condition_name, spaced
 from experiments.report.numbers import MISSING, capital, fixed
 from experiments.report.theme import (
@@ -31,6 +32,9 @@ MAP_REACH = 6.0
 
 SIGNIFICANT = 0.05
 """Adjusted p value below which a residual is marked."""
+
+MANY_BARS = 12
+"""Bars beyond which a chart is taller."""
 
 DODGE = 0.16
 """Distance of the points of a condition from each other."""
@@ -55,7 +59,7 @@ def residual_maps(found: Discovery, terms: Terms) -> list[Chart]:
 def explained_chart(found: Discovery, terms: Terms) -> Chart:
     """Draw what each candidate explains of the excess."""
     figure = new_figure("share of the excess explained [%]")
-    ordered = found.candidates[::-1]
+    ordered = shown_candidates(found)[::-1]
     names = [terms.titles(candidate.mechanisms) for candidate in ordered]
     for label, color, wanted in (("admitted", BLUE, True), ("refused", ORANGE, False)):
         rows = [at for at, candidate in enumerate(ordered) if candidate.admitted is wanted]
@@ -72,7 +76,8 @@ def explained_chart(found: Discovery, terms: Terms) -> Chart:
     figure.update_yaxes(categoryorder="array", categoryarray=names, ticks="", ticklabelstandoff=6)
     figure.update_xaxes(range=[0.0, 100.0])
     figure.update_layout(bargap=0.35)
-    return Chart("explained-chart", "Share of the base's excess that each candidate removes.", figure)
+    caption = "Share of the base's excess that each candidate removes."
+    return Chart("explained-chart", caption, figure, "tall" if len(names) > MANY_BARS else "")
 
 
 def confounding_chart(confounding: Confounding, terms: Terms) -> Chart:

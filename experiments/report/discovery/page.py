@@ -36,7 +36,7 @@ TITLES = {
     "heaps": "Heaps side by side",
     "power": "What these data could show",
     "changes": "What would change the verdict",
-    "data": "The data, and what was wrong with them",
+    "data": "The data, and notes on them",
     "provenance": "Settings and provenance",
 }
 """Headings by section, in the order of the page."""

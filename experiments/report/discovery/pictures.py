@@ -1,20 +1,48 @@
-"""Heaps to be set side by side: photographed, and simulated by a model."""
+"""Heaps to be set side by side: photographed, and simulated by models."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
+
+import cv2
+import numpy as np
 
 from dem_warp import CaseResult
 from experiments.report.pictures import HeapPicture, drawn_heap
 from experiments.study import Study
-from imaging import PictureError, measure_photograph, overlay, read_picture
+from imaging import PictureError, ReposeAngle, measure_photograph, overlay, read_picture
 
 PIXELS = 800
 """Width of a drawn heap."""
 
+WIDEST = 1000
+"""Columns of a picture in the page, at most."""
+
+BESIDE, ABOVE, BELOW = 0.2, 0.12, 0.06
+"""Free space to either side of a heap, above its summit and below its plate, in its widths."""
+
+
+@dataclass(frozen=True)
+class _Window:
+    """What a picture shows: to either side of the heap's middle, above its plate and below, in any unit."""
+
+    reach: float
+    above: float
+    below: float
+
+    @classmethod
+    def around(cls, width: float, height: float) -> _Window:
+        return cls((0.5 + BESIDE) * width, height + ABOVE * width, BELOW * width)
+
+    def over(self, unit: float) -> _Window:
+        """The window in another unit."""
+        return _Window(self.reach / unit, self.above / unit, self.below / unit)
+
 
 def photograph(path: Path, condition: str, fit: str) -> HeapPicture | None:
-    """Draw the fitted flanks on a photograph; None where it shows no heap."""
+    """Cut the heap out of a photograph, its fitted flanks drawn on it; None where it shows no heap."""
     try:
         angle = measure_photograph(path, fit)
     except PictureError:
@@ -22,23 +50,70 @@ def photograph(path: Path, condition: str, fit: str) -> HeapPicture | None:
     caption = (
         f"“{condition}”, {path.name}: {angle.mean:.1f}°; left {angle.left:.1f}°, right {angle.right:.1f}°."
     )
-    return HeapPicture("Measured", caption, overlay(read_picture(path), angle))
+    return HeapPicture("Measured", caption, _shown(read_picture(path), angle, _Window.around(*_size(angle))))
 
 
-def simulated_heap(title: str, condition: str, study: Study, result: CaseResult) -> HeapPicture | None:
-    """Draw a heap of a model as a photograph would show it, x to the right; None where the case left none."""
-    if result.status != "finished":
-        return None
-    try:
-        (angle, view), _, image = drawn_heap(_in_large(study), result, view=0)
-    except PictureError:
-        return None
-    seen = angle.views[view]
-    caption = (
-        f"“{condition}”: {angle.mean:.1f}° ± {angle.se:.1f}° over {len(angle.views)} views; this view: left"
-        f" {seen.left:.1f}°, right {seen.right:.1f}°."
-    )
-    return HeapPicture(title, caption, image)
+def simulated_heaps(models: Mapping[str, CaseResult], condition: str, study: Study) -> list[HeapPicture]:
+    """Draw heaps as a photograph would show them, x to the right, all at one scale.
+
+    Parameters
+    ----------
+    models
+        Results of models by their titles; one that left no heap is left out.
+    condition
+        Name of the condition.
+    study
+        The study under that condition.
+    """
+    heaps = {}
+    for title, result in models.items():
+        try:
+            if result.status == "finished":
+                heaps[title] = drawn_heap(_in_large(study), result, view=0)
+        except PictureError:
+            continue
+    sizes = [
+        picture.meters_per_pixel * np.array(_size(angle.views[view]))
+        for (angle, view), picture, _ in heaps.values()
+    ]
+    pictures = []
+    for title, ((angle, view), picture, _) in heaps.items():
+        seen = angle.views[view]
+        window = _Window.around(*np.max(sizes, axis=0)).over(picture.meters_per_pixel)
+        caption = (
+            f"“{condition}”: {angle.mean:.1f}° ± {angle.se:.1f}° over {len(angle.views)} views; this view:"
+            f" left {seen.left:.1f}°, right {seen.right:.1f}°."
+        )
+        pictures.append(HeapPicture(title, caption, _shown(picture.image, seen, window, beyond=True)))
+    return pictures
+
+
+def _size(angle: ReposeAngle) -> tuple[float, float]:
+    """Width and height of a heap [pixels]."""
+    return float(np.ptp(angle.outline.position)), float(angle.outline.height.max())
+
+
+def _shown(image: np.ndarray, angle: ReposeAngle, window: _Window, beyond: bool = False) -> np.ndarray:
+    """Cut a window of pixels about the heap out of a picture, and draw the fitted flanks on it.
+
+    What lies beyond the picture is left out, or made of its border.
+    """
+    ends = angle.outline.position[[0, -1]]
+    columns, rows = angle.outline.plate.picture_point(ends, np.zeros(2))
+    middle, ground = float(columns.mean()), float(rows.mean())
+    left, right = round(middle - window.reach), round(middle + window.reach)
+    top, bottom = round(ground - window.above), round(ground + window.below)
+    part = image[max(top, 0) : bottom, max(left, 0) : right]
+    if beyond:
+        lacks = ((-top, bottom - len(image)), (-left, right - image.shape[1]), (0, 0))
+        part = np.pad(part, np.maximum(lacks, 0), "edge")
+    else:
+        left, top = max(left, 0), max(top, 0)
+    drawn = overlay(np.ascontiguousarray(part), angle.in_part(left, top))
+    if drawn.shape[1] <= WIDEST:
+        return drawn
+    rows_left = round(len(drawn) * WIDEST / drawn.shape[1])
+    return cv2.resize(drawn, (WIDEST, rows_left), interpolation=cv2.INTER_AREA)
 
 
 def _in_large(study: Study) -> Study:

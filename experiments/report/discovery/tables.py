@@ -10,6 +10,9 @@ from experiments.report.discovery.terms import GAP, Terms, condition_name
 from experiments.report.numbers import MISSING, fixed, interval, trimmed
 from experiments.report.tables import Column, Table, make_table
 
+SHOWN_PAIRS = 5
+"""Pairs of mechanisms that the page shows."""
+
 
 def frames(found: Discovery) -> dict[str, pd.DataFrame]:
     """Every table of a discovery by file name (without ending); numbers in full, in natural units."""
@@ -71,8 +74,15 @@ def parameters_frame(found: Discovery) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+def shown_candidates(found: Discovery) -> list[Candidate]:
+    """Candidates that the page shows, in their order: every mechanism, and the first pairs."""
+    pairs = [candidate for candidate in found.candidates if len(candidate.mechanisms) > 1]
+    return [candidate for candidate in found.candidates if candidate not in pairs[SHOWN_PAIRS:]]
+
+
 def candidates_table(found: Discovery, terms: Terms) -> Table:
-    """Lay out the ranked candidates."""
+    """Lay out the candidates that `shown_candidates` picks."""
+    shown = shown_candidates(found)
     frame = pd.DataFrame(
         [
             {
@@ -84,10 +94,9 @@ def candidates_table(found: Discovery, terms: Terms) -> Table:
                 "size": _sizes(candidate, terms),
                 "over_se": min(candidate.size_over_se),
                 "gain": _interval(candidate.held_out_gain, 1),
-                "by": "fresh runs" if candidate.simulated else "emulator",
                 "judged": "admitted" if candidate.admitted else candidate.objection,
             }
-            for rank, candidate in enumerate(found.candidates, start=1)
+            for rank, candidate in enumerate(shown, start=1)
         ]
     )
     columns = [
@@ -99,20 +108,23 @@ def candidates_table(found: Discovery, terms: Terms) -> Table:
         Column("size", "size [90 % interval]"),
         Column("over_se", "size / se", "ratio"),
         Column("gain", "held-out gain"),
-        Column("by", "judged by"),
         Column("judged", "judgement"),
     ]
     note = (
         "Q: squared residuals of the training conditions in standard deviations, after factors and size were"
         " fitted together; its limit is what 2.5 % of data sets exceed that the model itself makes. Held-out"
         " gain: rise of the log score of the conditions that took no part in any fit, with its 90 %"
-        " interval."
+        " interval. What was too far behind was judged by the emulator, the others by fresh runs."
     )
+    if left_out := len(found.candidates) - len(shown):
+        note += f" {left_out} pairs further behind stand in tables/candidates.csv."
     marks = [
         "chosen" if candidate.admitted and set(candidate.mechanisms) <= set(found.named) else ""
-        for candidate in found.candidates
+        for candidate in shown
     ]
-    return make_table("candidates", frame, columns, "Mechanisms of the library, best first.", note, marks)
+    pairs = any(len(candidate.mechanisms) > 1 for candidate in shown)
+    title = f"Mechanisms of the library{', and pairs of them, each' if pairs else ','} best first."
+    return make_table("candidates", frame, columns, title, note, marks)
 
 
 def power_table(found: Discovery, terms: Terms) -> Table:
@@ -170,7 +182,10 @@ def before_after_table(found: Discovery) -> Table:
         Column("removed", "excess removed [%]"),
         Column("runs", "fresh runs a model and condition", "count"),
     ]
-    note = "Values with 90 % bootstrap intervals. Noise alone gives a Q near the degrees of freedom."
+    note = (
+        "Values with 90 % bootstrap intervals. Noise alone gives a Q near the degrees of freedom. What the"
+        " noise of the means adds to a Q is taken off its interval, whose lower end may so fall below zero."
+    )
     return make_table("before-after", frame, columns, "The gap before and after.", note)
 
 
@@ -225,19 +240,21 @@ def drifts_table(found: Discovery) -> Table:
 
 
 def data_table(found: Discovery, terms: Terms) -> Table:
-    """Lay out the measured means: a row an observable, a column a condition."""
+    """Lay out the measured means: a row an observable, a column a condition, of those that were measured."""
     data = found.data
     rows = []
-    for at, observable in enumerate(data.observables):
-        factor = terms.scale(observable)[0]
+    measured = np.isfinite(data.means)
+    for at in np.flatnonzero(measured.any(axis=0)):
+        factor = terms.scale(data.observables[at])[0]
         estimates = zip(factor * data.means[:, at], factor * data.standard_errors[:, at], strict=True)
         shown = [_estimate(mean, se) if np.isfinite(mean) else MISSING for mean, se in estimates]
-        rows.append({"observable": terms.axis(observable), **dict(zip(data.conditions, shown, strict=True))})
+        row = dict(zip(data.conditions, shown, strict=True))
+        rows.append({"observable": terms.axis(data.observables[at]), **row})
     heaps = [str(count) for count in data.replicates.max(axis=1)]
     rows.append({"observable": "heaps", **dict(zip(data.conditions, heaps, strict=True))})
     heads = [
-        Column(name, condition_name(name, held_out))
-        for name, held_out in zip(data.conditions, data.held_out, strict=True)
+        Column(data.conditions[at], condition_name(data.conditions[at], data.held_out[at]))
+        for at in np.flatnonzero(measured.any(axis=1))
     ]
     columns = [Column("observable", "observable"), *heads]
     return make_table("data", pd.DataFrame(rows), columns, "Measured means and their standard errors.")

@@ -57,7 +57,7 @@ class Terms:
         """Write the size of a mechanism with its unit; `MISSING` where there is none."""
         if not math.isfinite(value):
             return MISSING
-        return f"{trimmed(value, SIZE_DIGITS)} {self._unit(name)}".rstrip()
+        return f"{trimmed(value, SIZE_DIGITS)}{self._unit(name)}"
 
     def size(self, name: str, size: Interval) -> str:
         """Write the size of a mechanism with its 90 % interval."""
@@ -67,7 +67,7 @@ class Terms:
     def short_size(self, name: str, size: Interval) -> str:
         """Write a size for a table: value, interval, unit."""
         low, high = (trimmed(end, SIZE_DIGITS) for end in (size.low, size.high))
-        return f"{trimmed(size.value, SIZE_DIGITS)}{GAP}[{low},{GAP}{high}] {self._unit(name)}".rstrip()
+        return f"{trimmed(size.value, SIZE_DIGITS)}{GAP}[{low},{GAP}{high}]{self._unit(name)}"
 
     def sizes(self, names: Sequence[str], sizes: Sequence[Interval]) -> str:
         """Write the sizes of several mechanisms in words."""
@@ -84,8 +84,9 @@ class Terms:
         return f"{spaced(observable)} [{unit}]" if unit else spaced(observable)
 
     def _unit(self, name: str) -> str:
-        unit = self.mechanisms[name].unit
-        return {"1": "", "deg": "°"}.get(unit, unit.replace("^2", "²").replace("^3", "³"))
+        """Unit as it follows a number."""
+        unit = self.mechanisms[name].unit.replace("^2", "²").replace("^3", "³")
+        return {"1": "", "deg": "°"}.get(unit, f" {unit}")
 
 
 def spaced(name: str) -> str:

@@ -22,7 +22,7 @@ def headline(found: Discovery, terms: Terms) -> str:
     """Say the verdict in a few words."""
     named = terms.titles(found.named)
     return {
-        Verdict.NONE: "Nothing is missing",
+        Verdict.NONE: "Nothing is missing that these data could show",
         Verdict.NAMED: f"Missing: {named}",
         Verdict.TIE: f"A tie: {terms.titles(found.named, 'or')}",
         Verdict.INCOMPLETE: f"Missing: {named}, and something else",
@@ -81,7 +81,7 @@ def _none(found: Discovery, terms: Terms) -> str:
     return (
         "Fitted as well as it can be, the model agrees with the data within their noise:"
         f" Q = {trimmed(found.base.q, 3)} at {fixed(found.base.degrees_of_freedom, 0)} degrees of freedom,"
-        f" where a gap would begin at {trimmed(found.base.q_limit, 3)} (p = {p_value(found.base.p_value)})."
+        f" where a gap would begin at {trimmed(found.base.q_limit, 3)}."
     )
 
 
@@ -145,12 +145,13 @@ def _smaller_effects(found: Discovery, terms: Terms, settings: Settings) -> Iter
     visible = [power for power in found.power if power.resolvable]
     hidden = [power for power in found.power if not power.resolvable]
     if visible:
-        sizes = ", ".join(
-            f"{terms.title(p.mechanism)} {terms.value(p.mechanism, p.gamma80)}" for p in visible
+        yield (
+            "Effects below the smallest sizes listed above would have gone unseen, and one in five of just"
+            " these sizes."
         )
-        yield f"Smaller effects than these would have gone unseen (one in five at these sizes): {sizes}."
     if hidden:
-        yield f"{_cannot_be_seen(hidden, terms)}: whether they act here is left open."
+        act = "it acts" if len(hidden) == 1 else "they act"
+        yield f"{_cannot_be_seen(hidden, terms)}: whether {act} here is left open."
 
 
 def _margins(found: Discovery, terms: Terms, settings: Settings) -> Iterator[str]:

@@ -128,7 +128,7 @@ def test_heaps_that_lack_nothing_raise_no_alarm_with_a_balance_or_photographs_on
     out = tmp_path / "out"
     code, said, err = discover(DATA / "nothing-missing.csv", "--out", out)
     assert (code, said) == (0, "")
-    assert "Nothing is missing. " in err
+    assert "Nothing is missing that these data could show. " in err
     files = ["report.html", "results.json", "settings.json", "study.json", "tables"]
     assert sorted(path.name for path in out.iterdir() if path.name != OUTCOMES) == files
     code, said, _ = discover(
