@@ -172,7 +172,9 @@ def _gap(found: Discovery, terms: Terms) -> Section | None:
 def _candidates(found: Discovery, terms: Terms) -> Section | None:
     if not found.candidates:
         return None
-    drawn = {"explained": [charts.explained_chart(found, terms)]}
+    drawn = {}
+    if found.base and found.base.excess:
+        drawn["explained"] = [charts.explained_chart(found, terms)]
     if found.confounding:
         drawn["confounding"] = [charts.confounding_chart(found.confounding, terms)]
     return Section("candidates", {"candidates": tables.candidates_table(found, terms)}, drawn)

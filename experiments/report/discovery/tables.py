@@ -83,12 +83,13 @@ def shown_candidates(found: Discovery) -> list[Candidate]:
 def candidates_table(found: Discovery, terms: Terms) -> Table:
     """Lay out the candidates that `shown_candidates` picks."""
     shown = shown_candidates(found)
+    excess = found.base.excess if found.base else 0.0
     frame = pd.DataFrame(
         [
             {
                 "rank": rank,
                 "mechanism": terms.titles(candidate.mechanisms),
-                "explained": 100.0 * candidate.explained,
+                "explained": 100.0 * candidate.explained if excess else None,
                 "q": candidate.q,
                 "limit": candidate.q_limit,
                 "size": _sizes(candidate, terms),
@@ -114,7 +115,13 @@ def candidates_table(found: Discovery, terms: Terms) -> Table:
         "Q: squared residuals of the training conditions in standard deviations, after factors and size were"
         " fitted together; its limit is what 2.5 % of data sets exceed that the model itself makes. Held-out"
         " gain: rise of the log score of the conditions that took no part in any fit, with its 90 %"
-        " interval. What was too far behind was judged by the emulator, the others by fresh runs."
+        " interval."
+        + (
+            ""
+            if excess
+            else " There is no share of an excess: Q of the base is within its degrees of freedom."
+        )
+        + " What was too far behind was judged by the emulator, the others by fresh runs."
     )
     if left_out := len(found.candidates) - len(shown):
         note += f" {left_out} pairs further behind stand in tables/candidates.csv."

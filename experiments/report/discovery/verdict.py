@@ -108,7 +108,7 @@ def _tie(found: Discovery, terms: Terms) -> str:
         f"{terms.titles(one.mechanisms)} at {size} leaves Q = {trimmed(one.q, 3)}"
         for one, size in zip(tied(found), sizes, strict=True)
     )
-    return f"The model disagrees with the data, and these explain it equally well: {each}."
+    return f"The model disagrees with the data, and these explain it alike: {each}."
 
 
 def _unknown(found: Discovery, terms: Terms) -> str:
@@ -121,9 +121,12 @@ def _unknown(found: Discovery, terms: Terms) -> str:
     )
     if found.candidates:
         best = found.candidates[0]
-        text += (
-            f"; the best, {terms.titles(best.mechanisms)}, removes {percent(best.explained)} of the excess"
+        does = (
+            f"removes {percent(best.explained)} of the excess"
+            if found.base.excess
+            else f"leaves Q = {trimmed(best.q, 3)}"
         )
+        text += f"; the best, {terms.titles(best.mechanisms)}, {does}"
     return text + "."
 
 

@@ -14,6 +14,7 @@ from experiments.discover.discovery import Discovery, Verdict
 from experiments.discover.settings import Settings
 from experiments.report import HeapPicture
 from experiments.report.discovery import Terms, render_discovery, verdict_sentence
+from experiments.report.discovery.tables import SHOWN_PAIRS, data_table, shown_candidates
 from experiments.study import Study
 
 Discovered = Callable[[Verdict], Discovery]
@@ -48,6 +49,35 @@ def test_a_named_effect_is_told_with_its_size_and_what_it_removed(
         "Adding contact cohesion at 0.052 J/m² (90 % interval 0.041 to 0.064) removed 98 % (94 to 100 %) of"
         " the excess; held out, Q fell from 121 (98 to 143) to 11 (7.1 to 16)."
     )
+
+
+def test_no_share_is_told_of_an_excess_that_is_not_there(
+    discovered: Discovered, whole_study: Study, terms: Terms, read_page: type
+) -> None:
+    # A gap may be found by the fall of Q that a mechanism brings, though Q itself is within its noise.
+    found = discovered(Verdict.TIE)
+    assert found.base is not None
+    quiet = replace(found, base=replace(found.base, q=found.base.degrees_of_freedom - 1.0))
+    for one, told in ((found, True), (quiet, False)):
+        page = read_page(render_discovery(one, whole_study, terms, Settings()))
+        assert ("explained-chart" in page.charts) is told
+        assert (page.rows("candidates")[0][2][1] is not None) is told
+    sentence = verdict_sentence(replace(quiet, verdict=Verdict.UNKNOWN), terms)
+    assert sentence.endswith("the best, contact cohesion, leaves Q = 48.3.")
+
+
+def test_the_page_shows_every_mechanism_and_the_first_pairs(discovered: Discovered) -> None:
+    found = discovered(Verdict.UNKNOWN)
+    single = found.candidates[0]
+    pairs = [replace(single, mechanisms=("plate_tilt", f"other_{number}")) for number in range(9)]
+    several = replace(found, candidates=(*found.candidates, *pairs))
+    assert shown_candidates(several) == [*found.candidates, *pairs[:SHOWN_PAIRS]]
+
+
+def test_only_what_was_measured_stands_in_the_table_of_data(discovered: Discovered, terms: Terms) -> None:
+    table = data_table(discovered(Verdict.NOT_IDENTIFIABLE), terms)
+    assert [column.key for column in table.columns] == ["observable", "base"]
+    assert [row.cells[0].text for row in table.rows] == ["flank angle [°]", "heaps"]
 
 
 def test_a_rise_of_the_held_out_gap_is_not_called_a_fall(discovered: Discovered, terms: Terms) -> None:
