@@ -115,7 +115,7 @@ def _background(channels: FloatArray) -> tuple[FloatArray, float]:
         if (now := (size, chosen.tobytes())) == before:
             continue
         before = now
-        surface = np.linalg.lstsq(terms[chosen, :size], sample[chosen], rcond=None)[0]
+        surface = _least_squares(terms[chosen, :size], sample[chosen])
         residual = np.linalg.norm(sample - terms[:, :size] @ surface, axis=1)
         noise = float(np.median(residual[chosen]))
     grid = np.mgrid[0:rows, 0:columns]
@@ -134,12 +134,17 @@ def _robust_plane(terms: FloatArray, sample: FloatArray) -> FloatArray:
     weight = np.ones(len(sample))
     for _ in range(ROBUST_ROUNDS):
         root = np.sqrt(weight)[:, None]
-        plane = np.linalg.lstsq(root * terms, root * sample, rcond=None)[0]
+        plane = _least_squares(root * terms, root * sample)
         before = weight
         weight = 1.0 / np.maximum(np.linalg.norm(sample - terms @ plane, axis=1), LEAST_NOISE)
         if np.array_equal(weight, before):
             break
     return np.asarray(plane)
+
+
+def _least_squares(terms: FloatArray, sample: FloatArray) -> FloatArray:
+    """Fit by the normal equations, for many pixels and few terms from -1 to 1, far from dependent."""
+    return np.asarray(np.linalg.lstsq(terms.T @ terms, terms.T @ sample, rcond=None)[0])
 
 
 def _surface_terms(row: NDArray[np.intp], column: NDArray[np.intp], shape: tuple[int, int]) -> FloatArray:

@@ -17,12 +17,13 @@ from dem_warp.simulation import batches
 from experiments.discover.devices import resolve_devices
 from experiments.discover.observables import measure
 from experiments.discover.outcome_table import Outcome, OutcomeTable
+from experiments.discover.threads import use_one_thread
 from experiments.study.study import MeasurementSection
 
-WORLDS = 1024
+WORLDS = 512
 """Worlds that one launch on a GPU holds: enough to fill it, few enough that a killed run loses little."""
 
-DRIVERS = 3
+DRIVERS = 4
 """Launches at once on each GPU, each driven by a process of its own: while one's controllers decide on the
 host, the GPU works for the others."""
 
@@ -105,7 +106,7 @@ class WaveRunner:
     @cached_property
     def _measurers(self) -> ProcessPoolExecutor:
         # Processes, as measuring holds Python's lock.
-        return ProcessPoolExecutor(self._workers or os.cpu_count(), _CONTEXT, end_with_parent)
+        return ProcessPoolExecutor(self._workers or os.cpu_count(), _CONTEXT, _begin_measuring)
 
     @cached_property
     def _driven(self) -> ProcessPoolExecutor:
@@ -157,6 +158,12 @@ class WaveRunner:
 
     def _take(self, measured: _Measured, keys: Sequence[str], index: int, result: CaseResult) -> None:
         measured.add(keys[index], self._measurers.submit(measure, self._settings, result))
+
+
+def _begin_measuring() -> None:
+    """Measure on one thread: there is a process for every core."""
+    end_with_parent()
+    use_one_thread()
 
 
 def _begin_driving(devices: Queue[str]) -> None:
