@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from worlds import SMALL_TUBE, assert_same_bits, assert_same_result, pile, small_case, solve, state
+from worlds import DEVICE, SMALL_TUBE, assert_same_bits, assert_same_result, pile, small_case, solve, state
 
 import dem_warp.batch
 import dem_warp.checkpoint
@@ -41,9 +41,9 @@ ENDLESS = [small_case(seed, replace(SMALL_TUBE, duration=3600.0)) for seed in (1
 
 
 def start(*cases: Case, folder: Path | None = None, every: float = NEVER) -> Batch:
-    """A batch on the CPU that takes up the checkpoints of a folder."""
+    """A batch that takes up the checkpoints of a folder."""
     kept = Checkpoints(folder, every) if folder else None
-    return Batch(cases, resolve_device("cpu"), kept)
+    return Batch(cases, resolve_device(DEVICE), kept)
 
 
 def finish(batch: Batch) -> dict[int, CaseResult]:
@@ -150,9 +150,9 @@ def test_a_killed_simulation_goes_on_to_the_same_bits(tmp_path):
     """Its processes end with it, and both cases go on from where they were; in one batch this time."""
     code = """
 import sys
-from test_checkpoint import ALWAYS, ENDLESS, simulate
+from test_checkpoint import ALWAYS, DEVICE, ENDLESS, simulate
 settings = {"workers": 2, "checkpoint": sys.argv[1], "checkpoint_every": ALWAYS}
-simulate(ENDLESS, "cpu", on_progress=lambda p: print(p.phase_counts.get("lift", 0), flush=True), **settings)
+simulate(ENDLESS, DEVICE, on_progress=lambda p: print(p.phase_counts.get("lift", 0), flush=True), **settings)
 """
     command = [sys.executable, "-c", code, str(tmp_path)]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(map(os.path.abspath, sys.path))}
@@ -179,7 +179,7 @@ simulate(ENDLESS, "cpu", on_progress=lambda p: print(p.phase_counts.get("lift", 
 
 def test_an_interrupted_simulation_goes_on(alone, tmp_path, monkeypatch):
     monkeypatch.setattr(dem_warp.simulation, "REPORT_EVERY", 0.0)
-    settings = {"device": "cpu", "workers": 1, "checkpoint": tmp_path, "checkpoint_every": ALWAYS}
+    settings = {"device": DEVICE, "workers": 1, "checkpoint": tmp_path, "checkpoint_every": ALWAYS}
 
     def interrupt(progress):
         if "lift" in progress.phase_counts:
@@ -199,7 +199,7 @@ def test_processes_take_up_their_cases(alone, left, tmp_path):
     ended = []
     results = simulate(
         [handful(5), small_case()],
-        device="cpu",
+        device=DEVICE,
         workers=2,
         on_result=lambda index, _: ended.append((index, len(list(tmp_path.iterdir())))),
         checkpoint=tmp_path,
@@ -218,7 +218,7 @@ def test_a_result_that_could_not_be_kept_leaves_its_checkpoint(left, tmp_path):
         raise OSError("no space left on device")
 
     with pytest.raises(OSError, match="no space"):
-        simulate([small_case()], device="cpu", workers=1, on_result=full, checkpoint=tmp_path)
+        simulate([small_case()], device=DEVICE, workers=1, on_result=full, checkpoint=tmp_path)
     assert start(small_case(), folder=tmp_path).steps[0] > 0
 
 
@@ -291,7 +291,7 @@ def test_a_run_goes_on_where_no_checkpoint_can_be_written(tmp_path, caplog):
 
 def test_an_interval_is_not_negative(tmp_path):
     with pytest.raises(ValueError, match=r"Checkpoints.every: must be 0 or more \[s\], got -1"):
-        simulate([small_case()], device="cpu", checkpoint=tmp_path, checkpoint_every=-1.0)
+        simulate([small_case()], device=DEVICE, checkpoint=tmp_path, checkpoint_every=-1.0)
 
 
 def test_a_world_goes_on_in_another_batch_with_its_walls_in_motion():

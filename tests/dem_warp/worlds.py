@@ -5,6 +5,7 @@ have one sphere or nine: so all tests together compile few builds of the kernels
 """
 
 import math
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -26,6 +27,9 @@ from dem_warp.scenes.lifted_cylinder import LiftedCylinder
 from dem_warp.scenes.scene import Scene
 from dem_warp.solver import Solver
 from dem_warp.walls import Cylinder, Plane, Wall
+
+DEVICE = os.environ.get("DEM_WARP_TEST_DEVICE", "cpu")
+"""Where these worlds run; what is promised of a world's bits holds on every device."""
 
 GRAVITY = 9.81
 RADIUS = 5e-3
@@ -240,7 +244,7 @@ def record(solver: Solver, steps: int) -> Record:
 
 
 def solve(
-    *setups: WorldSetup, precision: str = "double", device: str = "cpu", capacity: int | None = None
+    *setups: WorldSetup, precision: str = "double", device: str = DEVICE, capacity: int | None = None
 ) -> Solver:
     """Solver of worlds on a device."""
     return Solver(setups, resolve_device(device), precision, capacity)
