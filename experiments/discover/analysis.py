@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass
-from itertools import combinations
 
 import numpy as np
 
@@ -26,7 +25,7 @@ from experiments.discover.discovery import (
 )
 from experiments.discover.emulator import Emulator
 from experiments.discover.evidence import Evidence, gather
-from experiments.discover.fitting import Fitted, fit
+from experiments.discover.fitting import Fitted, fit, weigh
 from experiments.discover.gap import GapTest, find_gap
 from experiments.discover.held_out import held_out_gain
 from experiments.discover.laboratory import Laboratory, Request
@@ -89,9 +88,9 @@ def analyse(measured: Measured, emulator: Emulator, settings: Settings, seed: in
             Verdict.NOT_IDENTIFIABLE, (), "no training condition left a heap to compare", None
         )
         return _empty(emulator, evidence, settings, seed, decision)
-    base = _base(fit(Stack(Model(emulator, (), settings.systematic), evidence.training)), settings, seed)
     laboratory = Laboratory(emulator, emulator.space.conditions, seed)
     parts = _Parts(emulator, evidence, settings, seed, laboratory)
+    base = parts.base(fit(Stack(Model(emulator, (), settings.systematic), evidence.training)))
     factors = len(emulator.space.factors)
     if evidence.count - factors < LEAST_FREEDOM:
         reason = (
@@ -109,8 +108,9 @@ def _search(parts: _Parts, base: _Base) -> Analysis:
     """Steps 4 to 8: who could explain the gap, simulated again, decided, shown before and after."""
     settings = parts.settings
     contenders: Contenders = {(): Contender(base.fitted), **parts.contenders([(n,) for n in base.seen.names])}
-    contenders = yield from simulate_again(contenders, parts.laboratory, settings)
-    base = _base(contenders[()].fitted, settings, parts.seed)
+    error = settings.shortlist_share * base.gap.excess
+    contenders = yield from simulate_again(contenders, parts.laboratory, settings, error)
+    base = parts.base(contenders[()].fitted)
     if not base.gap.found:
         reason = f"fresh runs at the optimum agree with the data within the noise (p = {base.gap.p:.2g})"
         return parts.discovery(base, Decision(Verdict.NONE, (), reason, None), [])
@@ -145,16 +145,21 @@ def _nothing_fits(singles: Sequence[Assessment], settings: Settings) -> bool:
 def _pairs(
     parts: _Parts, base: _Base, singles: Sequence[Assessment]
 ) -> Generator[list[Point], Outcomes, list[Assessment]]:
-    names = [one.mechanisms[0] for one in singles[: parts.settings.pair_candidates]]
-    contenders: Contenders = parts.contenders(list(combinations(names, 2)))
-    contenders = yield from simulate_again(contenders, parts.laboratory, parts.settings)
+    contenders: Contenders = parts.contenders(_promising_pairs(singles)[: parts.settings.pair_candidates])
+    error = parts.settings.shortlist_share * base.gap.excess
+    contenders = yield from simulate_again(contenders, parts.laboratory, parts.settings, error)
     return parts.assess(base, contenders)
 
 
-def _base(fitted: Fitted, settings: Settings, seed: int) -> _Base:
-    seen = signatures(fitted)
-    gap = find_gap(fitted, seen, settings.false_alarm, settings.draws, seed)
-    return _Base(fitted, gap, seen, visibilities(fitted, seen, settings))
+def _promising_pairs(singles: Sequence[Assessment]) -> list[tuple[str, ...]]:
+    """All pairs, by what Q would be if the one joined the other: the residuals of each alone say so."""
+    promised: dict[tuple[str, ...], float] = {}
+    for one in singles:
+        for name, score in zip(one.gap.mechanisms, one.gap.scores, strict=True):
+            pair = tuple(sorted((*one.mechanisms, name)))
+            left = one.gap.q - max(score, 0.0) ** 2
+            promised[pair] = min(left, promised.get(pair, left))
+    return sorted(promised, key=lambda pair: promised[pair])
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,21 +178,25 @@ class _Parts:
         systematic = self.settings.systematic
         return {m: Contender(fit(Stack(Model(self.emulator, m, systematic), blocks))) for m in models}
 
+    def base(self, fitted: Fitted) -> _Base:
+        """Look at the calibrated base."""
+        seen = signatures(fitted)
+        gap = self._gap(fitted, self.settings.false_alarm)
+        return _Base(fitted, gap, seen, visibilities(fitted, seen, self.settings))
+
+    def _gap(self, fitted: Fitted, level: float) -> GapTest:
+        """Test a model on all conditions: those that it was fitted to, and those that it forecasts."""
+        whole = weigh(Stack(fitted.model, (*self.evidence.training, *self.evidence.held_out)), fitted.x)
+        return find_gap(whole, signatures(whole), level, self.settings.draws, self.seed)
+
     def assess(self, base: _Base, contenders: Contenders) -> list[Assessment]:
         """Look at contenders by every rule, best first."""
         resolvable = {one.name for one in base.visible if one.resolvable}
         settings, out = self.settings, []
         for names, one in contenders.items():
-            gap = find_gap(one.fitted, signatures(one.fitted), settings.fit_level, settings.draws, self.seed)
-            gain = held_out_gain(
-                base.fitted,
-                one.fitted,
-                self.evidence.held_out,
-                settings.fit_level,
-                settings.draws,
-                self.seed,
-            )
-            share = explained_share(base.fitted, one.fitted)
+            gap = self._gap(one.fitted, settings.fit_level)
+            gain = held_out_gain(base.fitted, one.fitted, self.evidence.held_out, settings.draws, self.seed)
+            share = explained_share(base.gap, gap)
             same = frozenset[str]()
             if len(names) == 1:
                 same = alike(base.seen, names[0], float(one.fitted.sizes[0]), settings.tie_margin)

@@ -6,6 +6,7 @@ from collections.abc import Generator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import stats
 
 from experiments.discover.fitting import Fitted, fit
 from experiments.discover.laboratory import Laboratory, Request
@@ -47,19 +48,21 @@ Contenders = Mapping[tuple[str, ...], Contender]
 
 
 def simulate_again(
-    contenders: Contenders, laboratory: Laboratory, settings: Settings
+    contenders: Contenders, laboratory: Laboratory, settings: Settings, error: float
 ) -> Generator[list[Point], Outcomes, Contenders]:
-    """Correct the leading models, and the base if it is among them, by fresh runs until none of them moves.
+    """Correct by fresh runs the models that may fit and may lead, half as many in every next round.
 
     Parameters
     ----------
     contenders : mapping
-        By mechanisms.
+        By mechanisms; the base is corrected once, if it may fit, whoever leads.
     laboratory : Laboratory
     settings : Settings
+    error : float
+        By how much the emulator may be wrong about Q.
     """
     for number in range(settings.refinement_rounds):
-        chosen = _worth_running(contenders, settings)
+        chosen = _worth_running(contenders, settings, error, max(1, settings.shortlist >> number))
         if not chosen:
             break
         requests = [
@@ -85,16 +88,23 @@ def _updated(contender: Contender, fresh: Runs) -> Contender:
     return Contender(fit(Stack(corrected, before.stack.blocks), before.x, count=2), runs, before.x)
 
 
-def _worth_running(contenders: Contenders, settings: Settings) -> list[tuple[str, ...]]:
-    """The base, and the models so near the best that its lead may be the emulator's error, unless settled."""
-    scores = {names: contender.fitted.score for names, contender in contenders.items() if names}
-    best = min(scores.values(), default=0.0)
-    margin = 2.0 * settings.tie_margin
-    if () in contenders:
-        base = contenders[()].fitted
-        margin = max(margin, settings.shortlist_share * (base.q - base.freedom))
-    near = sorted(
-        (names for names in scores if scores[names] - best <= margin), key=lambda names: scores[names]
-    )
-    shortlist = [names for names in near if not contenders[names].settled][: settings.shortlist]
-    return [names for names in contenders if not names and not contenders[names].settled] + shortlist
+def _worth_running(
+    contenders: Contenders, settings: Settings, error: float, count: int
+) -> list[tuple[str, ...]]:
+    """The base and so many others that fresh runs may bring within the noise and before the rest.
+
+    The best is run at least once, whatever it leaves: nothing is said without a fresh run.
+    """
+    best = min(contender.fitted.score for contender in contenders.values())
+    tied, near = 2.0 * settings.tie_margin, []
+    for names, one in contenders.items():
+        behind, limit = one.fitted.score - best, stats.chi2.isf(settings.false_alarm, one.fitted.freedom)
+        if one.simulated:  # What the emulator got wrong of it is known.
+            may_lead, may_fit = behind <= tied, one.fitted.q <= limit + error
+        else:
+            may_lead = behind <= max(error, tied) or not names
+            may_fit = one.fitted.q <= limit + error or behind == 0.0
+        if may_lead and may_fit and not one.settled:
+            near.append(names)
+    others = sorted(filter(None, near), key=lambda names: contenders[names].fitted.score)
+    return [names for names in near if not names] + others[:count]

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.discover.discovery import Verdict
+from experiments.discover.discovery import Interval, Verdict
 from experiments.discover.fitting import Fitted
 from experiments.discover.gap import GapTest
-from experiments.discover.held_out import Gain
 from experiments.discover.settings import Settings
 
 
@@ -22,8 +21,8 @@ class Assessment:
     ----------
     fitted : Fitted
     gap : GapTest
-        Of the data with the candidate in the model.
-    gain : Gain or None
+        Of all conditions with the candidate in the model, those held out by forecast.
+    gain : Interval or None
         Of the held-out log score over the base.
     explained : float
         Share of the base's excess that it removes.
@@ -37,7 +36,7 @@ class Assessment:
 
     fitted: Fitted
     gap: GapTest
-    gain: Gain | None
+    gain: Interval | None
     explained: float
     simulated: bool
     resolvable: bool
@@ -51,7 +50,7 @@ class Assessment:
     @property
     def score(self) -> float:
         """Minus twice the log-likelihood of all data, the held-out ones by forecast; up to a constant."""
-        return self.fitted.score - (0.0 if self.gain is None else 2.0 * self.gain.interval.value)
+        return self.fitted.score - (0.0 if self.gain is None else 2.0 * self.gain.value)
 
     @property
     def ratios(self) -> np.ndarray:
@@ -78,12 +77,11 @@ class Decision:
     chosen: int | None
 
 
-def explained_share(base: Fitted, fitted: Fitted) -> float:
+def explained_share(base: GapTest, with_it: GapTest) -> float:
     """Share of the base's excess of Q over its degrees of freedom that a model removes, at most 1."""
-    excess = base.q - base.freedom
-    if excess <= 0.0:
+    if base.excess <= 0.0:
         return 0.0
-    return float(np.clip(1.0 - max(fitted.q - fitted.freedom, 0.0) / excess, 0.0, 1.0))
+    return max(1.0 - with_it.excess / base.excess, 0.0)
 
 
 def objections(assessment: Assessment, settings: Settings) -> list[str]:
@@ -100,11 +98,8 @@ def objections(assessment: Assessment, settings: Settings) -> list[str]:
         found.append(f"its size is {ratio:.1f} standard errors, less than {least:g}")
     if gain is None:
         found.append("no held-out condition was measured")
-    elif gain.interval.value <= max(gain.promised, 0.0):
-        found.append(
-            f"it predicts the held-out conditions no better (log score {gain.interval.value:+.1f}, promised"
-            f" at least {gain.promised:+.1f})"
-        )
+    elif gain.value <= 0.0:
+        found.append(f"it predicts the held-out conditions no better (log score {gain.value:+.1f})")
     return found
 
 

@@ -81,8 +81,9 @@ class Fit:
     at_bounds : tuple of str
         Factors and mechanisms that ended at an end of their range.
     q, degrees_of_freedom, q_limit, p_value : float
-        Sum of squares of the whitened residuals of the training conditions, its degrees of freedom, the point
-        that 2.5 % of the parametric bootstrap exceeds, and the share of it above ``q``.
+        Sum of squares of the whitened residuals of all conditions (of those held out: by how far the forecast
+        misses them), its degrees of freedom, the point that the bootstrap exceeds at the level of the rules,
+        and the p value of the whole disagreement, of which Q is one part.
     predicted, predicted_se : (conditions, observables) array
         What the model says, held-out conditions included, and how well its means are known.
     residuals, adjusted_p : (conditions, observables) array
@@ -116,7 +117,7 @@ class Gap:
     Attributes
     ----------
     found : bool
-        True if ``base.q`` or the largest drop passes its limit.
+        True if the base disagrees by its Q, by the largest drop, or by all its scores together.
     largest_drop, drop_limit : float
         Largest fall of Q that a mechanism of the library brings, and the point that 2.5 % of the bootstrap
         exceeds.

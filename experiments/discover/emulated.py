@@ -48,7 +48,12 @@ class EmulatedSimulator:
 
 
 def emulated_heaps(
-    emulator: Emulator, theta: Sequence[float], sizes: Mapping[str, float], replicates: int, seed: int
+    emulator: Emulator,
+    theta: Sequence[float],
+    sizes: Mapping[str, float],
+    replicates: int,
+    seed: int,
+    systematic: float = 0.0,
 ) -> Measured:
     """Measured heaps of every condition in an emulated world.
 
@@ -60,13 +65,17 @@ def emulated_heaps(
     sizes : mapping
         Mechanisms with their sizes in natural units.
     replicates, seed : int
+    systematic : float
+        Standard deviation, in units of that of one run, of what shifts all replicates of a condition alike.
     """
     simulator = EmulatedSimulator(emulator)
-    rng = np.random.default_rng(seed)
+    rng, shifts = np.random.default_rng(seed), np.random.default_rng([seed, 1])
     hidden = tuple(sorted(sizes.items()))
     values = {}
     for condition in emulator.space.conditions:
         seeds = rng.integers(2**31, size=replicates)
         points = [Point(tuple(theta), hidden, condition, int(number)) for number in seeds]
-        values[condition] = simulator(points).values[:, list(emulator.columns)]
+        variance = emulator.surfaces[condition].noise.variance(emulator.space.coded_theta(np.array(theta)))
+        shift = systematic * np.sqrt(variance) * shifts.standard_normal(len(variance))
+        values[condition] = simulator(points).values[:, list(emulator.columns)] + shift
     return Measured(emulator.space.conditions, emulator.observables, values)

@@ -14,26 +14,33 @@ from experiments.discover.ranking import Signatures, projector
 
 @dataclass(frozen=True, eq=False)
 class GapTest:
-    """Two questions to the whitened residuals at once: are they too large, and do they point at a mechanism?
+    """Three questions to the whitened residuals at once.
+
+    Are they too large? Do they point at a mechanism of the library? And do they lie where mechanisms change
+    heaps at all, whichever way: there lies, most likely, what the library lacks, too?
 
     Attributes
     ----------
-    q, q_limit, q_p : float
-        Sum of squares, the point that ``level`` of the bootstrap exceeds, and the share of it above ``q``.
+    q, freedom : float
+        Sum of squares of what a refit leaves, and its degrees of freedom.
+    q_limit : float
+        The point that ``level`` of the bootstrap exceeds.
+    mechanisms : tuple of str
     scores : (mechanisms,) array
-        z of each visible signature in the residuals.
+        z of the visible signature of each in the residuals.
     drop, drop_limit : float
         Largest fall of Q that a positive size of one mechanism brings, and its limit.
     mechanism : str
         Of that fall; empty without a library.
     p : float
-        Of the smaller of the two p values, by the same bootstrap.
+        Of the smallest of the three p values, by the same bootstrap.
     level : float
     """
 
     q: float
+    freedom: int
     q_limit: float
-    q_p: float
+    mechanisms: tuple[str, ...]
     scores: np.ndarray
     drop: float
     drop_limit: float
@@ -46,13 +53,23 @@ class GapTest:
         """Whether there is a gap."""
         return self.p < self.level
 
+    @property
+    def excess(self) -> float:
+        """What of Q the noise does not account for."""
+        return max(self.q - self.freedom, 0.0)
+
 
 def find_gap(fitted: Fitted, seen: Signatures, level: float, draws: int, seed: int) -> GapTest:
     """Test a calibrated model by parametric bootstrap, each draw refitted (linearised at the optimum).
 
+    Conditions that took no part in the calibration may be among those of ``fitted``: what a linear refit to
+    all leaves has the same sum of squares as what the calibration leaves and what its forecasts then miss,
+    each against its own uncertainty.
+
     Parameters
     ----------
     fitted : Fitted
+        Weighed on all conditions that are to be looked at.
     seen : Signatures
         Of the mechanisms that it lacks.
     level : float
@@ -62,21 +79,27 @@ def find_gap(fitted: Fitted, seen: Signatures, level: float, draws: int, seed: i
     project = projector(fitted.sensitivities)
     noise = np.random.default_rng(seed).standard_normal((draws, len(project))) @ project
     q_drawn = (noise**2).sum(axis=1)
-    drops_drawn = (np.maximum(noise @ seen.directions.T, 0.0) ** 2).max(axis=1, initial=0.0)
-    scores = seen.directions @ fitted.residuals
+    scores_drawn = noise @ seen.directions.T
+    drops_drawn = (np.maximum(scores_drawn, 0.0) ** 2).max(axis=1, initial=0.0)
+    left = project @ fitted.residuals
+    q = float(left @ left)
+    scores = seen.directions @ left
     drops = np.maximum(scores, 0.0) ** 2
     drop = float(drops.max(initial=0.0))
-    q_p, drop_p = _exceeded(q_drawn, fitted.q), _exceeded(drops_drawn, drop)
-    smaller = np.minimum(_own_p(q_drawn), _own_p(drops_drawn))
+    drawn = (q_drawn, drops_drawn, (scores_drawn**2).sum(axis=1))
+    found = (q, drop, float(scores @ scores))
+    p_value = min(_exceeded(of, value) for of, value in zip(drawn, found, strict=True))
+    smallest = np.min([_own_p(of) for of in drawn], axis=0)
     return GapTest(
-        q=fitted.q,
+        q=q,
+        freedom=round(float(np.trace(project))),
         q_limit=float(np.quantile(q_drawn, 1.0 - level)),
-        q_p=q_p,
+        mechanisms=seen.names,
         scores=scores,
         drop=drop,
         drop_limit=float(np.quantile(drops_drawn, 1.0 - level)),
         mechanism=seen.names[int(np.argmax(drops))] if seen.names else "",
-        p=(1.0 + float(np.sum(smaller <= min(q_p, drop_p)))) / (draws + 1.0),
+        p=(1.0 + float(np.sum(smallest <= p_value))) / (draws + 1.0),
         level=level,
     )
 

@@ -45,30 +45,14 @@ def forecast(fitted: Fitted, blocks: tuple[Block, ...]) -> Forecast:
     return Forecast(stack.target, stack.predict(fitted.x[None])[0], covariance, stack.noise(fitted.x))
 
 
-@dataclass(frozen=True)
-class Gain:
-    """What the log score of the held-out conditions gains over the base.
-
-    Attributes
-    ----------
-    interval : Interval
-        The gain, and the 90 % interval over the replicates' noise.
-    promised : float
-        The least that the model itself promises, but for a probability of ``level``.
-    """
-
-    interval: Interval
-    promised: float
-
-
 def held_out_gain(
-    base: Fitted, fitted: Fitted, blocks: tuple[Block, ...], level: float, draws: int, seed: int
-) -> Gain | None:
-    """What the log score gains over the base, with parametric bootstraps.
+    base: Fitted, fitted: Fitted, blocks: tuple[Block, ...], draws: int, seed: int
+) -> Interval | None:
+    """What the log score gains over the base, with its 90 % interval over the replicates' noise.
 
     Returns
     -------
-    Gain or None
+    Interval or None
         None where no held-out condition was measured.
     """
     if not blocks:
@@ -76,10 +60,8 @@ def held_out_gain(
     before, after = forecast(base, blocks), forecast(fitted, blocks)
     value = float(after.log_score(after.measured) - before.log_score(after.measured))
     normal = np.random.default_rng(seed).standard_normal((draws, len(after.measured)))
-    told = after.predicted + normal @ np.linalg.cholesky(after.covariance).T
-    promised = float(np.quantile(after.log_score(told) - before.log_score(told), level))
     drawn = after.measured + normal @ np.linalg.cholesky(after.noise).T
     gains = after.log_score(drawn) - before.log_score(drawn)
     # Measured means have been drawn once already: only the spread of a second draw is of interest.
     low, high = np.quantile(gains - gains.mean(), [0.05, 0.95])
-    return Gain(Interval(value + float(low), value, value + float(high)), promised)
+    return Interval(value + float(low), value, value + float(high))

@@ -161,7 +161,8 @@ def base_q(
     A signature brings the seed noise of its heaps: it widens the errors, and lowers every Q, whether it
     explains anything or not.
     """
-    blocks = gather(published_heaps(), emulator).training
+    evidence = gather(published_heaps(), emulator)
+    blocks = (*evidence.training, *evidence.held_out)
     base, with_them = (Model(emulator, names, settings.systematic) for names in ((), tuple(mechanisms)))
     # How an outline is read brings no error: any reading will do.
     whitening = whiten(Stack(with_them, blocks).covariance(np.array([0.0, *sizes])))

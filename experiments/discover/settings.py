@@ -29,8 +29,8 @@ class Settings:
     false_alarm : float
         Probability that a model that lacks nothing is said to lack something.
     fit_level : float
-        A model whose disagreement with the data has a smaller p value is not admitted, nor one whose held-out
-        gain is as far below what it promises.
+        A model whose disagreement with the data has a smaller p value is not admitted. It is the share of
+        true models that are lost; the larger it is, the more of what the library lacks is seen to lack.
     least_ratio : float
         Least size over standard error of a mechanism that is named.
     pair_ratio : float
@@ -48,16 +48,16 @@ class Settings:
     draws : int
         Draws of every bootstrap.
     shortlist_share : float
-        Models whose score is within this share of the base's excess of the best are simulated again (and
-        those within twice the tie margin).
+        By so much of the base's excess the emulator may be wrong: models within it of the best, and of a fit,
+        are simulated again.
     shortlist : int
-        Most models that are simulated again at a time.
+        Most models that are simulated again at first; half as many in every next round.
     refinement_points, refinement_repeats : int
         Fresh points around an optimum, and runs of each, in every condition.
     refinement_rounds : int
         Most times that the optima are simulated again.
     pair_candidates : int
-        The best so many mechanisms are tried in pairs.
+        So many pairs are tried: those that the residuals of their members promise most of.
     direct_runs : int
         Fresh runs a model and condition at the final optimum.
     resolvable : tuple of str or None
@@ -68,7 +68,7 @@ class Settings:
     bank_repeats: int = 2
     bank_mechanism_points: int = 64
     false_alarm: float = 0.025
-    fit_level: float = 0.025
+    fit_level: float = 0.05
     least_ratio: float = 3.0
     pair_ratio: float = 5.0
     tie_margin: float = 6.0
@@ -77,11 +77,11 @@ class Settings:
     systematic: float = 0.2
     draws: int = 4000
     shortlist_share: float = 0.3
-    shortlist: int = 4
+    shortlist: int = 3
     refinement_points: int = 10
     refinement_repeats: int = 2
     refinement_rounds: int = 3
-    pair_candidates: int = 6
+    pair_candidates: int = 12
     direct_runs: int = 16
     resolvable: tuple[str, ...] | None = None
 

@@ -2,8 +2,8 @@
 
     python -m experiments.discover.trials.emulated bank.npz --count 8
 
-They tune and guard the rules without a simulation. What they cannot show is whether the emulator is right;
-the blind trials do that.
+They tune and guard the rules without a simulation. The heaps are shifted as the rules say that cameras and
+time steps shift them. What they cannot show is whether the emulator is right; the blind trials do that.
 """
 
 from __future__ import annotations
@@ -29,7 +29,8 @@ from experiments.discover.settings import Settings
 from experiments.discover.trials.declaration import declared_effects, with_names
 from experiments.discover.trials.drawing import STRONG, Effect
 
-REPLICATES = 5
+REPLICATES = 8
+"""Heaps a condition, as in the sealed trials."""
 STRONGEST = 6.0
 """Largest size drawn, in gamma80, where the range has so much."""
 
@@ -45,17 +46,15 @@ class Truth:
     sizes : tuple of (str, float)
     theta : tuple of float
     seed : int
+    library_lacks : tuple of str
+        What is withheld: the mechanism, and those that look like it.
     """
 
     kind: str
     sizes: tuple[tuple[str, float], ...]
     theta: tuple[float, ...]
     seed: int
-
-    @property
-    def library_lacks(self) -> tuple[str, ...]:
-        """Mechanisms that are withheld."""
-        return tuple(name for name, _ in self.sizes) if self.kind == "withheld" else ()
+    library_lacks: tuple[str, ...] = ()
 
 
 def draw_truths(emulator: Emulator, effects: tuple[Effect, ...], count: int, seed: int) -> Iterator[Truth]:
@@ -80,7 +79,8 @@ def draw_truths(emulator: Emulator, effects: tuple[Effect, ...], count: int, see
         coded = rng.uniform(-0.9, 0.9, len(emulator.space.factors))
         sizes = tuple((effect.name, _size(effect, rng)) for effect in members)
         theta = tuple(float(value) for value in emulator.space.natural_theta(coded))
-        yield Truth(kind, sizes, theta, seed + number)
+        lacks = [{effect.name, *effect.kin} for effect in members if kind == "withheld"]
+        yield Truth(kind, sizes, theta, seed + number, tuple(sorted(set().union(*lacks))))
 
 
 def _size(effect: Effect, rng: np.random.Generator) -> float:
@@ -92,7 +92,9 @@ def _size(effect: Effect, rng: np.random.Generator) -> float:
 
 def run_trial(emulator: Emulator, settings: Settings, truth: Truth) -> dict[str, object]:
     """Analyse one trial; a row of the table of `emulated_trials`."""
-    measured = emulated_heaps(emulator, truth.theta, dict(truth.sizes), REPLICATES, truth.seed)
+    measured = emulated_heaps(
+        emulator, truth.theta, dict(truth.sizes), REPLICATES, truth.seed, settings.systematic
+    )
     known = emulator.without(*truth.library_lacks)
     found = drive(analyse(measured, known, settings, truth.seed), EmulatedSimulator(emulator))
     hidden = tuple(sorted(name for name, _ in truth.sizes))

@@ -112,9 +112,10 @@ def candidates_table(found: Discovery, terms: Terms) -> Table:
         Column("judged", "judgement"),
     ]
     note = (
-        "Q: squared residuals of the training conditions in standard deviations, after factors and size were"
-        " fitted together; its limit is what 2.5 % of data sets exceed that the model itself makes. Held-out"
-        " gain: rise of the log score of the conditions that took no part in any fit, with its 90 %"
+        "Q: squared residuals in standard deviations, after factors and size were fitted together to the"
+        " training conditions; held-out conditions count by how far their forecast misses them. Its limit"
+        " is exceeded by a share, fit_level in the rules, of the data sets that the model itself makes."
+        " Held-out gain: rise of the log score of the conditions that took no part in any fit, with its 90 %"
         " interval."
         + (
             ""

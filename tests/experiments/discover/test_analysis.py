@@ -106,6 +106,24 @@ def test_what_the_library_lacks_is_unknown() -> None:
     assert all(not candidate.admitted for candidate in found.candidates)
 
 
+def test_what_cannot_fit_costs_one_look() -> None:
+    _, waves = _run(measure({"stranger": 2.0}, 6))
+    one_model = SETTINGS.refinement_points * SETTINGS.refinement_repeats * len(CONDITIONS)
+    # No mechanism of the library, and not the base, comes near: the best is run to be sure, no other is.
+    assert len(waves[0]) == one_model
+    assert sum(map(len, waves)) <= 5 * one_model
+
+
+def test_a_forecast_that_fails_is_a_gap_though_the_fit_is_good() -> None:
+    whole = measure({}, 3)
+    values = dict(whole.values)
+    values["fast-wide"] = values["fast-wide"] + 3.0 * values["fast-wide"].std(axis=0)
+    found, _ = _run(Measured(CONDITIONS, OBSERVABLES, values))
+    assert found.verdict == Verdict.UNKNOWN
+    assert found.gap is not None
+    assert found.gap.found
+
+
 def test_one_angle_a_condition_cannot_tell_a_mechanism_from_friction() -> None:
     found, _ = _run(measure({"delta": 1.0}, 3).only(["flank_angle"]))
     assert found.verdict == Verdict.NOT_IDENTIFIABLE

@@ -11,14 +11,14 @@ from synthetic import SETTINGS, emulator, space
 from experiments.discover.emulated import emulated_heaps
 from experiments.discover.trials.declaration import declared_effects, with_names
 from experiments.discover.trials.drawing import STRONG
-from experiments.discover.trials.emulated import draw_truths, run_trial, summary
+from experiments.discover.trials.emulated import REPLICATES, draw_truths, run_trial, summary
 
 KNOWN = emulator().without("twin")
 
 
 @pytest.fixture(scope="module")
 def table() -> pd.DataFrame:
-    effects = declared_effects(KNOWN, SETTINGS, 5)
+    effects = declared_effects(KNOWN, SETTINGS, REPLICATES)
     truths = list(draw_truths(KNOWN, effects, 1, seed=2))
     fixed = with_names(SETTINGS, effects)
     kept = [truth for truth in truths if truth.kind in ("none", "one")]
@@ -46,7 +46,7 @@ def test_the_summary_counts_every_trial(table: pd.DataFrame) -> None:
 
 
 def test_sizes_drawn_are_strong_and_inside_their_range() -> None:
-    effects = {effect.name: effect for effect in declared_effects(KNOWN, SETTINGS, 5)}
+    effects = {effect.name: effect for effect in declared_effects(KNOWN, SETTINGS, REPLICATES)}
     for truth in draw_truths(KNOWN, tuple(effects.values()), 3, seed=1):
         for name, size in truth.sizes:
             assert STRONG * effects[name].gamma80 * (1.0 - 1e-9) <= size <= effects[name].maximum

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import stats
 from synthetic import SETTINGS, emulator, measure, space
 
 from experiments.discover.evidence import gather
-from experiments.discover.fitting import Fitted, fit, size_interval
+from experiments.discover.fitting import Fitted, fit, size_interval, weigh
 from experiments.discover.gap import drift_p, find_gap, holm
+from experiments.discover.held_out import forecast
 from experiments.discover.measured import Measured
 from experiments.discover.model import Model, Stack
 from experiments.discover.ranking import projector, signatures, visibilities
@@ -67,6 +70,38 @@ def test_a_strong_effect_is_a_gap_and_points_at_itself() -> None:
     gap = find_gap(fitted, signatures(fitted), 0.025, 1000, 0)
     assert gap.found
     assert gap.mechanism == "delta"
+
+
+def test_what_a_refit_to_all_leaves_is_what_the_forecast_misses_too() -> None:
+    known = emulator().without("twin")
+    evidence = gather(measure({"beta": 0.3}, 2), known)
+    fitted = fit(Stack(Model(known, (), 0.0), evidence.training))
+    whole = weigh(Stack(fitted.model, (*evidence.training, *evidence.held_out)), fitted.x)
+    gap = find_gap(whole, signatures(whole), 0.025, 1000, 0)
+    ahead = forecast(fitted, evidence.held_out)
+    missed = ahead.measured - ahead.predicted
+    # Ranges as prior knowledge, and where the fit stopped: each some 1e-6 of Q.
+    assert gap.q == pytest.approx(fitted.q + missed @ np.linalg.solve(ahead.covariance, missed), rel=1e-4)
+    assert gap.freedom == 5 * 12 - 3
+
+
+def test_what_lies_between_the_signatures_the_other_way_is_a_gap_too() -> None:
+    fitted = _calibrated(measure({}, 1))
+    seen = signatures(fitted)
+    # Where most signatures lie, turned to where the fewest gain; three standard deviations and no noise.
+    along = np.linalg.svd(seen.directions)[2][0]
+    along = along if (seen.directions @ along).max() < -(seen.directions @ along).min() else -along
+    missed = fitted.stack.predict(fitted.x[None])[0] + np.linalg.solve(fitted.whitening, 3.0 * along)
+    starts = np.cumsum([0, *(len(block.mean) for block in fitted.stack.blocks)])
+    blocks = tuple(
+        replace(block, mean=missed[start : start + len(block.mean)])
+        for block, start in zip(fitted.stack.blocks, starts, strict=False)
+    )
+    gap = find_gap(weigh(Stack(fitted.model, blocks), fitted.x), seen, 0.025, 1000, 0)
+    assert gap.q == pytest.approx(9.0)
+    assert gap.q < gap.q_limit
+    assert gap.drop < gap.drop_limit
+    assert gap.found
 
 
 def test_a_projector_takes_out_what_calibration_can() -> None:
