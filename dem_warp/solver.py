@@ -233,7 +233,8 @@ class Solver:
         self._launch(watch.mark_stale, total, inputs)
         wp.capture_if(self.any_stale, self._rebuild_together, steps=steps, read=read)
         threads = total * WARP if self.device.is_cuda else total
-        self._launch(watch.heed_neighbours, threads, [self.model, self.alive, self.idle, self.hood])
+        striking = [steps, self.model, self.alive, self.idle, self.fastest, self.hood]
+        self._launch(watch.heed_neighbours, threads, striking)
         self._launch(watch.select_near, threads, [steps, *seen, self.hood, self.fastest])
 
     def _look_back(self, read: int) -> None:

@@ -148,11 +148,13 @@ def watch_kernels(build: Build) -> SimpleNamespace:
 
     @wp.kernel(module=module, grid_stride=False)
     def heed_neighbours(
+        ahead: int,
         # model
         model: Model,
         # state in
         alive: wp.array(dtype=int),
         idle: wp.array(dtype=int),
+        fastest: wp.array(dtype=float),
         # state in and out
         hood: Neighbours,
     ):
@@ -163,8 +165,15 @@ def watch_kernels(build: Build) -> SimpleNamespace:
         w = g // model.grain_count
         if idle[w] != 0 or alive[g] <= 0:
             return
+        world = model.world[w]
+        pace = float(STRUCK) * fastest[w]
+        if real(pace) * real(ahead) * world.time_step <= real(LEAST_PATH) * world.skin:
+            # so slow a world that it hardly matters who strikes
+            if lane == 0:
+                hood.near.pace[g] = wp.max(hood.near.pace[g], pace)
+            return
         row = hood.list[w] * model.shape.shape[0] + g
-        fastest = float(0.0)
+        striker = float(0.0)
         for k in range(lane, hood.count[row], lanes):
             partner = hood.entry[row * hood.capacity + k] & SPHERE_MASK
             speed = hood.near.wall_speed[w]
@@ -174,10 +183,10 @@ def watch_kernels(build: Build) -> SimpleNamespace:
                 if wp.static(not build.cooperative):
                     # this list alone has the two of them
                     hood.near.pace[j] = wp.max(hood.near.pace[j], float(STRUCK) * hood.near.speed[g])
-            fastest = wp.max(fastest, speed)
-        fastest = largest_of_warp(fastest)
+            striker = wp.max(striker, speed)
+        striker = largest_of_warp(striker)
         if lane == 0:
-            hood.near.pace[g] = wp.max(hood.near.pace[g], float(STRUCK) * fastest)
+            hood.near.pace[g] = wp.max(hood.near.pace[g], float(STRUCK) * striker)
 
     @wp.kernel(module=module, grid_stride=False)
     def select_near(

@@ -47,5 +47,9 @@ def coulomb_spring(
         displacement = displacement * keep
         force = force * keep
     else:
-        force = limited(force - tangential_velocity * damping_rate, limit)
+        force = force - tangential_velocity * damping_rate
+        # written out: calling `limited` makes a CPU's step 5 % longer
+        size = wp.length(force)
+        if size > limit:
+            force = force * (limit / size)
     return force, displacement
