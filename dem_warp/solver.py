@@ -39,7 +39,7 @@ SKIN_PER_CYCLE = 0.1
 """Part of the skin that the fastest grain of a world may use up between two looks at the neighbour list."""
 
 SHORT_CYCLE, SKIN_PER_SHORT_CYCLE = 8, 0.25
-"""Steps up to which it may use up more: so few hardly pay for the look."""
+"""Steps up to which it may use up more on a GPU, where so few hardly pay for the look."""
 
 LOOK_CHUNKS = 16
 """Chunks after which the length of a cycle is chosen anew, from how fast the grains have become."""
@@ -269,7 +269,8 @@ class Solver:
         speed = self.fastest.numpy()[self._running] + gravity * chunks * CHUNK * time_step
         with np.errstate(divide="ignore"):
             free = float(np.min(skin / (speed * time_step)))
-        length = max(SKIN_PER_CYCLE * free, min(SKIN_PER_SHORT_CYCLE * free, SHORT_CYCLE), SHORTEST_CYCLE)
+        short = min(SKIN_PER_SHORT_CYCLE * free, SHORT_CYCLE) if self.device.is_cuda else 0.0
+        length = max(SKIN_PER_CYCLE * free, short, SHORTEST_CYCLE)
         return int(2 ** np.floor(np.log2(min(length, self.cycle_limit))))
 
     def advance(self, chunks: int = 1) -> None:
