@@ -12,6 +12,9 @@ from experiments.discover.fitting import Fitted
 from experiments.discover.gap import GapTest
 from experiments.discover.settings import Settings
 
+CHANCE = 1.645
+"""Standard deviations that a normal number passes upwards in one case of twenty."""
+
 
 @dataclass(frozen=True, eq=False)
 class Assessment:
@@ -103,12 +106,29 @@ def objections(assessment: Assessment, settings: Settings) -> list[str]:
     return found
 
 
+def is_open(behind: float, are_alike: bool, margin: float) -> bool:
+    """Whether it stays open which of two models is right, one of which is so much behind.
+
+    Of models d standard deviations apart the wrong one is behind by d^2 +- 2 d. Two that should look the
+    same, their d^2 being below the margin, are told apart where chance does so in one case of twenty at most.
+
+    Parameters
+    ----------
+    behind : float
+        In Q, held-out conditions included.
+    are_alike : bool
+        Whether they should look the same.
+    margin : float
+    """
+    return behind < (margin + 2.0 * CHANCE * margin**0.5 if are_alike else margin)
+
+
 def decide(assessments: Sequence[Assessment], settings: Settings) -> Decision:
     """Choose among candidates of equally many mechanisms.
 
-    The one of the best score is named if it passes every rule, is resolvable, and no other comes within the
-    tie margin or looks the same. Single mechanisms within it are a tie if one of them passes. Of two pairs
-    within it neither is named: where two pairs fit, so may what the library does not have.
+    The one of the best score is named if it passes every rule, is resolvable, and no other is so close behind
+    that it stays open which of them it is. Single mechanisms so close are a tie if one of them passes. Of two
+    such pairs neither is named: where two pairs fit, so may what the library does not have.
 
     Parameters
     ----------
@@ -122,8 +142,11 @@ def decide(assessments: Sequence[Assessment], settings: Settings) -> Decision:
     close = [
         i
         for i in order
-        if assessments[i].score - best.score < settings.tie_margin
-        or set(assessments[i].mechanisms) <= best.alike
+        if is_open(
+            assessments[i].score - best.score,
+            set(assessments[i].mechanisms) <= best.alike,
+            settings.tie_margin,
+        )
     ]
     passing = [i for i in close if not objections(assessments[i], settings)]
     failed = objections(best, settings)

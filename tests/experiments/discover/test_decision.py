@@ -1,0 +1,27 @@
+"""When two models count as told apart."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from experiments.discover.decision import is_open
+
+MARGIN = 6.0
+DRAWS = 100_000
+
+
+def test_models_that_look_the_same_are_told_apart_by_chance_in_one_case_of_twenty() -> None:
+    rng = np.random.default_rng(1)
+    # Twelve means with unit noise about the true model; the other lies as far off as still looks the same.
+    data = rng.standard_normal((DRAWS, 12))
+    other = np.full(12, np.sqrt(MARGIN / 12.0))
+    behind = ((data - other) ** 2).sum(axis=1) - (data**2).sum(axis=1)
+    apart = np.mean([not is_open(value, True, MARGIN) for value in behind])
+    # The share's standard error is sqrt(0.05 * 0.95 / 1e5) = 0.0007; four of them.
+    assert apart == pytest.approx(0.05, abs=0.0028)
+
+
+def test_models_that_do_not_look_the_same_are_open_within_the_margin() -> None:
+    assert is_open(MARGIN - 1e-9, False, MARGIN)
+    assert not is_open(MARGIN, False, MARGIN)
