@@ -261,7 +261,7 @@ def device_structs(precision: Precision) -> SimpleNamespace:
         rank: wp.array(dtype=int)  # of a sphere in its bucket, (spheres,)
         order: wp.array(dtype=int)  # spheres by bucket, (spheres,)
         ordered: wp.array(dtype=sphere)  # their positions, (spheres,)
-        found: wp.array(dtype=int)  # partners of a sphere, sorted, (spheres * found_capacity,)
+        found: wp.array(dtype=int)  # partners of a sphere, unsorted, (spheres * found_capacity,)
         found_count: wp.array(dtype=int)  # (spheres,)
         found_capacity: int
 
