@@ -38,8 +38,8 @@ class Settings:
         wrong ones make up for much.
     tie_margin : float
         Mechanisms within so much of the best are a tie: in Q plus the logarithm of the determinant, less
-        twice the held-out gain, which is minus twice a log-likelihood. Those that should look the same are one
-        within somewhat more (`decision.is_open`).
+        twice the held-out gain, which is minus twice a log-likelihood. Those that should look the same
+        are one within somewhat more (`decision.is_open`).
     incomplete_share : float
         Least share of the excess that a mechanism explains which is named although something is left.
     power : float
