@@ -2,6 +2,8 @@
 
 import warp as wp
 
+from dem_warp.kernels.lanes import lanes_with, sync_warp
+
 CLEARANCE = 1.02
 """Spheres are kept apart by this factor of the sum of their radii."""
 
@@ -30,8 +32,50 @@ def is_outside(section: wp.vec3, x: float, y: float, radius: float) -> bool:
     return wp.abs(x) + radius > section[0] or wp.abs(y) + radius > section[1]
 
 
-@wp.kernel(enable_backward=False)
+@wp.func
+def spread_spheres(
+    g: int,
+    center: wp.vec3,
+    lane: int,
+    lanes: int,
+    sphere_count: int,
+    shape_spheres: wp.array(dtype=wp.vec4),
+    count: int,
+    first: int,
+    orientation: wp.quat,
+    size: float,
+    section: wp.vec3,
+    spheres: wp.array(dtype=wp.vec4),
+) -> bool:
+    """Places a grain's spheres, a sphere a lane; whether one of the lane's passes the edge."""
+    outside = bool(False)
+    for s in range(lane, count, lanes):
+        local = shape_spheres[first + s] * size
+        p = center + wp.quat_rotate(orientation, wp.vec3(local[0], local[1], local[2]))
+        spheres[g * sphere_count + s] = wp.vec4(p[0], p[1], p[2], local[3])
+        if is_outside(section, p[0], p[1], CLEARANCE * local[3]):
+            outside = True
+    return outside
+
+
+@wp.func
+def meet(
+    g: int, count: int, h: int, others: int, sphere_count: int, spheres: wp.array(dtype=wp.vec4)
+) -> bool:
+    """Whether two grains are less than the clearance apart."""
+    for a in range(count):
+        for b in range(others):
+            sa = spheres[g * sphere_count + a]
+            sb = spheres[h * sphere_count + b]
+            d = wp.vec3(sa[0] - sb[0], sa[1] - sb[1], sa[2] - sb[2])
+            if wp.length(d) < CLEARANCE * (sa[3] + sb[3]):
+                return True
+    return False
+
+
+@wp.kernel(enable_backward=False, grid_stride=False)
 def place_grains(
+    lanes: int,
     # model
     first: wp.array(dtype=int),
     sphere_count: int,
@@ -49,16 +93,18 @@ def place_grains(
     spheres: wp.array(dtype=wp.vec4),
     delays: wp.array(dtype=int),
 ):
-    """One thread a world: places its grains, which begin at `first`, in order of arrival.
+    """Places the grains of a world, which begin at `first`, in order of arrival; a warp a world on a GPU.
 
     A cross-section is its half sides along x and y, and its radius where it is round, 0 where it is not [m].
     """
-    w = wp.tid()
+    thread = wp.tid()
+    w = thread // lanes
+    lane = thread - w * lanes
     state = wp.rand_init(seed[w])
     late = int(0)
     for g in range(first[w], first[w + 1]):
         n = g - first[w]
-        shape_g = shape[g]
+        count = shape_sphere_count[shape[g]]
         placed = bool(False)
         while not placed and late < MAX_DELAYS:
             z = spacing[w] * float(n + late)
@@ -67,29 +113,24 @@ def place_grains(
                     u = wp.randf(state)
                     place = place_in(section[w], u, wp.randf(state))
                     center = wp.vec3(place[0], place[1], z)
-                    free = bool(True)
-                    for s in range(shape_sphere_count[shape_g]):
-                        local = shape_spheres[shape_g * sphere_count + s] * size[g]
-                        offset = wp.quat_rotate(orientation[g], wp.vec3(local[0], local[1], local[2]))
-                        p = center + offset
-                        spheres[g * sphere_count + s] = wp.vec4(p[0], p[1], p[2], local[3])
-                        if is_outside(section[w], p[0], p[1], CLEARANCE * local[3]):
-                            free = False
-                    h = g - 1
-                    while free and h >= first[w] and z - position[h][2] < 2.0 * reach[w]:
-                        apart = wp.length(center - position[h])
-                        if apart < CLEARANCE * reach[w] * 2.0:
-                            for a in range(shape_sphere_count[shape_g]):
-                                for b in range(shape_sphere_count[shape[h]]):
-                                    sa = spheres[g * sphere_count + a]
-                                    sb = spheres[h * sphere_count + b]
-                                    d = wp.vec3(sa[0] - sb[0], sa[1] - sb[1], sa[2] - sb[2])
-                                    if wp.length(d) < CLEARANCE * (sa[3] + sb[3]):
-                                        free = False
-                        h -= 1
-                    if free:
+                    outside = spread_spheres(
+                        g, center, lane, lanes, sphere_count, shape_spheres, count,
+                        shape[g] * sphere_count, orientation[g], size[g], section[w], spheres,
+                    )  # fmt: skip
+                    placed = lanes_with(outside) == 0
+                    sync_warp()
+                    # an earlier grain a lane, from the last one down to those too low to be met
+                    last = g - 1
+                    while placed and last >= first[w] and z - position[last][2] < 2.0 * reach[w]:
+                        h = last - lane
+                        met = bool(False)
+                        if h >= first[w] and z - position[h][2] < 2.0 * reach[w]:
+                            if wp.length(center - position[h]) < CLEARANCE * reach[w] * 2.0:
+                                met = meet(g, count, h, shape_sphere_count[shape[h]], sphere_count, spheres)
+                        placed = lanes_with(met) == 0
+                        last -= lanes
+                    if placed:
                         position[g] = center
-                        placed = True
             if not placed:
                 late += 1
     delays[w] = late

@@ -14,6 +14,7 @@ import numpy as np
 import warp as wp
 
 from dem_warp.clumps import stack_spheres
+from dem_warp.kernels.lanes import WARP
 from dem_warp.kernels.rain import MAX_DELAYS, place_grains
 from dem_warp.population import DrawnGrains
 
@@ -94,7 +95,9 @@ def place_rain(
     with wp.ScopedDevice(device):
         position = wp.zeros(int(first[-1]), dtype=wp.vec3)
         delays = wp.zeros(len(grains), dtype=int)
+        lanes = WARP if wp.get_device().is_cuda else 1
         inputs = [
+            lanes,
             wp.array(first, dtype=int),
             spheres.shape[1],
             wp.array(spheres.reshape(-1, 4), dtype=wp.vec4),
@@ -110,7 +113,7 @@ def place_rain(
             wp.zeros(int(first[-1]) * spheres.shape[1], dtype=wp.vec4),
             delays,
         ]
-        wp.launch(place_grains, len(grains), inputs=inputs, block_dim=32)
+        wp.launch(place_grains, len(grains) * lanes, inputs=inputs, block_dim=WARP)
         placed = np.split(position.numpy().astype(float), first[1:-1])
         crowded = np.flatnonzero(delays.numpy() >= MAX_DELAYS)
     if crowded.size:
