@@ -22,6 +22,7 @@ import typer
 from experiments.commands.run import RECORD
 from experiments.errors import InputError
 from experiments.files import replacing, write_text
+from experiments.report.material_card import CARD
 from experiments.report.record import CAMPAIGN, HEAPS, PROVENANCE, RUNS, SENSITIVITIES, write_page
 from experiments.studies.buckwheat import paper
 from experiments.studies.buckwheat.sensitivities import SETTINGS
@@ -47,6 +48,9 @@ def gather_paper(source: Path, record: Path, commit: str | None = None) -> None:
     for name in (CAMPAIGN, HEAPS):
         if (source / RECORD / name).is_file():
             _copy(source / RECORD / name, record / name)
+    # The card of the campaign beside, with its clumps.
+    for path in source.glob(f"{Path(CARD).stem}*"):
+        _copy(path, record / path.name)
     if commit:
         made_by = json.loads((record / PROVENANCE).read_text(encoding="utf-8"))
         write_text(record / PROVENANCE, json.dumps(made_by | {"commit": commit}, indent=1) + "\n")

@@ -14,6 +14,7 @@ import shutil
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 import pandas as pd
 import typer
 
@@ -34,6 +35,10 @@ FOLDER = Path(paper.__file__).with_name("point")
 CASES, PROVENANCE, PAGE = "cases.csv", "provenance.json", "README.md"
 KEY = ["stage", "scene", "run", "replicate", "seed"]
 """Columns that name a case."""
+
+LAST_DIGITS = 1e-8
+"""Relative difference of two settings that are the same: where climbs and optima end, the linear algebra of
+another machine finds other last digits."""
 
 
 class KeptCases:
@@ -64,16 +69,24 @@ class KeptCases:
             rule = "kept cases must be those that the study's campaign asks for; gather them anew"
             raise InputError(rule, dict(zip(KEY, missing[0], strict=True)), self.source)
         found = self.cases.loc[wanted.index]
-        # Written by repr and read back: the same bits.
-        if not found[wanted.columns].eq(wanted).all(axis=None):
+        if not np.allclose(found[wanted.columns], wanted, rtol=LAST_DIGITS, atol=0.0):
             raise InputError("kept cases must have the study's settings", "others", self.source)
         # An empty reason is read back as no number.
         found = found.assign(reason=found["reason"].astype(object).fillna(""))
         return found.reset_index()[[*table.columns, *found.columns.drop(wanted.columns)]]
 
 
-def gather(scale: str, source: Path, record: Path) -> None:
+def gather(scale: str, source: Path, record: Path, commit: str | None = None) -> None:
     """Take over the cases of a campaign's folder, and what made them.
+
+    Parameters
+    ----------
+    scale, source
+        Of the campaign: its scale and its folder.
+    record
+        The record's folder.
+    commit
+        Commit that made them, where the machine that did had no repository.
 
     Raises
     ------
@@ -87,7 +100,8 @@ def gather(scale: str, source: Path, record: Path) -> None:
     with replacing(record / scale / CASES) as temporary:
         shutil.copyfile(cases, temporary)
     made_by = json.loads(results.read_text(encoding="utf-8"))["provenance"]
-    facts = made_by | {"walls": pd.read_csv(source / WALLS).to_dict("records")}
+    facts = made_by | ({"commit": commit} if commit else {})
+    facts["walls"] = pd.read_csv(source / WALLS).to_dict("records")
     write_text(record / scale / PROVENANCE, json.dumps(facts, indent=1) + "\n")
 
 
@@ -126,7 +140,11 @@ def _findings(campaign: Campaign, study: Study, folder: Path) -> list[str]:
     if len(joint.factors) > 1:
         with replacing(folder / "joint.png") as temporary:
             joint_plot(joint, hidden).savefig(temporary, dpi=130)
-        picture = [f"![Where each response agrees, and where all do]({folder.name}/joint.png)"]
+        picture = [
+            f"![Where each response agrees, and where all do]({folder.name}/joint.png)",
+            "Each panel is a cut through the point of the smallest chi²; the hidden truth has further settings, "
+            "so that it may lie in the compatible region and yet beside it in a cut.",
+        ]
     tables = response_tables(campaign, study.responses)
     return [
         prose(outcome),
@@ -155,12 +173,13 @@ def main(
     sources: Annotated[
         list[str] | None, typer.Option("--from", metavar="SCALE=FOLDER", help="Folder of a campaign.")
     ] = None,
+    commit: Annotated[str | None, typer.Option(help="Commit that made the campaigns.")] = None,
     out: Annotated[Path, typer.Option(help="Folder of the record.")] = FOLDER,
 ) -> None:
     """Gather the record and write its page."""
     for text in sources or []:
         scale, _, source = text.partition("=")
-        gather(scale, Path(source), out)
+        gather(scale, Path(source), out, commit)
     print(write_page(out))
 
 

@@ -135,6 +135,7 @@ def run_campaign(desk: Desk, on_stage: StageHook | None = None, replay: Replay |
 
     campaign = calibrate(desk.study, runner, on_stage)
     provenance = {
+        **_source_and_day(),
         "device": desk.device,
         "workers": desk.workers,
         "seconds": round(time.perf_counter() - started, 1),
@@ -213,12 +214,15 @@ def _provenance(desk: Desk, replay: Replay) -> dict[str, Any]:
     return {
         "scale": desk.study.scale,
         "fit": desk.study.measurement.fit,
-        "commit": source_commit(),
-        "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
+        **_source_and_day(),
         **_engine(desk, replay.cases),
         "versions": library_versions(),
         "walls": desk.walls.to_dict("records"),
     }
+
+
+def _source_and_day() -> dict[str, Any]:
+    return {"commit": source_commit(), "date": datetime.datetime.now(datetime.UTC).date().isoformat()}
 
 
 def _engine(desk: Desk, cases: pd.DataFrame) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from experiments.calibrate.export import jsonable
 from experiments.calibrate.results import Campaign
 from experiments.files import replacing, write_text
 from experiments.report.markdown import markdown_table
+from experiments.report.material_card import CARD
 from experiments.report.numbers import fixed, plain
 from experiments.report.pictures import heap_row
 from experiments.report.replay_tables import ranking_sentence, replay_tables
@@ -47,6 +48,8 @@ class Record:
     """What made the numbers: commit, machine, date, wall times."""
     campaign: Mapping[str, Any] | None = None
     """A campaign of our own beside it: outcome, reason, effects of its screening."""
+    card: bool = False
+    """Whether there is a card of the material that it chose."""
     scales: Mapping[str, Replay] = field(default_factory=dict)
     """The same runs at smaller scales, by name."""
     sensitivities: Sensitivities | None = None
@@ -70,6 +73,7 @@ class Record:
             Replay(pd.read_csv(folder / RUNS)),
             json.loads((folder / PROVENANCE).read_text(encoding="utf-8")),
             json.loads(campaign.read_text(encoding="utf-8")) if campaign.is_file() else None,
+            (folder / CARD).is_file(),
             {name: Replay(pd.read_csv(path)) for name, path in scales.items()},
             Sensitivities.read(folder / SENSITIVITIES),
             (folder / HEAPS).is_file(),
@@ -178,8 +182,9 @@ def record_page(record: Record) -> str:
         *_section("Screening", tables, "effects"),
         *([ranking_sentence(record.replay)] if "effects" in tables else []),
         *_section("Response surface", tables, "anova", "coefficients"),
+        *_section("Where the friction of steel acts", tables, "course", "slopes"),
         *_section("Verification", tables, "verification"),
-        *_campaign(record.campaign),
+        *_campaign(record),
         *_scales(record),
         *_sensitivities(record.sensitivities),
         "## Every run",
@@ -217,10 +222,12 @@ def _picture(record: Record) -> list[str]:
     ]
 
 
-def _campaign(campaign: Mapping[str, Any] | None) -> list[str]:
-    if campaign is None:
+def _campaign(record: Record) -> list[str]:
+    if record.campaign is None:
         return []
-    return ["## Our own campaign", f"Outcome: {campaign['outcome']}. {campaign['reason']}"]
+    outcome = f"Outcome: {record.campaign['outcome']}. {record.campaign['reason']}"
+    card = f"The material, and all settings that are as good: [{CARD}]({CARD})." if record.card else ""
+    return ["## Our own campaign", outcome, card]
 
 
 def scale_cost(small: Replay, full: Replay) -> Agreement:

@@ -8,7 +8,7 @@ import pandas as pd
 
 from experiments.report.numbers import fixed, interval, p_value, term
 from experiments.report.tables import Column, Table, make_table
-from experiments.studies.buckwheat.replay import Replay, published_noise
+from experiments.studies.buckwheat.replay import COURSE, Replay, published_noise
 from experiments.studies.buckwheat.runs import STAGES
 
 STRAY = 5.0
@@ -38,6 +38,9 @@ def replay_tables(replay: Replay, campaign: pd.DataFrame | None = None) -> dict[
         tables["coefficients"] = replay_coefficients_table(replay)
     if "verification" in replay.analysed:
         tables["verification"] = replay_verification_table(replay)
+    if "course" in replay.analysed:
+        tables["course"] = course_table(replay)
+        tables["slopes"] = slopes_table(replay)
     return tables | {"runs": runs_table(replay)}
 
 
@@ -184,6 +187,40 @@ def replay_verification_table(replay: Replay) -> Table:
     ]
     caption = "Heaps at the published optimum against the measured angle."
     return make_table("replay-verification", pd.DataFrame(rows), columns, caption)
+
+
+def course_table(replay: Replay) -> Table:
+    """Lay out what became of the grains along the climb."""
+    columns = [
+        Column("run", "run", "label"),
+        *(Column(name, name, "value") for name in "EF"),
+        Column("published", "published angle", "angle", "°"),
+        *(Column(name, title, "ratio") for name, (title, _) in COURSE.items()),
+    ]
+    caption = "Along the steepest climb, means of the heaps of a run."
+    note = (
+        "The weight on the tube is the grains' own, a mean while it is drawn; beyond two tube radii lie "
+        "those that slid or rolled off."
+    )
+    return make_table("replay-course", replay.course, columns, caption, note)
+
+
+def slopes_table(replay: Replay) -> Table:
+    """Lay out how the observables change over the composite design."""
+    frame = replay.slopes.rename(index={name: title for name, (title, _) in COURSE.items()}).reset_index()
+    columns = [
+        Column("observable", "observable"),
+        *(
+            column
+            for name in "EF"
+            for column in (
+                Column(name, f"a step of {name}", "ratio"),
+                Column(f"{name}_t", "over its error", "ratio"),
+            )
+        ),
+    ]
+    note = "Planes by least squares through all heaps of Table 6; a step is one coded unit."
+    return make_table("replay-slopes", frame, columns, "Slopes over Table 6.", note)
 
 
 def ranking_sentence(replay: Replay) -> str:

@@ -85,6 +85,15 @@ def test_cases_of_another_campaign_are_refused(campaign: Campaign) -> None:
         kept(plan.assign(E=0.5))
 
 
+def test_settings_may_end_in_other_digits_on_another_machine(campaign: Campaign) -> None:
+    heaps = campaign.cases.query("stage == 'climb'")
+    plan = heaps[["stage", "scene", "run", "replicate", "E", "F", "G", "H", "seed"]]
+    kept = KeptCases(campaign.cases, "cases.csv")
+    assert (kept(plan.assign(E=plan["E"] * (1 + 1e-10)))["E"] == heaps["E"].to_numpy()).all()
+    with pytest.raises(InputError, match="the study's settings"):
+        kept(plan.assign(E=plan["E"] * (1 + 1e-6)))
+
+
 def test_a_folder_without_a_campaign_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="must hold a campaign"):
         gather("bench", tmp_path, tmp_path / "record")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -14,13 +15,15 @@ from experiments.calibrate import Campaign
 from experiments.errors import InputError
 from experiments.report import render_page
 from experiments.report.markdown import markdown_table
+from experiments.report.material_card import CARD, write_material_card
 from experiments.report.record import PAGE, RUNS, Record, record_page, scale_cost, write_record
 from experiments.report.replay_tables import ranking_sentence, replay_tables
 from experiments.report.tables import Column, make_table
 from experiments.studies.buckwheat.replay import Replay
 from experiments.studies.buckwheat.runs import planned_cases
 from experiments.studies.buckwheat.variants import variants
-from experiments.study import Study
+from experiments.study import Study, load_study
+from experiments.study.card import read_card, with_material
 
 WALLS = [{"stage": "paper, climb", "simulated": 6, "seconds": 44.7}]
 
@@ -44,6 +47,20 @@ def test_the_committed_page_follows_from_the_committed_angles() -> None:
     assert page == record_page(Record.read(paper_record.FOLDER))
 
 
+def test_the_committed_card_is_that_of_the_committed_campaign() -> None:
+    card = tomllib.loads((paper_record.FOLDER / CARD).read_text(encoding="utf-8"))
+    campaign = Record.read(paper_record.FOLDER).campaign
+    assert campaign is not None
+    assert (card["fitted"]["outcome"], card["fitted"]["reason"]) == (campaign["outcome"], campaign["reason"])
+    study = load_study(None, "paper")
+    case = study.case({name: factor["chosen"] for name, factor in card["factor"].items()}, 1)
+    own = with_material({"material": CARD}, paper_record.FOLDER)
+    assert own["grain"]["density"] == "698 kg/m^3"
+    friction = own["contact"]["grain-wall"]["static_friction"]
+    # The card has the chosen point in full, the table of its factors four figures of it.
+    assert friction == pytest.approx(case.grain_wall.static_friction, rel=1e-3)
+
+
 def test_a_page_shows_the_numbers_of_its_cases(tmp_path: Path, campaign: Campaign) -> None:
     page = write_record(tmp_path, cases(1.5), {"device": "CPU", "walls": WALLS}, campaign).read_text("utf-8")
     replay = Replay(cases(1.5))
@@ -58,10 +75,13 @@ def test_a_page_shows_the_numbers_of_its_cases(tmp_path: Path, campaign: Campaig
     assert f"Outcome: {campaign.outcome.value}. {campaign.reason}" in page
 
 
-def test_a_record_takes_in_scales_sensitivities_and_notes(tmp_path: Path) -> None:
+def test_a_record_takes_in_a_card_scales_sensitivities_and_notes(
+    tmp_path: Path, campaign: Campaign, study: Study
+) -> None:
     bench, varied, record = tmp_path / "bench", tmp_path / "varied", tmp_path / "record"
     for folder, shift in ((tmp_path / "paper", 0.0), (bench, -4.0)):
-        write_record(folder / "record", cases(shift), {"commit": None})
+        write_record(folder / "record", cases(shift), {"commit": None}, campaign)
+    write_material_card(campaign, study, tmp_path / "paper")
     varied.mkdir()
     (varied / "settings.json").write_text(
         json.dumps({"scale": "paper", "modulus_scale": 10.0, "replicates": 1}), encoding="utf-8"
@@ -76,6 +96,9 @@ def test_a_record_takes_in_scales_sensitivities_and_notes(tmp_path: Path) -> Non
     paper_record.main(tmp_path / "paper", [f"bench={bench}"], varied, "abc123", record)
     page = (record / PAGE).read_text(encoding="utf-8")
     assert "What we make of it." in page
+    assert f"]({CARD})" in page
+    clumps = [Path(read_card(folder / CARD)["grain"]["clump"]) for folder in (tmp_path / "paper", record)]
+    assert clumps[1].read_bytes() == clumps[0].read_bytes()
     assert "- commit: abc123" in page
     cost = scale_cost(Replay(cases(-4.0)), Replay(cases()))
     # The same noise in both: the difference is the shift.
