@@ -39,6 +39,11 @@ class Contender:
         return self.centre is not None
 
     @property
+    def can_run(self) -> bool:
+        """Whether fresh runs of it end: a study may refuse a model, and of some no heap can be measured."""
+        return self.runs is None or len(self.runs.conditions) > 0
+
+    @property
     def settled(self) -> bool:
         """Whether they lie around its optimum."""
         return self.centre is not None and not has_moved(self.fitted, self.centre)
@@ -55,7 +60,8 @@ def simulate_again(
     Parameters
     ----------
     contenders : mapping
-        By mechanisms; the base is corrected once, if it may fit, whoever leads.
+        By mechanisms; the base is corrected once, if it may fit, whoever leads. A rival of which no fresh
+        run ends is out.
     laboratory : Laboratory
     settings : Settings
     error : float
@@ -77,7 +83,9 @@ def simulate_again(
         updated = {
             name: _updated(contenders[name], runs) for name, runs in zip(chosen, finished, strict=True)
         }
-        contenders = {**contenders, **updated}
+        contenders = {
+            names: one for names, one in {**contenders, **updated}.items() if not names or one.can_run
+        }
     return contenders
 
 

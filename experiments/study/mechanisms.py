@@ -31,10 +31,20 @@ class _Mechanisms(Section):
         Raises
         ------
         ValueError
-            When a parameter leaves what is physical.
+            When a parameter leaves what is physical, or two of them exclude each other.
         """
         named = [(kind, getattr(self, name)) for name, kind in MECHANISMS.items()]
-        return tuple(kind(**dict(section)) for kind, section in named if section is not None)
+        built = tuple(kind(**dict(section)) for kind, section in named if section is not None)
+        for one in built:
+            for other in built:
+                if other.name in one.excludes and _meet(one, other):
+                    rule = f"mechanism.{one.name} must not stand beside mechanism.{other.name} in one contact"
+                    raise ValueError(f"{rule}, got {one.between!r} and {other.between!r}")
+        return built
+
+
+def _meet(one: Mechanism, other: Mechanism) -> bool:
+    return any(one.acts_between(kind) and other.acts_between(kind) for kind in ("grains", "walls"))
 
 
 _SECTIONS: dict[str, Any] = {name: (_section(kind) | None, None) for name, kind in MECHANISMS.items()}

@@ -45,8 +45,21 @@ def test_a_mechanism_can_be_a_factor(write_study: WriteStudy) -> None:
         ("[mechanism.jkr]\nwork_of_adhesion = -1.0", r"mechanism.jkr.work_of_adhesion: must be greater than"),
         ('[mechanism.jkr]\nbetween = "grain"', r"mechanism.jkr.between: must be 'all', 'grains' or 'walls'"),
         ("[mechanism.kinetic_friction]\nfriction_drop = 1.5", r"friction_drop: must be .* got 1.5"),
+        (
+            "[mechanism.jkr]\nwork_of_adhesion = 0.1\n[mechanism.hysteretic_spring]\nplasticity = 0.3",
+            r"mechanism.jkr must not stand beside mechanism.hysteretic_spring in one contact",
+        ),
     ],
 )
 def test_a_wrong_mechanism_is_named_with_its_place(write_study: WriteStudy, wrong: str, rule: str) -> None:
     with pytest.raises(StudyError, match=rule):
         load_study(write_study(add=f"\n{wrong}\n"))
+
+
+def test_mechanisms_that_exclude_each_other_may_act_in_different_contacts(write_study: WriteStudy) -> None:
+    apart = '[mechanism.jkr]\nwork_of_adhesion = 0.1\nbetween = "grains"\n[mechanism.hysteretic_spring]\n'
+    study = load_study(write_study(add=f'\n{apart}plasticity = 0.3\nbetween = "walls"\n'))
+    case = study.case({}, seed=1)
+    grains, walls = case.contacts(case.scene.wall_material)
+    assert [one.name for one in grains.mechanisms] == ["jkr"]
+    assert [one.name for one in walls.mechanisms] == ["hysteretic_spring"]

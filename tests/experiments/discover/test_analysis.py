@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 
@@ -20,8 +21,10 @@ ALONE = emulator().without("twin")
 """The library without the mechanism that cannot be told from another."""
 
 
-def _run(measured: Measured, known: Emulator = ALONE, lost: int = 0) -> tuple[Discovery, list[list[Point]]]:
-    """Drive an analysis; the first ``lost`` cases of each wave leave no heap."""
+def _run(
+    measured: Measured, known: Emulator = ALONE, is_lost: Callable[[int, Point], bool] = lambda *_: False
+) -> tuple[Discovery, list[list[Point]]]:
+    """Drive an analysis; lost cases, told by their number in the wave and their point, leave no heap."""
     waves, simulator = [], SyntheticSimulator(space())
     analysis = analyse(measured, known, SETTINGS, seed=5)
     try:
@@ -29,10 +32,9 @@ def _run(measured: Measured, known: Emulator = ALONE, lost: int = 0) -> tuple[Di
         while True:
             waves.append(points)
             values = simulator(points).values
-            values[:lost] = np.nan
-            points = analysis.send(
-                Outcomes(values, tuple("clogged" if i < lost else "" for i in range(len(points))))
-            )
+            lost = [is_lost(i, point) for i, point in enumerate(points)]
+            values[lost] = np.nan
+            points = analysis.send(Outcomes(values, tuple("clogged" if one else "" for one in lost)))
     except StopIteration as end:
         return end.value, waves
 
@@ -96,6 +98,17 @@ def test_two_mechanisms_at_once_are_both_named() -> None:
     found, _ = _run(measure({"alpha": 0.6, "delta": 0.8}, 5))
     assert found.verdict == Verdict.NAMED
     assert set(found.named) == {"alpha", "delta"}
+
+
+def test_a_pair_that_cannot_be_simulated_is_not_named() -> None:
+    # What explains the data, but is refused by the study: the emulator alone shall not speak for it.
+    found, waves = _run(
+        measure({"alpha": 0.6, "delta": 0.8}, 5),
+        is_lost=lambda _, point: dict(point.sizes).keys() == {"alpha", "delta"},
+    )
+    assert any(dict(point.sizes).keys() == {"alpha", "delta"} for wave in waves for point in wave)
+    assert ("alpha", "delta") not in [candidate.mechanisms for candidate in found.candidates]
+    assert found.verdict == Verdict.UNKNOWN
 
 
 def test_what_the_library_lacks_is_unknown() -> None:
@@ -186,7 +199,7 @@ def test_an_observable_that_nobody_simulates_is_left_out_with_a_note() -> None:
 
 
 def test_fresh_runs_that_fail_are_counted_and_left_out() -> None:
-    found, _ = _run(measure({"delta": 0.6}, 3), lost=7)
+    found, _ = _run(measure({"delta": 0.6}, 3), is_lost=lambda i, _: i < 7)
     assert found.named == ("delta",)
     assert any("fresh runs left no heap" in note for note in found.notes)
 
