@@ -142,8 +142,8 @@ def _findings(campaign: Campaign, study: Study, folder: Path) -> list[str]:
             joint_plot(joint, hidden).savefig(temporary, dpi=130)
         picture = [
             f"![Where each response agrees, and where all do]({folder.name}/joint.png)",
-            "Each panel is a cut through the point of the smallest chi². The hidden truth has further settings: "
-            "it may lie in the compatible region and yet beside it in a cut.",
+            "Each panel is a cut through the point of the smallest chi². The hidden truth may lie in the "
+            "compatible region and yet beside it in a cut.",
         ]
     tables = response_tables(campaign, study.responses)
     return [
