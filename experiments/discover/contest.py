@@ -39,9 +39,9 @@ class Contender:
         return self.centre is not None
 
     @property
-    def can_run(self) -> bool:
-        """Whether fresh runs of it end: a study may refuse a model, and of some no heap can be measured."""
-        return self.runs is None or len(self.runs.conditions) > 0
+    def fails(self) -> bool:
+        """Whether no fresh run of it has ended: a study may refuse a model, or all its tubes clog."""
+        return self.runs is not None and not len(self.runs.conditions)
 
     @property
     def settled(self) -> bool:
@@ -60,8 +60,8 @@ def simulate_again(
     Parameters
     ----------
     contenders : mapping
-        By mechanisms; the base is corrected once, if it may fit, whoever leads. A rival of which no fresh
-        run ends is out.
+        By mechanisms; the base is corrected once, if it may fit, whoever leads. A rival whose runs fail is
+        out, where runs can be had at all.
     laboratory : Laboratory
     settings : Settings
     error : float
@@ -83,9 +83,9 @@ def simulate_again(
         updated = {
             name: _updated(contenders[name], runs) for name, runs in zip(chosen, finished, strict=True)
         }
-        contenders = {
-            names: one for names, one in {**contenders, **updated}.items() if not names or one.can_run
-        }
+        contenders = {**contenders, **updated}
+        if laboratory.runs_end:
+            contenders = {names: one for names, one in contenders.items() if not names or not one.fails}
     return contenders
 
 

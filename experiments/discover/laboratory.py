@@ -52,6 +52,11 @@ class Laboratory:
         self.failures = 0
         self._waves = 0
 
+    @property
+    def runs_end(self) -> bool:
+        """Whether any run has ended; of published tables none can be had."""
+        return self.failures < self.cases
+
     def wave(self, requests: Sequence[Request]) -> Waves:
         """Yield the points of one wave, be sent their outcomes, return the finished runs by request.
 
