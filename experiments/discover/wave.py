@@ -20,7 +20,7 @@ from experiments.discover.outcome_table import Outcome, OutcomeTable
 from experiments.discover.threads import use_one_thread
 from experiments.study.study import MeasurementSection
 
-WORLDS = 512
+WORLDS = 1024
 """Worlds that one launch on a GPU holds: enough to fill it, few enough that a killed run loses little."""
 
 DRIVERS = 4
