@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields
+from itertools import permutations
 from typing import Any, Literal
 
 from pydantic import Field, create_model
@@ -35,11 +36,10 @@ class _Mechanisms(Section):
         """
         named = [(kind, getattr(self, name)) for name, kind in MECHANISMS.items()]
         built = tuple(kind(**dict(section)) for kind, section in named if section is not None)
-        for one in built:
-            for other in built:
-                if other.name in one.excludes and _meet(one, other):
-                    rule = f"mechanism.{one.name} must not stand beside mechanism.{other.name} in one contact"
-                    raise ValueError(f"{rule}, got {one.between!r} and {other.between!r}")
+        for one, other in permutations(built, 2):
+            if other.name in one.excludes and _meet(one, other):
+                rule = f"mechanism.{one.name} must not stand beside mechanism.{other.name} in one contact"
+                raise ValueError(f"{rule}, got {one.between!r} and {other.between!r}")
         return built
 
 
