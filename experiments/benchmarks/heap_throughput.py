@@ -4,14 +4,15 @@ A sphere-step is one sphere of a grain moved on by one step. Grains of the rain 
 are moved on too, but meet nobody: `of free grains` leaves them out. The columns are simulated once and kept
 (`--columns`); worlds beyond `--seeds` hold the same columns at other moments.
 
-    python -m experiments.benchmarks.heap_throughput --scale soft --device cpu --peer liggghts --processes 2
+    python -m experiments.benchmarks.heap_throughput --scale soft --device cpu --processes 2
+    python -m experiments.benchmarks.heap_throughput --scale soft --peer lammps --peer liggghts --peer yade
     python -m experiments.benchmarks.heap_throughput --scale paper --device cuda --worlds 1,12,31,128
 
-Every table goes to `--out` as CSV, and all of them to throughput.md; `record.py` puts them into README.md.
+Every table goes to `--out` as CSV, and all of them to throughput.md; those beside other codes to its folder
+peers and to peers.md. `record.py` puts both pages into README.md.
 """
 
 from collections.abc import Iterator, Sequence
-from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -22,18 +23,13 @@ from dem_warp.device import resolve_device
 from dem_warp.solver import Solver
 from experiments.benchmarks.columns import MOMENTS, Columns
 from experiments.benchmarks.parallel import processes_table
-from experiments.benchmarks.peers.comparison import compare_with_liggghts
+from experiments.benchmarks.peers.comparison import compare
+from experiments.benchmarks.peers.library import PEERS, PeerName
 from experiments.benchmarks.roofline import Traffic, copy_bandwidth, step_traffic
 from experiments.benchmarks.tables import machine, parse_counts, write_page
 from experiments.benchmarks.timing import Timing, run_in, start, time_steps
 
 Section = tuple[str, str, pd.DataFrame]
-
-
-class Peer(StrEnum):
-    """Codes to compare with."""
-
-    LIGGGHTS = "liggghts"
 
 
 def speed_tables(columns: Columns, counts: Sequence[int], steps: int) -> Iterator[list[Section]]:
@@ -95,7 +91,7 @@ def main(
     worlds: Annotated[str, typer.Option(help="Numbers of worlds to measure, such as 1,12,31,128.")] = "1",
     seeds: Annotated[int, typer.Option(help="Most columns to simulate beforehand.")] = 32,
     steps: Annotated[int, typer.Option(help="Steps of a stretch.")] = 2048,
-    peer: Annotated[Peer | None, typer.Option(help="A code to compare with.")] = None,
+    peer: Annotated[list[PeerName] | None, typer.Option(help="Codes to compare with, each named so.")] = None,
     processes: Annotated[int, typer.Option(help="Processes to run at once on the CPU.")] = 1,
     columns: Annotated[Path, typer.Option(help="Folder of simulated columns.")] = Path("out/columns"),
     out: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("out/throughput"),
@@ -104,15 +100,27 @@ def main(
     name, counts = resolve_device(device), parse_counts(worlds)
     if name != "cpu" and (peer or processes > 1):
         raise typer.BadParameter("--peer and --processes are for --device cpu")
+    _require_installed(peer or [])
     prepared = Columns(scale, min(max(counts), seeds), name, columns)
     sections: list[Section] = []
     for sections in speed_tables(prepared, counts, steps):
         write_page(out, "throughput", sections)
-    if peer:
-        sections.append(compare_with_liggghts(prepared, steps, out / "liggghts"))
     if processes > 1:
         sections.append(processes_table(prepared, columns, processes, steps))
-    print(write_page(out, "throughput", sections).read_text(encoding="utf-8"))
+    pages = [write_page(out, "throughput", sections)]
+    if peer:
+        comparisons = [compare(code, prepared, steps, out / code) for code in peer]
+        pages.append(write_page(out / "peers", "peers", comparisons))
+    print("\n".join(page.read_text(encoding="utf-8") for page in pages))
+
+
+def _require_installed(peers: Sequence[PeerName]) -> None:
+    """Refuse peers that are not there before anything is measured."""
+    try:
+        for peer in peers:
+            PEERS[peer].locate()
+    except ValueError as error:
+        raise typer.BadParameter(str(error), param_hint="--peer") from error
 
 
 if __name__ == "__main__":

@@ -12,7 +12,8 @@ from dem_warp.model import Grains
 from dem_warp.solver import CHUNK, Solver
 from experiments.benchmarks.columns import Columns, Moment
 from experiments.benchmarks.contacts import placed_centers
-from experiments.benchmarks.peers import liggghts
+from experiments.benchmarks.peers.library import PEERS, PeerName
+from experiments.benchmarks.peers.peer import PeerRun, Plan
 from experiments.benchmarks.roofline import world_contacts
 from experiments.benchmarks.timing import STRETCHES, Timing, run_in, start, time_steps
 
@@ -25,36 +26,38 @@ REST_AFTER = 0.1
 SPEED = "million sphere-steps/s"
 
 
-def compare_with_liggghts(columns: Columns, steps: int, folder: Path) -> tuple[str, str, pd.DataFrame]:
-    """Time a settled column here, in LIGGGHTS, and here again.
+def compare(name: PeerName, columns: Columns, steps: int, folder: Path) -> tuple[str, str, pd.DataFrame]:
+    """Time a settled column here, in another code, and here again.
 
     Parameters
     ----------
+    name : PeerName
+        Also that of the table.
     columns : Columns
     steps : int
-        Of a stretch, in both codes.
+        Of a stretch.
     folder : Path
-        For LIGGGHTS' files.
+        For the peer's files.
     """
     case = columns.cases[0]
     moment = _below_rim(columns.moments("settled", 1)[0], case.scene)
     default = moment.setup.skin
     ours = {skin: _start(moment, skin, columns.device) for skin in (*SKINS, default)}
     timings = {skin: [time_steps(solver, steps)] for skin, solver in ours.items()}
-    length = timings[default][0].steps
     lead = int(np.ceil(REST_AFTER / (moment.setup.time_step * CHUNK))) * CHUNK
-    theirs = liggghts.run(folder, case, moment, SKINS, lead, length, 2 * STRETCHES)
+    plan = Plan(SKINS, lead, timings[default][0].steps, 2 * STRETCHES)
+    theirs = PEERS[name].run(folder, case, moment, plan)
     for skin, solver in ours.items():
         timings[skin].append(time_steps(solver, steps))
 
     rows = [_row("dem-warp", skin, _joined(pair)) for skin, pair in timings.items()]
     rows += [_row(theirs.version, skin, timing) for skin, timing in theirs.timings.items()]
     table = pd.DataFrame(rows)
-    return "liggghts", _summary(table, ours[default], theirs), table
+    return name, _summary(table, ours[default], theirs), table
 
 
 def _below_rim(moment: Moment, tube: LiftedCylinder) -> Moment:
-    """The column without the grains that reach over the rim: LIGGGHTS' cylinders have no end."""
+    """The column without the grains that reach over the rim: a peer's tube has no rim."""
     setup = moment.setup
     grains, shape = setup.grains, setup.shapes[0]
     centers = placed_centers(shape, grains.positions, grains.orientations, grains.sizes)
@@ -89,7 +92,7 @@ def _row(code: str, skin: float, timing: Timing) -> dict[str, object]:
     }
 
 
-def _summary(table: pd.DataFrame, ours: Solver, theirs: liggghts.PeerRun) -> str:
+def _summary(table: pd.DataFrame, ours: Solver, theirs: PeerRun) -> str:
     here, there = table[table["code"] == "dem-warp"], table[table["code"] != "dem-warp"]
     best, peer, default = here[SPEED].max(), there[SPEED].max(), here[SPEED].iloc[-1]
     fastest = there["fastest"].min() / here["fastest"].min()
@@ -101,7 +104,7 @@ def _summary(table: pd.DataFrame, ours: Solver, theirs: liggghts.PeerRun) -> str
         "the last of dem-warp's rows). At the end "
         f"{contacts.grain_pairs} and {theirs.contacts.grain_pairs} contacts between grains, "
         f"{contacts.wall_pairs} and {theirs.contacts.wall_pairs} with walls; kinetic energy "
-        f"{_kinetic_energy(ours):.1e} and {theirs.kinetic_energy:.1e} J. LIGGGHTS started within "
+        f"{_kinetic_energy(ours):.1e} and {theirs.kinetic_energy:.1e} J. {theirs.version} started within "
         f"{1e9 * theirs.placement_error:.1f} nm of the same places."
     )
 

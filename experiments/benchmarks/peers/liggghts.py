@@ -9,22 +9,23 @@ in until the column is at rest.
 """
 
 import re
-import shutil
-import subprocess
-from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from dem_warp import Case, LiftedCylinder
 from experiments.benchmarks.columns import Moment
-from experiments.benchmarks.contacts import ContactCounts, count_contacts, placed_centers
-from experiments.benchmarks.timing import Timing
-
-PROGRAM = "liggghts"
-MARGIN = 0.01
-"""Between the tube and the sides of LIGGGHTS' box [m]."""
+from experiments.benchmarks.peers.lammps_files import (
+    END,
+    INPUT,
+    START,
+    read_energy,
+    read_spheres,
+    read_timings,
+    run_input,
+    timed_runs,
+)
+from experiments.benchmarks.peers.peer import MARGIN, PeerRun, Plan, judged
 
 SPOT = 1e-9
 """Half the side of the region that a grain is inserted in [m]."""
@@ -78,84 +79,25 @@ undump {name}
 """
 
 
-@dataclass(frozen=True, eq=False)
-class PeerRun:
-    """What LIGGGHTS did with a column.
-
-    Attributes
-    ----------
-    version : str
-    timings : dict
-        Loop times of the stretches, by skin [m].
-    kinetic_energy : float
-        Of the translation, at the end [J].
-    contacts : ContactCounts
-        At the end.
-    placement_error : float
-        Largest distance of a sphere from where it was to be at the start [m].
-    """
-
-    version: str
-    timings: dict[float, Timing]
-    kinetic_energy: float
-    contacts: ContactCounts
-    placement_error: float
+def simulate(program: str, folder: Path, case: Case[LiftedCylinder], moment: Moment, plan: Plan) -> PeerRun:
+    """Run a settled column of grains of one shape and size; see `Peer.run`."""
+    write_input(folder, case, moment, plan)
+    log = run_input(program, folder)
+    start, end = read_spheres(folder / START), read_spheres(folder / END)
+    version = re.findall(r"LIGGGHTS-\w+ [\d.]+", log)[0]
+    # before the stretches: the insertion, its dump and the running in
+    timings = read_timings(log, plan, len(end), before=3)
+    return judged(moment, version, timings, read_energy(log), start, end)
 
 
-def run(
-    folder: Path,
-    case: Case[LiftedCylinder],
-    moment: Moment,
-    skins: Sequence[float],
-    run_in: int,
-    steps: int,
-    stretches: int,
-) -> PeerRun:
-    """Run a settled column of grains of one shape and size.
-
-    Parameters
-    ----------
-    folder : Path
-        For the input and what LIGGGHTS writes.
-    case, moment
-        The column.
-    skins : sequence of float
-        Neighbour skins to time, one after another on the same state [m].
-    run_in, steps, stretches : int
-        Steps before the first stretch, steps of a stretch, and stretches a skin.
+def write_input(folder: Path, case: Case[LiftedCylinder], moment: Moment, plan: Plan) -> None:
+    """Write `column.in` and `clump.txt`.
 
     Raises
     ------
     ValueError
-        If LIGGGHTS is not installed, or the grains differ in size.
-    RuntimeError
-        If it stops with an error.
+        If the grains differ in size.
     """
-    program = shutil.which(PROGRAM)
-    if program is None:
-        raise ValueError(f"peer: {PROGRAM} must be installed (Debian package liggghts), found none")
-    folder.mkdir(parents=True, exist_ok=True)
-    write_input(folder, case, moment, skins, run_in, steps, stretches)
-    command = [program, "-in", "column.in", "-log", "column.log"]
-    # its screen output must exist (3.8.0 stops with a fault otherwise); it goes nowhere
-    done = subprocess.run(command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    log = (folder / "column.log").read_text(encoding="utf-8", errors="replace")
-    error = re.search(r"^ERROR.*", log, re.MULTILINE)
-    if done.returncode or error:
-        raise RuntimeError(f"{PROGRAM} failed in {folder}: {error[0] if error else done.returncode}")
-    return _read(folder, log, moment, skins, stretches)
-
-
-def write_input(
-    folder: Path,
-    case: Case[LiftedCylinder],
-    moment: Moment,
-    skins: Sequence[float],
-    run_in: int,
-    steps: int,
-    stretches: int,
-) -> None:
-    """Write `column.in` and `clump.txt`; parameters as for `run`."""
     setup = moment.setup
     sizes = np.unique(setup.grains.sizes)
     if len(sizes) > 1:
@@ -163,17 +105,17 @@ def write_input(
     shape = setup.shapes[0]
     np.savetxt(folder / "clump.txt", np.column_stack([shape.centers, shape.radii]), fmt="%.15g")
     count = setup.grains.count
-    parts = [_head(case, moment, skins[0]), *(_grain(moment, i) for i in range(count)), "run 1\n"]
+    parts = [_head(case, moment, plan.skins[0]), *(_grain(moment, i) for i in range(count)), "run 1\n"]
     parts += [f"unfix put{i}\n" for i in range(count)]
     parts += [
         _DUMP.format(name="start"),
         f"timestep {setup.time_step!r}\n",
         "compute energy all ke/multisphere\nthermo_style custom step c_energy\n",
-        f"thermo {steps}\nrun {run_in}\n",
+        f"thermo {plan.steps}\nrun {plan.run_in}\n",
+        timed_runs(plan),
+        _DUMP.format(name="end"),
     ]
-    parts += [f"neighbor {skin} bin\n" + f"run {steps}\n" * stretches for skin in skins]
-    parts.append(_DUMP.format(name="end"))
-    (folder / "column.in").write_text("".join(parts), encoding="utf-8")
+    (folder / INPUT).write_text("".join(parts), encoding="utf-8")
 
 
 def _head(case: Case[LiftedCylinder], moment: Moment, skin: float) -> str:
@@ -212,37 +154,3 @@ def _grain(moment: Moment, i: int) -> str:
     x, y, z, w = (q / np.linalg.norm(q)).tolist()
     box = " ".join(f"{center - SPOT:.15g} {center + SPOT:.15g}" for center in position)
     return _GRAIN.format(i=i, box=box, seed=_SEEDS[2], w=w, x=x, y=y, z=z)
-
-
-def _read(folder: Path, log: str, moment: Moment, skins: Sequence[float], stretches: int) -> PeerRun:
-    setup = moment.setup
-    shape, grains = setup.shapes[0], setup.grains
-    start, end = _spheres(folder / "start.txt"), _spheres(folder / "end.txt")
-    placed = placed_centers(shape, grains.positions, grains.orientations, grains.sizes)
-    grain = np.repeat(np.arange(grains.count), shape.sphere_count)
-    return PeerRun(
-        version=re.findall(r"LIGGGHTS-\w+ [\d.]+", log)[0],
-        timings=_timings(log, skins, stretches, len(end)),
-        kinetic_energy=float(re.findall(r"^ +\d+ +(\S+) *\nLoop time", log, re.MULTILINE)[-1]),
-        contacts=count_contacts(end[:, :3], end[:, 3], grain, [wall for wall, _ in setup.walls]),
-        placement_error=float(np.linalg.norm(start[:, :3] - placed, axis=1).max()),
-    )
-
-
-def _timings(log: str, skins: Sequence[float], stretches: int, spheres: int) -> dict[float, Timing]:
-    """Stretches by skin, after the three runs of insertion, its dump, and running in."""
-    loops = re.findall(r"^Loop time of (\S+) on 1 procs for (\d+) steps", log, re.MULTILINE)[3:]
-    builds = [int(n) for n in re.findall(r"^Neighbor list builds = (\d+)", log, re.MULTILINE)][3:]
-    steps, timings = int(loops[0][1]), {}
-    for k, skin in enumerate(skins):
-        rows = slice(k * stretches, (k + 1) * stretches)
-        seconds = tuple(float(duration) for duration, _ in loops[rows])
-        timings[skin] = Timing(steps, seconds, spheres, sum(builds[rows]) / (steps * stretches))
-    return timings
-
-
-def _spheres(path: Path) -> np.ndarray:
-    """Centres and radii of a dump, in the order of insertion, (n, 4)."""
-    lines = path.read_text(encoding="utf-8").splitlines()
-    first = next(i for i, line in enumerate(lines) if line.startswith("ITEM: ATOMS")) + 1
-    return np.array([line.split()[1:] for line in lines[first:]], dtype=float)

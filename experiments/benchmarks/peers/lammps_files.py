@@ -1,0 +1,60 @@
+"""Running LAMMPS and what descends from it, and reading what they write."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from experiments.benchmarks.peers.peer import Plan, execute
+from experiments.benchmarks.timing import Timing
+
+INPUT, LOG = "column.in", "column.log"
+
+START, END = "start.txt", "end.txt"
+"""Dumps of the spheres: number, centre and radius."""
+
+
+def run_input(program: str, folder: Path) -> str:
+    """Run the input of a folder and return the log.
+
+    Raises
+    ------
+    RuntimeError
+        If the program stops with an error.
+    """
+    status = execute([program, "-in", INPUT, "-log", LOG], folder)
+    log = (folder / LOG).read_text(encoding="utf-8", errors="replace")
+    error = re.search(r"^ERROR.*", log, re.MULTILINE)
+    if status or error:
+        raise RuntimeError(f"{program} failed in {folder}: {error[0] if error else status}")
+    return log
+
+
+def timed_runs(plan: Plan) -> str:
+    """Commands that time every skin of a plan."""
+    return "".join(f"neighbor {skin} bin\n" + f"run {plan.steps}\n" * plan.stretches for skin in plan.skins)
+
+
+def read_timings(log: str, plan: Plan, spheres: int, before: int) -> dict[float, Timing]:
+    """Loop times of the stretches by skin, after a number of other runs."""
+    loops = re.findall(r"^Loop time of (\S+) on 1 procs for \d+ steps", log, re.MULTILINE)[before:]
+    builds = re.findall(r"^Neighbor list builds = (\d+)", log, re.MULTILINE)[before:]
+    timings = {}
+    for k, skin in enumerate(plan.skins):
+        rows = slice(k * plan.stretches, (k + 1) * plan.stretches)
+        seconds = tuple(map(float, loops[rows]))
+        rebuilds = sum(map(int, builds[rows])) / (plan.steps * plan.stretches)
+        timings[skin] = Timing(plan.steps, seconds, spheres, rebuilds)
+    return timings
+
+
+def read_energy(log: str) -> float:
+    """The second and last column of the last line of thermodynamic output."""
+    return float(re.findall(r"^ +\d+ +(\S+) *\nLoop time", log, re.MULTILINE)[-1])
+
+
+def read_spheres(path: Path) -> np.ndarray:
+    """Centres and radii of a dump, in the order of their numbers, (n, 4)."""
+    lines = path.read_text(encoding="utf-8").splitlines()
+    first = next(i for i, line in enumerate(lines) if line.startswith("ITEM: ATOMS")) + 1
+    return np.array([line.split()[1:] for line in lines[first:]], dtype=float)
