@@ -1,9 +1,7 @@
-"""The benchmarks' instruments: scene, counts, export to another code, record. Speeds are not tested."""
+"""The benchmarks' instruments: scene, counts, record. Speeds are not tested."""
 
 from __future__ import annotations
 
-import stat
-import sys
 from dataclasses import asdict, replace
 from pathlib import Path
 
@@ -11,32 +9,20 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from dem_warp import LiftedCylinder
-from dem_warp.device import resolve_device
 from dem_warp.solver import CHUNK
 from dem_warp.walls import Cylinder, Disc, Plane
 from experiments.benchmarks import columns as scene
-from experiments.benchmarks.columns import Columns, Moment, reference_case
+from experiments.benchmarks.columns import Columns, reference_case
 from experiments.benchmarks.contacts import count_contacts, placed_centers
 from experiments.benchmarks.grain_cost import bed
 from experiments.benchmarks.heap_throughput import speed_tables
-from experiments.benchmarks.peers import liggghts
 from experiments.benchmarks.record import record_page
-from experiments.benchmarks.roofline import step_traffic, world_contacts
+from experiments.benchmarks.roofline import step_traffic
 from experiments.benchmarks.tables import markdown_table, parse_counts
 from experiments.benchmarks.timing import run_in, start, time_steps
 from experiments.study import load_study
 
 DEVICE = "cpu"
-SMALL = LiftedCylinder(0.020, 0.020, scene.STEEL, rain_rate=300.0, grain_count=60)
-
-
-@pytest.fixture(scope="module")
-def small_columns(tmp_path_factory: pytest.TempPathFactory) -> Columns:
-    """One column of sixty grains, simulated and kept."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setitem(scene.SCALES, "small", (SMALL, 400.0))
-        return Columns("small", 1, resolve_device(DEVICE), tmp_path_factory.mktemp("columns"))
 
 
 @pytest.mark.parametrize("scale", ["bench", "soft", "paper"])
@@ -58,18 +44,19 @@ def test_an_unknown_scale_is_refused() -> None:
 
 
 def test_moments_are_what_their_names_say(small_columns: Columns) -> None:
+    tube = small_columns.cases[0].scene
     filling, settled, lifting = (small_columns.moments(phase, 1)[0] for phase in scene.MOMENTS)
     waiting = filling.setup.grains.release_steps > 0
     assert 0 < np.count_nonzero(waiting) < filling.setup.grains.count
     # rain falls at its speed until it is released
-    np.testing.assert_allclose(filling.setup.grains.velocities[waiting, 2], -SMALL.rain_speed, rtol=1e-6)
-    assert np.abs(settled.setup.grains.velocities).max() < 10.0 * SMALL.rest_speed
+    np.testing.assert_allclose(filling.setup.grains.velocities[waiting, 2], -tube.rain_speed, rtol=1e-6)
+    assert np.abs(settled.setup.grains.velocities).max() < 10.0 * tube.rest_speed
     # caught at the first look after the moment; a look is due every chunk
-    late = CHUNK * lifting.setup.time_step * SMALL.lift_speed / SMALL.diameter
-    rise = lifting.setup.walls[scene.TUBE][0].point[2] / SMALL.diameter
+    late = CHUNK * lifting.setup.time_step * tube.lift_speed / tube.diameter
+    rise = lifting.setup.walls[scene.TUBE][0].point[2] / tube.diameter
     share = scene.MOMENTS["lifting"][0]
     assert share <= rise < share + late
-    assert lifting.tube_motion.velocity == (0.0, 0.0, SMALL.lift_speed)
+    assert lifting.tube_motion.velocity == (0.0, 0.0, tube.lift_speed)
 
 
 def test_worlds_take_all_moments_before_they_repeat(small_columns: Columns) -> None:
@@ -81,12 +68,13 @@ def test_worlds_take_all_moments_before_they_repeat(small_columns: Columns) -> N
 
 
 def test_a_settled_column_goes_on_at_rest(small_columns: Columns) -> None:
+    tube = small_columns.cases[0].scene
     solver = start(small_columns.moments("settled", 1), DEVICE)
     run_in(solver)
     timing = time_steps(solver, 256, stretches=1)
     assert timing.rebuilds == 0.0
-    assert timing.free_spheres == 9 * SMALL.grain_count
-    assert np.abs(solver.view([0])[0].velocities).max() < SMALL.rest_speed
+    assert timing.free_spheres == 9 * tube.grain_count
+    assert np.abs(solver.view([0])[0].velocities).max() < tube.rest_speed
 
 
 def test_waiting_grains_count_neither_as_work_nor_in_the_lists(small_columns: Columns) -> None:
@@ -143,100 +131,6 @@ def test_near_is_what_may_touch_within_the_paths_of_both(small_columns: Columns)
     listed = (among.grain_pairs + on_walls.wall_pairs) / grains.count
     # a pair at the very edge may fall to either side in fixed point
     assert step_traffic(solver).list_length == pytest.approx(listed, abs=2 / grains.count)
-
-
-# ---- another code ------------------------------------------------------------------------------------------
-
-FAKE = '''\
-#!{python}
-"""Places the grains of the input by itself and says that its runs took 0.5 s, 0.6 s, ..."""
-import re, sys
-import numpy as np
-text = open("column.in").read()
-clump = np.loadtxt("clump.txt")
-number = r"([-+.\\de]+)"
-boxes = re.findall(r"region at\\d+ block " + " ".join([number] * 6), text)
-turns = re.findall(r"orientation constant " + " ".join([number] * 4), text)
-rows = []
-for box, turn in zip(boxes, turns, strict=True):
-    low, high = np.array(box, dtype=float).reshape(3, 2).T
-    w, x, y, z = map(float, turn)
-    matrix = np.array([
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ])
-    rows += [(*((low + high) / 2 + matrix @ sphere[:3]), sphere[3]) for sphere in clump]
-for name in ("start", "end"):
-    with open(name + ".txt", "w") as file:
-        print("ITEM: ATOMS id x y z radius", file=file)
-        for i, row in enumerate(rows):
-            print(i + 1, *map(repr, map(float, row)), file=file)
-with open("column.log", "w") as log:
-    print("LIGGGHTS (Version LIGGGHTS-PUBLIC 3.8.0, compiled)", file=log)
-    for i, steps in enumerate(re.findall(r"^run (\\d+)", text, re.MULTILINE)):
-        print(f"    Step energy\\n  {{i}}  1.5e-9", file=log)
-        print(f"Loop time of {{0.5 + 0.1 * i}} on 1 procs for {{steps}} steps", file=log)
-        print(f"Neighbor list builds = {{i}}", file=log)
-'''
-
-
-@pytest.fixture
-def column(small_columns: Columns) -> Moment:
-    return small_columns.moments("settled", 1)[0]
-
-
-def test_liggghts_gets_the_column_and_its_times_are_read(
-    small_columns: Columns, column: Moment, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    program = tmp_path / "liggghts"
-    program.write_text(FAKE.format(python=sys.executable))
-    program.chmod(program.stat().st_mode | stat.S_IXUSR)
-    monkeypatch.setattr(liggghts, "PROGRAM", str(program))
-    done = liggghts.run(tmp_path / "run", small_columns.cases[0], column, [1e-4, 2e-4], 700, 300, 2)
-    # the regions are SPOT wide, and numbers are written with fifteen digits
-    assert done.placement_error < liggghts.SPOT
-    assert done.contacts == world_contacts(start([column], DEVICE), 0)
-    assert done.version == "LIGGGHTS-PUBLIC 3.8.0"
-    assert done.kinetic_energy == 1.5e-9
-    # runs 0 to 2 are the insertion, its dump and the running in
-    assert done.timings[1e-4].seconds == pytest.approx((0.8, 0.9))
-    assert done.timings[2e-4].seconds == pytest.approx((1.0, 1.1))
-    assert done.timings[2e-4].steps == 300
-    assert done.timings[2e-4].rebuilds == pytest.approx((5 + 6) / 600)
-    assert done.timings[2e-4].free_spheres == 9 * SMALL.grain_count
-
-
-def test_liggghts_gets_the_materials_of_the_case(
-    small_columns: Columns, column: Moment, tmp_path: Path
-) -> None:
-    case = small_columns.cases[0]
-    liggghts.write_input(tmp_path, case, column, [1e-4], 700, 300, 2)
-    text = (tmp_path / "column.in").read_text()
-    modulus = 2.0 * 34.325e6 / 400.0 * 1.29  # E = 2 G (1 + v), softened
-    found = {
-        name: [float(word) for word in text.split(f"global {name} ")[1].splitlines()[0].split()[1:]]
-        for name in ("youngsModulus", "poissonsRatio", "coefficientRestitution", "coefficientFriction")
-    }
-    assert found["youngsModulus"] == pytest.approx([modulus, 2.0 * 70e9 * 1.3])
-    assert found["poissonsRatio"] == [0.29, 0.30]
-    assert found["coefficientRestitution"] == [2, 0.18, 0.5, 0.5, 0.5]
-    assert found["coefficientFriction"] == [2, 0.46, 0.38, 0.38, 0.38]
-    mass = float(text.split(" mass ")[1].split()[0])
-    assert mass == pytest.approx(698.0 * column.setup.shapes[0].volume)
-
-
-def test_a_peer_that_cannot_run_is_refused(
-    small_columns: Columns, column: Moment, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    case = small_columns.cases[0]
-    grains = replace(column.setup.grains, sizes=np.linspace(0.9, 1.0, column.setup.grains.count))
-    mixed = replace(column, setup=replace(column.setup, grains=grains))
-    with pytest.raises(ValueError, match="peer: grains must be of one size, got 60 sizes from"):
-        liggghts.write_input(tmp_path, case, mixed, [1e-4], 1, 1, 1)
-    monkeypatch.setattr(liggghts, "PROGRAM", str(tmp_path / "nowhere"))
-    with pytest.raises(ValueError, match="nowhere must be installed"):
-        liggghts.run(tmp_path, case, column, [1e-4], 1, 1, 1)
 
 
 # ---- beds, tables, record ----------------------------------------------------------------------------------

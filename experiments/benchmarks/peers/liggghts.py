@@ -25,7 +25,7 @@ from experiments.benchmarks.peers.lammps_files import (
     run_input,
     timed_runs,
 )
-from experiments.benchmarks.peers.peer import MARGIN, PeerRun, Plan, judged
+from experiments.benchmarks.peers.peer import MARGIN, PeerRun, Plan, common_size, judged
 
 SPOT = 1e-9
 """Half the side of the region that a grain is inserted in [m]."""
@@ -98,11 +98,7 @@ def write_input(folder: Path, case: Case[LiftedCylinder], moment: Moment, plan: 
     ValueError
         If the grains differ in size.
     """
-    setup = moment.setup
-    sizes = np.unique(setup.grains.sizes)
-    if len(sizes) > 1:
-        raise ValueError(f"peer: grains must be of one size, got {len(sizes)} sizes from {sizes[0]:g}")
-    shape = setup.shapes[0]
+    setup, shape = moment.setup, moment.setup.shapes[0]
     np.savetxt(folder / "clump.txt", np.column_stack([shape.centers, shape.radii]), fmt="%.15g")
     count = setup.grains.count
     parts = [_head(case, moment, plan.skins[0]), *(_grain(moment, i) for i in range(count)), "run 1\n"]
@@ -143,7 +139,7 @@ def _head(case: Case[LiftedCylinder], moment: Moment, skin: float) -> str:
         seeds=_SEEDS,
         density=grain.density,
         spheres=shape.sphere_count,
-        size=float(setup.grains.sizes[0]),
+        size=common_size(moment),
         mass=float(setup.masses[0]),
         inertia=setup.inertias[0].tolist(),
     )

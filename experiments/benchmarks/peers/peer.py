@@ -120,6 +120,20 @@ def execute(command: Sequence[str], folder: Path) -> int:
         ).returncode
 
 
+def common_size(moment: Moment) -> float:
+    """Size of all grains of a column.
+
+    Raises
+    ------
+    ValueError
+        If they differ.
+    """
+    sizes = moment.setup.grains.sizes
+    if np.ptp(sizes) > 0.0:
+        raise ValueError(f"peer: grains must be of one size, got {sizes.min():g} to {sizes.max():g}")
+    return float(sizes[0])
+
+
 def grain_of_sphere(moment: Moment) -> np.ndarray:
     """Grain that each sphere belongs to, in the order in which peers get them, (n * S,)."""
     setup = moment.setup

@@ -16,7 +16,7 @@ import numpy as np
 from dem_warp import Case, LiftedCylinder
 from dem_warp.scenes.lifted_cylinder import TUBE
 from experiments.benchmarks.columns import Moment
-from experiments.benchmarks.peers.peer import MARGIN, PeerRun, Plan, execute, judged
+from experiments.benchmarks.peers.peer import MARGIN, PeerRun, Plan, common_size, execute, judged
 from experiments.benchmarks.timing import Timing
 
 SIDES = 180
@@ -139,11 +139,8 @@ def write_input(folder: Path, case: Case[LiftedCylinder], moment: Moment, plan: 
     """
     setup = moment.setup
     grains, shape, scene = setup.grains, setup.shapes[0], case.scene
-    if np.ptp(grains.sizes) > 0:
-        raise ValueError(
-            f"peer: grains must be of one size, got {grains.sizes.min():g} to {grains.sizes.max():g}"
-        )
-    centers, radii = shape.centers * grains.sizes[0], shape.radii * grains.sizes[0]
+    size = common_size(moment)
+    centers, radii = shape.centers * size, shape.radii * size
     contacts = [setup.contacts[0], setup.contacts[setup.walls[TUBE][1]]]
     given = {
         "time_step": setup.time_step,
