@@ -164,7 +164,6 @@ def test_the_table_has_both_codes(small_columns: Columns, install: Install, tmp_
     assert name == "yade"
     assert list(table["code"]) == 5 * ["dem-warp"] + 4 * ["Yade 2030.01"]
     ours, theirs = table[table["code"] == "dem-warp"], table[table["code"] != "dem-warp"]
-    # a settled column stays as it was, and the one that the fake hands back is that of the start
     assert f"{ours[SPEED].max() / theirs[SPEED].max():.2f} times as fast" in text
     assert "kinetic energy" in text
 
