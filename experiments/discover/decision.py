@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.discover.discovery import Interval, Verdict
+from experiments.discover.discovery import Answer, Interval, Question, Verdict
 from experiments.discover.fitting import Fitted
 from experiments.discover.gap import GapTest
 from experiments.discover.settings import Settings
@@ -96,7 +96,7 @@ def objections(assessment: Assessment, settings: Settings) -> list[str]:
     if not assessment.simulated:
         found.append("it was too far behind to be simulated again")
     if gap.p < settings.fit_level:
-        found.append(f"the data still disagree with it (Q = {gap.q:.0f}, p = {gap.p:.2g})")
+        found.append(f"the data still disagree with it ({_answer(gap.clearest)}, p = {gap.p:.2g})")
     if ratio < least:
         found.append(f"its size is {ratio:.1f} standard errors, less than {least:g}")
     if gain is None:
@@ -190,5 +190,18 @@ def _is_incomplete(best: Assessment, close: int, failed: Sequence[str], settings
     return only_the_fit and alone and best.explained >= settings.incomplete_share
 
 
+def _answer(answer: Answer) -> str:
+    statistic = {
+        Question.SIZE: "Q =",
+        Question.FALL: f"{_spaced(answer.mechanism)} would lower Q by",
+        Question.SCORES: "the squared scores sum to",
+    }[answer.question]
+    return f"{statistic} {answer.value:.1f}, limit {answer.limit:.1f}"
+
+
 def _title(assessment: Assessment) -> str:
-    return " with ".join(name.replace("_", " ") for name in assessment.mechanisms)
+    return " with ".join(_spaced(name) for name in assessment.mechanisms)
+
+
+def _spaced(name: str) -> str:
+    return name.replace("_", " ")

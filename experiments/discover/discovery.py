@@ -66,6 +66,36 @@ class Data:
     replicates: np.ndarray
 
 
+class Question(StrEnum):
+    """What is asked of the residuals of a model."""
+
+    SIZE = "size"
+    """Whether they are too large: Q."""
+    FALL = "fall"
+    """Whether they point at one mechanism: the largest fall of Q that a positive size of one brings."""
+    SCORES = "scores"
+    """Whether they lie where mechanisms act at all, either way: the sum of all squared scores."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What one question to the residuals gave.
+
+    Attributes
+    ----------
+    question : Question
+    value, limit : float
+        The statistic, and the point that the bootstrap exceeds at the level of the rules.
+    mechanism : str
+        Of the fall; empty with the other questions.
+    """
+
+    question: Question
+    value: float
+    limit: float
+    mechanism: str = ""
+
+
 @dataclass(frozen=True, eq=False)
 class Fit:
     """A model as close to the training conditions as it comes.
@@ -84,6 +114,8 @@ class Fit:
         Sum of squares of the whitened residuals of all conditions (of those held out: by how far the forecast
         misses them), its degrees of freedom, the point that the bootstrap exceeds at the level of the rules,
         and the p value of the whole disagreement, of which Q is one part.
+    clearest : Answer
+        Of the questions that the p value is made of, the one that noise alone answers so most seldom.
     predicted, predicted_se : (conditions, observables) array
         What the model says, held-out conditions included, and how well its means are known.
     residuals, adjusted_p : (conditions, observables) array
@@ -99,6 +131,7 @@ class Fit:
     degrees_of_freedom: int
     q_limit: float
     p_value: float
+    clearest: Answer
     predicted: np.ndarray
     predicted_se: np.ndarray
     residuals: np.ndarray

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
+from experiments.discover.discovery import Answer, Question
 from experiments.discover.fitting import Fitted, fit
 from experiments.discover.model import Stack
 from experiments.discover.ranking import Signatures, projector
@@ -14,10 +15,10 @@ from experiments.discover.ranking import Signatures, projector
 
 @dataclass(frozen=True, eq=False)
 class GapTest:
-    """Three questions to the whitened residuals at once.
+    """Every `Question` to the whitened residuals at once.
 
-    Are they too large? Do they point at a mechanism of the library? And do they lie where mechanisms change
-    heaps at all, whichever way: there lies, most likely, what the library lacks, too?
+    The last one looks where mechanisms change heaps at all, whichever way: there lies, most likely, what the
+    library lacks, too.
 
     Attributes
     ----------
@@ -34,6 +35,8 @@ class GapTest:
         Of that fall; empty without a library.
     p : float
         Of the smallest of the three p values, by the same bootstrap.
+    clearest : Answer
+        To the question of that smallest p value; beyond its limit where there is a gap.
     level : float
     """
 
@@ -46,6 +49,7 @@ class GapTest:
     drop_limit: float
     mechanism: str
     p: float
+    clearest: Answer
     level: float
 
     @property
@@ -78,30 +82,41 @@ def find_gap(fitted: Fitted, seen: Signatures, level: float, draws: int, seed: i
     """
     project = projector(fitted.sensitivities)
     noise = np.random.default_rng(seed).standard_normal((draws, len(project))) @ project
-    q_drawn = (noise**2).sum(axis=1)
-    scores_drawn = noise @ seen.directions.T
-    drops_drawn = (np.maximum(scores_drawn, 0.0) ** 2).max(axis=1, initial=0.0)
     left = project @ fitted.residuals
-    q = float(left @ left)
     scores = seen.directions @ left
-    drops = np.maximum(scores, 0.0) ** 2
-    drop = float(drops.max(initial=0.0))
-    drawn = (q_drawn, drops_drawn, (scores_drawn**2).sum(axis=1))
-    found = (q, drop, float(scores @ scores))
-    p_value = min(_exceeded(of, value) for of, value in zip(drawn, found, strict=True))
-    smallest = np.min([_own_p(of) for of in drawn], axis=0)
+    drawn, found = _statistics(noise, noise @ seen.directions.T), _statistics(left, scores)
+    limits = {of: float(np.quantile(values, 1.0 - level)) for of, values in drawn.items()}
+    p_values = {of: _exceeded(values, float(found[of])) for of, values in drawn.items()}
+    smallest = np.min([_own_p(values) for values in drawn.values()], axis=0)
+    clearest = min(p_values, key=p_values.__getitem__)
+    mechanism = seen.names[int(np.argmax(scores))] if seen.names else ""
     return GapTest(
-        q=q,
+        q=float(found[Question.SIZE]),
         freedom=round(float(np.trace(project))),
-        q_limit=float(np.quantile(q_drawn, 1.0 - level)),
+        q_limit=limits[Question.SIZE],
         mechanisms=seen.names,
         scores=scores,
-        drop=drop,
-        drop_limit=float(np.quantile(drops_drawn, 1.0 - level)),
-        mechanism=seen.names[int(np.argmax(drops))] if seen.names else "",
-        p=(1.0 + float(np.sum(smallest <= p_value))) / (draws + 1.0),
+        drop=float(found[Question.FALL]),
+        drop_limit=limits[Question.FALL],
+        mechanism=mechanism,
+        p=(1.0 + float(np.sum(smallest <= p_values[clearest]))) / (draws + 1.0),
+        clearest=Answer(
+            clearest,
+            float(found[clearest]),
+            limits[clearest],
+            mechanism if clearest is Question.FALL else "",
+        ),
         level=level,
     )
+
+
+def _statistics(residuals: np.ndarray, scores: np.ndarray) -> dict[Question, np.ndarray]:
+    """What answers each question, of residuals (..., n) and their scores (..., mechanisms)."""
+    return {
+        Question.SIZE: (residuals**2).sum(axis=-1),
+        Question.FALL: (np.maximum(scores, 0.0) ** 2).max(axis=-1, initial=0.0),
+        Question.SCORES: (scores**2).sum(axis=-1),
+    }
 
 
 def _exceeded(drawn: np.ndarray, value: float) -> float:

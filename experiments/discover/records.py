@@ -56,6 +56,7 @@ def fit_record(fitted: Fitted, gap: GapTest, evidence: Evidence) -> Fit:
         degrees_of_freedom=gap.freedom,
         q_limit=gap.q_limit,
         p_value=gap.p,
+        clearest=gap.clearest,
         predicted=predicted,
         predicted_se=predicted_se,
         residuals=residuals,

@@ -6,7 +6,16 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from experiments.discover.discovery import BeforeAfter, Candidate, Discovery, Interval, Power, Verdict
+from experiments.discover.discovery import (
+    Answer,
+    BeforeAfter,
+    Candidate,
+    Discovery,
+    Interval,
+    Power,
+    Question,
+    Verdict,
+)
 from experiments.discover.settings import Settings
 from experiments.report.discovery.terms import Terms, percent, spaced
 from experiments.report.numbers import capital, fixed, p_value, trimmed
@@ -81,7 +90,7 @@ def _none(found: Discovery, terms: Terms) -> str:
     return (
         "Fitted as well as it can be, the model agrees with the data within their noise:"
         f" Q = {trimmed(found.base.q, 3)} at {fixed(found.base.degrees_of_freedom, 0)} degrees of freedom,"
-        f" where a gap would begin at {trimmed(found.base.q_limit, 3)}."
+        f" p {_p(found.base.p_value)}."
     )
 
 
@@ -114,9 +123,11 @@ def _tie(found: Discovery, terms: Terms) -> str:
 def _unknown(found: Discovery, terms: Terms) -> str:
     if found.base is None:
         return reason_sentence(found)
+    within = found.base.q <= found.base.q_limit
+    how = f", not by Q alone but in that {_beyond(found.base.clearest, terms)}" if within else ""
     text = (
         f"The model disagrees with the data (Q = {trimmed(found.base.q, 3)} at"
-        f" {fixed(found.base.degrees_of_freedom, 0)} degrees of freedom, p {_p(found.base.p_value)}),"
+        f" {fixed(found.base.degrees_of_freedom, 0)} degrees of freedom, p {_p(found.base.p_value)}){how},"
         " and nothing in the library explains it"
     )
     if found.candidates:
@@ -131,13 +142,21 @@ def _unknown(found: Discovery, terms: Terms) -> str:
 
 
 def _incomplete(found: Discovery, terms: Terms) -> str:
-    rest = (
-        f" What is left, Q = {trimmed(found.chosen.q, 3)}, is still beyond the noise"
-        f" (limit {trimmed(found.chosen.q_limit, 3)}): something else is missing too."
-        if found.chosen
-        else ""
-    )
-    return _added(found, terms) + rest
+    if found.chosen is None:
+        return _added(found, terms)
+    left = f"What is left is still beyond the noise: {_beyond(found.chosen.clearest, terms)}."
+    return f"{_added(found, terms)} {left} Something else is missing too."
+
+
+def _beyond(answer: Answer, terms: Terms) -> str:
+    """Say by which of the questions residuals are beyond the noise, a clause."""
+    statistic = {
+        Question.SIZE: "Q is",
+        Question.FALL: f"{terms.title(answer.mechanism)} would lower Q by",
+        Question.SCORES: "it lies along the effects of the library, whose squared scores sum to",
+    }[answer.question]
+    limit = "limit of such a fall" if answer.question is Question.FALL else "limit"
+    return f"{statistic} {trimmed(answer.value, 3)} ({limit} {trimmed(answer.limit, 3)})"
 
 
 def _not_identifiable(found: Discovery, terms: Terms) -> str:
@@ -171,6 +190,12 @@ def _margins(found: Discovery, terms: Terms, settings: Settings) -> Iterator[str
         gain = _gain(chosen.held_out_gain)
         text += f", or the held-out gain (now {gain}) to nothing"
     yield text + ", would withdraw the name."
+
+
+def _room(found: Discovery, terms: Terms, settings: Settings) -> Iterator[str]:
+    chosen = found.chosen
+    if chosen is None:
+        return
     room = chosen.q_limit - chosen.q
     if room > 0.0:
         yield (
@@ -230,7 +255,7 @@ _SENTENCES: dict[Verdict, Callable[[Discovery, Terms], str]] = {
 
 _CHANGES: dict[Verdict, tuple[Callable[[Discovery, Terms, Settings], Iterator[str]], ...]] = {
     Verdict.NONE: (_smaller_effects,),
-    Verdict.NAMED: (_margins, _rivals, _unresolved, _outside),
+    Verdict.NAMED: (_margins, _room, _rivals, _unresolved, _outside),
     Verdict.TIE: (_settle_by_experiment, _rivals, _unresolved),
     Verdict.INCOMPLETE: (_margins, _widen, _rivals, _unresolved),
     Verdict.UNKNOWN: (_rivals, _widen, _unresolved),

@@ -9,6 +9,7 @@ import pytest
 from scipy import stats
 from synthetic import SETTINGS, emulator, measure, space
 
+from experiments.discover.discovery import Answer, Question
 from experiments.discover.evidence import gather
 from experiments.discover.fitting import Fitted, fit, size_interval, weigh
 from experiments.discover.gap import drift_p, find_gap, holm
@@ -72,6 +73,41 @@ def test_a_strong_effect_is_a_gap_and_points_at_itself() -> None:
     assert gap.mechanism == "delta"
 
 
+def test_an_effect_too_small_for_q_is_seen_by_the_fall_of_q_that_it_brings() -> None:
+    fitted = _calibrated(measure({}, 1))
+    seen = signatures(fitted)
+    # The model with four standard deviations of one signature, and no noise.
+    direction = seen.directions[seen.names.index("delta")]
+    gap = find_gap(_without_noise(fitted, 4.0 * direction), seen, 0.025, 1000, 0)
+    assert gap.q == pytest.approx(16.0)
+    assert gap.q < gap.q_limit
+    assert gap.found
+    assert gap.clearest == Answer(Question.FALL, gap.drop, gap.drop_limit, "delta")
+    assert gap.drop == pytest.approx(16.0)
+    assert gap.drop > gap.drop_limit
+
+
+def test_whatever_shows_a_gap_lies_beyond_its_own_limit() -> None:
+    gaps = []
+    for seed in range(20):
+        fitted = _calibrated(measure({"beta": 0.1}, seed))
+        gaps.append(find_gap(fitted, signatures(fitted), 0.025, 1000, seed))
+    answers = [gap.clearest for gap in gaps if gap.found]
+    assert {answer.question for answer in answers} == set(Question)
+    assert all(answer.value > answer.limit for answer in answers)
+
+
+def _without_noise(fitted: Fitted, residuals: np.ndarray) -> Fitted:
+    """Weigh a calibrated model on means that miss its own by whitened residuals."""
+    missed = fitted.stack.predict(fitted.x[None])[0] + np.linalg.solve(fitted.whitening, residuals)
+    starts = np.cumsum([0, *(len(block.mean) for block in fitted.stack.blocks)])
+    blocks = tuple(
+        replace(block, mean=missed[start : start + len(block.mean)])
+        for block, start in zip(fitted.stack.blocks, starts, strict=False)
+    )
+    return weigh(Stack(fitted.model, blocks), fitted.x)
+
+
 def test_what_a_refit_to_all_leaves_is_what_the_forecast_misses_too() -> None:
     known = emulator().without("twin")
     evidence = gather(measure({"beta": 0.3}, 2), known)
@@ -91,17 +127,14 @@ def test_what_lies_between_the_signatures_the_other_way_is_a_gap_too() -> None:
     # Where most signatures lie, turned to where the fewest gain; three standard deviations and no noise.
     along = np.linalg.svd(seen.directions)[2][0]
     along = along if (seen.directions @ along).max() < -(seen.directions @ along).min() else -along
-    missed = fitted.stack.predict(fitted.x[None])[0] + np.linalg.solve(fitted.whitening, 3.0 * along)
-    starts = np.cumsum([0, *(len(block.mean) for block in fitted.stack.blocks)])
-    blocks = tuple(
-        replace(block, mean=missed[start : start + len(block.mean)])
-        for block, start in zip(fitted.stack.blocks, starts, strict=False)
-    )
-    gap = find_gap(weigh(Stack(fitted.model, blocks), fitted.x), seen, 0.025, 1000, 0)
+    gap = find_gap(_without_noise(fitted, 3.0 * along), seen, 0.025, 1000, 0)
     assert gap.q == pytest.approx(9.0)
     assert gap.q < gap.q_limit
     assert gap.drop < gap.drop_limit
     assert gap.found
+    assert gap.clearest.question is Question.SCORES
+    assert gap.clearest.value == pytest.approx(float(gap.scores @ gap.scores))
+    assert gap.clearest.value > gap.clearest.limit
 
 
 def test_a_projector_takes_out_what_calibration_can() -> None:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from experiments.discover.discovery import (
+    Answer,
     BeforeAfter,
     Candidate,
     Confounding,
@@ -22,6 +23,7 @@ from experiments.discover.discovery import (
     Interval,
     NextExperiment,
     Power,
+    Question,
     Verdict,
 )
 from experiments.report.discovery import Terms
@@ -116,6 +118,7 @@ def made_fit(data: Data, residuals: np.ndarray, mechanisms: tuple[str, ...] = ()
         len(training) * len(OBSERVABLES) - len(FACTORS) - len(mechanisms),
         66.2,
         0.21 if np.nansum(training**2) < 66.2 else 2e-6,
+        Answer(Question.SIZE, float(np.nansum(training**2)), 66.2),
         data.means - residuals * np.hypot(data.standard_errors, 0.5 * data.standard_errors),
         0.5 * data.standard_errors,
         residuals,

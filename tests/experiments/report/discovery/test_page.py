@@ -10,11 +10,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.discover.discovery import Discovery, Verdict
+from experiments.discover.discovery import Answer, Discovery, Question, Verdict
 from experiments.discover.settings import Settings
 from experiments.report import HeapPicture
 from experiments.report.discovery import Terms, render_discovery, verdict_sentence
 from experiments.report.discovery.tables import SHOWN_PAIRS, data_table, shown_candidates
+from experiments.report.discovery.verdict import changes
 from experiments.study import Study
 
 Discovered = Callable[[Verdict], Discovery]
@@ -64,6 +65,39 @@ def test_no_share_is_told_of_an_excess_that_is_not_there(
         assert (page.rows("candidates")[0][2][1] is not None) is told
     sentence = verdict_sentence(replace(quiet, verdict=Verdict.UNKNOWN), terms)
     assert sentence.endswith("the best, contact cohesion, leaves Q = 48.3.")
+
+
+@pytest.mark.parametrize(
+    ("clearest", "told"),
+    [
+        (Answer(Question.SIZE, 91.3, 73.7), "Q is 91.3 (limit 73.7)"),
+        (
+            Answer(Question.FALL, 14.2, 9.1, "plate_tilt"),
+            "tilt of the plate would lower Q by 14.2 (limit of such a fall 9.1)",
+        ),
+        (
+            Answer(Question.SCORES, 33.0, 25.2),
+            "it lies along the effects of the library, whose squared scores sum to 33 (limit 25.2)",
+        ),
+    ],
+)
+def test_what_is_left_is_told_by_the_test_that_sees_it(
+    clearest: Answer, told: str, discovered: Discovered, terms: Terms
+) -> None:
+    found = discovered(Verdict.INCOMPLETE)
+    assert found.base is not None
+    assert found.chosen is not None
+    # Q itself lies within its limit, which must not be called beyond the noise.
+    quiet = replace(found.chosen, q=43.8, q_limit=73.7, clearest=clearest)
+    sentence = verdict_sentence(replace(found, chosen=quiet), terms)
+    assert sentence.endswith(
+        f"What is left is still beyond the noise: {told}. Something else is missing too."
+    )
+    assert "43.8" not in sentence
+    assert not any("43.8" in change for change in changes(replace(found, chosen=quiet), terms, Settings()))
+    base = replace(found.base, q=43.8, q_limit=73.7, clearest=clearest)
+    unknown = verdict_sentence(replace(found, base=base, verdict=Verdict.UNKNOWN), terms)
+    assert f"not by Q alone but in that {told}, and nothing in the library" in unknown
 
 
 def test_the_page_shows_every_mechanism_and_the_first_pairs(discovered: Discovered) -> None:
