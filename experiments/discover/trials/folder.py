@@ -12,15 +12,16 @@ from experiments.benchmarks.tables import machine
 from experiments.discover.devices import resolve_devices
 from experiments.discover.outcome_table import OutcomeTable
 
-DECLARED, SEALED, LABELS, FINDINGS, RUNS, PAGE = (
+DECLARED, SEALED, LABELS, FINDINGS, RUNS, NOTES, PAGE = (
     "declared.json",
     "sealed.csv",
     "labels.json",
     "findings.csv",
     "runs.csv",
+    "notes.md",
     "README.md",
 )
-"""Files of a record, in the order in which they come to be; labels are there when all is found."""
+"""Files of a record; labels are there when all is found, notes where something is to be said beside."""
 
 
 @dataclass(frozen=True)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import Any
 
 import matplotlib as mpl
 import matplotlib.pyplot as plt
@@ -14,8 +15,9 @@ from experiments.benchmarks.tables import markdown_table
 from experiments.discover.trials.declaration import Declaration, read_declaration
 from experiments.discover.trials.drawing import STRONG
 from experiments.discover.trials.findings import EVERYTHING, PHOTOGRAPHS, read_findings
-from experiments.discover.trials.folder import DECLARED, FINDINGS, LABELS, PAGE, RUNS, SEALED
+from experiments.discover.trials.folder import DECLARED, FINDINGS, LABELS, NOTES, PAGE, RUNS, SEALED
 from experiments.discover.trials.score import (
+    OTHERS,
     Aim,
     aims,
     by_mechanism,
@@ -28,10 +30,12 @@ from experiments.discover.trials.score import (
 from experiments.discover.trials.truth import read_labels, read_sealed, revealed
 from experiments.files import write_text
 
-RECORD = Path(__file__).parents[1] / "record"
-"""Where the record of the full trials lies."""
-
 TITLES = {EVERYTHING: "With every observable", PHOTOGRAPHS: "With photographs only"}
+
+_UNAIMED = {
+    PHOTOGRAPHS: "No aims were set for photographs, which show less; gamma80 is that of every observable."
+}
+"""Views that have figures only, and why."""
 
 _VERDICTS = {True: "pass", False: "**FAIL**", None: "too few"}
 
@@ -49,7 +53,7 @@ Pearson).
 
 
 def write_page(folder: Path) -> Path:
-    """Write the page and the pictures of a record from its files.
+    """Write the page and the pictures of a record from its files, its notes after the introduction.
 
     Parameters
     ----------
@@ -70,7 +74,9 @@ def write_page(folder: Path) -> Path:
     labels = revealed(read_labels(folder / LABELS), sealed)
     declared = read_declaration(folder / DECLARED)
     table = scored(read_findings([folder / FINDINGS]), labels, sealed)
-    parts = [_INTRODUCTION, _runs(folder / RUNS), _declared(declared)]
+    notes = folder / NOTES
+    parts = [_INTRODUCTION, *([notes.read_text(encoding="utf-8")] if notes.is_file() else [])]
+    parts += [_runs(folder / RUNS), _declared(declared)]
     for view, title in TITLES.items():
         if len(rows := table[table["view"] == view]):
             parts.append(_view(rows, view, title, declared, folder))
@@ -113,15 +119,16 @@ def _declared(declared: Declaration) -> str:
 
 
 def _view(rows: pd.DataFrame, view: str, title: str, declared: Declaration, folder: Path) -> str:
-    unresolvable = [effect.name for effect in declared.library if not effect.resolvable]
+    found = aims(rows, [effect.name for effect in declared.library if not effect.resolvable])
     _draw_power(power_curve(rows), folder / f"power-{view}.png")
     _draw_confusion(confusion(rows), folder / f"confusion-{view}.png")
     parts = [
         f"## {title}\n",
-        f"{len(rows)} trials.\n",
-        _aims(aims(rows, unresolvable)),
+        f"{len(rows)} trials. {_UNAIMED.get(view, '')}".rstrip() + "\n",
+        _figures(found) if view in _UNAIMED else _aims(found),
         f"![shares of alarms and names by effect](power-{view}.png)\n",
         f"![answers by truth](confusion-{view}.png)\n",
+        "Strong effects have a row each; *incomplete* counts by its name. In brackets: trials.\n",
         "### Strong effects, by mechanism\n",
         markdown_table(by_mechanism(rows).reset_index()),
         "### Effects that may not be named\n",
@@ -136,37 +143,66 @@ def _aims(found: Sequence[Aim]) -> str:
     return "\n".join(lines) + "\n"
 
 
+def _figures(found: Sequence[Aim]) -> str:
+    return markdown_table(pd.DataFrame([{"question": aim.question, "found": aim.found} for aim in found]))
+
+
 def _draw_power(curve: pd.DataFrame, path: Path) -> None:
     mpl.use("agg")
     figure, axes = plt.subplots(figsize=(7.2, 3.8), layout="constrained")
-    for name, label, colour in (("alarm", "gap found", "#0072B2"), ("right", "named right", "#D55E00")):
-        if len(curve):
-            value = curve[name].to_numpy()
-            spread = np.abs(curve[[f"{name}_low", f"{name}_high"]].to_numpy().T - value)
-            axes.errorbar(
-                curve["strength"], value, yerr=spread, fmt="o-", color=colour, capsize=3, label=label
-            )
-    axes.axvline(1.5, color="#5d6673", linestyle=":", linewidth=1.0)
-    axes.set(xlabel="effect [gamma80]", ylabel="share of trials", ylim=(-0.03, 1.03))
-    axes.grid(color="#eceff3")
+    places = np.arange(len(curve))
+    series = (("alarm", "gap found", "#0072B2", -0.08), ("right", "named right", "#D55E00", 0.08))
+    for name, label, colour, aside in series if len(curve) else ():
+        value = curve[name].to_numpy()
+        spread = np.abs(curve[[f"{name}_low", f"{name}_high"]].to_numpy().T - value)
+        axes.errorbar(places + aside, value, spread, fmt="o", color=colour, capsize=3, label=label)
+    if len(curve):
+        axes.set_xticks(places, [_class_label(row) for row in curve.itertuples()])
+        strong = int((curve["most"] <= STRONG).sum())
+        axes.axvline(strong - 0.5, color="#5d6673", linestyle=":", linewidth=1.0)
+        figure.legend(frameon=False, loc="outside upper right", ncols=len(series))
+    axes.set(xlabel="effect [gamma80], and trials", ylabel="share of trials", ylim=(-0.03, 1.03))
+    axes.grid(axis="y", color="#eceff3")
+    axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
-    axes.legend(frameon=False, loc="lower right")
     figure.savefig(path, dpi=110, metadata={"Software": None})
     plt.close(figure)
 
 
+def _class_label(row: Any) -> str:
+    ends = f"{row.least:g} to {row.most:g}" if np.isfinite(row.most) else f"above {row.least:g}"
+    return f"{ends}\n({row.trials})"
+
+
 def _draw_confusion(counts: pd.DataFrame, path: Path) -> None:
     mpl.use("agg")
-    shares = counts.div(counts.sum(axis=1), axis=0).to_numpy()
-    size = (2.6 + 0.42 * counts.shape[1], 2.0 + 0.27 * counts.shape[0])
+    trials = counts.sum(axis=1)
+    shares = counts.div(trials, axis=0).to_numpy()
+    size = (2.8 + 0.42 * counts.shape[1], 2.0 + 0.27 * counts.shape[0])
     figure, axes = plt.subplots(figsize=size, layout="constrained")
     axes.imshow(shares, cmap="Blues", vmin=0.0, vmax=1.2, aspect="auto")
     for (row, column), count in np.ndenumerate(counts.to_numpy()):
         if count:
             ink = "white" if shares[row, column] > 0.6 else "black"
             axes.text(column, row, str(count), ha="center", va="center", fontsize=8, color=ink)
-    axes.set_xticks(range(counts.shape[1]), [str(name) for name in counts.columns], rotation=90, fontsize=8)
-    axes.set_yticks(range(counts.shape[0]), [str(name) for name in counts.index], fontsize=8)
+    columns, rows = (
+        [str(name).replace("_", " ") for name in names] for names in (counts.columns, counts.index)
+    )
+    labels = [f"{name} ({count})" for name, count in zip(rows, trials, strict=True)]
+    axes.set_xticks(range(len(columns)), columns, rotation=45, ha="right", rotation_mode="anchor", fontsize=8)
+    axes.set_yticks(range(len(labels)), labels, fontsize=8)
+    axes.set_xticks(np.arange(1, len(columns)) - 0.5, minor=True)
+    axes.set_yticks(np.arange(1, len(labels)) - 0.5, minor=True)
+    axes.grid(which="minor", color="white", linewidth=1.0)
+    axes.tick_params(which="both", length=0)
+    axes.spines[:].set_visible(False)
+    axes.axhline(_mechanisms(counts.index) - 0.5, color="#5d6673", linewidth=1.0)
+    axes.axvline(_mechanisms(counts.columns) - 0.5, color="#5d6673", linewidth=1.0)
     axes.set(xlabel="verdict", ylabel="truth")
     figure.savefig(path, dpi=110, metadata={"Software": None})
     plt.close(figure)
+
+
+def _mechanisms(names: Iterable[str]) -> int:
+    """How many of a confusion's labels, which come first, name a mechanism."""
+    return sum(name not in OTHERS for name in names)

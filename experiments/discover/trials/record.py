@@ -1,7 +1,7 @@
 """Reveal the labels, score the findings, and write the record of the trials.
 
-    python -m experiments.discover.trials.record out/trials
-    python -m experiments.discover.trials.record --page-only
+    python -m experiments.discover.trials.record out/trials --out experiments/discover/record/first
+    python -m experiments.discover.trials.record --page-only --out experiments/discover/record/first
 
 The first takes over what was published, found and, now, hidden; the second writes the page again from the
 files of the record.
@@ -17,7 +17,7 @@ import typer
 
 from experiments.commands.console import clear_errors
 from experiments.discover.trials.folder import DECLARED, FINDINGS, LABELS, RUNS, SEALED, Folder
-from experiments.discover.trials.page import RECORD, write_page
+from experiments.discover.trials.page import write_page
 from experiments.errors import InputError
 from experiments.files import replacing
 
@@ -40,9 +40,9 @@ def gather(folder: Folder, record: Path) -> None:
 
 
 def main(
+    out: Annotated[Path, typer.Option(help="The record.")],
     folder: Annotated[Path | None, typer.Argument(help="Folder of the trials.")] = None,
     page_only: Annotated[bool, typer.Option("--page-only", help="Write the page again.")] = False,
-    out: Annotated[Path, typer.Option(help="The record.")] = RECORD,
 ) -> None:
     """Write the record of the trials."""
     if (folder is None) != page_only:

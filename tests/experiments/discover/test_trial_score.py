@@ -11,11 +11,26 @@ from experiments.discover.discovery import Verdict
 from experiments.discover.settings import Settings
 from experiments.discover.trials.declaration import Declaration
 from experiments.discover.trials.drawing import Effect, Plan
-from experiments.discover.trials.findings import EVERYTHING, Finding, findings_table, write_findings
+from experiments.discover.trials.findings import (
+    EVERYTHING,
+    PHOTOGRAPHS,
+    Finding,
+    findings_table,
+    write_findings,
+)
 from experiments.discover.trials.folder import Folder
 from experiments.discover.trials.page import write_page
 from experiments.discover.trials.record import gather
-from experiments.discover.trials.score import Share, aims, confusion, covered, power_curve, removed, scored
+from experiments.discover.trials.score import (
+    Share,
+    aims,
+    by_mechanism,
+    confusion,
+    covered,
+    power_curve,
+    removed,
+    scored,
+)
 from experiments.discover.trials.truth import Kind, Label, Sealed, write_labels, write_sealed
 from experiments.errors import InputError
 
@@ -140,7 +155,11 @@ def test_the_page_is_written_from_the_record_alone(tmp_path: Path) -> None:
         tmp_path / "sealed.csv", [Sealed(name, "all", (), label.hash) for name, label in labels.items()]
     )
     write_labels(tmp_path / "labels.json", list(labels.values()))
-    write_findings(tmp_path / "findings.csv", findings)
+    # Photographs show the same, and no aim was set for them.
+    both = findings_table([Finding(**row) for view in (EVERYTHING, PHOTOGRAPHS)
+                           for row in findings.assign(view=view).to_dict("records")])  # fmt: skip
+    write_findings(tmp_path / "findings.csv", both)
+    (tmp_path / "notes.md").write_text("Said beside.\n")
     (tmp_path / "runs.csv").write_text(
         "what,machine,warp,date,cases,seconds\nheaps,GPU,1.19,2026-01-01,40,3.5\n"
     )
@@ -148,10 +167,32 @@ def test_the_page_is_written_from_the_record_alone(tmp_path: Path) -> None:
     assert text.count("| pass |") == len(aims(scored(findings, labels, []), []))
     # The mechanisms of this library are not those that must be resolvable.
     assert text.count("FAIL") == 1
+    assert "Said beside." in text
     assert {path.name for path in tmp_path.glob("*.png")} == {
         "confusion-everything.png",
         "power-everything.png",
+        "confusion-photographs.png",
+        "power-photographs.png",
     }
+
+
+def test_a_strong_trial_ends_in_one_way() -> None:
+    findings, labels = ideal_trials()
+    one = findings["trial"] == "a-3"
+    for verdict, named, column in (
+        ("incomplete", "a", "right, incomplete"),
+        ("incomplete", "b", "wrong"),
+        ("tie", "a b", "tied"),
+        ("tie", "b c", "tie of others"),
+        ("none", "", "unseen"),
+        ("crash", "", "crash"),
+    ):
+        changed = findings.assign(
+            verdict=findings["verdict"].mask(one, verdict), named=findings["named"].mask(one, named)
+        )
+        ends = by_mechanism(scored(changed, labels, [])).drop(columns="trials")
+        assert (ends.sum(axis=1) == 15).all()
+        assert ends.loc["a", column] == 1
 
 
 def test_trials_that_have_not_run_leave_a_record_as_it_is(tmp_path: Path) -> None:
