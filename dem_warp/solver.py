@@ -1,8 +1,7 @@
 """The sequence of launches that moves a batch on, captured once as a graph and replayed."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -25,7 +24,6 @@ from dem_warp.state import (
     build_neighbours,
     copy_grains,
     living_grains,
-    unchanged,
 )
 from dem_warp.triangles import place_triangles
 from dem_warp.types import FRAMES, PRECISIONS, Build, device_structs
@@ -50,9 +48,6 @@ for more lanes a grain, which shorten a step."""
 
 MOST_LANES = 16
 
-WEIGHED_TOGETHER = 64
-"""Worlds whose walls are weighed at once, at the most: what a step changes of them is kept meanwhile."""
-
 
 @dataclass(frozen=True)
 class WorldView:
@@ -71,8 +66,8 @@ class WorldView:
         [m], [m/s]
     masses : (n,) array
         [kg]
-    load : callable
-        Force [N], (3,), that the grains put on a wall, by its number; see `Solver.wall_loads`.
+    impulses : (walls, 3) array
+        What the grains have given to each weighed wall since the first step [N s]; see `Solver.impulses`.
     """
 
     step: int
@@ -82,7 +77,7 @@ class WorldView:
     positions: np.ndarray
     velocities: np.ndarray
     masses: np.ndarray
-    load: Callable[[int], np.ndarray]
+    impulses: np.ndarray
 
 
 class Solver:
@@ -344,57 +339,21 @@ class Solver:
         place = (world * self.layout.wall_count + wall) * FRAMES + step % FRAMES
         return self.model.frame[place : place + 1]
 
-    def wall_loads(self, wall: int) -> np.ndarray:
-        """Force that the grains of each running world put on one of its walls [N], whatever the contact law.
-
-        It is the momentum that grains and wall would exchange in the next step if there were no other wall,
-        over the length of the step: the forces between grains cancel in the sum. Nothing is changed. To be
-        called after `advance` and before a wall moves.
-
-        Parameters
-        ----------
-        wall : int
-            Its number.
+    def impulses(self) -> np.ndarray:
+        """What the grains have given to each wall that is weighed since the first step [N s].
 
         Returns
         -------
-        (worlds, 3) array
-            0 for a world that was stopped.
+        (worlds, walls, 3) array
+            The sum over all steps of force times time step; 0 for walls that are not weighed.
         """
-        loads = np.zeros((self.layout.world_count, 3))
-        walls = self.layout.world_count * self.layout.wall_count
-        self._launch(self._wall_kernels.leave_alone, walls, [wall, self.model, self.grains[0]])
-        for first in range(0, len(loads), WEIGHED_TOGETHER):
-            group = slice(first, min(first + WEIGHED_TOGETHER, len(loads)))
-            if running := [w for w in self._running if group.start <= w < group.stop]:
-                self._weigh(group, running, loads)
-        self._place_walls(0)
-        return loads
-
-    def _weigh(self, group: slice, running: Sequence[int], loads: np.ndarray) -> None:
-        """Work out the loads of some running worlds of a group."""
-        n, count, grains = self.layout.grain_count, self.layout.world_count, self.grains
-        slots, members = len(running) * n, wp.array(list(running), dtype=int, device=self.device)  # type: ignore[var-annotated]
-        lists = [
-            array.reshape((2, count, -1)) for array in (self.hood.history, self.hood.memory) if array.size
-        ]
-        others = [array.reshape((count, -1))[group] for array in (self.hood.travel, self.alive, self.flags)]
-        inputs = [
-            self.lanes, slots, self.model, members, grains[0], self.hood, self.alive, self.flags, grains[1],
-        ]  # fmt: skip
-        with unchanged([array[number, group] for array in lists for number in range(2)] + others):
-            self._launch(self._step_kernels.step, self._whole_warps(slots * self.lanes), inputs)
-        start, end = (array.velocity.reshape((count, n))[group].numpy().astype(float) for array in grains)
-        release = self.model.release_step.reshape((count, n))[group].numpy()
-        free = (others[1].numpy() > 0) & (release <= grains[0].step[group].numpy()[:, None])
-        for w in running:
-            i, setup = w - group.start, self.worlds[w]
-            masses, gained = start[i, free[i], 3], end[i, free[i], :3] - start[i, free[i], :3]
-            loads[w] = masses.sum() * np.array(setup.gravity) - masses @ gained / setup.time_step
+        counts = self.hood.pushed.numpy().reshape(self.layout.world_count, self.layout.wall_count, 3)
+        each = [world.time_step / world.force_rate for world in self.worlds]
+        return np.asarray(counts * np.reshape(each, (-1, 1, 1)))
 
     def view(self, worlds: Sequence[int]) -> list[WorldView]:
         """What scenes need of some worlds, copied from the device."""
-        n, loads = self.layout.grain_count, cache(self.wall_loads)
+        n, impulses = self.layout.grain_count, self.impulses()
         grains = self.grains[0]
         steps, alive = grains.step.numpy(), self.alive.numpy().reshape(-1, n) > 0
         release = self.model.release_step.numpy().reshape(-1, n)
@@ -409,7 +368,7 @@ class Solver:
                 positions[w],
                 velocities[w, :, :3],
                 velocities[w, :, 3],
-                partial(_load_of, loads, w),
+                impulses[w, : len(self.worlds[w].walls)],
             )
             for w in worlds
         ]
@@ -427,8 +386,3 @@ class Solver:
             "velocities": grains.velocity[rows].numpy()[slots, :3],
             "spins": grains.spin[rows].numpy()[slots, :3],
         }
-
-
-def _load_of(loads: Callable[[int], np.ndarray], world: int, wall: int) -> np.ndarray:
-    """One world's part of what is worked out for all at once."""
-    return loads(wall)[world]

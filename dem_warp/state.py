@@ -1,7 +1,6 @@
 """The device arrays of a batch: what stays (`Model`), what moves (`Grains`, twice), the neighbour lists."""
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -94,9 +93,10 @@ def _wall_rows(worlds: Sequence[WorldSetup]) -> list[dict[str, Any]]:
             "reach": wall.reach,
             "point": wall.point,
             "orientation": (0.0, 0.0, 0.0, 1.0),
+            "weighed": number in world.weighed,
         }
         for world in worlds
-        for wall, pair in world.walls
+        for number, (wall, pair) in enumerate(world.walls)
     ]
 
 
@@ -129,6 +129,7 @@ def build_model(
             "cell_rate": _cell_rate(world, precision),
             "speed_limit": world.speed_limit,
             "kept": np.exp(-world.air_drag * world.time_step),
+            "force_rate": world.force_rate,
             "origin": world.origin,
             "half_extent": world.half_extent,
             "most_found": found,
@@ -199,17 +200,6 @@ def arrays_of(struct: Any) -> dict[str, wp.array]:
     return {name: value for name, value in vars(struct).items() if isinstance(value, wp.array)}
 
 
-@contextmanager
-def unchanged(arrays: Sequence[Any]) -> Iterator[None]:
-    """Give arrays back the values that they have now."""
-    kept = [wp.clone(array) for array in arrays]
-    try:
-        yield
-    finally:
-        for array, values in zip(arrays, kept, strict=True):
-            wp.copy(array, values)
-
-
 def copy_grains(grains: Any, precision: Precision) -> Any:
     """A second copy of `Grains`, for steps that read one and write the other."""
     other = device_structs(precision).Grains()
@@ -241,6 +231,7 @@ def build_neighbours(
     hood.memory = wp.zeros(slots * remembered, dtype=precision.real, device=device)
     hood.rebuilt = wp.zeros(layout.world_count, dtype=int, device=device)
     hood.travel = wp.zeros(layout.grain_total, dtype=precision.real, device=device)
+    hood.pushed = wp.zeros(3 * layout.world_count * layout.wall_count, dtype=wp.int64, device=device)
     near = device_structs(precision).Near()
     near.count = wp.zeros(layout.grain_total, dtype=int, device=device)
     near.item = wp.zeros(layout.grain_total * capacity, dtype=wp.vec2i, device=device)

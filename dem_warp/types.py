@@ -142,6 +142,7 @@ def device_structs(precision: Precision) -> SimpleNamespace:
         cell_rate: real  # cells per count of a sphere position
         speed_limit: real  # above it the world has diverged [m/s]
         kept: real  # part of a grain's velocity that the air leaves it in a step; 1 without drag
+        force_rate: real  # counts of a force on a wall that is weighed [1/N]
         origin: wp.vec3d  # where sphere positions count from [m]
         half_extent: wp.vec3d  # a grain further from the origin has left the domain [m]
         most_found: int  # partners that a sphere may have; of its own, so that no other world changes it
@@ -157,6 +158,7 @@ def device_structs(precision: Precision) -> SimpleNamespace:
         length: wp.float64  # of the profile along the axis [m]
         reach: wp.float64  # from the wall's point to its farthest [m]
         start_step: int  # the motion starts with this step
+        weighed: int  # 1: what grains put on it is summed up; 0: it is not
         duration: wp.float64  # and ends after this time [s]
         point: wp.vec3d  # the wall's point when the motion starts [m]
         orientation: wp.quatd  # how far it had then turned
@@ -248,6 +250,7 @@ def device_structs(precision: Precision) -> SimpleNamespace:
         memory: wp.array(dtype=real)  # what the mechanisms remember of a contact, in SI units
         rebuilt: wp.array(dtype=int)  # step of the last rebuild, (worlds,)
         travel: wp.array(dtype=real)  # path of a grain's farthest point since the rebuild [m], (grains,)
+        pushed: wp.array(dtype=wp.int64)  # sum of forces on weighed walls, (worlds * walls * 3,) counts
         near: Near
         reactions: Reactions
 

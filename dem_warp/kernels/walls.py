@@ -10,7 +10,6 @@ from dem_warp.types import FRAMES, Build, device_structs
 from dem_warp.walls import CYLINDER, MESH, PLANE
 
 TINY = 1.0e-12  # m; nearer than this to an axis or a surface no direction is defined
-FAR = wp.constant(wp.float64(1.0e3))  # m; from there nothing touches a wall
 TURN = wp.constant(wp.float64(2.0 * wp.pi))  # rad
 
 
@@ -205,7 +204,7 @@ def wall_functions(build: Build) -> SimpleNamespace:
 
 @functools.cache
 def wall_kernels(build: Build) -> SimpleNamespace:
-    """`place_walls` works out where walls stand in the steps to come, `leave_alone` sets some aside."""
+    """`place_walls` works out where walls stand in the steps to come."""
     precision = build.precision
     real, vec3 = precision.real, precision.vec3
     types = device_structs(precision)
@@ -242,14 +241,4 @@ def wall_kernels(build: Build) -> SimpleNamespace:
         time = wp.float64(step - wall.start_step) * wp.float64(model.world[w].time_step)
         model.frame[index * FRAMES + step % FRAMES] = moved(wall, time)
 
-    @wp.kernel(module=module)
-    def leave_alone(number: int, model: Model, grains: Grains):
-        """Takes every wall of a world but one out of reach of its grains, in the present step alone."""
-        index = wp.tid()
-        if index % walls_each != number:
-            place = index * FRAMES + grains.step[index // walls_each] % FRAMES
-            frame = model.frame[place]
-            frame.origin -= frame.axis * FAR
-            model.frame[place] = frame
-
-    return SimpleNamespace(place_walls=place_walls, leave_alone=leave_alone, module=module)
+    return SimpleNamespace(place_walls=place_walls, module=module)

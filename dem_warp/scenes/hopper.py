@@ -8,9 +8,9 @@ import numpy as np
 
 from dem_warp.case import Case
 from dem_warp.materials import Material
-from dem_warp.model import WorldSetup
+from dem_warp.model import GRAVITY, WorldSetup
 from dem_warp.scenes.discharge import DISCHARGE_OBSERVABLES, DischargeController
-from dem_warp.scenes.poured_scene import FILL_OBSERVABLES, GRAVITY, PouredScene
+from dem_warp.scenes.poured_scene import FILL_OBSERVABLES, PouredScene
 from dem_warp.scenes.rain import CrossSection
 from dem_warp.scenes.scene import Observable
 from dem_warp.solver import WorldView

@@ -9,9 +9,9 @@ import numpy as np
 
 from dem_warp.case import Case
 from dem_warp.materials import Material
-from dem_warp.model import ContactCoefficients, WorldSetup
+from dem_warp.model import GRAVITY, ContactCoefficients, WorldSetup
 from dem_warp.scenes.poured_controller import UNREST, Phase, PouredController
-from dem_warp.scenes.poured_scene import FILL_OBSERVABLES, GRAVITY, PouredScene
+from dem_warp.scenes.poured_scene import FILL_OBSERVABLES, PouredScene
 from dem_warp.scenes.rain import CrossSection
 from dem_warp.scenes.scene import Course, Decision, Observable
 from dem_warp.scenes.surfaces import bed_level
@@ -37,9 +37,9 @@ LIFT_OBSERVABLES = {
     "grains_lost": Observable("1", "grains that left the plate, or rose with the tube"),
     "wall_drag": Observable(
         "1",
-        "part of the grains' weight that hangs on the tube while it is drawn, the mean of the looks from the "
-        "start of the lift until t75, or the tube is clear: what a balance that it hangs on shows beyond its "
-        "own weight",
+        "part of the grains' weight that hangs on the tube while it is drawn, the mean over every step from "
+        "the start of the lift until t75, or the tube is clear: what a balance that it hangs on shows beyond "
+        "its own weight",
     ),
     "centre_height": Observable(
         "m", "height of the heap's centre of mass above the plate; absent where every grain was lost"
@@ -107,6 +107,7 @@ class LiftedCylinder(PouredScene):
     observables: ClassVar[Mapping[str, Observable]] = FILL_OBSERVABLES | LIFT_OBSERVABLES
     densest_fill = 0.58
     floor = 0.0
+    weighed = (TUBE,)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -210,13 +211,16 @@ class Lift(Course):
         Of the grains that filled the tube [kg].
     surface : list of float
         Time since the start of the lift [s], and level of the surface [m], when last looked at.
-    drags : list of float
-        Parts of the grains' weight that hung on the tube.
+    pushed : float
+        What the grains had given to the tube, along its axis, when the lift began [N s].
+    drawn : list of float
+        Time since the start of the lift [s], and what they had given to it when last looked at.
     """
 
     mass: float = 0.0
     surface: list[float] = field(default_factory=list)
-    drags: list[float] = field(default_factory=list)
+    pushed: float = 0.0
+    drawn: list[float] = field(default_factory=list)
 
 
 class LiftController(PouredController[Lift]):
@@ -235,6 +239,8 @@ class LiftController(PouredController[Lift]):
         """Lift the tube, and let the drive shake the plate."""
         self.course.mass = float(view.masses[kept].astype(float).sum())
         self.course.surface = [0.0, self.course.observables["fill_height"]]
+        self.course.pushed = float(view.impulses[TUBE, 2])
+        self.course.drawn = [0.0, self.course.pushed]
         self.course.enter("lift", view)
         return self.scene.lift
 
@@ -253,9 +259,8 @@ class LiftController(PouredController[Lift]):
         rise = self.scene.lift_speed * elapsed
         positions = view.positions[view.alive]
         top = positions[:, 2].max() + self.reach if len(positions) else 0.0
-        if "t75" not in self.course.observables and (rise <= top or not self.course.drags):
-            self.course.drags.append(float(view.load(TUBE)[2] / (self.course.mass * self.scene.gravity[2])))
         self._time_fall(view, elapsed)
+        self._weigh_tube(view, elapsed, rise > top)
         if self.scene.duration is not None and view.time < self.scene.duration:
             return Decision()
         calm = elapsed >= self.scene.vibration_time and rise > top
@@ -288,15 +293,27 @@ class LiftController(PouredController[Lift]):
                 seen[name] = before + (above - awaited_level) / (above - level) * (elapsed - before)
         self.course.surface = [elapsed, level]
 
+    def _weigh_tube(self, view: WorldView, elapsed: float, ends: bool) -> None:
+        """Note the mean load of the tube until t75, or until there is no more to come."""
+        seen, (before, carried) = self.course.observables, self.course.drawn
+        if "wall_drag" in seen:
+            return
+        pushed = float(view.impulses[TUBE, 2])
+        if ends or "t75" in seen:
+            end = seen.get("t75", elapsed)
+            mean = (np.interp(end, [before, elapsed], [carried, pushed]) - self.course.pushed) / end
+            seen["wall_drag"] = float(mean / (self.course.mass * self.scene.gravity[2]))
+        self.course.drawn = [elapsed, pushed]
+
     def _finish(self, view: WorldView, elapsed: float) -> None:
         course = self.course
         rested = elapsed if course.slow_since is None else course.slow_since - course.phase_start
         course.observables |= {
             "time_to_rest": float(rested),
-            "wall_drag": float(np.mean(course.drags)),
             "simulated_time": view.time,
             "grains_lost": course.observables["grain_count"] - float(np.count_nonzero(view.alive)),
         }
+        self._weigh_tube(view, elapsed, True)
         self._weigh_heap(view)
         course.enter("rest", view)
 

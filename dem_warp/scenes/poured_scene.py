@@ -8,12 +8,11 @@ from typing import Any, ClassVar
 import numpy as np
 
 from dem_warp.case import Case
-from dem_warp.model import ContactCoefficients, Grains, WorldSetup
+from dem_warp.model import GRAVITY, ContactCoefficients, Grains, WorldSetup
 from dem_warp.scenes.rain import CrossSection, Rain, place_rain
 from dem_warp.scenes.scene import Controller, Observable
 from dem_warp.walls import Wall
 
-GRAVITY = 9.81
 FREEBOARD = 1.2
 """Grains fall this many times the way from the brim to the lowest wall, at the most."""
 
@@ -53,6 +52,8 @@ class PouredScene(ABC):
     observables: ClassVar[Mapping[str, Observable]] = FILL_OBSERVABLES
     densest_fill: ClassVar[float] = 0.64
     """Solid fraction that no poured bed is expected to pass: how many grains are kept ready."""
+    weighed: ClassVar[tuple[int, ...]] = ()
+    """Numbers of the walls whose impulses are summed up."""
 
     def __post_init__(self) -> None:
         self._require_positive("rain_rate", "rain_speed", "rest_speed", "rest_time")
@@ -182,6 +183,7 @@ def _world(case: Case[Any], rain: Rain) -> WorldSetup:
         gravity=scene.gravity,
         air_drag=scene.air_drag,
         rolling_holds=case.numerics.rolling_holds,
+        weighed=scene.weighed,
     )
 
 
