@@ -124,6 +124,7 @@ class Solver:
             self._build_state([(found, capacity or listed) for found, listed in room])
         self._running = list(range(len(worlds)))
         self._pace = np.array([(w.time_step, w.skin, np.linalg.norm(w.gravity)) for w in worlds]).T
+        self._impulse_of_count = np.array([w.time_step / w.force_rate for w in worlds])
         self._graphs: dict[tuple[int, int, int], Any] = {}
         self._place()
 
@@ -348,8 +349,7 @@ class Solver:
             The sum over all steps of force times time step; 0 for walls that are not weighed.
         """
         counts = self.hood.pushed.numpy().reshape(self.layout.world_count, self.layout.wall_count, 3)
-        each = [world.time_step / world.force_rate for world in self.worlds]
-        return np.asarray(counts * np.reshape(each, (-1, 1, 1)))
+        return np.asarray(counts * self._impulse_of_count[:, None, None])
 
     def view(self, worlds: Sequence[int]) -> list[WorldView]:
         """What scenes need of some worlds, copied from the device."""

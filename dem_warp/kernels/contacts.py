@@ -160,11 +160,12 @@ def contact_functions(build: Build) -> SimpleNamespace:
         pack.store_vec4(hood.reactions.torque, g, t - vec4(torque[0], torque[1], torque[2], real(0.0)))
 
     @wp.func
-    def weigh(world: World, hood: Neighbours, wall: int, force: vec3):
-        """Adds the opposite of a force to what a wall has borne; counts have the same sum in any order."""
-        for i in range(3):
-            count = wp.int64(wp.rint(force[i] * world.force_rate))
-            wp.atomic_add(hood.pushed, wall * 3 + i, -count)
+    def weigh(model: Model, world: World, hood: Neighbours, wall: int, force: vec3):
+        """Adds the opposite of a force to what a weighed wall has borne; counts are the same in any order."""
+        if model.wall[wall].weighed != 0:
+            for i in range(3):
+                count = wp.int64(wp.rint(force[i] * world.force_rate))
+                wp.atomic_add(hood.pushed, wall * 3 + i, -count)
 
     @wp.func
     def contact(
@@ -190,7 +191,6 @@ def contact_functions(build: Build) -> SimpleNamespace:
             apart = world.reach
         pair = w * model.pair_count
         meets = bool(False)
-        weighed = int(-1)
         mass = pack.load_vec4(grains.velocity, g)[3]
         c = Contact()
         c.mass = mass
@@ -207,8 +207,6 @@ def contact_functions(build: Build) -> SimpleNamespace:
             wall = walls.wall_of(model, w, number)
             c = walls.meet(model, c, wall, number, pack.place(a, world), radius, step)
             pair += model.wall[wall].pair
-            if model.wall[wall].weighed != 0:
-                weighed = wall
             meets = c.overlap > -apart
             if wp.static(build.has_mesh):
                 if number >= walls_each and meets:
@@ -230,8 +228,8 @@ def contact_functions(build: Build) -> SimpleNamespace:
             torque += wp.cross(c.lever, force)
             if meets:
                 pack.store_vec4(hood.history, slot, pack.stamp(displacement, step + 1))
-                if weighed >= 0:
-                    weigh(world, hood, weighed, force)
+                if partner >= wall_base:
+                    weigh(model, world, hood, walls.wall_of(model, w, partner - wall_base), force)
         if wp.static(is_speculative) and not meets:
             force = vec3()
             torque = vec3()

@@ -167,7 +167,7 @@ class DrawDownController(DischargeController):
         """Slopes of a bed to either side of the middle that can be seen, and their mean where both can."""
         if not len(positions):
             return {}
-        reach = self.case.grains.grain_reach
+        reach = self.grain_reach
         x, z = profile(positions, reach)
         sides = {"left": x < 0, "right": x > 0}
         angles = {f"{name}_{side}": flank_angle(x[part], z[part], reach) for side, part in sides.items()}

@@ -183,7 +183,7 @@ class DrumController(PouredController[Turning]):
         radius, level = self.scene.diameter / 2, self.course.observables["fill_height"]
         half_chord = math.sqrt(max(level * (2 * radius - level), 0.0))
         from_axis = view.positions[view.alive] - np.array([0.0, 0.0, radius])
-        angles = surface_angles(from_axis, half_chord, self.case.grains.grain_reach)
+        angles = surface_angles(from_axis, half_chord, self.grain_reach)
         if angles is not None:
             self.course.angles.append(list(angles))
         if view.time - self.course.phase_start < self.phases["turn"].expected:

@@ -287,7 +287,7 @@ class LiftController(PouredController[Lift]):
             return
         radius, (before, above) = self.scene.diameter / 2, self.course.surface
         inside = view.alive & (np.hypot(view.positions[:, 0], view.positions[:, 1]) < radius)
-        level = bed_level(view.positions[inside], (radius, radius), self.case.grains.grain_reach)
+        level = bed_level(view.positions[inside], (radius, radius), self.grain_reach)
         for name, awaited_level in awaited.items():
             if level <= awaited_level:
                 seen[name] = before + (above - awaited_level) / (above - level) * (elapsed - before)

@@ -48,6 +48,7 @@ class PouredController(ABC, Generic[CourseT]):
         self.case, self.setup = case, setup
         self.poured: PouredScene = case.scene
         self.reach = float(setup.bounding_radii.max())
+        self.grain_reach = case.grains.grain_reach
         self.period = chunk * 2 ** max(int(np.ceil(np.log2(self.LOOK / (chunk * setup.time_step)))), 0)
         self.rain_end = float(setup.grains.release_steps.max() * setup.time_step)
         self.phases = {
@@ -115,7 +116,7 @@ class PouredController(ABC, Generic[CourseT]):
         return Decision(remove=np.flatnonzero(above), move=self.begin(view, kept))
 
     def _measure_fill(self, view: WorldView, kept: np.ndarray) -> None:
-        scene, reach = self.poured, self.case.grains.grain_reach
+        scene, reach = self.poured, self.grain_reach
         volumes = self.setup.masses / self.setup.grains.densities
         half_sides = scene.cross_section(self.reach).half_sides
         level = bed_level(view.positions[kept], half_sides, reach)

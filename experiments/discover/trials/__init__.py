@@ -5,7 +5,6 @@
     python -m experiments.discover.trials.run out/trials --plan-only          # what it will cost
     python -m experiments.discover.trials.generate measure out/trials         # the heaps
     python -m experiments.discover.trials.run out/trials                      # the analyses
-    python -m experiments.discover.trials.run out/trials --photographs        # with photographs only
     python -m experiments.discover.trials.record out/trials --out out/record  # reveals, scores, records
 
 The seals are to be published before the heaps are measured.

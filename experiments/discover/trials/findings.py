@@ -19,6 +19,8 @@ EVERYTHING = "everything"
 PHOTOGRAPHS = "photographs"
 """View of an analysis that has only what a photograph shows."""
 
+VIEWS = (EVERYTHING, PHOTOGRAPHS)
+
 CRASH = "crash"
 """Stands for the verdict of an analysis that raised."""
 

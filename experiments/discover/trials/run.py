@@ -1,4 +1,4 @@
-"""Analyse the trials: all of a part side by side, their waves in one batch.
+"""Analyse the trials: all of them in both views side by side, their waves in one batch.
 
     python -m experiments.discover.trials.run out/trials --part alone --device cuda --seconds 480
     python -m experiments.discover.trials.run out/trials --plan-only
@@ -30,22 +30,23 @@ from experiments.discover.search import Search
 from experiments.discover.trials.cost import planned_cases
 from experiments.discover.trials.declaration import read_declaration
 from experiments.discover.trials.desk import Desk, OutOfTime, TimedSimulator, job_name, keep, read_data
-from experiments.discover.trials.findings import EVERYTHING, PHOTOGRAPHS, read_findings
+from experiments.discover.trials.findings import VIEWS, read_findings
 from experiments.discover.trials.folder import Folder, Run
 from experiments.discover.trials.generate import STUDY, bank_beside
 from experiments.discover.trials.lockstep import Round, in_step, process_crew
 from experiments.discover.trials.truth import Sealed, read_sealed
+from experiments.errors import InputError
 from experiments.study import load_study
 
 UNFINISHED = 3
 """Exit code while analyses have not ended."""
 
 
-def open_jobs(folder: Folder, trials: Sequence[Sealed], view: str) -> dict[str, Sealed]:
+def open_jobs(folder: Folder, trials: Sequence[Sealed], views: Sequence[str]) -> dict[str, Sealed]:
     """Analyses of trials that have not ended, by name."""
     ended = read_findings([folder.findings] if folder.findings.exists() else [])
     done = {job_name(row.trial, row.view) for row in ended.itertuples()}
-    jobs = {job_name(trial.trial, view): trial for trial in trials}
+    jobs = {job_name(trial.trial, view): trial for view in views for trial in trials}
     return {name: trial for name, trial in jobs.items() if name not in done}
 
 
@@ -53,12 +54,12 @@ def run_trials(
     folder: Folder,
     trials: Sequence[Sealed],
     bank: Path | None = None,
-    view: str = EVERYTHING,
+    views: Sequence[str] = VIEWS,
     device: str | None = None,
     workers: int | None = None,
     seconds: float = math.inf,
 ) -> None:
-    """Analyse trials in one view, those that have not ended; report every round.
+    """Run the analyses of trials that have not ended; report every round.
 
     Parameters
     ----------
@@ -68,8 +69,8 @@ def run_trials(
         Some of those that were sealed.
     bank
         File of the bank of the trial study; None: its own.
-    view
-        What the analyses get to see.
+    views
+        What the analyses get to see: one of each trial in each.
     device, workers
         Of the simulator; there are as many processes for analyses.
     seconds
@@ -84,9 +85,9 @@ def run_trials(
     declaration = read_declaration(folder.declared)
     search = Search.of(load_study(STUDY, declaration.scale or None))
     emulator = fit_emulator(search.read_bank(bank or bank_beside(declaration.scale)))
-    jobs = open_jobs(folder, trials, view)
-    measured, refused = read_data(folder, list(jobs.values()), search.study)
-    keep(folder, {job_name(trial, view): crash for trial, crash in refused.items()})
+    jobs = open_jobs(folder, trials, views)
+    measured, refused = read_data(folder, list(dict.fromkeys(jobs.values())), search.study)
+    keep(folder, {name: refused[trial.trial] for name, trial in jobs.items() if trial.trial in refused})
     names = [name for name, trial in jobs.items() if trial.trial in measured]
     withheld = {trial.trial: trial.withheld for trial in trials}
     desk = Desk(emulator, declaration.settings, measured, withheld)
@@ -94,7 +95,7 @@ def run_trials(
     with (
         EngineSimulator(search.study, search.library, table, device, workers) as engine,
         process_crew(desk, workers or os.cpu_count() or 1) as crew,
-        Run(folder, f"analyses, {view}", device, table),
+        Run(folder, f"analyses, {' and '.join(views)}", device, table),
     ):
         for turn in in_step(names, crew, TimedSimulator(engine, deadline)):
             keep(folder, turn.ended)
@@ -124,7 +125,7 @@ def main(
     bank: Annotated[Path | None, typer.Option(help="Bank of the trial study; left out: its own.")] = None,
     part: Annotated[str | None, typer.Option(help="Trials of one part; left out: all.")] = None,
     first: Annotated[int | None, typer.Option(help="So many trials of each part; left out: all.")] = None,
-    photographs: Annotated[bool, typer.Option("--photographs", help="With photographs only.")] = False,
+    view: Annotated[str | None, typer.Option(help="everything or photographs; left out: both.")] = None,
     device: Annotated[str | None, typer.Option(help="cpu, cuda, or several GPUs, as cuda:0,cuda:1.")] = None,
     workers: Annotated[int | None, typer.Option(help="Processes.")] = None,
     seconds: Annotated[float, typer.Option(help="Begin no batch after this time.")] = math.inf,
@@ -132,15 +133,17 @@ def main(
 ) -> None:
     """Analyse the trials that have not been."""
     with clear_errors("the same command"):
-        place, view = Folder(folder), PHOTOGRAPHS if photographs else EVERYTHING
+        if view not in (None, *VIEWS):
+            raise InputError(f"must be one of {', '.join(VIEWS)}", view, "--view")
+        place, views = Folder(folder), VIEWS if view is None else (view,)
         if plan_only:
             print(plan_page(place, bank))
             return
         trials = chosen(read_sealed(place.sealed), part, first)
         try:
-            run_trials(place, trials, bank, view, chosen_devices(device), workers, seconds)
+            run_trials(place, trials, bank, views, chosen_devices(device), workers, seconds)
         except OutOfTime:
-            print(f"time is up; {len(open_jobs(place, trials, view))} analyses have not ended: run it again")
+            print(f"time is up; {len(open_jobs(place, trials, views))} analyses have not ended: run it again")
             raise typer.Exit(UNFINISHED) from None
 
 
