@@ -10,7 +10,7 @@ import numpy as np
 from dem_warp.clumps import ClumpShape
 from dem_warp.laws.contact_law import Mechanisms
 from dem_warp.laws.library import MECHANISMS
-from dem_warp.laws.mechanism import Mechanism
+from dem_warp.laws.mechanism import Mechanism, clashes
 from dem_warp.materials import Interaction, Material, damping_coefficient, effective_moduli
 from dem_warp.types import MAX_PARTNERS, MAX_SPHERES_PER_GRAIN
 from dem_warp.walls import Wall
@@ -54,11 +54,8 @@ class ContactCoefficients:
         names = [mechanism.name for mechanism in self.mechanisms]
         if len(set(names)) < len(names):
             raise ValueError(f"ContactCoefficients.mechanisms: must be different, got {names}")
-        for mechanism in self.mechanisms:
-            if unfit := sorted(set(mechanism.excludes) & set(names)):
-                raise ValueError(
-                    f"ContactCoefficients.mechanisms: {mechanism.name} must not stand beside {unfit}"
-                )
+        for name, other in clashes(self.mechanisms):
+            raise ValueError(f"ContactCoefficients.mechanisms: {name} must not stand beside {other}")
 
     @classmethod
     def of_pair(

@@ -97,3 +97,9 @@ class Mechanism:
         `modulus` is the pair's effective Young's modulus E* [Pa].
         """
         return 0.0
+
+
+def clashes(mechanisms: tuple[Mechanism, ...]) -> list[tuple[str, str]]:
+    """Names of those that must not stand in one contact: each with the one that it excludes."""
+    pairs = [(one, other) for one in mechanisms for other in mechanisms]
+    return [(one.name, other.name) for one, other in pairs if other.name in one.excludes]

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import fields
-from itertools import permutations
 from typing import Any, Literal
 
 from pydantic import Field, create_model
 
 from dem_warp.laws.library import MECHANISMS
-from dem_warp.laws.mechanism import Mechanism
+from dem_warp.laws.mechanism import Mechanism, clashes
 from experiments.study.schema import Number, Section
 
 
@@ -36,15 +35,11 @@ class _Mechanisms(Section):
         """
         named = [(kind, getattr(self, name)) for name, kind in MECHANISMS.items()]
         built = tuple(kind(**dict(section)) for kind, section in named if section is not None)
-        for one, other in permutations(built, 2):
-            if other.name in one.excludes and _meet(one, other):
-                rule = f"mechanism.{one.name} must not stand beside mechanism.{other.name} in one contact"
-                raise ValueError(f"{rule}, got {one.between!r} and {other.between!r}")
+        for kind in ("grains", "walls"):
+            for name, other in clashes(tuple(one for one in built if one.acts_between(kind))):
+                rule = f"mechanism.{name} must not stand beside mechanism.{other} in one contact"
+                raise ValueError(f"{rule}, got both between {kind}")
         return built
-
-
-def _meet(one: Mechanism, other: Mechanism) -> bool:
-    return any(one.acts_between(kind) and other.acts_between(kind) for kind in ("grains", "walls"))
 
 
 _SECTIONS: dict[str, Any] = {name: (_section(kind) | None, None) for name, kind in MECHANISMS.items()}
