@@ -1,14 +1,28 @@
-"""An emulator in the place of the simulator, so that the statistics can be tried on a frozen bank."""
+"""An emulator in the place of the simulator, so that the statistics can be tried on a frozen bank.
+
+Where the analysis has that very emulator, its errors never show. So a bank may be drawn from it with fresh
+noise, and the analysis have the emulator of that; bent by what no quadratic follows, the first is never
+quite in the reach of the second.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cache
+from zlib import crc32
 
 import numpy as np
 
+from experiments.discover.bank import Bank, bank_points, make_bank
 from experiments.discover.emulator import Emulator
 from experiments.discover.measured import Measured
+from experiments.discover.settings import Settings
 from experiments.discover.simulator import Outcomes, Point
+
+BEND_LENGTH = 0.7
+"""Length over which a bend changes, in half ranges: a quadratic follows the larger part of it."""
+WAVES = 64
+"""Cosines that a bend is the sum of."""
 
 
 class EmulatedSimulator:
@@ -20,13 +34,17 @@ class EmulatedSimulator:
     ----------
     emulator : Emulator
         Its whole library; a search may know less of it.
+    bend : float
+        Standard deviation, in units of that of one run, of a smooth random function of the parameters that is
+        added to the base and, times its size, to every mechanism.
     """
 
-    def __init__(self, emulator: Emulator) -> None:
+    def __init__(self, emulator: Emulator, bend: float = 0.0) -> None:
         names = [""] * (max(emulator.columns) + 1)
         for name, column in zip(emulator.observables, emulator.columns, strict=True):
             names[column] = name
         self.emulator = emulator
+        self.bend = bend
         self.observables = tuple(names)
 
     def __call__(self, points: Sequence[Point]) -> Outcomes:
@@ -44,11 +62,42 @@ class EmulatedSimulator:
         x = np.array([*theta, *sizes])
         triangle = np.linalg.cholesky(surfaces.noise_covariance(x, names))
         scatter = triangle @ np.random.default_rng(point.seed).standard_normal(len(triangle))
-        return np.asarray(surfaces.predict(x[None], names)[0] + scatter)
+        return np.asarray(surfaces.predict(x[None], names)[0] + self._bent(theta, point) + scatter)
+
+    def _bent(self, theta: np.ndarray, point: Point) -> np.ndarray:
+        space, noise = self.emulator.space, self.emulator.surfaces[point.condition].noise
+        bent = _waves(point.condition, "", theta, self.emulator.observables)
+        for name, size in point.sizes:
+            coded = space.coded_size(name, size)
+            # Sizes run from 0 to 1, factors from -1 to 1.
+            at = np.append(theta, 2.0 * coded - 1.0)
+            bent = bent + coded * _waves(point.condition, name, at, self.emulator.observables)
+        return np.asarray(self.bend * np.sqrt(noise.variance(np.zeros_like(theta))) * bent)
+
+
+def _waves(condition: str, mechanism: str, at: np.ndarray, observables: tuple[str, ...]) -> np.ndarray:
+    """Smooth random functions of variance 1 at one point, (observables,); the same in every process."""
+    vectors, phases = _cosines(f"{condition} {mechanism}", len(at), len(observables))
+    return np.asarray(np.sqrt(2.0 / WAVES) * np.cos(vectors @ at + phases).sum(axis=1))
+
+
+@cache
+def _cosines(title: str, parameters: int, observables: int) -> tuple[np.ndarray, np.ndarray]:
+    """Wave vectors (observables, waves, parameters) and phases of a squared-exponential covariance."""
+    rng = np.random.default_rng(crc32(title.encode()))
+    vectors = rng.standard_normal((observables, WAVES, parameters)) / BEND_LENGTH
+    return vectors, rng.uniform(0.0, 2.0 * np.pi, (observables, WAVES))
+
+
+def redrawn_bank(simulator: EmulatedSimulator, settings: Settings, seed: int) -> Bank:
+    """Bank of the library waves, as an emulated world answers them."""
+    space = simulator.emulator.space
+    points = bank_points(space, settings, seed)
+    return make_bank(space, simulator.observables, points, simulator(points))
 
 
 def emulated_heaps(
-    emulator: Emulator,
+    simulator: EmulatedSimulator,
     theta: Sequence[float],
     sizes: Mapping[str, float],
     replicates: int,
@@ -59,7 +108,7 @@ def emulated_heaps(
 
     Parameters
     ----------
-    emulator : Emulator
+    simulator : EmulatedSimulator
     theta : sequence of float
         Factors in natural units.
     sizes : mapping
@@ -68,7 +117,7 @@ def emulated_heaps(
     systematic : float
         Standard deviation, in units of that of one run, of what shifts all replicates of a condition alike.
     """
-    simulator = EmulatedSimulator(emulator)
+    emulator = simulator.emulator
     rng, shifts = np.random.default_rng(seed), np.random.default_rng([seed, 1])
     hidden = tuple(sorted(sizes.items()))
     values = {}

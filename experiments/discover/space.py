@@ -17,6 +17,9 @@ from experiments.discover.simulator import Point
 from experiments.errors import InputError
 from experiments.study import Study
 
+CODED_DIGITS = 9
+"""Decimals of the coded parameters of a case."""
+
 
 @dataclass(frozen=True)
 class MechanismRange:
@@ -132,7 +135,11 @@ class SearchSpace:
         return (natural - mechanism.null) / (mechanism.maximum - mechanism.null)
 
     def point(self, coded: np.ndarray, mechanisms: tuple[str, ...], condition: str, seed: int) -> Point:
-        """Return the case of one row of coded parameters."""
+        """Return the case of one row of coded parameters.
+
+        Rounded, so that the last bits of a host's linear algebra make no other case.
+        """
+        coded = np.round(coded, CODED_DIGITS)
         theta = self.natural_theta(coded[: len(self.factors)])
         sizes = zip(mechanisms, coded[len(self.factors) :], strict=True)
         natural = sorted((name, self.natural_size(name, size)) for name, size in sizes)

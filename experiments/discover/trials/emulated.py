@@ -1,9 +1,11 @@
-"""Trials of the decision rules on a bank alone, in seconds: the truth is drawn from the emulator.
+"""Trials of the decision rules on a bank alone, in seconds: the truth is an emulator.
 
-    python -m experiments.discover.trials.emulated bank.npz --count 8
+    python -m experiments.discover.trials.emulated --scale bench --banks 8
 
-They tune and guard the rules without a simulation. The heaps are shifted as the rules say that cameras and
-time steps shift them. What they cannot show is whether the emulator is right; the blind trials do that.
+They tune and guard the rules without a simulation. From the emulator of the shipped bank, bent by what no
+quadratic follows, new banks are drawn, and an analysis knows no more than one of these: so their noise, and
+what their emulators miss, show. The heaps are shifted as the rules say that cameras and time steps do.
+Whether the bent emulator is like the engine, only the blind trials show.
 """
 
 from __future__ import annotations
@@ -13,7 +15,6 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from itertools import combinations
-from pathlib import Path
 from typing import Annotated
 
 import numpy as np
@@ -22,12 +23,15 @@ import typer
 
 from experiments.discover.analysis import analyse
 from experiments.discover.discovery import Discovery, Verdict
-from experiments.discover.emulated import EmulatedSimulator, emulated_heaps
-from experiments.discover.emulator import Emulator, read_emulator
-from experiments.discover.search import drive
+from experiments.discover.emulated import EmulatedSimulator, emulated_heaps, redrawn_bank
+from experiments.discover.emulator import Emulator, fit_emulator
+from experiments.discover.observables import NAMES, PHOTOGRAPHED
+from experiments.discover.search import Search, drive
 from experiments.discover.settings import Settings
 from experiments.discover.trials.declaration import declared_effects, with_names
 from experiments.discover.trials.drawing import STRONG, Effect
+from experiments.discover.trials.generate import STUDY, bank_beside
+from experiments.study import load_study
 
 REPLICATES = 8
 """Heaps a condition, as in the sealed trials."""
@@ -90,18 +94,47 @@ def _size(effect: Effect, rng: np.random.Generator) -> float:
     return float(effect.null + drawn * np.sign(effect.maximum - effect.null))
 
 
-def run_trial(emulator: Emulator, settings: Settings, truth: Truth) -> dict[str, object]:
-    """Analyse one trial; a row of the table of `emulated_trials`."""
+@dataclass(frozen=True, eq=False)
+class World:
+    """An emulated world, and what its bank lets one know of it.
+
+    Attributes
+    ----------
+    truth : EmulatedSimulator
+        Makes the heaps and the fresh runs.
+    known : Emulator
+        Fitted to a bank that was drawn from the truth; the analysis has no other.
+    effects : tuple of Effect
+        Of the library, as that emulator declares them.
+    settings : Settings
+        Which let the resolvable ones be named.
+    """
+
+    truth: EmulatedSimulator
+    known: Emulator
+    effects: tuple[Effect, ...]
+    settings: Settings
+
+    @classmethod
+    def of(cls, truth: EmulatedSimulator, settings: Settings, seed: int) -> World:
+        """Draw a bank and declare what it shows."""
+        known = fit_emulator(redrawn_bank(truth, settings, seed))
+        effects = declared_effects(known, settings, REPLICATES)
+        return cls(truth, known, effects, with_names(settings, effects))
+
+
+def run_trial(world: World, observables: tuple[str, ...], truth: Truth) -> dict[str, object]:
+    """Analyse one trial, of which some observables are measured; a row of the table of `emulated_trials`."""
+    settings = world.settings
     measured = emulated_heaps(
-        emulator, truth.theta, dict(truth.sizes), REPLICATES, truth.seed, settings.systematic
-    )
-    known = emulator.without(*truth.library_lacks)
-    found = drive(analyse(measured, known, settings, truth.seed), EmulatedSimulator(emulator))
+        world.truth, truth.theta, dict(truth.sizes), REPLICATES, truth.seed, settings.systematic
+    ).only(observables)
+    known = world.known.without(*truth.library_lacks)
+    found = drive(analyse(measured, known, settings, truth.seed), world.truth)
     hidden = tuple(sorted(name for name, _ in truth.sizes))
-    covered = None
-    if truth.kind == "one" and found.verdict == Verdict.NAMED and found.named == hidden and found.chosen:
-        size = found.chosen.sizes[0]
-        covered = size.low <= truth.sizes[0][1] <= size.high
+    covered, z = None, None
+    if truth.kind == "one":
+        covered, z = _size_found(found, world.known, *truth.sizes[0])
     return {
         "kind": truth.kind,
         "hidden": " + ".join(hidden),
@@ -111,8 +144,20 @@ def run_trial(emulator: Emulator, settings: Settings, truth: Truth) -> dict[str,
         "wrong": found.verdict == Verdict.NAMED
         and not set(found.named) <= set(hidden) - set(truth.library_lacks),
         "covered": covered,
+        "z": z,
         "cases": found.effort.fresh_cases,
     }
+
+
+def _size_found(
+    found: Discovery, known: Emulator, hidden: str, size: float
+) -> tuple[bool | None, float | None]:
+    """Whether the interval of a named mechanism covers its size, and the error over its standard error."""
+    if found.verdict != Verdict.NAMED or found.named != (hidden,):
+        return None, None
+    (one,) = (candidate for candidate in found.candidates if candidate.mechanisms == (hidden,))
+    got, effect = one.sizes[0], one.sizes[0].value - known.space.mechanism(hidden).null
+    return got.low <= size <= got.high, (got.value - size) / abs(effect) * one.size_over_se[0]
 
 
 def _is_right(truth: Truth, found: Discovery, hidden: tuple[str, ...]) -> bool:
@@ -124,21 +169,44 @@ def _is_right(truth: Truth, found: Discovery, hidden: tuple[str, ...]) -> bool:
 
 
 def emulated_trials(
-    emulator: Emulator, settings: Settings, count: int, seed: int = 0, workers: int | None = None
+    truth: EmulatedSimulator,
+    settings: Settings,
+    count: int,
+    banks: int = 1,
+    observables: tuple[str, ...] = NAMES,
+    seed: int = 0,
+    workers: int | None = None,
 ) -> pd.DataFrame:
     """Run trials side by side.
+
+    Parameters
+    ----------
+    truth : EmulatedSimulator
+    settings : Settings
+        Of the banks that are drawn from it, and of the analyses.
+    count : int
+        Trials of each mechanism with every bank.
+    banks : int
+    observables : tuple of str
+        What is measured.
+    seed : int
+        Of the banks and of the trials.
+    workers : int, optional
+        Processes; None: one a core.
 
     Returns
     -------
     pandas.DataFrame
         A row a trial: what was hidden, the verdict, what was named, whether that is right, or names something
-        that was not there, whether the interval of the size covers the truth, fresh cases.
+        that was not there; of a single effect that was named whether the interval of its size covers the
+        truth, and by how many standard errors the size is off; fresh cases.
     """
-    effects = declared_effects(emulator, settings, REPLICATES)
-    fixed = with_names(settings, effects)
-    truths = list(draw_truths(emulator, effects, count, seed))
+    rows: list[dict[str, object]] = []
     with ProcessPoolExecutor(workers) as pool:
-        rows = list(pool.map(partial(run_trial, emulator, fixed), truths))
+        for number in range(banks):
+            world = World.of(truth, settings, seed + number)
+            truths = draw_truths(world.known, world.effects, count, 1000 * (seed + number))
+            rows += pool.map(partial(run_trial, world, observables), truths)
     return pd.DataFrame(rows)
 
 
@@ -152,18 +220,23 @@ def summary(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def main(
-    bank: Annotated[Path, typer.Argument(help="Bank of a study.")],
-    count: Annotated[int, typer.Option(help="Trials of each mechanism.")] = 4,
+    scale: Annotated[str, typer.Option(help="Scale of the trial study; left out: as written.")] = "",
+    photographs: Annotated[bool, typer.Option("--photographs", help="With photographs only.")] = False,
+    count: Annotated[int, typer.Option(help="Trials of each mechanism with every bank.")] = 1,
+    banks: Annotated[int, typer.Option(help="Banks that are drawn.")] = 4,
+    bend: Annotated[float, typer.Option(help="What no quadratic follows, in deviations of one run.")] = 0.3,
     seed: Annotated[int, typer.Option()] = 0,
     workers: Annotated[int | None, typer.Option(help="Processes; default: one a core.")] = None,
 ) -> None:
-    """Try the decision rules on a bank."""
-    emulator, settings = read_emulator(bank), Settings()
-    for effect in declared_effects(emulator, settings, REPLICATES):
-        print(f"{effect.name}: gamma80 {effect.gamma80:.4g} of {abs(effect.maximum - effect.null):.4g}")
-    table = emulated_trials(emulator, settings, count, seed, workers)
+    """Try the decision rules on banks drawn from the emulator of the trial study."""
+    search = Search.of(load_study(STUDY, scale or None))
+    truth = EmulatedSimulator(fit_emulator(search.read_bank(bank_beside(scale))), bend)
+    seen = PHOTOGRAPHED if photographs else NAMES
+    table = emulated_trials(truth, search.settings, count, banks, seen, seed, workers)
     print(summary(table).round(2).to_string())
     print(table.groupby("kind")[["right", "wrong"]].mean().round(3).to_string())
+    z, covered = table["z"].dropna().astype(float), table["covered"].dropna().astype(float)
+    print(f"sizes: {covered.mean():.0%} of {len(covered)} covered; z {z.mean():.2f} +- {z.std():.2f}")
 
 
 if __name__ == "__main__":

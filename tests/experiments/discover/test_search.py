@@ -197,3 +197,11 @@ def test_one_angle_is_not_identifiable_and_said_so(tmp_path: Path) -> None:
     page = write_discovery(found, search.study, terms, search.settings, tmp_path)
     assert "These data cannot tell" in page.read_text(encoding="utf-8")
     assert verdict_line(found, terms).endswith(".")
+
+
+def test_the_last_bits_of_coded_parameters_make_no_other_case() -> None:
+    space = Search.of(load_study(TRIAL, "bench")).space
+    name = space.names[0]
+    coded = np.append(np.linspace(-0.7, 0.6, len(space.factors)), 1.0 / 3.0)
+    other = coded * (1.0 + np.array([1.0, -1.0, 1.0, -1.0]) * 2.0**-50)
+    assert space.point(coded, (name,), "base", 1) == space.point(other, (name,), "base", 1)
