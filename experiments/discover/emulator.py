@@ -9,8 +9,17 @@ from pathlib import Path
 import numpy as np
 
 from experiments.discover.bank import Bank, load_bank
+from experiments.discover.noise import shared_correlations
 from experiments.discover.space import SearchSpace
-from experiments.discover.surfaces import Surfaces, added, fit_surfaces
+from experiments.discover.surfaces import (
+    AddedRuns,
+    Addition,
+    Surfaces,
+    added,
+    fit_additions,
+    fit_base,
+    repeats_noise,
+)
 from experiments.discover.threads import in_one_thread
 from experiments.errors import InputError
 
@@ -71,23 +80,22 @@ def fit_emulator(bank: Bank) -> Emulator:
         notes.append(f"{failed} of {len(bank.reasons)} cases of the bank left no heap")
     thin = _too_few(bank)
     notes += [f"{name} has too few finished cases in the bank: left out of the library" for name in thin]
-    surfaces = {}
-    for number, condition in enumerate(bank.space.conditions):
-        base = bank.rows(number, -1)
-        mechanisms = [(index, name) for index, name in enumerate(bank.space.names) if name not in thin]
-        runs = {name: bank.rows(number, index) for index, name in mechanisms}
-        try:
-            surfaces[condition] = fit_surfaces(
-                bank.theta[base],
-                bank.values[np.ix_(base, columns)],
-                {
-                    name: (bank.theta[rows], bank.size[rows], bank.values[np.ix_(rows, columns)])
-                    for name, rows in runs.items()
-                },
-                RESOLUTION * spread[columns],
-            )
-        except InputError as error:
-            raise InputError(error.rule, error.value, f"condition {condition} of the bank") from error
+    bases = _bases(bank, columns, RESOLUTION * spread[columns])
+    additions: list[dict[str, Addition]] = [{} for _ in bases]
+    for index, name in enumerate(bank.space.names):
+        if name in thin:
+            continue
+        runs = []
+        for number, base in enumerate(bases):
+            rows = bank.rows(number, index)
+            values = bank.values[np.ix_(rows, columns)]
+            runs.append(AddedRuns(base, bank.theta[rows], bank.size[rows], values))
+        for own, addition in zip(additions, fit_additions(runs), strict=True):
+            own[name] = addition
+    surfaces = {
+        condition: replace(base, additions=own)
+        for condition, base, own in zip(bank.space.conditions, bases, additions, strict=True)
+    }
     names = tuple(bank.observables[column] for column in columns)
     return Emulator(
         bank.space.without(*thin),
@@ -97,6 +105,20 @@ def fit_emulator(bank: Bank) -> Emulator:
         len(bank.reasons),
         tuple(notes),
     )
+
+
+def _bases(bank: Bank, columns: np.ndarray, floor: np.ndarray) -> list[Surfaces]:
+    """Surfaces of every condition without mechanisms."""
+    data = []
+    for number, condition in enumerate(bank.space.conditions):
+        rows = bank.rows(number, -1)
+        theta, values = bank.theta[rows], bank.values[np.ix_(rows, columns)]
+        try:
+            data.append((theta, values, repeats_noise(theta, values, floor)))
+        except InputError as error:
+            raise InputError(error.rule, error.value, f"condition {condition} of the bank") from error
+    noises = shared_correlations([noise for _, _, noise in data])
+    return [fit_base(theta, values, noise) for (theta, values, _), noise in zip(data, noises, strict=True)]
 
 
 def _too_few(bank: Bank) -> list[str]:

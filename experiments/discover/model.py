@@ -8,40 +8,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.linalg import block_diag
 
+from experiments.discover.correction import Correction
 from experiments.discover.emulator import Emulator
 from experiments.discover.evidence import Block
-from experiments.discover.kriging import Kriging
 
 STEP = 0.02
 """Half the step of derivatives, in coded units."""
-
-
-@dataclass(frozen=True, eq=False)
-class Correction:
-    """What fresh runs around an optimum say beyond the emulator, for one condition.
-
-    Attributes
-    ----------
-    parts : tuple of Kriging
-        One an observable.
-    correlation : (observables, observables) array
-        Of their errors.
-    noise_ratio : (observables,) array
-        Standard deviations of one run around the optimum over those of the emulator.
-    """
-
-    parts: tuple[Kriging, ...]
-    correlation: np.ndarray
-    noise_ratio: np.ndarray
-
-    def mean(self, x: np.ndarray) -> np.ndarray:
-        """What is added to the emulator, (n, observables)."""
-        return np.column_stack([part.mean(x) for part in self.parts])
-
-    def error(self, x: np.ndarray) -> np.ndarray:
-        """Covariance of the corrected prediction's error at one row of coded parameters."""
-        sd = np.sqrt([part.variance(x[None])[0] for part in self.parts])
-        return np.asarray(sd[:, None] * self.correlation * sd)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,12 +1,14 @@
 """The scatter of heaps from seed to seed: a covariance over the factors, from repeated runs.
 
 Variances vary over the factors (slippery grains scatter otherwise than rough ones), so each observable's is
-the exponential of a plane; correlations are taken as the same everywhere.
+the exponential of a plane; correlations are taken as the same over the factors, and as alike between
+conditions.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,6 +16,9 @@ SLOPE_SD = 0.7
 """Prior standard deviation of the slopes of a log-variance over half a range: a factor of two either way."""
 CORRELATION_SHRINKAGE = 0.02
 """Share of the identity in a correlation matrix, which keeps nearly equal observables apart."""
+ALIKE = 100.0
+"""Repeats that the correlation of all conditions is worth in that of one. In the bank of the trial study (160
+repeats a condition) correlations differ between conditions by about what 100 repeats leave open."""
 NEWTON_STEPS = 30
 
 
@@ -27,12 +32,15 @@ class Noise:
         Of the log-variances.
     correlation : (observables, observables) array
     degrees_of_freedom : int
-        Number of independent deviations that they come from.
+        Number of independent deviations that the variances come from.
+    correlation_freedom : float
+        Number of those that the correlation is worth.
     """
 
     coefficients: np.ndarray
     correlation: np.ndarray
     degrees_of_freedom: int
+    correlation_freedom: float
 
     def variance(self, theta: np.ndarray) -> np.ndarray:
         """Variance of one run, (..., observables), at coded factors (..., factors) kept to their ranges."""
@@ -46,7 +54,7 @@ class Noise:
 
     def inverse_bias(self, count: int) -> float:
         """Factor that makes the inverse of the covariance of so many observables unbiased (Wishart)."""
-        return self.degrees_of_freedom / max(self.degrees_of_freedom - count - 1.0, 1.0)
+        return self.correlation_freedom / max(self.correlation_freedom - count - 1.0, 1.0)
 
 
 def fit_noise(theta: np.ndarray, deviations: np.ndarray, floor: np.ndarray) -> Noise:
@@ -81,7 +89,25 @@ def fit_noise(theta: np.ndarray, deviations: np.ndarray, floor: np.ndarray) -> N
     scale = np.sqrt(np.diag(moments))
     correlation = moments / (scale[:, None] * scale)
     shrunk = (1.0 - CORRELATION_SHRINKAGE) * correlation + CORRELATION_SHRINKAGE * np.eye(size)
-    return Noise(coefficients, shrunk, len(deviations))
+    return Noise(coefficients, shrunk, len(deviations), float(len(deviations)))
+
+
+def shared_correlations(noises: Sequence[Noise]) -> list[Noise]:
+    """Let conditions learn from one another how observables hang together.
+
+    The correlation of each is drawn towards the mean of all: the mean of a Wishart posterior whose prior is
+    worth `ALIKE` repeats.
+    """
+    counts = np.array([noise.degrees_of_freedom for noise in noises], dtype=float)
+    mean = np.average([noise.correlation for noise in noises], axis=0, weights=counts)
+    out = []
+    for noise, count in zip(noises, counts, strict=True):
+        share = ALIKE / (ALIKE + count) if len(noises) > 1 else 0.0
+        # Neither are all conditions alike, nor is their mean known without error.
+        variance = (1.0 - share) / count + share**2 / counts.sum()
+        correlation = share * mean + (1.0 - share) * noise.correlation
+        out.append(replace(noise, correlation=correlation, correlation_freedom=1.0 / variance))
+    return out
 
 
 def fit_growth(size: np.ndarray, ratios: np.ndarray) -> np.ndarray:

@@ -55,14 +55,14 @@ class Signatures:
         Effect of a unit of coded size.
     visible : (mechanisms, means) array
         What a refit leaves of it.
-    bias : (mechanisms,) array
-        What the emulator's own noise adds to the squared length of ``visible``.
+    noise : (mechanisms,) array
+        Squared length that the bank's noise alone would give ``visible``.
     """
 
     names: tuple[str, ...]
     whole: np.ndarray
     visible: np.ndarray
-    bias: np.ndarray
+    noise: np.ndarray
 
     @property
     def directions(self) -> np.ndarray:
@@ -74,8 +74,8 @@ class Signatures:
 
     @property
     def shares(self) -> np.ndarray:
-        """Share of each squared signature that is visible, less its bias, (mechanisms,)."""
-        visible = np.maximum((self.visible**2).sum(axis=1) - self.bias, 0.0)
+        """Share of each squared signature that is visible, (mechanisms,)."""
+        visible = (self.visible**2).sum(axis=1)
         whole = (self.whole**2).sum(axis=1)
         return np.asarray(
             np.divide(visible, whole, out=np.zeros_like(whole), where=whole > 0.0).clip(0.0, 1.0)
@@ -96,16 +96,16 @@ def signatures(fitted: Fitted) -> Signatures:
     natural = np.array([signature(emulator, blocks, theta, name) for name in names]).reshape(size)
     whole = natural @ fitted.whitening.T
     project = projector(fitted.sensitivities)
-    bias = np.array([_bias(fitted, project, theta, name) for name in names])
-    return Signatures(names, whole, whole @ project, bias)
+    noise = np.array([_noise(fitted, project, theta, name) for name in names])
+    return Signatures(names, whole, whole @ project, noise)
 
 
-def _bias(fitted: Fitted, project: np.ndarray, theta: np.ndarray, name: str) -> float:
-    """tr(M cov M) of the error of a whitened signature, cov by conditions."""
+def _noise(fitted: Fitted, project: np.ndarray, theta: np.ndarray, name: str) -> float:
+    """tr(M cov M) of the noise of a whitened signature, cov by conditions."""
     seen = project @ fitted.whitening
     total, start = 0.0, 0
     for block in fitted.stack.blocks:
-        error = fitted.model.emulator.surfaces[block.condition].added_error(theta, SECANT, name)
+        error = fitted.model.emulator.surfaces[block.condition].added_noise(theta, SECANT, name)
         part = seen[:, start : start + len(block.columns)]
         total += float(np.sum(part * (part @ error[np.ix_(block.columns, block.columns)])))
         start += len(block.columns)
@@ -113,12 +113,15 @@ def _bias(fitted: Fitted, project: np.ndarray, theta: np.ndarray, name: str) -> 
 
 
 def _apart(seen: Signatures, index: int, rival: int) -> float:
-    """Squared visible length of a signature of coded size 1 that its rival cannot take up, less its bias."""
+    """Squared visible length of a signature of coded size 1 that its rival cannot take up.
+
+    Two that are the same differ by their noise, which is subtracted.
+    """
     own, other = seen.visible[index], seen.visible[rival]
     # A size that is not negative takes up nothing of an opposite signature.
     taken = max(float(own @ other), 0.0) / max(float(other @ other), LEAST_LENGTH**2)
     left = own - taken * other
-    return max(float(left @ left) - float(seen.bias[index]) - taken**2 * float(seen.bias[rival]), 0.0)
+    return max(float(left @ left) - float(seen.noise[index]) - taken**2 * float(seen.noise[rival]), 0.0)
 
 
 def alike(seen: Signatures, name: str, size: float, margin: float) -> frozenset[str]:
@@ -172,7 +175,7 @@ def visibilities(base: Fitted, seen: Signatures, settings: Settings) -> tuple[Vi
     out = []
     for index, name in enumerate(seen.names):
         effects = secants(base.model.emulator, base.stack.blocks, theta, name, SIZES) @ project.T
-        squares = np.maximum((effects**2).sum(axis=1) - seen.bias[index] * SIZES**2, 0.0)
+        squares = (effects**2).sum(axis=1)
         found = np.flatnonzero(squares >= (settings.least_ratio + quantile) ** 2)
         gamma80 = float(SIZES[found[0]]) if len(found) else float("inf")
         closest = int(np.argmax(correlations[index])) if len(seen.names) > 1 else index

@@ -14,20 +14,18 @@ import numpy as np
 from scipy import stats
 
 from experiments.discover.bank import sobol
+from experiments.discover.correction import Prior, condition_on, log_likelihood
 from experiments.discover.fitting import Fitted
-from experiments.discover.kriging import krige, squared_exponential
-from experiments.discover.model import Correction, Model
+from experiments.discover.model import Model
 from experiments.discover.noise import repeat_deviations
 
 LENGTH = 0.7
 """Length over which the emulator's error changes, in half ranges: what a quadratic leaves over."""
-AMPLITUDES = 2.0 ** np.arange(8)
-"""Variances of that error tried, in units of what the emulator states."""
-LEAST_AMPLITUDE = 0.01
-"""Least stated variance of that error, in units of the noise of one run."""
+AMPLITUDES = 0.04 * 4.0 ** np.arange(6)
+"""Variances of that error tried, in units of the noise of one run; the emulator states what comes beside."""
 NOISE_WEIGHT = 20.0
 """Weight of the bank's noise beside the scatter of fresh repeats, in repeats."""
-SPREAD_RANGE = (0.06, 0.3)
+SPREAD_RANGE = (0.12, 0.3)
 """Least and largest standard deviation of the fresh points, in coded units."""
 MOVED = 1.5
 """An optimum that has moved by more of those standard deviations is simulated again."""
@@ -91,63 +89,75 @@ def correct(model: Model, runs: Runs, centre: np.ndarray) -> Model:
     """
     plain = replace(model, corrections={})
     names = [c for c in model.emulator.surfaces if np.sum(runs.conditions == c) >= 2]
-    factors = len(model.emulator.space.factors)
-    # Sizes run from 0 to 1, factors from -1 to 1.
-    length = np.where(np.arange(len(centre)) < factors, LENGTH, LENGTH / 2.0)
     ratio = _noise_ratio(plain, runs, names)
-    local = {name: _local(plain, runs, centre, length, ratio, name) for name in names}
-    amplitude = _likeliest(list(local.values()))
-    corrections = {}
-    for name, part in local.items():
-        parts = [
-            krige(
-                part.x,
-                part.missed[:, j],
-                np.full(len(part.x), part.noise[j]),
-                amplitude * part.prior[j],
-                length,
-            )
-            for j in range(len(ratio))
-        ]
-        correlation = model.emulator.surfaces[name].noise.correlation
-        corrections[name] = Correction(tuple(parts), correlation, np.sqrt(ratio))
+    seen = {name: _seen(plain, runs, centre, ratio, name) for name in names}
+    amplitude = max(AMPLITUDES, key=lambda tried: sum(one.log_likelihood(tried) for one in seen.values()))
+    surfaces = model.emulator.surfaces
+    corrections = {
+        name: condition_on(
+            one.prior(amplitude),
+            one.x,
+            one.missed,
+            one.noise,
+            surfaces[name].noise.correlation,
+            np.sqrt(ratio),
+        )
+        for name, one in seen.items()
+    }
     return replace(model, corrections=corrections)
 
 
 @dataclass(frozen=True, eq=False)
-class _Local:
-    """What the emulator misses in one condition: runs, residuals, noise and stated error a run, kernel."""
+class _Seen:
+    """What the emulator missed in one condition.
+
+    Attributes
+    ----------
+    x : (n, parameters) array
+        Points, each once.
+    missed, noise : (n, observables) array
+        Mean of its runs less the emulated, and the variance of its noise.
+    coefficients : (observables, terms, terms) array
+        Covariances of the emulator's errors.
+    misfit, variance : (observables,) array
+        What the emulator states of what no coefficient follows, and variance of one run.
+    """
 
     x: np.ndarray
     missed: np.ndarray
     noise: np.ndarray
-    prior: np.ndarray
-    kernel: np.ndarray
+    coefficients: np.ndarray
+    misfit: np.ndarray
+    variance: np.ndarray
+    factors: int
+
+    def prior(self, amplitude: float) -> Prior:
+        """What is known without the runs."""
+        # Sizes run from 0 to 1, factors from -1 to 1.
+        length = np.where(np.arange(self.x.shape[1]) < self.factors, LENGTH, LENGTH / 2.0)
+        return Prior(self.factors, self.coefficients, self.misfit + amplitude * self.variance, length)
+
+    def log_likelihood(self, amplitude: float) -> float:
+        """Of what was missed."""
+        return log_likelihood(self.prior(amplitude), self.x, self.missed, self.noise)
 
 
-def _local(
-    model: Model, runs: Runs, centre: np.ndarray, length: np.ndarray, ratio: np.ndarray, condition: str
-) -> _Local:
+def _seen(model: Model, runs: Runs, centre: np.ndarray, ratio: np.ndarray, condition: str) -> _Seen:
     here = runs.conditions == condition
-    x = runs.x[here]
-    surfaces = model.emulator.surfaces[condition]
-    noise = np.diag(surfaces.noise_covariance(centre, model.mechanisms)) * ratio
-    stated = np.diag(surfaces.error(centre, model.mechanisms))
-    prior = np.maximum(stated, LEAST_AMPLITUDE * noise)
-    missed = runs.values[here] - model.predict(x, condition)
-    return _Local(x, missed, noise, prior, squared_exponential(x / length, x / length))
-
-
-def _likeliest(parts: Sequence[_Local]) -> float:
-    """Amplitude, common to all conditions and observables, of largest likelihood."""
-    likelihood = np.zeros(len(AMPLITUDES))
-    for part in parts:
-        spectrum, vectors = np.linalg.eigh(part.kernel)
-        squares = (vectors.T @ part.missed) ** 2
-        for index, amplitude in enumerate(AMPLITUDES):
-            variance = np.maximum(spectrum, 0.0)[:, None] * (amplitude * part.prior) + part.noise
-            likelihood[index] -= 0.5 * float(np.sum(np.log(variance) + squares / variance))
-    return float(AMPLITUDES[int(np.argmax(likelihood))])
+    surfaces, factors = model.emulator.surfaces[condition], len(model.emulator.space.factors)
+    x, groups, counts = np.unique(runs.x[here], axis=0, return_inverse=True, return_counts=True)
+    missed = np.zeros((len(x), len(ratio)))
+    np.add.at(missed, groups.reshape(-1), runs.values[here])
+    variance = np.diag(surfaces.noise_covariance(centre, model.mechanisms)) * ratio
+    return _Seen(
+        x,
+        missed / counts[:, None] - model.predict(x, condition),
+        variance / counts[:, None],
+        surfaces.coefficient_errors(centre[:factors], model.mechanisms),
+        surfaces.misfit_variance(centre, model.mechanisms),
+        variance,
+        factors,
+    )
 
 
 def _noise_ratio(model: Model, runs: Runs, conditions: Sequence[str]) -> np.ndarray:

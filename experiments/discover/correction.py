@@ -1,0 +1,123 @@
+"""What fresh runs say beyond the emulator: its coefficients anew, and what no coefficients follow.
+
+The emulator is the mean of what its bank leaves open, and its stated error the covariance. Fresh runs narrow
+that down as more runs of the bank would; besides, they show a smooth function that the polynomials lack.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from experiments.discover.kriging import squared_exponential
+from experiments.discover.surfaces import all_terms
+
+
+@dataclass(frozen=True, eq=False)
+class Prior:
+    """What is known of the emulator's error in one condition before fresh runs.
+
+    Attributes
+    ----------
+    factors : int
+        Number of the factors; the other parameters are sizes.
+    coefficients : (observables, terms, terms) array
+        Covariances of the errors of the coefficients.
+    amplitude : (observables,) array
+        Variances of the smooth function.
+    length : (parameters,) array
+        Over which it changes, in coded units.
+    """
+
+    factors: int
+    coefficients: np.ndarray
+    amplitude: np.ndarray
+    length: np.ndarray
+
+    def covariance(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        """Covariance of errors at coded (m, parameters) and (n, parameters), (observables, m, n)."""
+        terms = all_terms(a, self.factors), all_terms(b, self.factors)
+        smooth = squared_exponential(a / self.length, b / self.length)
+        return np.asarray(terms[0] @ self.coefficients @ terms[1].T + self.amplitude[:, None, None] * smooth)
+
+
+@dataclass(frozen=True, eq=False)
+class Correction:
+    """The emulator's error in one condition, given fresh runs around an optimum.
+
+    Attributes
+    ----------
+    prior : Prior
+    points : (n, parameters) array
+        Of the runs, coded.
+    coefficients : (terms, observables) array
+        What is added to the emulator's.
+    weights : (n, observables) array
+        Of the smooth function.
+    inverse : (observables, n, n) array
+        Inverse covariances of the runs.
+    correlation : (observables, observables) array
+        Of errors.
+    noise_ratio : (observables,) array
+        Standard deviations of one run around the optimum over those of the emulator.
+    """
+
+    prior: Prior
+    points: np.ndarray
+    coefficients: np.ndarray
+    weights: np.ndarray
+    inverse: np.ndarray
+    correlation: np.ndarray
+    noise_ratio: np.ndarray
+
+    def mean(self, x: np.ndarray) -> np.ndarray:
+        """What is added to the emulator, (n, observables)."""
+        smooth = squared_exponential(x / self.prior.length, self.points / self.prior.length)
+        return np.asarray(all_terms(x, self.prior.factors) @ self.coefficients + smooth @ self.weights)
+
+    def error(self, x: np.ndarray) -> np.ndarray:
+        """Covariance of the corrected prediction's error at one row of coded parameters."""
+        known = self.prior.covariance(x[None], self.points)
+        left = self.prior.covariance(x[None], x[None]) - known @ self.inverse @ np.swapaxes(known, 1, 2)
+        sd = np.sqrt(np.maximum(left[:, 0, 0], 0.0))
+        return np.asarray(sd[:, None] * self.correlation * sd)
+
+
+def condition_on(
+    prior: Prior,
+    points: np.ndarray,
+    missed: np.ndarray,
+    noise: np.ndarray,
+    correlation: np.ndarray,
+    noise_ratio: np.ndarray,
+) -> Correction:
+    """Learn from what the emulator missed.
+
+    Parameters
+    ----------
+    prior : Prior
+    points : (n, parameters) array
+        Coded.
+    missed : (n, observables) array
+        Simulated less emulated means.
+    noise : (n, observables) array
+        Variances of the means' noise.
+    correlation : (observables, observables) array
+    noise_ratio : (observables,) array
+    """
+    covariance = prior.covariance(points, points) + noise.T[:, :, None] * np.eye(len(points))
+    inverse = np.linalg.inv(covariance)
+    weights = np.einsum("jmn,nj->mj", inverse, missed)
+    terms = all_terms(points, prior.factors)
+    coefficients = np.einsum("jst,mt,mj->sj", prior.coefficients, terms, weights)
+    smooth = prior.amplitude * weights
+    return Correction(prior, points, coefficients, smooth, inverse, correlation, noise_ratio)
+
+
+def log_likelihood(prior: Prior, points: np.ndarray, missed: np.ndarray, noise: np.ndarray) -> float:
+    """Of what the emulator missed, all observables together, but for a constant; see `condition_on`."""
+    covariance = prior.covariance(points, points) + noise.T[:, :, None] * np.eye(len(points))
+    triangle = np.linalg.cholesky(covariance)
+    white = np.linalg.solve(triangle, missed.T[:, :, None])
+    return -float(np.sum(np.log(np.einsum("jnn->jn", triangle))) + 0.5 * np.sum(white**2))
