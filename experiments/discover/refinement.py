@@ -1,8 +1,8 @@
 """Fresh runs around an optimum, and the model that they correct.
 
 An emulator of the whole range is never quite right at the optimum, and of two mechanisms together it knows
-only the sum. What it misses there is a smooth function of the parameters, which the fresh runs show: how
-large it is, relative to the error that the emulator states, is what makes them most likely.
+only the sum. Fresh runs show what it misses there: errors of its coefficients, as large as it states them,
+and a smooth function of the parameters, as large as makes the runs most likely.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from experiments.discover.model import Model
 from experiments.discover.noise import repeat_deviations
 
 LENGTH = 0.7
-"""Length over which the emulator's error changes, in half ranges: what a quadratic leaves over."""
+"""Length over which the smooth function changes, in half ranges: what a quadratic leaves over."""
 AMPLITUDES = 0.04 * 4.0 ** np.arange(6)
-"""Variances of that error tried, in units of the noise of one run; the emulator states what comes beside."""
+"""Variances of the smooth function tried, in units of the noise of one run."""
 NOISE_WEIGHT = 20.0
 """Weight of the bank's noise beside the scatter of fresh repeats, in repeats."""
 SPREAD_RANGE = (0.12, 0.3)
@@ -121,6 +121,8 @@ class _Seen:
         Covariances of the emulator's errors.
     misfit, variance : (observables,) array
         What the emulator states of what no coefficient follows, and variance of one run.
+    factors : int
+        Number of the factors; the other parameters are sizes.
     """
 
     x: np.ndarray

@@ -65,7 +65,7 @@ def groove() -> Solver:
 
 
 def borne(solver: Solver, seconds: float) -> np.ndarray:
-    """Mean load of each weighed wall over a while [N], (walls, 3), and how long that is."""
+    """Mean load of each weighed wall over a while [N], (walls, 3)."""
     before, start = solver.impulses()[0], solver.view([0])[0].time
     run_for(solver, seconds)
     return (solver.impulses()[0] - before) / (solver.view([0])[0].time - start)
