@@ -171,8 +171,8 @@ class WorldSetup:
         Rate at which the air takes a grain's velocity, whatever its size [1/s].
     rolling_holds : bool
         Whether rolling resistance stops a spin at most, and never reverses it.
-    weighed : tuple of int
-        Numbers of the walls whose impulses are summed up in every step (`Solver.impulses`).
+    weighed : int, optional
+        Number of the wall whose impulse is summed up in every step (`Solver.impulses`).
     """
 
     grains: Grains
@@ -186,7 +186,7 @@ class WorldSetup:
     gravity: tuple[float, float, float] = (0.0, 0.0, -GRAVITY)
     air_drag: float = 0.0
     rolling_holds: bool = True
-    weighed: tuple[int, ...] = ()
+    weighed: int | None = None
 
     def __post_init__(self) -> None:
         for name in ("time_step", "skin", "speed_limit"):
@@ -205,8 +205,9 @@ class WorldSetup:
                     f"WorldSetup.walls: must name a contact from 1 to {len(self.contacts) - 1}, got {pair} "
                     f"for {wall!r}"
                 )
-        if odd := [number for number in self.weighed if not 0 <= number < len(self.walls)]:
-            raise ValueError(f"WorldSetup.weighed: must number walls, 0 to {len(self.walls) - 1}, got {odd}")
+        if self.weighed is not None and not 0 <= self.weighed < len(self.walls):
+            rule = f"must number a wall, 0 to {len(self.walls) - 1}"
+            raise ValueError(f"WorldSetup.weighed: {rule}, got {self.weighed!r}")
         spheres = max(shape.sphere_count for shape in self.shapes)
         if spheres > MAX_SPHERES_PER_GRAIN:
             raise ValueError(f"ClumpShape: at most {MAX_SPHERES_PER_GRAIN} spheres a grain, got {spheres}")
@@ -218,7 +219,7 @@ class WorldSetup:
 
     @property
     def force_rate(self) -> float:
-        """Counts that a force on a weighed wall is summed up in [1/N]: about 2**30 to the grains' weight.
+        """Counts that a force on the weighed wall is summed up in [1/N]: about 2**30 to the grains' weight.
 
         A power of two. Single forces are then good to 1e-5 of a small grain's weight among 1e4, and 64 bits
         hold the sum of all over 1e9 steps.

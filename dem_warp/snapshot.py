@@ -96,9 +96,8 @@ def _fields(solver: Solver, world: int, counts: np.ndarray) -> Iterator[_Field]:
         raise ValueError(f"{COUNT}: must be at most {capacity} for each of {grains} grains, got {counts}")
     listed = np.zeros((slots, capacity), dtype=bool)
     listed[:grains] = np.arange(capacity) < counts[:, None]
-    for name, array in (("walls", solver.model.wall), ("pushed", solver.hood.pushed)):
-        part = array.reshape((layout.world_count, -1))[world]
-        yield _Field(f"world.{name}", (part,), (layout.wall_count,), slice(None))
+    walls = solver.model.wall.reshape((layout.world_count, -1))[world]
+    yield _Field("world.walls", (walls,), (layout.wall_count,), slice(None))
     for name, arrays in _state(solver).items():
         of_lists = name.startswith("neighbours.") and arrays[0].size % (LISTS * layout.grain_total) == 0
         lists, place = (LISTS, (held, world)) if of_lists else (1, (0, world))
@@ -120,8 +119,8 @@ def _state(solver: Solver) -> dict[str, tuple[Any, ...]]:
     }
     state |= {f"neighbours.{name}": (array,) for name, array in arrays_of(solver.hood).items()}
     state |= {f"world.{name}": (getattr(solver, name),) for name in ("alive", "flags", "rebuilds")}
-    # which list holds: the snapshot's entries go into the one that holds in the batch; walls have their own
-    del state["neighbours.list"], state["neighbours.pushed"]
+    # which list holds: the snapshot's entries go into the one that holds in the batch
+    del state["neighbours.list"]
     return {name: arrays for name, arrays in state.items() if arrays[0].size}
 
 

@@ -66,8 +66,8 @@ class WorldView:
         [m], [m/s]
     masses : (n,) array
         [kg]
-    impulses : (walls, 3) array
-        What the grains have given to each weighed wall since the first step [N s]; see `Solver.impulses`.
+    impulse : float
+        What the grains have given to the weighed wall since the first step [N s]; see `Solver.impulses`.
     """
 
     step: int
@@ -77,7 +77,7 @@ class WorldView:
     positions: np.ndarray
     velocities: np.ndarray
     masses: np.ndarray
-    impulses: np.ndarray
+    impulse: float
 
 
 class Solver:
@@ -341,15 +341,15 @@ class Solver:
         return self.model.frame[place : place + 1]
 
     def impulses(self) -> np.ndarray:
-        """What the grains have given to each wall that is weighed since the first step [N s].
+        """What the grains have given to the wall that is weighed, along z, since the first step [N s].
 
         Returns
         -------
-        (worlds, walls, 3) array
-            The sum over all steps of force times time step; 0 for walls that are not weighed.
+        (worlds,) array
+            The sum over all steps of force times time step; 0 where no wall is weighed.
         """
-        counts = self.hood.pushed.numpy().reshape(self.layout.world_count, self.layout.wall_count, 3)
-        return np.asarray(counts * self._impulse_of_count[:, None, None])
+        counts = self.hood.pushed.numpy().reshape(self.layout.world_count, -1).sum(axis=1)
+        return np.asarray(counts * self._impulse_of_count)
 
     def view(self, worlds: Sequence[int]) -> list[WorldView]:
         """What scenes need of some worlds, copied from the device."""
@@ -368,7 +368,7 @@ class Solver:
                 positions[w],
                 velocities[w, :, :3],
                 velocities[w, :, 3],
-                impulses[w, : len(self.worlds[w].walls)],
+                float(impulses[w]),
             )
             for w in worlds
         ]

@@ -93,7 +93,7 @@ def _wall_rows(worlds: Sequence[WorldSetup]) -> list[dict[str, Any]]:
             "reach": wall.reach,
             "point": wall.point,
             "orientation": (0.0, 0.0, 0.0, 1.0),
-            "weighed": number in world.weighed,
+            "weighed": number == world.weighed,
         }
         for world in worlds
         for number, (wall, pair) in enumerate(world.walls)
@@ -231,7 +231,7 @@ def build_neighbours(
     hood.memory = wp.zeros(slots * remembered, dtype=precision.real, device=device)
     hood.rebuilt = wp.zeros(layout.world_count, dtype=int, device=device)
     hood.travel = wp.zeros(layout.grain_total, dtype=precision.real, device=device)
-    hood.pushed = wp.zeros(3 * layout.world_count * layout.wall_count, dtype=wp.int64, device=device)
+    hood.pushed = wp.zeros(layout.grain_total, dtype=wp.int64, device=device)
     near = device_structs(precision).Near()
     near.count = wp.zeros(layout.grain_total, dtype=int, device=device)
     near.item = wp.zeros(layout.grain_total * capacity, dtype=wp.vec2i, device=device)

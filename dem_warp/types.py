@@ -142,7 +142,7 @@ def device_structs(precision: Precision) -> SimpleNamespace:
         cell_rate: real  # cells per count of a sphere position
         speed_limit: real  # above it the world has diverged [m/s]
         kept: real  # part of a grain's velocity that the air leaves it in a step; 1 without drag
-        force_rate: real  # counts of a force on a wall that is weighed [1/N]
+        force_rate: real  # counts of a force on the weighed wall [1/N]
         origin: wp.vec3d  # where sphere positions count from [m]
         half_extent: wp.vec3d  # a grain further from the origin has left the domain [m]
         most_found: int  # partners that a sphere may have; of its own, so that no other world changes it
@@ -250,7 +250,7 @@ def device_structs(precision: Precision) -> SimpleNamespace:
         memory: wp.array(dtype=real)  # what the mechanisms remember of a contact, in SI units
         rebuilt: wp.array(dtype=int)  # step of the last rebuild, (worlds,)
         travel: wp.array(dtype=real)  # path of a grain's farthest point since the rebuild [m], (grains,)
-        pushed: wp.array(dtype=wp.int64)  # sum of forces on weighed walls, (worlds * walls * 3,) counts
+        pushed: wp.array(dtype=wp.int64)  # sum of its forces on the weighed wall, in counts, (grains,)
         near: Near
         reactions: Reactions
 

@@ -160,12 +160,13 @@ def contact_functions(build: Build) -> SimpleNamespace:
         pack.store_vec4(hood.reactions.torque, g, t - vec4(torque[0], torque[1], torque[2], real(0.0)))
 
     @wp.func
-    def weigh(model: Model, world: World, hood: Neighbours, wall: int, force: vec3):
-        """Adds the opposite of a force to what a weighed wall has borne; counts are the same in any order."""
+    def weigh(model: Model, world: World, hood: Neighbours, wall: int, g: int, force: vec3):
+        """Adds the opposite of a force to what a grain has given to the weighed wall.
+
+        Counts have the same sum in any order; a sum for each grain, as one for all would have to wait.
+        """
         if model.wall[wall].weighed != 0:
-            for i in range(3):
-                count = wp.int64(wp.rint(force[i] * world.force_rate))
-                wp.atomic_add(hood.pushed, wall * 3 + i, -count)
+            wp.atomic_add(hood.pushed, g, -wp.int64(wp.rint(force[2] * world.force_rate)))
 
     @wp.func
     def contact(
@@ -173,8 +174,8 @@ def contact_functions(build: Build) -> SimpleNamespace:
     ):
         """Force [N], torque and rolling torque [N m] of an item of `near`, none if the two do not meet.
 
-        Updates the history of the contact, what a weighed wall has borne and, on a CPU, the reactions of the
-        partner.
+        Updates the history of the contact, what the weighed wall has borne and, on a CPU, the reactions of
+        the partner.
         """
         near = load_pair(hood.near.item, item)
         entry = near[0]
@@ -229,7 +230,7 @@ def contact_functions(build: Build) -> SimpleNamespace:
             if meets:
                 pack.store_vec4(hood.history, slot, pack.stamp(displacement, step + 1))
                 if partner >= wall_base:
-                    weigh(model, world, hood, walls.wall_of(model, w, partner - wall_base), force)
+                    weigh(model, world, hood, walls.wall_of(model, w, partner - wall_base), g, force)
         if wp.static(is_speculative) and not meets:
             force = vec3()
             torque = vec3()

@@ -107,7 +107,7 @@ class LiftedCylinder(PouredScene):
     observables: ClassVar[Mapping[str, Observable]] = FILL_OBSERVABLES | LIFT_OBSERVABLES
     densest_fill = 0.58
     floor = 0.0
-    weighed = (TUBE,)
+    weighed = TUBE
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -239,7 +239,7 @@ class LiftController(PouredController[Lift]):
         """Lift the tube, and let the drive shake the plate."""
         self.course.mass = float(view.masses[kept].astype(float).sum())
         self.course.surface = [0.0, self.course.observables["fill_height"]]
-        self.course.pushed = float(view.impulses[TUBE, 2])
+        self.course.pushed = view.impulse
         self.course.drawn = [0.0, self.course.pushed]
         self.course.enter("lift", view)
         return self.scene.lift
@@ -298,12 +298,11 @@ class LiftController(PouredController[Lift]):
         seen, (before, carried) = self.course.observables, self.course.drawn
         if "wall_drag" in seen:
             return
-        pushed = float(view.impulses[TUBE, 2])
         if ends or "t75" in seen:
             end = seen.get("t75", elapsed)
-            mean = (np.interp(end, [before, elapsed], [carried, pushed]) - self.course.pushed) / end
+            mean = (np.interp(end, [before, elapsed], [carried, view.impulse]) - self.course.pushed) / end
             seen["wall_drag"] = float(mean / (self.course.mass * self.scene.gravity[2]))
-        self.course.drawn = [elapsed, pushed]
+        self.course.drawn = [elapsed, view.impulse]
 
     def _finish(self, view: WorldView, elapsed: float) -> None:
         course = self.course

@@ -52,8 +52,8 @@ class PouredScene(ABC):
     observables: ClassVar[Mapping[str, Observable]] = FILL_OBSERVABLES
     densest_fill: ClassVar[float] = 0.64
     """Solid fraction that no poured bed is expected to pass: how many grains are kept ready."""
-    weighed: ClassVar[tuple[int, ...]] = ()
-    """Numbers of the walls whose impulses are summed up."""
+    weighed: ClassVar[int | None] = None
+    """Number of the wall whose impulse is summed up."""
 
     def __post_init__(self) -> None:
         self._require_positive("rain_rate", "rain_speed", "rest_speed", "rest_time")

@@ -244,7 +244,7 @@ def end_of_lift(riding: int) -> tuple[Decision, Decision, float]:
         positions = bed.copy()
         positions[:riding, 2] += rise
         step = round(time / setup.time_step)
-        view = WorldView(step, time, alive, alive, positions, rest, setup.masses, np.zeros((2, 3)))
+        view = WorldView(step, time, alive, alive, positions, rest, setup.masses, 0.0)
         decision = controller.look(view)
         if decision.remove is not None:
             alive[decision.remove] = False

@@ -118,7 +118,7 @@ def world(
     skin: float = 2e-3,
     speed_limit: float = 20.0,
     domain: tuple[tuple[float, float, float], tuple[float, float, float]] = BOX,
-    weighed: tuple[int, ...] = (0, 1),
+    weighed: int | None = 0,
 ) -> WorldSetup:
     """A world in which one contact holds for grains and walls alike, its walls made up to two."""
     both = (*walls, *[_NOWHERE] * (2 - len(walls)))
