@@ -189,7 +189,7 @@ def _power(found: Discovery) -> list[str]:
     ]
     columns = [
         Column("mechanism", "effect"),
-        Column("gamma80", "smallest size seen with 80 % probability"),
+        Column("gamma80", "smallest size named with 80 % probability"),
         Column("visible", "of its signature, a shift of all angles cannot imitate", "percent", "%"),
         Column("resolvable", "may be named"),
     ]

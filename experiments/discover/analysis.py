@@ -32,7 +32,7 @@ from experiments.discover.laboratory import Laboratory, Request
 from experiments.discover.measured import Measured
 from experiments.discover.model import Model, Stack
 from experiments.discover.next_experiment import propose
-from experiments.discover.ranking import Signatures, Visibility, alike, signatures, visibilities
+from experiments.discover.ranking import Effects, Signatures, Visibility, alike, signatures, visibilities
 from experiments.discover.records import (
     candidate_record,
     data_record,
@@ -57,6 +57,7 @@ class _Base:
     fitted: Fitted
     gap: GapTest
     seen: Signatures
+    effects: Effects
     visible: tuple[Visibility, ...]
 
 
@@ -182,7 +183,8 @@ class _Parts:
         """Look at the calibrated base."""
         seen = signatures(fitted)
         gap = self._gap(fitted, self.settings.false_alarm)
-        return _Base(fitted, gap, seen, visibilities(fitted, seen, self.settings))
+        effects = Effects.of(fitted, seen)
+        return _Base(fitted, gap, seen, effects, visibilities(effects, seen.shares, self.settings))
 
     def _gap(self, fitted: Fitted, level: float) -> GapTest:
         """Test a model on all conditions: those that it was fitted to, and those that it forecasts."""
@@ -191,7 +193,6 @@ class _Parts:
 
     def assess(self, base: _Base, contenders: Contenders) -> list[Assessment]:
         """Look at contenders by every rule, best first."""
-        resolvable = {one.name for one in base.visible if one.resolvable}
         settings, out = self.settings, []
         for names, one in contenders.items():
             gap = self._gap(one.fitted, settings.fit_level)
@@ -199,8 +200,8 @@ class _Parts:
             share = explained_share(base.gap, gap)
             same = frozenset[str]()
             if len(names) == 1:
-                same = alike(base.seen, names[0], float(one.fitted.sizes[0]), settings.tie_margin)
-            may = set(names) <= resolvable
+                same = alike(base.effects, names[0], float(one.fitted.sizes[0]), settings.tie_margin)
+            may = settings.resolvable is None or set(names) <= set(settings.resolvable)
             out.append(Assessment(one.fitted, gap, gain, share, one.simulated, may, same))
         return sorted(out, key=lambda one: one.score)
 

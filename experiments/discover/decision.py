@@ -31,8 +31,8 @@ class Assessment:
         Share of the base's excess that it removes.
     simulated : bool
         Whether fresh runs around its optimum stand behind it.
-    resolvable : bool
-        Whether all its mechanisms may be named.
+    declared : bool
+        Whether all its mechanisms may be named by what was declared.
     alike : frozenset of str
         Mechanisms that these data cannot tell from it at its size.
     """
@@ -42,7 +42,7 @@ class Assessment:
     gain: Interval | None
     explained: float
     simulated: bool
-    resolvable: bool
+    declared: bool
     alike: frozenset[str] = frozenset()
 
     @property
@@ -126,7 +126,7 @@ def is_open(behind: float, are_alike: bool, margin: float) -> bool:
 def decide(assessments: Sequence[Assessment], settings: Settings) -> Decision:
     """Choose among candidates of equally many mechanisms.
 
-    The one of the best score is named if it passes every rule, is resolvable, and no other is so close behind
+    The one of the best score is named if it passes every rule, may be named, and no other is so close behind
     that it stays open which of them it is. Single mechanisms so close are a tie if one of them passes. Of two
     such pairs neither is named: where two pairs fit, so may what the library does not have.
 
@@ -159,10 +159,10 @@ def decide(assessments: Sequence[Assessment], settings: Settings) -> Decision:
         return Decision(
             Verdict.TIE, names, f"{titles} explain the data alike, within {margin:.1f} of Q", passing[0]
         )
-    if passing and best.resolvable:
+    if passing and best.declared:
         return _named(assessments, order[0], order[1:])
     if passing:
-        failed = ["the data could not tell it from others, so it may not be named"]
+        failed = ["it was declared that such data cannot tell it from others"]
     elif _is_incomplete(best, len(close), failed, settings):
         reason = f"{_title(best)} explains {best.explained:.0%} of the excess, but {failed[0]}"
         return Decision(Verdict.INCOMPLETE, best.mechanisms, reason, order[0])
@@ -186,7 +186,7 @@ def _named(assessments: Sequence[Assessment], chosen: int, others: Sequence[int]
 def _is_incomplete(best: Assessment, close: int, failed: Sequence[str], settings: Settings) -> bool:
     """Whether a single mechanism is to be named although the data still disagree a little."""
     only_the_fit = best.gap.p < settings.fit_level and len(failed) == 1
-    alone = close == 1 and len(best.mechanisms) == 1 and best.resolvable
+    alone = close == 1 and len(best.mechanisms) == 1 and best.declared
     return only_the_fit and alone and best.explained >= settings.incomplete_share
 
 

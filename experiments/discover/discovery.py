@@ -223,16 +223,16 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Power:
-    """The smallest size of a mechanism that these data could show."""
+    """The smallest size of a mechanism that these data could show and tell from every other."""
 
     mechanism: str
     gamma80: float
-    """Size found with 80 % probability at a false-alarm rate of 2.5 %; infinite if there is none."""
+    """Size found and told apart with 80 % probability at a false-alarm rate of 2.5 %; infinite if none."""
     maximum: float
     """End of its range."""
     visible_share: float
     resolvable: bool
-    """What is not resolvable may not be named."""
+    """Whether its range has such a size, as the emulator has it; or what was declared."""
 
 
 @dataclass(frozen=True, eq=False)

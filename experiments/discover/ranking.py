@@ -17,6 +17,8 @@ SECANT = 0.5
 """Coded size at which a signature is taken: an effect a unit of size."""
 SIZES = np.linspace(0.0, 1.0, 201)[1:]
 """Coded sizes that the smallest visible one is searched on."""
+SAME = 0.98
+"""Correlation from which two signatures are one: an emulator is not right to a fifth of an effect."""
 LEAST_LENGTH = 1e-6
 """A signature that is shorter (whitened) is not seen at all."""
 
@@ -55,14 +57,11 @@ class Signatures:
         Effect of a unit of coded size.
     visible : (mechanisms, means) array
         What a refit leaves of it.
-    noise : (mechanisms,) array
-        Squared length that the bank's noise alone would give ``visible``.
     """
 
     names: tuple[str, ...]
     whole: np.ndarray
     visible: np.ndarray
-    noise: np.ndarray
 
     @property
     def directions(self) -> np.ndarray:
@@ -95,43 +94,69 @@ def signatures(fitted: Fitted) -> Signatures:
     size = (len(names), len(fitted.covariance))
     natural = np.array([signature(emulator, blocks, theta, name) for name in names]).reshape(size)
     whole = natural @ fitted.whitening.T
-    project = projector(fitted.sensitivities)
-    noise = np.array([_noise(fitted, project, theta, name) for name in names])
-    return Signatures(names, whole, whole @ project, noise)
+    return Signatures(names, whole, whole @ projector(fitted.sensitivities))
 
 
-def _noise(fitted: Fitted, project: np.ndarray, theta: np.ndarray, name: str) -> float:
-    """tr(M cov M) of the noise of a whitened signature, cov by conditions."""
-    seen = project @ fitted.whitening
-    total, start = 0.0, 0
-    for block in fitted.stack.blocks:
-        error = fitted.model.emulator.surfaces[block.condition].added_noise(theta, SECANT, name)
-        part = seen[:, start : start + len(block.columns)]
-        total += float(np.sum(part * (part @ error[np.ix_(block.columns, block.columns)])))
-        start += len(block.columns)
-    return total / SECANT**2
+@dataclass(frozen=True, eq=False)
+class Effects:
+    """What mechanisms of every size show beside a fitted model, a refit of which takes up its part.
 
-
-def _apart(seen: Signatures, index: int, rival: int) -> float:
-    """Squared visible length of a signature of coded size 1 that its rival cannot take up.
-
-    Two that are the same differ by their noise, which is subtracted.
+    Attributes
+    ----------
+    names : tuple of str
+    visible : (mechanisms, sizes, means) array
+        Whitened, at the coded `SIZES`.
+    correlations : (mechanisms, mechanisms) array
+        Between visible signatures.
     """
-    own, other = seen.visible[index], seen.visible[rival]
-    # A size that is not negative takes up nothing of an opposite signature.
-    taken = max(float(own @ other), 0.0) / max(float(other @ other), LEAST_LENGTH**2)
-    left = own - taken * other
-    return max(float(left @ left) - float(seen.noise[index]) - taken**2 * float(seen.noise[rival]), 0.0)
+
+    names: tuple[str, ...]
+    visible: np.ndarray
+    correlations: np.ndarray
+
+    @classmethod
+    def of(cls, fitted: Fitted, seen: Signatures) -> Effects:
+        """Of the mechanisms that are not in a fitted model."""
+        project = projector(fitted.sensitivities) @ fitted.whitening
+        theta = fitted.x[: len(fitted.model.emulator.space.factors)]
+        visible = [
+            secants(fitted.model.emulator, fitted.stack.blocks, theta, name, SIZES) @ project.T
+            for name in seen.names
+        ]
+        shape = (len(seen.names), len(SIZES), len(project))
+        return cls(seen.names, np.array(visible).reshape(shape), seen.correlations)
+
+    @property
+    def squares(self) -> np.ndarray:
+        """Squared lengths, (mechanisms, sizes)."""
+        return np.asarray((self.visible**2).sum(axis=2))
+
+    def apart(self, index: int) -> np.ndarray:
+        """Squared distance of a mechanism of every size from each other one, (mechanisms, sizes).
+
+        The other has the size in its range that is nearest, or none. Those whose signatures correlate by
+        `SAME` or more are one to an emulator; of the mechanism itself nothing is nearest.
+        """
+        squares = self.squares
+        out = np.repeat(squares[index][None], len(self.names), axis=0)
+        for rival in range(len(self.names)):
+            if rival != index:
+                products = self.visible[index] @ self.visible[rival].T
+                nearest = (squares[index][:, None] + squares[rival] - 2.0 * products).min(axis=1)
+                same = self.correlations[index, rival] >= SAME
+                out[rival] = 0.0 if same else np.clip(nearest, 0.0, squares[index])
+        return out
 
 
-def alike(seen: Signatures, name: str, size: float, margin: float) -> frozenset[str]:
+def alike(effects: Effects, name: str, size: float, margin: float) -> frozenset[str]:
     """Mechanisms whose Q, refitted, would be less than the margin above that of one of a coded size.
 
     What fresh runs then show between them is their own noise.
     """
-    index = seen.names.index(name)
-    others = (rival for rival in range(len(seen.names)) if rival != index)
-    return frozenset(seen.names[rival] for rival in others if size**2 * _apart(seen, index, rival) < margin)
+    index = effects.names.index(name)
+    apart = effects.apart(index)[:, np.abs(SIZES - size).argmin()]
+    others = (rival for rival in range(len(effects.names)) if rival != index)
+    return frozenset(effects.names[rival] for rival in others if apart[rival] < margin)
 
 
 @dataclass(frozen=True)
@@ -142,48 +167,42 @@ class Visibility:
     ----------
     name : str
     gamma80 : float
-        Smallest coded size that is found with the power of the settings; infinite if the largest is not.
+        Smallest coded size that is found, and told from every other, with the power of the settings; infinite
+        if the largest is not.
     share : float
         Share of its squared signature that calibration cannot take up.
-    rival : str
-        The mechanism most like it; empty if it is alone.
-    apart : float
-        Distance from the rival at the largest size, each refitted, in standard deviations.
     resolvable : bool
-        Visible within its range and, at its end, apart from every other.
+        Whether a size in its range is; or what was declared.
     """
 
     name: str
     gamma80: float
     share: float
-    rival: str
-    apart: float
     resolvable: bool
 
 
-def visibilities(base: Fitted, seen: Signatures, settings: Settings) -> tuple[Visibility, ...]:
-    """Power of the data for every mechanism, from the calibrated base.
+def visibilities(effects: Effects, shares: np.ndarray, settings: Settings) -> tuple[Visibility, ...]:
+    """Power of the data for every mechanism.
 
     A mechanism is found where its visible effect is ``least_ratio`` standard deviations and what the power
-    asks beyond. It may be told from a rival if at its largest size that is more likely than a tie: the
-    difference in Q of models d apart is d^2 +- 2 d.
+    asks beyond. It is told from a rival where that is further behind in Q than a tie: the difference in Q of
+    models d apart is d^2 +- 2 d.
+
+    Parameters
+    ----------
+    effects : Effects
+        Beside the calibrated base.
+    shares : (mechanisms,) array
+        See `Visibility`.
+    settings : Settings
     """
     quantile = float(stats.norm.ppf(settings.power))
-    project = projector(base.sensitivities) @ base.whitening
-    theta = base.x[: len(base.model.emulator.space.factors)]
-    correlations = np.maximum(seen.correlations, 0.0) - np.eye(len(seen.names))
+    least = (settings.least_ratio + quantile) ** 2
+    least_apart = (quantile + np.sqrt(quantile**2 + settings.tie_margin)) ** 2
     out = []
-    for index, name in enumerate(seen.names):
-        effects = secants(base.model.emulator, base.stack.blocks, theta, name, SIZES) @ project.T
-        squares = (effects**2).sum(axis=1)
-        found = np.flatnonzero(squares >= (settings.least_ratio + quantile) ** 2)
-        gamma80 = float(SIZES[found[0]]) if len(found) else float("inf")
-        closest = int(np.argmax(correlations[index])) if len(seen.names) > 1 else index
-        apart = float(np.sqrt(squares.max() if closest == index else _apart(seen, index, closest)))
-        rival = seen.names[closest] if closest != index else ""
-        resolvable = np.isfinite(gamma80) and (apart**2 >= settings.tie_margin or not rival)
-        if settings.resolvable is not None:
-            resolvable = name in settings.resolvable
-        share = float(seen.shares[index])
-        out.append(Visibility(name, gamma80, share, rival, apart, bool(resolvable)))
+    for index, name in enumerate(effects.names):
+        shown = (effects.squares[index] >= least) & (effects.apart(index).min(axis=0) >= least_apart)
+        gamma80 = float(SIZES[shown.argmax()]) if shown.any() else float("inf")
+        resolvable = shown.any() if settings.resolvable is None else name in settings.resolvable
+        out.append(Visibility(name, gamma80, float(shares[index]), bool(resolvable)))
     return tuple(out)

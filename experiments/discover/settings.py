@@ -45,8 +45,8 @@ class Settings:
     power : float
         Probability at which ``gamma80`` is stated.
     systematic : float
-        Standard deviation, in units of that of one run, of what cameras and time steps add to every mean: 0.06
-        in the first blind trials, over all observables but the drag on the tube, which has been mended since.
+        Standard deviation, in units of that of one run, of what cameras and time steps add to every mean. In
+        the first blind trials it was 0.06, but for the drag on the tube, which has been mended since.
     draws : int
         Draws of every bootstrap.
     shortlist_share : float
@@ -63,7 +63,7 @@ class Settings:
     direct_runs : int
         Fresh runs a model and condition at the final optimum.
     resolvable : tuple of str or None
-        Mechanisms that may be named. None: those that the data can tell from every other.
+        Mechanisms that may be named. None: any that the data tell from every other.
     """
 
     bank_points: int = 160
@@ -73,18 +73,18 @@ class Settings:
     fit_level: float = 0.05
     least_ratio: float = 3.0
     pair_ratio: float = 5.0
-    tie_margin: float = 6.0
+    tie_margin: float = 8.0
     incomplete_share: float = 0.97
     power: float = 0.8
     systematic: float = 0.1
     draws: int = 4000
     shortlist_share: float = 0.3
     shortlist: int = 3
-    refinement_points: int = 10
+    refinement_points: int = 8
     refinement_repeats: int = 2
     refinement_rounds: int = 3
     pair_candidates: int = 12
-    direct_runs: int = 16
+    direct_runs: int = 8
     resolvable: tuple[str, ...] | None = None
 
     def __post_init__(self) -> None:

@@ -158,24 +158,10 @@ class Surfaces:
             terms = added(theta[None], np.array([size]))[0]
             base = base - part.base_terms.T @ terms
             own += (terms @ part.gram_inverse @ terms) * part.variance
-        return self._scatter(theta, base, own) + np.diag(self.misfit_variance(x, mechanisms))
-
-    def added_noise(self, theta: np.ndarray, size: float, mechanism: str) -> np.ndarray:
-        """Covariance of the noise of what a mechanism adds, (observables, observables).
-
-        That of the estimate over banks: less than its error, of which what it was shrunk by is a part.
-        """
-        part = self.additions[mechanism]
-        terms = added(theta[None], np.array([size]))[0]
-        own = np.sum((terms @ part.polynomial.pseudo_inverse) ** 2) * part.variance
-        misfit = size**2 * part.polynomial.misfit_variance(np.append(theta, size))
-        return self._scatter(theta, part.base_terms.T @ terms, own) + np.diag(misfit)
-
-    def _scatter(self, theta: np.ndarray, base: np.ndarray, own: np.ndarray) -> np.ndarray:
-        """Covariance from the noise of the base at a row of its terms, and a mechanism's own variances."""
         sd = np.sqrt(own)
         shared = (base @ self.gram_inverse @ base) * self.noise.covariance(theta)
-        return np.asarray(shared + sd[:, None] * self.noise.correlation * sd)
+        scatter = shared + sd[:, None] * self.noise.correlation * sd
+        return np.asarray(scatter + np.diag(self.misfit_variance(x, mechanisms)))
 
     def coefficient_errors(self, theta: np.ndarray, mechanisms: tuple[str, ...]) -> np.ndarray:
         """Covariances of errors of all coefficients, of noise as at some factors (observables, terms, terms).

@@ -76,7 +76,8 @@ class Effect:
     null, maximum : float
         Its range.
     gamma80 : float
-        Distance from the null that is found with 80 % probability; infinite where the range has none.
+        Distance from the null that is found and told from every other with 80 % probability; infinite where
+        the range has none.
     told_apart : bool
         Whether the data tell it, at the end of its range, from every other.
     kin : tuple of str

@@ -146,7 +146,7 @@ def power_table(found: Discovery, terms: Terms) -> Table:
                 "maximum": terms.value(power.mechanism, power.maximum),
                 "share": 100.0 * power.gamma80 / power.maximum,
                 "visible": 100.0 * power.visible_share,
-                "resolvable": "yes" if power.resolvable else "no: may not be named",
+                "resolvable": "yes" if power.resolvable else "no",
             }
             for power in found.power
         ]
@@ -154,14 +154,15 @@ def power_table(found: Discovery, terms: Terms) -> Table:
     columns = [
         Column("mechanism", "mechanism"),
         Column("what", "what it does"),
-        Column("gamma80", "smallest size seen"),
+        Column("gamma80", "smallest size named"),
         Column("maximum", "end of its range"),
         Column("share", "of the range", "percent", "%"),
         Column("visible", "left after calibration", "percent", "%"),
         Column("resolvable", "resolvable"),
     ]
     note = (
-        "Smallest size seen: found in four of five data sets like this one, at a false-alarm rate of 2.5 %."
+        "Smallest size named: found and told from every other in four of five data sets like this one, at a"
+        " false-alarm rate of 2.5 %, as the emulator has it; resolvable is what has such a size in its range."
         " Left after calibration: the share of its signature that other values of the factors cannot imitate."
     )
     return make_table("power", frame, columns, "The smallest size of each mechanism that shows.", note)

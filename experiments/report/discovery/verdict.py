@@ -168,8 +168,8 @@ def _smaller_effects(found: Discovery, terms: Terms, settings: Settings) -> Iter
     hidden = [power for power in found.power if not power.resolvable]
     if visible:
         yield (
-            "Effects below the smallest sizes listed above would have gone unseen, and one in five of just"
-            " these sizes."
+            "Effects below the smallest sizes listed above could have gone unseen or unnamed, and one in"
+            " five of just these sizes would have."
         )
     if hidden:
         act = "it acts" if len(hidden) == 1 else "they act"
