@@ -14,15 +14,17 @@ from experiments.discover.space import SearchSpace
 from experiments.discover.surfaces import (
     AddedRuns,
     Addition,
+    BaseRuns,
     Surfaces,
-    added,
     fit_additions,
-    fit_base,
+    fit_bases,
     repeats_noise,
 )
 from experiments.discover.threads import in_one_thread
 from experiments.errors import InputError
 
+LEAST_RUNS = 10
+"""Of a mechanism, in every condition."""
 RESOLUTION = 1e-3
 """Least standard deviation of an observable, as a share of its range over the whole bank."""
 
@@ -118,17 +120,17 @@ def _bases(bank: Bank, columns: np.ndarray, floor: np.ndarray) -> list[Surfaces]
         except InputError as error:
             raise InputError(error.rule, error.value, f"condition {condition} of the bank") from error
     noises = shared_correlations([noise for _, _, noise in data])
-    return [fit_base(theta, values, noise) for (theta, values, _), noise in zip(data, noises, strict=True)]
+    runs = [BaseRuns.of(theta, values, noise) for (theta, values, _), noise in zip(data, noises, strict=True)]
+    return fit_bases(runs)
 
 
 def _too_few(bank: Bank) -> list[str]:
-    """Mechanisms with fewer runs than two a term in some condition."""
-    least = 2 * added(bank.theta[:1], bank.size[:1]).shape[1]
+    """Mechanisms with too few runs in some condition."""
     conditions = range(len(bank.space.conditions))
     return [
         name
         for index, name in enumerate(bank.space.names)
-        if min(len(bank.rows(condition, index)) for condition in conditions) < least
+        if min(len(bank.rows(condition, index)) for condition in conditions) < LEAST_RUNS
     ]
 
 

@@ -40,7 +40,7 @@ class Fitted:
     score : float
         q plus the logarithm of the determinant: minus twice the log-likelihood, but for a constant.
     spread : (parameters, parameters) array
-        Covariance of the parameters.
+        Covariance of the parameters, but for the error of the model's shift.
     """
 
     stack: Stack
@@ -69,7 +69,13 @@ class Fitted:
     @property
     def size_errors(self) -> np.ndarray:
         """Standard errors of the coded sizes."""
-        return np.sqrt(np.diag(self.spread))[len(self.x) - len(self.mechanisms) :]
+        return self.errors[len(self.x) - len(self.mechanisms) :]
+
+    @property
+    def errors(self) -> np.ndarray:
+        """Standard errors of the coded parameters, (parameters,)."""
+        shift = self.model.shift
+        return np.sqrt(np.diag(self.spread) + (0.0 if shift is None else np.diag(shift.spread)))
 
     @property
     def freedom(self) -> int:
@@ -211,7 +217,8 @@ def size_interval(fitted: Fitted, number: int, coverage: float = 0.9) -> tuple[f
     upper = np.repeat(fitted.model.upper[None], len(grid), axis=0)
     lower[:, column] = upper[:, column] = grid
     _, q = minimise(fitted.stack, fitted.whitening, fitted.stack.target, starts, lower, upper)
-    rise = q - q.min() - stats.chi2.ppf(coverage, 1)
+    shifted = (fitted.errors[column] ** 2) / fitted.spread[column, column]
+    rise = q - q.min() - stats.chi2.ppf(coverage, 1) * shifted
     inside = np.flatnonzero(rise <= 0.0)
     return _crossing(grid, rise, inside[0], -1), _crossing(grid, rise, inside[-1], 1)
 

@@ -14,6 +14,8 @@ from scipy.linalg import cho_factor, cho_solve
 
 LENGTH_RANGE = (0.3, 6.0)
 """Lengths that a fit may find, in coded units: shorter ones would follow the noise."""
+START_LENGTH = 0.6
+"""Where the search for lengths begins: from longer ones it may end where nothing is smooth."""
 AMPLITUDE_RANGE = (1e-3, 1e2)
 """Amplitudes that a fit may find, in units of the variance of the data."""
 
@@ -97,7 +99,7 @@ def fit_kriging(points: np.ndarray, values: np.ndarray, noise: np.ndarray) -> Kr
     from sklearn.gaussian_process.kernels import RBF, ConstantKernel
 
     scale = float(np.sqrt(np.mean(values**2)))
-    kernel = ConstantKernel(0.5, AMPLITUDE_RANGE) * RBF(np.full(points.shape[1], 1.5), LENGTH_RANGE)
+    kernel = ConstantKernel(0.5, AMPLITUDE_RANGE) * RBF(np.full(points.shape[1], START_LENGTH), LENGTH_RANGE)
     process = GaussianProcessRegressor(kernel, alpha=noise / scale**2)
     with warnings.catch_warnings():
         # An amplitude or a length at the end of its range is an answer, not a failure.

@@ -12,6 +12,9 @@ from experiments.discover.refinement import Runs
 from experiments.discover.simulator import Outcomes, Point
 from experiments.errors import InputError
 
+DIGITS = 4
+"""Decimals of the coded points of fresh runs: fits whose last bits differ by the host ask for the same."""
+
 Waves = Generator[list[Point], Outcomes, list[Runs]]
 
 
@@ -68,7 +71,7 @@ class Laboratory:
         cases = [
             (number, row, condition)
             for number, request in enumerate(requests)
-            for row in request.x
+            for row in np.round(request.x, DIGITS)
             for _ in range(request.repeats)
             for condition in self.conditions
         ]

@@ -17,6 +17,22 @@ STEP = 0.02
 
 
 @dataclass(frozen=True, eq=False)
+class Shift:
+    """The emulator at one point is the engine at another: they differ by so much, in all conditions.
+
+    Attributes
+    ----------
+    value : (parameters,) array
+        Coded.
+    spread : (parameters, parameters) array
+        Covariance of its error.
+    """
+
+    value: np.ndarray
+    spread: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
 class Model:
     """Predictions of the base with some mechanisms.
 
@@ -26,13 +42,16 @@ class Model:
     mechanisms : tuple of str
     systematic : float
         Standard deviation, in units of that of one run, that is added to the error of every mean.
+    shift : Shift or None
+        By how much the emulator's parameters are off; None for the emulator alone.
     corrections : dict of Correction
-        By condition; empty for the emulator alone.
+        By condition, what it misses besides; empty for the emulator alone.
     """
 
     emulator: Emulator
     mechanisms: tuple[str, ...]
     systematic: float
+    shift: Shift | None = None
     corrections: Mapping[str, Correction] = field(default_factory=dict)
 
     @property
@@ -52,7 +71,8 @@ class Model:
 
     def predict(self, x: np.ndarray, condition: str) -> np.ndarray:
         """Observables at coded parameters (n, parameters), (n, observables)."""
-        values = self.emulator.surfaces[condition].predict(x, self.mechanisms)
+        shifted = x if self.shift is None else x + self.shift.value
+        values = self.emulator.surfaces[condition].predict(shifted, self.mechanisms)
         if condition in self.corrections:
             values = values + self.corrections[condition].mean(x)
         return values

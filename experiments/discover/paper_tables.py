@@ -26,7 +26,7 @@ from experiments.discover.noise import Noise
 from experiments.discover.settings import Settings
 from experiments.discover.simulator import Outcomes, Point
 from experiments.discover.space import MechanismRange, SearchSpace
-from experiments.discover.surfaces import Addition, Polynomial, Surfaces
+from experiments.discover.surfaces import Addition, Polynomial, Surfaces, added, cubic
 from experiments.studies.buckwheat import paper
 from experiments.studies.buckwheat.replay import Replay
 from experiments.studies.buckwheat.runs import DESIGNS, published_runs
@@ -100,8 +100,8 @@ def tables_emulator(base: Replay, found: Sensitivities | None) -> Emulator:
         noise = _noise(base, str(condition).partition("-")[0], 1)
         additions = {name: _addition(table.loc[condition], noise) for name, table in library.items()}
         # A mean, a shift as it is read, and no curvature.
-        terms, gram_inverse = np.array([heap["mean"], READING, 0.0]), np.diag([1.0 / heap["count"], 0.0, 0.0])
-        surfaces[str(condition)] = Surfaces(_exact(terms), gram_inverse, noise, additions)
+        fitted, spread = np.array([heap["mean"], READING]), np.diag([1.0 / heap["count"], 0.0])
+        surfaces[str(condition)] = _surfaces(fitted, spread, noise, additions)
     space = SearchSpace(
         ("reading",),
         (-READING,),
@@ -128,7 +128,7 @@ def physical_emulator(base: Replay, found: Sensitivities | None) -> Emulator:
     fit = base.surface.fit
     spread = fit.normalized_cov_params.loc[terms, terms].to_numpy()
     additions = {name: _addition(_averaged(table), noise) for name, table in library.items()}
-    surfaces = Surfaces(_exact(fit.params[terms].to_numpy()), spread, noise, additions)
+    surfaces = _surfaces(fit.params[terms].to_numpy(), spread, noise, additions)
     factors = paper.composite_factors()
     space = SearchSpace(
         tuple(factor.name for factor in factors),
@@ -223,20 +223,36 @@ def _averaged(signature: pd.DataFrame) -> pd.Series:
     return mean.replace({"share": mean["share"] / len(kept)})
 
 
+def _surfaces(
+    fitted: np.ndarray, spread: np.ndarray, noise: Noise, additions: dict[str, Addition]
+) -> Surfaces:
+    """The emulator of a condition of which the first terms were fitted, and there are no others."""
+    terms = _base_terms(noise)
+    coefficients, gram_inverse = np.zeros(terms), np.zeros((terms, terms))
+    coefficients[: len(fitted)] = fitted
+    gram_inverse[: len(fitted), : len(fitted)] = spread
+    return Surfaces(_exact(coefficients), gram_inverse, noise, additions)
+
+
 def _addition(signature: pd.Series, noise: Noise) -> Addition:
     """A mechanism that is linear in its size."""
-    factors = len(noise.coefficients) - 1
-    variance = noise.variance(np.zeros(factors))
-    coefficients, gram_inverse = np.zeros(2 + factors), np.zeros((2 + factors, 2 + factors))
+    middle = np.zeros((1, len(noise.coefficients) - 1))
+    variance, terms = noise.variance(middle[0]), added(middle, np.zeros(1)).shape[1]
+    coefficients, gram_inverse = np.zeros(terms), np.zeros((terms, terms))
     coefficients[0] = signature["shift"]
     gram_inverse[0, 0] = signature["spread"] / variance[0] if signature["lost"] else signature["share"]
-    base_terms = np.zeros((2 + factors, (1 + factors) * (2 + factors) // 2))
-    return Addition(_exact(coefficients), base_terms, gram_inverse, np.zeros(1), variance)
+    return Addition(
+        _exact(coefficients), np.zeros((terms, _base_terms(noise))), gram_inverse, np.zeros(1), variance
+    )
+
+
+def _base_terms(noise: Noise) -> int:
+    return int(cubic(np.zeros((1, len(noise.coefficients) - 1))).shape[1])
 
 
 def _exact(coefficients: np.ndarray) -> Polynomial:
     """A polynomial that nothing was fitted to, so that it misses nothing."""
-    return Polynomial(coefficients[:, None], np.zeros((len(coefficients), 0)), np.zeros(1), {})
+    return Polynomial(coefficients[:, None], np.zeros(1), {})
 
 
 def _ranges(library: Iterable[str]) -> tuple[MechanismRange, ...]:

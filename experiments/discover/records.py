@@ -41,7 +41,7 @@ def fit_record(fitted: Fitted, gap: GapTest, evidence: Evidence) -> Fit:
     factors = len(space.factors)
     theta = space.natural_theta(fitted.x[:factors])
     half_range = (np.array(space.upper) - np.array(space.lower)) / 2.0
-    errors = np.sqrt(np.diag(fitted.spread))[:factors] * half_range
+    errors = fitted.errors[:factors] * half_range
     at_bounds = (fitted.x < fitted.model.lower + AT_BOUND) | (fitted.x > fitted.model.upper - AT_BOUND)
     names = (*space.factors, *fitted.mechanisms)
     predicted, predicted_se = _predictions(fitted)
@@ -120,7 +120,7 @@ def drift_records(base: Fitted) -> tuple[Drift, ...]:
     half_range = (np.array(space.upper) - np.array(space.lower)) / 2.0
     conditions = tuple(one.stack.blocks[0].condition for one in fits)
     values = np.array([space.natural_theta(one.x) for one in fits])
-    errors = np.array([np.sqrt(np.diag(one.spread)) * half_range for one in fits])
+    errors = np.array([one.errors * half_range for one in fits])
     return tuple(
         Drift(
             factor,

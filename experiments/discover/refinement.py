@@ -1,8 +1,8 @@
 """Fresh runs around an optimum, and the model that they correct.
 
 An emulator of the whole range is never quite right at the optimum, and of two mechanisms together it knows
-only the sum. Fresh runs show what it misses there: errors of its coefficients, as large as it states them,
-and a smooth function of the parameters, as large as makes the runs most likely.
+only the sum. Fresh runs show what it misses there: a shift of its parameters, errors of its coefficients, as
+large as it states them, and a smooth function of the parameters, as large as makes the runs most likely.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from scipy import stats
 
 from experiments.discover.bank import sobol
 from experiments.discover.correction import Prior, condition_on, log_likelihood
-from experiments.discover.fitting import Fitted
-from experiments.discover.model import Model
+from experiments.discover.fitting import Fitted, whiten
+from experiments.discover.model import STEP, Model, Shift
 from experiments.discover.noise import repeat_deviations
 
 LENGTH = 0.7
@@ -27,6 +27,10 @@ NOISE_WEIGHT = 20.0
 """Weight of the bank's noise beside the scatter of fresh repeats, in repeats."""
 SPREAD_RANGE = (0.12, 0.3)
 """Least and largest standard deviation of the fresh points, in coded units."""
+SHIFT_SD = 0.15
+"""Prior standard deviation of a shift of parameters, in their ranges."""
+SHIFT_STEPS = 4
+"""Steps of Gauss and Newton that find it."""
 MOVED = 1.5
 """An optimum that has moved by more of those standard deviations is simulated again."""
 
@@ -87,10 +91,11 @@ def correct(model: Model, runs: Runs, centre: np.ndarray) -> Model:
     centre : (parameters,) array
         Optimum that they lie around.
     """
-    plain = replace(model, corrections={})
+    plain = replace(model, shift=None, corrections={})
     names = [c for c in model.emulator.surfaces if np.sum(runs.conditions == c) >= 2]
     ratio = _noise_ratio(plain, runs, names)
-    seen = {name: _seen(plain, runs, centre, ratio, name) for name in names}
+    shifted = replace(plain, shift=likeliest_shift(plain, runs, centre, ratio))
+    seen = {name: _seen(shifted, runs, centre, ratio, name) for name in names}
     amplitude = max(AMPLITUDES, key=lambda tried: sum(one.log_likelihood(tried) for one in seen.values()))
     surfaces = model.emulator.surfaces
     corrections = {
@@ -104,7 +109,46 @@ def correct(model: Model, runs: Runs, centre: np.ndarray) -> Model:
         )
         for name, one in seen.items()
     }
-    return replace(model, corrections=corrections)
+    return replace(shifted, corrections=corrections)
+
+
+def likeliest_shift(model: Model, runs: Runs, centre: np.ndarray, ratio: np.ndarray) -> Shift:
+    """Find by how much the emulator's parameters are off, by least squares over fresh runs of all conditions.
+
+    What its terms lack of one response they lack of all, as if a parameter were another. Seen in all
+    observables together that is far beyond the noise where it is nothing in any of them.
+
+    Parameters
+    ----------
+    model : Model
+        Not corrected.
+    runs : Runs
+    centre : (parameters,) array
+        Where the noise is taken.
+    ratio : (observables,) array
+        Variance of one run over the emulator's.
+    """
+    prior = (SHIFT_SD * (model.upper - model.lower)) ** -2.0
+    value = np.zeros(len(prior))
+    for _ in range(SHIFT_STEPS):
+        normal, descent = np.diag(prior), -prior * value
+        for name in np.unique(runs.conditions):
+            here = runs.conditions == name
+            x, sd = runs.x[here] + value, np.sqrt(ratio)
+            noise = model.emulator.surfaces[name].noise_covariance(centre, model.mechanisms)
+            whitening = whiten(sd[:, None] * noise * sd)
+            missed = (runs.values[here] - model.predict(x, name)) @ whitening.T
+            slopes = np.array([_slope(model, x, step, name) @ whitening.T for step in np.eye(len(value))])
+            normal = normal + np.einsum("pij,qij->pq", slopes, slopes)
+            descent = descent + np.einsum("pij,ij->p", slopes, missed)
+        value = value + np.linalg.solve(normal, descent)
+    return Shift(value, np.linalg.inv(normal))
+
+
+def _slope(model: Model, x: np.ndarray, direction: np.ndarray, condition: str) -> np.ndarray:
+    """Derivatives in a direction at coded parameters (n, parameters), (n, observables)."""
+    ahead, behind = (model.predict(x + side * STEP * direction, condition) for side in (1.0, -1.0))
+    return np.asarray((ahead - behind) / (2.0 * STEP))
 
 
 @dataclass(frozen=True, eq=False)

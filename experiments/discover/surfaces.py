@@ -1,8 +1,9 @@
 """Response surfaces of one condition: the base model's over the factors, and what each mechanism adds.
 
-The base is a full quadratic of the factors. A mechanism of coded size g adds g (a + b g + c . theta),
-nothing at g = 0. Both are least squares fits; where leave-one-out shows that the polynomial fails, the rest
-is kriged.
+The base is a full cubic of the factors. A mechanism of coded size g adds g times a full quadratic of g
+and the factors, nothing at g = 0. What a few terms lack all observables lack alike, as if a parameter were
+another; so there are many, and those that all runs together show little of are shrunk. Where leave-one-out
+shows that a polynomial fails, the rest is kriged.
 """
 
 from __future__ import annotations
@@ -25,6 +26,10 @@ MISFIT_LEVEL = 0.05
 BETTER = 0.97
 """Kriging is kept where it lowers the mean square of what is left out to less than this."""
 EM_STEPS = 100
+FIRST_SCALE = 3.0
+"""Standard deviation of a coefficient, in that of one run, before the runs have said how large they are."""
+SCALE_ROUNDS = 2
+"""Times that scales and noise are found, each from the other."""
 LEAST_SCALE = 1e-3
 """Least standard deviation of a coefficient, in that of one run: smaller ones are nothing."""
 LEAST_SIZE = 0.05
@@ -38,15 +43,21 @@ def quadratic(theta: np.ndarray) -> np.ndarray:
     return np.column_stack([np.ones(len(theta)), theta, *products])
 
 
+def cubic(theta: np.ndarray) -> np.ndarray:
+    """Terms of a full cubic: those of the quadratic, then products of three factors, (n, terms)."""
+    triples = combinations_with_replacement(range(theta.shape[1]), 3)
+    return np.column_stack([quadratic(theta), *(theta[:, list(triple)].prod(axis=1) for triple in triples)])
+
+
 def added(theta: np.ndarray, size: np.ndarray) -> np.ndarray:
-    """Terms of what a mechanism adds: g, g^2 and g times each factor, (n, terms)."""
-    return np.column_stack([size, size**2, size[:, None] * theta])
+    """Terms of what a mechanism adds: its size times a full quadratic of size and factors, (n, terms)."""
+    return np.asarray(size[:, None] * quadratic(np.column_stack([size, theta])))
 
 
 def all_terms(x: np.ndarray, factors: int) -> np.ndarray:
     """Terms of the base, then of every mechanism, at coded parameters (n, parameters), (n, terms)."""
     theta = x[:, :factors]
-    return np.concatenate([quadratic(theta), *(added(theta, size) for size in x[:, factors:].T)], axis=1)
+    return np.concatenate([cubic(theta), *(added(theta, size) for size in x[:, factors:].T)], axis=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +67,6 @@ class Polynomial:
     Attributes
     ----------
     coefficients : (terms, observables) array
-    pseudo_inverse : (terms, runs) array
     misfit : (observables,) array
         Variance of what neither the noise nor the kriging accounts for.
     kriging : dict of Kriging
@@ -64,7 +74,6 @@ class Polynomial:
     """
 
     coefficients: np.ndarray
-    pseudo_inverse: np.ndarray
     misfit: np.ndarray
     kriging: Mapping[int, Kriging]
 
@@ -132,7 +141,7 @@ class Surfaces:
         Mechanisms add up.
         """
         theta = x[:, : x.shape[1] - len(mechanisms)]
-        values = quadratic(theta) @ self.base.coefficients + self.base.missed(theta)
+        values = cubic(theta) @ self.base.coefficients + self.base.missed(theta)
         for name, size in zip(mechanisms, x[:, theta.shape[1] :].T, strict=True):
             part = self.additions[name].polynomial
             values = values + added(theta, size) @ part.coefficients
@@ -152,7 +161,7 @@ class Surfaces:
     def error(self, x: np.ndarray, mechanisms: tuple[str, ...]) -> np.ndarray:
         """Covariance of the prediction's error at one row of coded parameters, (observables, observables)."""
         theta = x[: len(x) - len(mechanisms)]
-        base, own = quadratic(theta[None])[0], np.zeros(len(self.base.misfit))
+        base, own = cubic(theta[None])[0], np.zeros(len(self.base.misfit))
         for name, size in zip(mechanisms, x[len(theta) :], strict=True):
             part = self.additions[name]
             terms = added(theta[None], np.array([size]))[0]
@@ -211,25 +220,81 @@ def repeats_noise(theta: np.ndarray, values: np.ndarray, floor: np.ndarray) -> N
     return fit_noise(theta[rows], deviations, floor)
 
 
-def fit_base(theta: np.ndarray, values: np.ndarray, noise: Noise) -> Surfaces:
-    """Fit the emulator of one condition without mechanisms.
+@dataclass(frozen=True, eq=False)
+class BaseRuns:
+    """Runs without a mechanism in one condition, repeats taken together.
 
-    Parameters
+    Attributes
     ----------
-    theta, values : (n, factors), (n, observables) array
-        Runs without a mechanism; repeats have equal factors.
+    theta : (n, factors) array
+        Each once.
+    repeats : (n,) array
+    means : (n, observables) array
     noise : Noise
-        Of one of them.
+        Of one run.
     """
-    points, groups, repeats = np.unique(theta, axis=0, return_inverse=True, return_counts=True)
-    sums = np.zeros((len(points), values.shape[1]))
-    np.add.at(sums, groups.reshape(-1), values)
-    variance = noise.variance(points) / repeats[:, None]
-    means = sums / repeats[:, None]
-    base = _fit_polynomial(quadratic(points), points, means, variance, noise.degrees_of_freedom)
-    # Every point weighs the same, whatever its repeats; the mean of r runs has 1 / r of the variance.
-    gram_inverse = (base.pseudo_inverse / repeats) @ base.pseudo_inverse.T
-    return Surfaces(base, gram_inverse, noise, {})
+
+    theta: np.ndarray
+    repeats: np.ndarray
+    means: np.ndarray
+    noise: Noise
+
+    @classmethod
+    def of(cls, theta: np.ndarray, values: np.ndarray, noise: Noise) -> BaseRuns:
+        """Take the repeats among runs (n, factors), (n, observables) together."""
+        points, groups, repeats = np.unique(theta, axis=0, return_inverse=True, return_counts=True)
+        sums = np.zeros((len(points), values.shape[1]))
+        np.add.at(sums, groups.reshape(-1), values)
+        return cls(points, repeats, sums / repeats[:, None], noise)
+
+    @property
+    def terms(self) -> np.ndarray:
+        """Terms of the base, each row as many times as its runs say it: by the root of their number."""
+        return np.asarray(np.sqrt(self.repeats)[:, None] * cubic(self.theta))
+
+    @property
+    def response(self) -> np.ndarray:
+        """The means likewise, with the noise of one run, (n, observables)."""
+        return np.asarray(np.sqrt(self.repeats)[:, None] * self.means)
+
+
+def fit_bases(conditions: Sequence[BaseRuns]) -> list[Surfaces]:
+    """Fit the emulators of all conditions without mechanisms.
+
+    The terms of third order are drawn towards nothing as those of the mechanisms are (`fit_additions`).
+    """
+    free = quadratic(conditions[0].theta).shape[1]
+    grams, moments = [], []
+    for runs in conditions:
+        linear, higher = runs.terms[:, :free], runs.terms[:, free:]
+        left = higher - linear @ (np.linalg.pinv(linear) @ higher)
+        grams.append(left.T @ left)
+        moments.append(left.T @ runs.response / np.sqrt(runs.noise.variance(runs.theta).mean(axis=0)))
+    scales = np.append(np.full(free, np.inf), likeliest_scales(grams, moments))
+    return [_fit_base(runs, scales) for runs in conditions]
+
+
+def _fit_base(runs: BaseRuns, scales: np.ndarray) -> Surfaces:
+    """Least squares and leave-one-out; what is smooth in the rest is kriged where they fail."""
+    terms, noise = runs.terms, runs.noise.variance(runs.theta)
+    gram_inverse = np.linalg.inv(terms.T @ terms + np.diag(1.0 / scales**2))
+    inverse = gram_inverse @ terms.T
+    coefficients = inverse @ runs.response
+    residual = runs.response - terms @ coefficients
+    leverage = np.einsum("ij,ji->i", terms, inverse)[:, None]
+    excess = residual**2 / (1.0 - leverage)
+    freedom, degrees = len(terms) - leverage.sum(), runs.noise.degrees_of_freedom
+    ratio = excess.mean(axis=0) / noise.mean(axis=0)
+    root = np.sqrt(runs.repeats)[:, None]
+    beyond = ratio > stats.f.isf(MISFIT_LEVEL, freedom, degrees)
+    misfit = np.where(beyond, ((excess - noise) / root**2).mean(axis=0), 0.0)
+    kriging = {}
+    for column in np.flatnonzero(ratio > stats.f.isf(FAILURE_LEVEL, freedom, degrees)):
+        missed, scatter = residual / root, noise / root**2
+        fitted = fit_kriging(runs.theta, missed[:, column], scatter[:, column])
+        if np.mean(fitted.leave_one_out**2) < BETTER * np.mean(missed[:, column] ** 2):
+            kriging[int(column)] = fitted
+    return Surfaces(Polynomial(coefficients, np.maximum(misfit, 0.0), kriging), gram_inverse, runs.noise, {})
 
 
 @dataclass(frozen=True, eq=False)
@@ -273,103 +338,107 @@ def fit_additions(conditions: Sequence[AddedRuns]) -> list[Addition]:
     How large its coefficients are, in standard deviations of one run, all conditions and observables say
     together (`likeliest_scales`); each is as much nearer to nothing as its noise makes it.
     """
-    grams, estimates = [], []
-    for runs in conditions:
-        inverse = np.linalg.pinv(runs.terms)
+    grams = [runs.terms.T @ runs.terms for runs in conditions]
+    scales = np.full(len(grams[0]), FIRST_SCALE)
+    for _ in range(SCALE_ROUNDS):
+        variances = [_mean_variance(runs, _Shrunk.of(runs, scales).growth) for runs in conditions]
+        moments = [
+            runs.terms.T @ runs.difference / np.sqrt(variance)
+            for runs, variance in zip(conditions, variances, strict=True)
+        ]
+        scales = likeliest_scales(grams, moments)
+    return [_fit_addition(runs, _Shrunk.of(runs, scales)) for runs in conditions]
+
+
+@dataclass(frozen=True, eq=False)
+class _Shrunk:
+    """A fit with coefficients drawn towards nothing.
+
+    Attributes
+    ----------
+    gram_inverse : (terms, terms) array
+        Covariance of the coefficients, in variances of one run.
+    inverse : (terms, runs) array
+    coefficients : (terms, observables) array
+    residual : (n, observables) array
+    leverage : (n, 1) array
+    growth : (observables,) array
+    """
+
+    gram_inverse: np.ndarray
+    inverse: np.ndarray
+    coefficients: np.ndarray
+    residual: np.ndarray
+    leverage: np.ndarray
+    growth: np.ndarray
+
+    @classmethod
+    def of(cls, runs: AddedRuns, scales: np.ndarray) -> _Shrunk:
+        """Fit with known standard deviations of the coefficients, in those of one run."""
+        gram_inverse = np.linalg.inv(runs.terms.T @ runs.terms + np.diag(1.0 / scales**2))
+        inverse = gram_inverse @ runs.terms.T
         coefficients = inverse @ runs.difference
-        growth = _growth(runs, runs.difference - runs.terms @ coefficients, runs.terms @ inverse)
-        grams.append(runs.terms.T @ runs.terms)
-        estimates.append(coefficients / np.sqrt(_mean_variance(runs, growth)))
-    scales = likeliest_scales(grams, estimates)
-    return [_fit_addition(runs, scales) for runs in conditions]
-
-
-def _growth(runs: AddedRuns, residual: np.ndarray, hat: np.ndarray) -> np.ndarray:
-    """A heap with a mechanism scatters more: an excess of the residuals is noise unless it is smooth."""
-    return fit_growth(runs.size, residual**2 / (1.0 - np.diag(hat))[:, None] / runs.noise)
+        residual = runs.difference - runs.terms @ coefficients
+        leverage = np.einsum("ij,ji->i", runs.terms, inverse)[:, None]
+        # A heap with a mechanism scatters more: an excess of the residuals is noise unless it is smooth.
+        growth = fit_growth(runs.size, residual**2 / (1.0 - leverage) / runs.noise)
+        return cls(gram_inverse, inverse, coefficients, residual, leverage, growth)
 
 
 def _mean_variance(runs: AddedRuns, growth: np.ndarray) -> np.ndarray:
     return np.asarray((runs.noise * np.exp(runs.size[:, None] * growth)).mean(axis=0))
 
 
-def _fit_addition(runs: AddedRuns, scales: np.ndarray) -> Addition:
-    theta, size, terms, noise = runs.theta, runs.size, runs.terms, runs.noise
+def _fit_addition(runs: AddedRuns, fitted: _Shrunk) -> Addition:
+    theta, size, noise, growth = runs.theta, runs.size, runs.noise, fitted.growth
     points = np.column_stack([theta, size])
-    gram_inverse = np.linalg.inv(terms.T @ terms + np.diag(1.0 / scales**2))
-    inverse = gram_inverse @ terms.T
-    coefficients = inverse @ runs.difference
-    residual, hat = runs.difference - terms @ coefficients, terms @ inverse
-    growth = _growth(runs, residual, hat)
-    leverage = np.diag(hat)[:, None]
-    left_out = residual / (1.0 - leverage)
-    freedom, kept = len(size) - terms.shape[1], size >= LEAST_SIZE
-    suspect = (left_out**2 * (1.0 - leverage) / noise).mean(axis=0) > stats.f.isf(
+    left_out = fitted.residual / (1.0 - fitted.leverage)
+    freedom, kept = len(size) - fitted.leverage.sum(), size >= LEAST_SIZE
+    suspect = (left_out**2 * (1.0 - fitted.leverage) / noise).mean(axis=0) > stats.f.isf(
         FAILURE_LEVEL, freedom, runs.base.noise.degrees_of_freedom
     )
     kriging = {}
     for column in np.flatnonzero(suspect):
         scatter = noise[:, column] * np.exp(size * growth[column])
-        missed = residual[kept, column] / size[kept]
-        fitted = fit_kriging(points[kept], missed, scatter[kept] / size[kept] ** 2)
-        alone = fitted.leave_one_out * size[kept]
-        if np.mean(alone**2 / scatter[kept]) < BETTER * np.mean(left_out[kept, column] ** 2 / scatter[kept]):
-            kriging[int(column)] = fitted
+        missed = fitted.residual[kept, column] / size[kept]
+        smooth = fit_kriging(points[kept], missed, scatter[kept] / size[kept] ** 2)
+        alone = smooth.leave_one_out * size[kept]
+        plain = fitted.residual[kept, column]
+        if np.mean(alone**2 / scatter[kept]) < BETTER * np.mean(plain**2 / scatter[kept]):
+            kriging[int(column)] = smooth
             growth[column] = fit_growth(size[kept], (alone**2 / noise[kept, column])[:, None])[0]
     return Addition(
-        Polynomial(coefficients, inverse, np.zeros(len(growth)), kriging),
-        inverse @ quadratic(theta),
-        gram_inverse,
+        Polynomial(fitted.coefficients, np.zeros(len(growth)), kriging),
+        fitted.inverse @ cubic(theta),
+        fitted.gram_inverse,
         growth,
         _mean_variance(runs, growth),
     )
 
 
-def likeliest_scales(grams: Sequence[np.ndarray], estimates: Sequence[np.ndarray]) -> np.ndarray:
-    """Standard deviations of coefficients of largest likelihood, given their estimates.
+def likeliest_scales(grams: Sequence[np.ndarray], moments: Sequence[np.ndarray]) -> np.ndarray:
+    """Standard deviations of coefficients of largest likelihood, given data y.
 
-    Estimates b scatter about coefficients with the covariance of the inverse of X'X, coefficients about
+    Data scatter about X times the coefficients with variance one, coefficients about
     nothing with the squares of the scales (Efron and Morris 1973), which expectation and maximisation find.
 
     Parameters
     ----------
     grams : sequence of (terms, terms) array
         X'X of each condition.
-    estimates : sequence of (terms, observables) array
-        In standard deviations of one run.
+    moments : sequence of (terms, observables) array
+        X'y of each.
 
     Returns
     -------
     (terms,) array
     """
-    squares = np.mean([np.mean(estimate**2, axis=1) for estimate in estimates], axis=0)
+    squares = np.ones(len(grams[0]))
     for _ in range(EM_STEPS):
         total = np.zeros_like(squares)
-        for gram, estimate in zip(grams, estimates, strict=True):
+        for gram, moment in zip(grams, moments, strict=True):
             covariance = np.linalg.inv(gram + np.diag(1.0 / squares))
-            mean = covariance @ gram @ estimate
+            mean = covariance @ moment
             total += np.mean(mean**2, axis=1) + np.diag(covariance)
         squares = np.maximum(total / len(grams), LEAST_SCALE**2)
     return np.sqrt(squares)
-
-
-def _fit_polynomial(
-    terms: np.ndarray, points: np.ndarray, values: np.ndarray, noise: np.ndarray, noise_df: int
-) -> Polynomial:
-    """Least squares and leave-one-out; what is smooth in the rest is kriged where they fail."""
-    inverse = np.linalg.pinv(terms)
-    coefficients = inverse @ values
-    residual = values - terms @ coefficients
-    leverage = np.einsum("ij,ji->i", terms, inverse)[:, None]
-    excess = residual**2 / (1.0 - leverage)
-    freedom = len(terms) - terms.shape[1]
-    ratio = excess.mean(axis=0) / noise.mean(axis=0)
-    beyond = ratio > stats.f.isf(MISFIT_LEVEL, freedom, noise_df)
-    misfit = np.where(beyond, excess.mean(axis=0) - noise.mean(axis=0), 0.0)
-    kriging = {}
-    for column in np.flatnonzero(ratio > stats.f.isf(FAILURE_LEVEL, freedom, noise_df)):
-        fitted = fit_kriging(points, residual[:, column], noise[:, column])
-        left_out = residual[:, column] / (1.0 - leverage[:, 0])
-        if np.mean(fitted.leave_one_out**2) < BETTER * np.mean(left_out**2):
-            kriging[int(column)] = fitted
-    return Polynomial(coefficients, inverse, misfit, kriging)

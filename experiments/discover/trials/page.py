@@ -43,12 +43,12 @@ _INTRODUCTION = """# Blind trials of the search for a missing mechanism
 
 Heaps of the real engine with a hidden effect: drawn and simulated by a generator that runs apart from the
 analysis, with seeds, time step and camera of its own. The truths were sealed by salted hashes (`sealed.csv`)
-before anything was simulated, and revealed (`labels.json`) when the last verdict was in. What was declared
-beforehand, the settings of the analysis by their hash and the smallest effect that it should see of each
-mechanism (gamma80), stands in `declared.json`. An effect is the distance of a size from the mechanism's null,
-counted in gamma80; *strong* is above 1.5. A verdict is right that names the hidden mechanism (or both) and
-nothing else; it is wrong as soon as it names one that is not there. Intervals of shares are 95 % (Clopper and
-Pearson).
+before anything was simulated, and revealed (`labels.json`) when the verdicts below were in. What was
+declared beforehand, the settings of the analysis by their hash and the smallest effect that it should see of
+each mechanism (gamma80), stands in `declared.json`. An effect is the distance of a size from the mechanism's
+null, counted in gamma80; *strong* is above 1.5. A verdict is right that names the hidden mechanism (or both)
+and nothing else; it is wrong as soon as it names one that is not there. Intervals of shares are 95 %
+(Clopper and Pearson).
 """
 
 
@@ -79,7 +79,8 @@ def write_page(folder: Path) -> Path:
     parts += [_runs(folder / RUNS), _declared(declared)]
     for view, title in TITLES.items():
         if len(rows := table[table["view"] == view]):
-            parts.append(_view(rows, view, title, declared, folder))
+            some = f" of {len(sealed)}" if len(rows) < len(sealed) else ""
+            parts.append(_view(rows, view, f"## {title}\n\n{len(rows)}{some} trials.", declared, folder))
     page = folder / PAGE
     write_text(page, "\n".join(parts))
     return page
@@ -118,13 +119,12 @@ def _declared(declared: Declaration) -> str:
     return f"## Declared beforehand\n\n{stated}\n\n{markdown_table(table)}\n{aim}"
 
 
-def _view(rows: pd.DataFrame, view: str, title: str, declared: Declaration, folder: Path) -> str:
+def _view(rows: pd.DataFrame, view: str, heading: str, declared: Declaration, folder: Path) -> str:
     found = aims(rows, [effect.name for effect in declared.library if not effect.resolvable])
     _draw_power(power_curve(rows), folder / f"power-{view}.png")
     _draw_confusion(confusion(rows), folder / f"confusion-{view}.png")
     parts = [
-        f"## {title}\n",
-        f"{len(rows)} trials. {_UNAIMED.get(view, '')}".rstrip() + "\n",
+        f"{heading} {_UNAIMED.get(view, '')}".rstrip() + "\n",
         _figures(found) if view in _UNAIMED else _aims(found),
         f"![shares of alarms and names by effect](power-{view}.png)\n",
         f"![answers by truth](confusion-{view}.png)\n",

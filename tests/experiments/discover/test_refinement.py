@@ -1,0 +1,69 @@
+"""What fresh runs say of an emulator that is off."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy import stats
+from synthetic import CONDITIONS, emulator, measure
+
+from experiments.discover.evidence import gather
+from experiments.discover.fitting import fit, size_interval, weigh
+from experiments.discover.model import Model, Shift, Stack
+from experiments.discover.refinement import Runs, correct, likeliest_shift
+
+OFF = np.array([0.1, -0.05, 0.08, -0.06])
+"""The world is the emulator at parameters that are larger by this."""
+CENTRE = np.array([0.2, -0.1, 0.1, 0.5])
+
+
+def model() -> Model:
+    return Model(emulator().without("twin"), ("delta",), 0.0)
+
+
+def runs_of_a_world_that_is_off(seed: int) -> Runs:
+    """Two runs of sixteen points around the centre in every condition."""
+    rng = np.random.default_rng(seed)
+    x = np.repeat(CENTRE + 0.1 * rng.standard_normal((16, 4)), 2, axis=0)
+    values = []
+    for condition in CONDITIONS:
+        noise = model().emulator.surfaces[condition].noise_covariance(CENTRE, ("delta",))
+        scatter = rng.multivariate_normal(np.zeros(len(noise)), noise, len(x))
+        values.append(model().predict(x + OFF, condition) + scatter)
+    return Runs(np.tile(x, (len(CONDITIONS), 1)), np.repeat(CONDITIONS, len(x)), np.concatenate(values))
+
+
+def test_a_shift_of_the_parameters_is_found_within_its_error() -> None:
+    squares = []
+    for seed in range(20):
+        runs = runs_of_a_world_that_is_off(seed)
+        shift = likeliest_shift(model(), runs, CENTRE, np.ones(runs.values.shape[1]))
+        missed = shift.value - OFF
+        squares.append(missed @ np.linalg.solve(shift.spread, missed))
+    # 20 sums of squares of four normal numbers; the prior is far wider than the error.
+    assert stats.chi2.ppf(1e-3, 80) < np.sum(squares) < stats.chi2.isf(1e-3, 80)
+
+
+def test_a_corrected_model_predicts_the_world_that_is_off() -> None:
+    corrected = correct(model(), runs_of_a_world_that_is_off(1), CENTRE)
+    for condition in CONDITIONS:
+        sd = np.sqrt(np.diag(model().emulator.surfaces[condition].noise_covariance(CENTRE, ("delta",))))
+        truth = model().predict(CENTRE[None] + OFF, condition)
+        before, after = (
+            np.abs(one.predict(CENTRE[None], condition) - truth) / sd for one in (model(), corrected)
+        )
+        # 32 runs leave 0.18 standard deviations of each mean, and less where observables share a shift.
+        assert after.max() < 0.5
+        assert after.mean() < 0.5 * before.mean()
+
+
+def test_the_error_of_the_shift_widens_what_is_said_of_a_size() -> None:
+    evidence = gather(measure({"delta": 0.6}, 3), model().emulator)
+    plain = fit(Stack(model(), evidence.training))
+    spread = 3.0 * plain.spread
+    shifted = weigh(Stack(replace(model(), shift=Shift(np.zeros(4), spread)), evidence.training), plain.x)
+    np.testing.assert_allclose(shifted.errors, 2.0 * plain.errors, rtol=1e-9)
+    widths = [np.diff(size_interval(one, 0))[0] for one in (plain, shifted)]
+    # Twice as wide where the profile is a parabola.
+    assert 1.8 < widths[1] / widths[0] < 2.2
