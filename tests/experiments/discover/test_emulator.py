@@ -8,13 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy import stats
-from synthetic import CONDITIONS, OBSERVABLES, SETTINGS, SyntheticSimulator, bank, emulator, space
+from synthetic import CONDITIONS, OBSERVABLES, SETTINGS, SyntheticSimulator, bank, emulator, measure, space
 
 from experiments.discover.bank import Bank, bank_points, load_bank, make_bank
 from experiments.discover.emulated import EmulatedSimulator
 from experiments.discover.emulator import fit_emulator
-from experiments.discover.fitting import whiten
+from experiments.discover.evidence import gather
+from experiments.discover.fitting import fit, whiten
 from experiments.discover.kriging import fit_kriging, krige
+from experiments.discover.model import Model, Stack
 from experiments.discover.noise import ALIKE, fit_noise, repeat_deviations, shared_correlations
 from experiments.discover.simulator import Outcomes
 from experiments.discover.surfaces import likeliest_scales
@@ -132,6 +134,29 @@ def test_what_a_cubic_cannot_follow_is_kriged() -> None:
     flat = replace(surfaces, base=replace(surfaces.base, kriging={}))
     kriged, cubic = (np.abs(one.predict(grid, ())[:, 2] - truth).max() for one in (surfaces, flat))
     assert kriged < 0.4 * cubic
+
+
+def _warped(theta: np.ndarray) -> np.ndarray:
+    """What a factor acts as: less than itself inside its range, and more at the ends (coded)."""
+    return np.asarray(theta + 0.4 * (theta**3 - 0.6 * theta))
+
+
+def test_what_all_observables_bend_alike_does_not_move_the_factors() -> None:
+    simulator, known = SyntheticSimulator(space(())), space(())
+    points = bank_points(known, SETTINGS, seed=1)
+    acting = [
+        replace(point, theta=tuple(known.natural_theta(_warped(known.coded_theta(np.array(point.theta))))))
+        for point in points
+    ]
+    bent = fit_emulator(make_bank(known, OBSERVABLES, points, simulator(acting)))
+    squares = []
+    for seed in range(10):
+        theta = np.random.default_rng(seed).uniform(-0.9, 0.9, 3)
+        data = measure({}, seed, theta=tuple(known.natural_theta(_warped(theta))))
+        fitted = fit(Stack(Model(bent, (), 0.0), gather(data, bent).training))
+        squares.append(((fitted.x - theta) / fitted.errors) ** 2)
+    # 30 squares of normal numbers; without terms of third order their sum is 160.
+    assert np.sum(squares) < stats.chi2.isf(1e-3, 30)
 
 
 def test_fitted_lengths_tell_a_flat_direction_from_a_steep_one() -> None:
