@@ -221,6 +221,36 @@ def repeats_noise(theta: np.ndarray, values: np.ndarray, floor: np.ndarray) -> N
 
 
 @dataclass(frozen=True, eq=False)
+class _Shrunk:
+    """A least squares fit with coefficients drawn towards nothing.
+
+    Attributes
+    ----------
+    gram_inverse : (terms, terms) array
+        Covariance of the coefficients, in variances of one run.
+    inverse : (terms, runs) array
+    coefficients : (terms, observables) array
+    residual : (runs, observables) array
+    leverage : (runs, 1) array
+    """
+
+    gram_inverse: np.ndarray
+    inverse: np.ndarray
+    coefficients: np.ndarray
+    residual: np.ndarray
+    leverage: np.ndarray
+
+    @classmethod
+    def of(cls, terms: np.ndarray, response: np.ndarray, scales: np.ndarray) -> _Shrunk:
+        """Fit with known standard deviations of the coefficients, in those of one run; infinite: free."""
+        gram_inverse = np.linalg.inv(terms.T @ terms + np.diag(1.0 / scales**2))
+        inverse = gram_inverse @ terms.T
+        coefficients = inverse @ response
+        leverage = np.einsum("ij,ji->i", terms, inverse)[:, None]
+        return cls(gram_inverse, inverse, coefficients, response - terms @ coefficients, leverage)
+
+
+@dataclass(frozen=True, eq=False)
 class BaseRuns:
     """Runs without a mechanism in one condition, repeats taken together.
 
@@ -276,25 +306,21 @@ def fit_bases(conditions: Sequence[BaseRuns]) -> list[Surfaces]:
 
 def _fit_base(runs: BaseRuns, scales: np.ndarray) -> Surfaces:
     """Least squares and leave-one-out; what is smooth in the rest is kriged where they fail."""
-    terms, noise = runs.terms, runs.noise.variance(runs.theta)
-    gram_inverse = np.linalg.inv(terms.T @ terms + np.diag(1.0 / scales**2))
-    inverse = gram_inverse @ terms.T
-    coefficients = inverse @ runs.response
-    residual = runs.response - terms @ coefficients
-    leverage = np.einsum("ij,ji->i", terms, inverse)[:, None]
-    excess = residual**2 / (1.0 - leverage)
-    freedom, degrees = len(terms) - leverage.sum(), runs.noise.degrees_of_freedom
+    fitted, noise = _Shrunk.of(runs.terms, runs.response, scales), runs.noise.variance(runs.theta)
+    excess = fitted.residual**2 / (1.0 - fitted.leverage)
+    freedom, degrees = len(noise) - fitted.leverage.sum(), runs.noise.degrees_of_freedom
     ratio = excess.mean(axis=0) / noise.mean(axis=0)
-    root = np.sqrt(runs.repeats)[:, None]
+    repeats = runs.repeats[:, None]
     beyond = ratio > stats.f.isf(MISFIT_LEVEL, freedom, degrees)
-    misfit = np.where(beyond, ((excess - noise) / root**2).mean(axis=0), 0.0)
+    misfit = np.where(beyond, ((excess - noise) / repeats).mean(axis=0), 0.0).clip(min=0.0)
     kriging = {}
     for column in np.flatnonzero(ratio > stats.f.isf(FAILURE_LEVEL, freedom, degrees)):
-        missed, scatter = residual / root, noise / root**2
-        fitted = fit_kriging(runs.theta, missed[:, column], scatter[:, column])
-        if np.mean(fitted.leave_one_out**2) < BETTER * np.mean(missed[:, column] ** 2):
-            kriging[int(column)] = fitted
-    return Surfaces(Polynomial(coefficients, np.maximum(misfit, 0.0), kriging), gram_inverse, runs.noise, {})
+        missed, scatter = fitted.residual / np.sqrt(repeats), noise / repeats
+        smooth = fit_kriging(runs.theta, missed[:, column], scatter[:, column])
+        if np.mean(smooth.leave_one_out**2) < BETTER * np.mean(missed[:, column] ** 2):
+            kriging[int(column)] = smooth
+    base = Polynomial(fitted.coefficients, misfit, kriging)
+    return Surfaces(base, fitted.gram_inverse, runs.noise, {})
 
 
 @dataclass(frozen=True, eq=False)
@@ -341,56 +367,33 @@ def fit_additions(conditions: Sequence[AddedRuns]) -> list[Addition]:
     grams = [runs.terms.T @ runs.terms for runs in conditions]
     scales = np.full(len(grams[0]), FIRST_SCALE)
     for _ in range(SCALE_ROUNDS):
-        variances = [_mean_variance(runs, _Shrunk.of(runs, scales).growth) for runs in conditions]
+        variances = [_addition_variance(runs, scales) for runs in conditions]
         moments = [
             runs.terms.T @ runs.difference / np.sqrt(variance)
             for runs, variance in zip(conditions, variances, strict=True)
         ]
         scales = likeliest_scales(grams, moments)
-    return [_fit_addition(runs, _Shrunk.of(runs, scales)) for runs in conditions]
+    return [_fit_addition(runs, scales) for runs in conditions]
 
 
-@dataclass(frozen=True, eq=False)
-class _Shrunk:
-    """A fit with coefficients drawn towards nothing.
-
-    Attributes
-    ----------
-    gram_inverse : (terms, terms) array
-        Covariance of the coefficients, in variances of one run.
-    inverse : (terms, runs) array
-    coefficients : (terms, observables) array
-    residual : (n, observables) array
-    leverage : (n, 1) array
-    growth : (observables,) array
-    """
-
-    gram_inverse: np.ndarray
-    inverse: np.ndarray
-    coefficients: np.ndarray
-    residual: np.ndarray
-    leverage: np.ndarray
-    growth: np.ndarray
-
-    @classmethod
-    def of(cls, runs: AddedRuns, scales: np.ndarray) -> _Shrunk:
-        """Fit with known standard deviations of the coefficients, in those of one run."""
-        gram_inverse = np.linalg.inv(runs.terms.T @ runs.terms + np.diag(1.0 / scales**2))
-        inverse = gram_inverse @ runs.terms.T
-        coefficients = inverse @ runs.difference
-        residual = runs.difference - runs.terms @ coefficients
-        leverage = np.einsum("ij,ji->i", runs.terms, inverse)[:, None]
-        # A heap with a mechanism scatters more: an excess of the residuals is noise unless it is smooth.
-        growth = fit_growth(runs.size, residual**2 / (1.0 - leverage) / runs.noise)
-        return cls(gram_inverse, inverse, coefficients, residual, leverage, growth)
+def _growth(runs: AddedRuns, fitted: _Shrunk) -> np.ndarray:
+    """A heap with a mechanism scatters more: an excess of the residuals is noise unless it is smooth."""
+    return fit_growth(runs.size, fitted.residual**2 / (1.0 - fitted.leverage) / runs.noise)
 
 
 def _mean_variance(runs: AddedRuns, growth: np.ndarray) -> np.ndarray:
     return np.asarray((runs.noise * np.exp(runs.size[:, None] * growth)).mean(axis=0))
 
 
-def _fit_addition(runs: AddedRuns, fitted: _Shrunk) -> Addition:
-    theta, size, noise, growth = runs.theta, runs.size, runs.noise, fitted.growth
+def _addition_variance(runs: AddedRuns, scales: np.ndarray) -> np.ndarray:
+    fitted = _Shrunk.of(runs.terms, runs.difference, scales)
+    return _mean_variance(runs, _growth(runs, fitted))
+
+
+def _fit_addition(runs: AddedRuns, scales: np.ndarray) -> Addition:
+    theta, size, noise = runs.theta, runs.size, runs.noise
+    fitted = _Shrunk.of(runs.terms, runs.difference, scales)
+    growth = _growth(runs, fitted)
     points = np.column_stack([theta, size])
     left_out = fitted.residual / (1.0 - fitted.leverage)
     freedom, kept = len(size) - fitted.leverage.sum(), size >= LEAST_SIZE
