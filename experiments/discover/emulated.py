@@ -1,7 +1,7 @@
 """An emulator in the place of the simulator, so that the statistics can be tried on a frozen bank.
 
 Where the analysis has that very emulator, its errors never show. So a bank may be drawn from it with fresh
-noise, and the analysis have the emulator of that; bent by what no quadratic follows, the first is never
+noise, and the analysis have the emulator of that; bent by what no polynomial follows, the first is never
 quite in the reach of the second.
 """
 
@@ -20,7 +20,7 @@ from experiments.discover.settings import Settings
 from experiments.discover.simulator import Outcomes, Point
 
 BEND_LENGTH = 0.7
-"""Length over which a bend changes, in half ranges: a quadratic follows the larger part of it."""
+"""Length over which a bend changes, in half ranges: a polynomial follows the larger part of it."""
 WAVES = 64
 """Cosines that a bend is the sum of."""
 

@@ -20,7 +20,7 @@ from experiments.discover.model import STEP, Model, Shift
 from experiments.discover.noise import repeat_deviations
 
 LENGTH = 0.7
-"""Length over which the smooth function changes, in half ranges: what a quadratic leaves over."""
+"""Length over which the smooth function changes, in half ranges: what the emulator's terms leave over."""
 AMPLITUDES = 0.04 * 4.0 ** np.arange(6)
 """Variances of the smooth function tried, in units of the noise of one run."""
 NOISE_WEIGHT = 20.0
@@ -128,15 +128,17 @@ def likeliest_shift(model: Model, runs: Runs, centre: np.ndarray, ratio: np.ndar
     ratio : (observables,) array
         Variance of one run over the emulator's.
     """
-    prior = (SHIFT_SD * (model.upper - model.lower)) ** -2.0
+    prior, sd = (SHIFT_SD * (model.upper - model.lower)) ** -2.0, np.sqrt(ratio)
+    whitenings = {}
+    for name in np.unique(runs.conditions):
+        noise = model.emulator.surfaces[name].noise_covariance(centre, model.mechanisms)
+        whitenings[name] = whiten(sd[:, None] * noise * sd)
     value = np.zeros(len(prior))
     for _ in range(SHIFT_STEPS):
         normal, descent = np.diag(prior), -prior * value
-        for name in np.unique(runs.conditions):
+        for name, whitening in whitenings.items():
             here = runs.conditions == name
-            x, sd = runs.x[here] + value, np.sqrt(ratio)
-            noise = model.emulator.surfaces[name].noise_covariance(centre, model.mechanisms)
-            whitening = whiten(sd[:, None] * noise * sd)
+            x = runs.x[here] + value
             missed = (runs.values[here] - model.predict(x, name)) @ whitening.T
             slopes = np.array([_slope(model, x, step, name) @ whitening.T for step in np.eye(len(value))])
             normal = normal + np.einsum("pij,qij->pq", slopes, slopes)

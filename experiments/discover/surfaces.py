@@ -422,8 +422,8 @@ def _fit_addition(runs: AddedRuns, scales: np.ndarray) -> Addition:
 def likeliest_scales(grams: Sequence[np.ndarray], moments: Sequence[np.ndarray]) -> np.ndarray:
     """Standard deviations of coefficients of largest likelihood, given data y.
 
-    Data scatter about X times the coefficients with variance one, coefficients about
-    nothing with the squares of the scales (Efron and Morris 1973), which expectation and maximisation find.
+    Data scatter about X times the coefficients with variance one, coefficients about nothing with the squares
+    of the scales (Efron and Morris 1973), which expectation and maximisation find.
 
     Parameters
     ----------

@@ -3,7 +3,7 @@
     python -m experiments.discover.trials.emulated --scale bench --banks 8
 
 They tune and guard the rules without a simulation. From the emulator of the shipped bank, bent by what no
-quadratic follows, new banks are drawn, and an analysis knows no more than one of these: so their noise, and
+polynomial follows, new banks are drawn, and an analysis knows no more than one of these: so their noise, and
 what their emulators miss, show. The heaps are shifted as the rules say that cameras and time steps do.
 Whether the bent emulator is like the engine, only the blind trials show.
 """
@@ -224,7 +224,7 @@ def main(
     photographs: Annotated[bool, typer.Option("--photographs", help="With photographs only.")] = False,
     count: Annotated[int, typer.Option(help="Trials of each mechanism with every bank.")] = 1,
     banks: Annotated[int, typer.Option(help="Banks that are drawn.")] = 4,
-    bend: Annotated[float, typer.Option(help="What no quadratic follows, in deviations of one run.")] = 0.3,
+    bend: Annotated[float, typer.Option(help="What no polynomial follows, in deviations of one run.")] = 0.3,
     seed: Annotated[int, typer.Option()] = 0,
     workers: Annotated[int | None, typer.Option(help="Processes; default: one a core.")] = None,
 ) -> None:
