@@ -108,7 +108,7 @@ class Batch:
         flags = self.solver.flags.numpy()
         ended, moves = [], []
         for w, view in zip(due, self.solver.view(due), strict=True):
-            verdict = _verdict(WorldFlag(int(flags[w])), view.time)
+            verdict = _verdict(WorldFlag(int(flags[w])), view.time) if flags[w] else None
             if verdict is None:
                 decision = self.controllers[w].look(view)
                 if decision.remove is not None:

@@ -68,6 +68,10 @@ class WorldView:
         [kg]
     impulse : float
         What the grains have given to the weighed wall since the first step [N s]; see `Solver.impulses`.
+    rms_speed, fastest : float
+        Root mean square, and largest, speed of the living grains [m/s]; 0 where none lives.
+    highest : float
+        Height of the highest centre of a living grain [m]; minus infinity where none lives.
     """
 
     step: int
@@ -78,6 +82,32 @@ class WorldView:
     velocities: np.ndarray
     masses: np.ndarray
     impulse: float
+    rms_speed: float
+    fastest: float
+    highest: float
+
+
+def overviews(
+    positions: np.ndarray, velocities: np.ndarray, alive: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """`WorldView.rms_speed`, `fastest` and `highest` of many worlds at once.
+
+    Parameters
+    ----------
+    positions, velocities : (worlds, n, 3 or more) arrays
+        [m], [m/s]; what stands behind their three components is not looked at.
+    alive : (worlds, n) bool array
+
+    Returns
+    -------
+    rms_speeds, fastest, highest : (worlds,) arrays
+        [m/s], [m/s], [m]
+    """
+    x, y, z = (velocities[:, :, axis] for axis in range(3))
+    squares = np.where(alive, x * x + y * y + z * z, 0.0)
+    mean = squares.sum(axis=1) / np.maximum(np.count_nonzero(alive, axis=1), 1)
+    highest = np.where(alive, positions[:, :, 2], -np.inf).max(axis=1)
+    return np.sqrt(mean), np.sqrt(squares.max(axis=1)), highest
 
 
 class Solver:
@@ -353,25 +383,24 @@ class Solver:
 
     def view(self, worlds: Sequence[int]) -> list[WorldView]:
         """What scenes need of some worlds, copied from the device."""
-        n, impulses = self.layout.grain_count, self.impulses()
-        grains = self.grains[0]
-        steps, alive = grains.step.numpy(), self.alive.numpy().reshape(-1, n) > 0
-        release = self.model.release_step.numpy().reshape(-1, n)
-        positions = grains.position.numpy().reshape(-1, n, 3)
-        velocities = grains.velocity.numpy().reshape(-1, n, 4)
-        return [
-            WorldView(
-                int(steps[w]),
-                float(steps[w] * self.worlds[w].time_step),
-                alive[w],
-                release[w] <= steps[w],
-                positions[w],
-                velocities[w, :, :3],
-                velocities[w, :, 3],
-                float(impulses[w]),
-            )
-            for w in worlds
+        n, grains, chosen = self.layout.grain_count, self.grains[0], list(worlds)
+        steps = grains.step.numpy()[chosen]
+        alive = self.alive.numpy().reshape(-1, n)[chosen] > 0
+        released = self.model.release_step.numpy().reshape(-1, n)[chosen] <= steps[:, None]
+        positions = grains.position.numpy().reshape(-1, n, 3)[chosen]
+        velocities = grains.velocity.numpy().reshape(-1, n, 4)[chosen]
+        numbers = [
+            steps.tolist(),
+            (steps * self._pace[0, chosen]).tolist(),
+            alive,
+            released,
+            positions,
+            velocities[:, :, :3],
+            velocities[:, :, 3],
+            self.impulses()[chosen].tolist(),
+            *(each.tolist() for each in overviews(positions, velocities, alive)),
         ]
+        return [WorldView(*each) for each in zip(*numbers, strict=True)]
 
     def poses(self, world: int) -> dict[str, np.ndarray]:
         """Slots, positions [m], orientations, velocities [m/s] and spins [rad/s] of the living grains."""

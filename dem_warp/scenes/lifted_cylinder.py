@@ -245,8 +245,8 @@ class LiftController(PouredController[Lift]):
         return self.scene.lift
 
     def _lift(self, view: WorldView) -> Decision:
-        still: Mapping[int, Motion] = {PLATE: Motion()} if self._vibration_ends(view) else {}
-        return replace(self._lifted(view), move=still)
+        decision = self._lifted(view)
+        return replace(decision, move={PLATE: Motion()}) if self._vibration_ends(view) else decision
 
     def _vibration_ends(self, view: WorldView) -> bool:
         """Whether the plate, which vibrated when the world was last looked at, has come to a stop."""
@@ -257,8 +257,7 @@ class LiftController(PouredController[Lift]):
     def _lifted(self, view: WorldView) -> Decision:
         elapsed = view.time - self.course.phase_start
         rise = self.scene.lift_speed * elapsed
-        positions = view.positions[view.alive]
-        top = positions[:, 2].max() + self.reach if len(positions) else 0.0
+        top = view.highest + self.reach
         self._time_fall(view, elapsed)
         self._weigh_tube(view, elapsed, rise > top)
         if self.scene.duration is not None and view.time < self.scene.duration:
@@ -268,8 +267,8 @@ class LiftController(PouredController[Lift]):
         if over:
             self._finish(view, elapsed)
             return Decision(done=True)
-        riding = view.alive & (view.positions[:, 2] > rise)
-        if rise > GONE * self.scene.height and riding.any():
+        if rise > GONE * self.scene.height and view.highest > rise:
+            riding = view.alive & (view.positions[:, 2] > rise)
             count = np.count_nonzero(riding)
             if count > CLOGGED * self.course.observables["grain_count"]:
                 return Decision(done=True, failure=f"the tube is clogged: {count} grains rose with it")

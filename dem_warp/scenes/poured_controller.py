@@ -74,12 +74,8 @@ class PouredController(ABC, Generic[CourseT]):
 
     def rests(self, view: WorldView) -> bool:
         """Whether the grains have been slow for `rest_time`."""
-        speed = np.linalg.norm(view.velocities[view.alive], axis=1)
-        slow = not speed.size or (
-            np.sqrt(np.mean(speed**2)) < self.poured.rest_speed
-            and speed.max() < CALM * self.poured.rest_speed
-        )
-        if not slow:
+        limit = self.poured.rest_speed
+        if not (view.rms_speed < limit and view.fastest < CALM * limit):
             self.course.slow_since = None
             return False
         if self.course.slow_since is None:
@@ -87,20 +83,25 @@ class PouredController(ABC, Generic[CourseT]):
         return view.time - self.course.slow_since >= self.poured.rest_time
 
     def _fill(self, view: WorldView) -> Decision:
-        free = view.alive & view.released
-        above = view.positions[:, 2] > self.poured.brim
-        slow = np.linalg.norm(view.velocities, axis=1) < 0.5 * self.poured.rain_speed
-        rained_out = bool(view.released[view.alive].all())
-        full = self.poured.grain_count is None and np.count_nonzero(free & above & slow) >= HEAPED
         if view.time > self.rain_end + self.FILL_MARGIN:
             failure = f"the filling did not end within {self.FILL_MARGIN:g} s of the rain; {UNREST}"
             return Decision(done=True, failure=failure)
-        if not (full or (rained_out and self.rests(view))):
+        awaited = view.alive & ~view.released
+        if not (self._is_full(view) or (not awaited.any() and self.rests(view))):
             return Decision()
         self.course.enter("settle", view)
         if self.poured.grain_count is not None:
             return Decision()
-        return Decision(remove=np.flatnonzero(view.alive & (above | ~view.released)))
+        above = view.alive & (view.positions[:, 2] > self.poured.brim)
+        return Decision(remove=np.flatnonzero(above | awaited))
+
+    def _is_full(self, view: WorldView) -> bool:
+        """Whether slow grains are heaped above the brim; a counted fill never is."""
+        if self.poured.grain_count is not None or view.highest <= self.poured.brim:
+            return False
+        above = view.alive & view.released & (view.positions[:, 2] > self.poured.brim)
+        slow = np.linalg.norm(view.velocities, axis=1) < 0.5 * self.poured.rain_speed
+        return bool(np.count_nonzero(above & slow) >= HEAPED)
 
     def _settle(self, view: WorldView) -> Decision:
         if view.time - self.course.phase_start > self.SETTLE_LIMIT:

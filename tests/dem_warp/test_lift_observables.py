@@ -29,7 +29,7 @@ from worlds import (
 from dem_warp import Case, CaseResult, simulate
 from dem_warp.device import resolve_device
 from dem_warp.model import WorldSetup
-from dem_warp.solver import WorldView
+from dem_warp.solver import WorldView, overviews
 from dem_warp.walls import Plane
 
 WEIGHT = ball_mass() * GRAVITY
@@ -167,7 +167,8 @@ def fallen(given: Callable[[float], float]) -> dict[str, float]:
         level = height * (1.0 - time / FALL_TIME) - 0.5 * case.grains.grain_reach
         positions = np.column_stack([place, np.where(np.arange(count) < 40, level, 0.0)])
         impulse = -float(masses.sum()) * GRAVITY * given(time)
-        return WorldView(step, time, alive, alive, positions, moving, masses, impulse)
+        overview = [each.item() for each in overviews(positions[None], moving[None], alive[None])]
+        return WorldView(step, time, alive, alive, positions, moving, masses, impulse, *overview)
 
     seen, step = controller.course.observables, 0
     seen |= {"fill_height": height, "grain_count": float(count)}

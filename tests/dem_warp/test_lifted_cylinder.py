@@ -11,7 +11,7 @@ from dem_warp import Case, CaseResult, ClumpShape, GrainPopulation, ShapeMixture
 from dem_warp.device import resolve_device
 from dem_warp.scenes.scene import Decision
 from dem_warp.simulation import batches
-from dem_warp.solver import WorldView
+from dem_warp.solver import WorldView, overviews
 
 
 def with_shapes(shapes: tuple[ClumpShape, ...], fractions: tuple[float, ...]) -> Case:
@@ -244,7 +244,8 @@ def end_of_lift(riding: int) -> tuple[Decision, Decision, float]:
         positions = bed.copy()
         positions[:riding, 2] += rise
         step = round(time / setup.time_step)
-        view = WorldView(step, time, alive, alive, positions, rest, setup.masses, 0.0)
+        overview = [each.item() for each in overviews(positions[None], rest[None], alive[None])]
+        view = WorldView(step, time, alive, alive, positions, rest, setup.masses, 0.0, *overview)
         decision = controller.look(view)
         if decision.remove is not None:
             alive[decision.remove] = False
