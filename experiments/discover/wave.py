@@ -23,7 +23,7 @@ from experiments.study.study import MeasurementSection
 WORLDS = 1024
 """Worlds that one launch on a GPU holds: enough to fill it, few enough that a killed run loses little."""
 
-DRIVERS = 4
+DRIVERS = 3
 """Launches at once on each GPU, each driven by a process of its own: while one's controllers decide on the
 host, the GPU works for the others."""
 
@@ -120,16 +120,20 @@ class WaveRunner:
         return self._devices[0] == "cpu"
 
     def _launches(self, cases: Mapping[str, Case]) -> list[list[str]]:
-        """Keys of the cases of each launch: all, or such as share what kernels are compiled for."""
+        """Keys of the cases of each launch: all, or such as share what kernels are compiled for.
+
+        The small ones come last, so that no driver is left alone with a large one.
+        """
         keys = list(cases)
         if self._on_cpu and self._worlds is None:
             return [keys]
         worlds = self._worlds or WORLDS
-        return [
+        launches = [
             [keys[i] for i in group[start : start + worlds]]
             for group in batches(list(cases.values()), one_each=False)
             for start in range(0, len(group), worlds)
         ]
+        return sorted(launches, key=len, reverse=True)
 
     def _launch(
         self, launches: Sequence[list[str]], cases: Mapping[str, Case], measured: _Measured, clock: _Clock

@@ -1,7 +1,8 @@
 """Many analyses in step: the waves of a round go to the simulator in one call.
 
 Each analysis is a generator that yields points and is sent their outcomes. They live in worker processes, so
-that the statistics of a round take every core; the simulator stays in this process.
+that the statistics of a round take every core; the simulator stays in this process. The analyses are in two
+shifts, which take turns: while the waves of the one are simulated, the other one calculates.
 """
 
 from __future__ import annotations
@@ -18,6 +19,9 @@ from typing import Protocol
 from experiments.discover.analysis import Analysis
 from experiments.discover.discovery import Discovery
 from experiments.discover.simulator import Outcomes, Point, Simulator
+
+POLITE = 10
+"""Niceness of the processes of the analyses."""
 
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
@@ -36,8 +40,11 @@ Step = list[Point] | Discovery | Crash
 class Crew(Protocol):
     """Whoever runs the analyses."""
 
-    def step(self, answers: Mapping[str, Outcomes | None]) -> dict[str, Step]:
-        """Send every named analysis the outcomes of its wave, or None to begin, and collect what they say."""
+    def send(self, answers: Mapping[str, Outcomes | None]) -> None:
+        """Send every named analysis the outcomes of its wave, or None to begin."""
+
+    def collect(self) -> dict[str, Step]:
+        """Wait for what those say that were sent something last."""
 
 
 class LocalCrew:
@@ -52,10 +59,15 @@ class LocalCrew:
     def __init__(self, begin: Callable[[str], Analysis]) -> None:
         self._begin = begin
         self._running: dict[str, Analysis] = {}
+        self._said: dict[str, Step] = {}
 
-    def step(self, answers: Mapping[str, Outcomes | None]) -> dict[str, Step]:
+    def send(self, answers: Mapping[str, Outcomes | None]) -> None:
         """Take one analysis after the other."""
-        return {name: self._step(name, answer) for name, answer in answers.items()}
+        self._said = {name: self._step(name, answer) for name, answer in answers.items()}
+
+    def collect(self) -> dict[str, Step]:
+        """What they said."""
+        return self._said
 
     def _step(self, name: str, answer: Outcomes | None) -> Step:
         try:
@@ -84,19 +96,24 @@ class ProcessCrew:
     def __init__(self, pipes: Sequence[Connection]) -> None:
         self._pipes = pipes
         self._homes: dict[str, int] = {}
+        self._asked: list[str] = []
 
-    def step(self, answers: Mapping[str, Outcomes | None]) -> dict[str, Step]:
-        """Send each process what its analyses wait for, then collect; new analyses are dealt in turn."""
+    def send(self, answers: Mapping[str, Outcomes | None]) -> None:
+        """Send each process what its analyses wait for; new analyses are dealt in turn."""
+        self._asked = list(answers)
         shares: dict[int, dict[str, Outcomes | None]] = {}
         for name, answer in answers.items():
             home = self._homes.setdefault(name, len(self._homes) % len(self._pipes))
             shares.setdefault(home, {})[name] = answer
         for home, share in shares.items():
             self._pipes[home].send(share)
+
+    def collect(self) -> dict[str, Step]:
+        """Wait for every process that was sent something."""
         steps: dict[str, Step] = {}
-        for home in shares:
+        for home in dict.fromkeys(self._homes[name] for name in self._asked):
             steps |= self._pipes[home].recv()
-        return {name: steps[name] for name in answers}
+        return {name: steps[name] for name in self._asked}
 
 
 @contextmanager
@@ -154,36 +171,45 @@ def _one_thread_each() -> Iterator[None]:
 
 def _serve(pipe: Connection) -> None:
     """Be told how analyses begin, and run them until the other end of the pipe closes."""
+    # Whoever simulates meanwhile goes first: a GPU must not wait for a core.
+    os.nice(POLITE)
     try:
         crew = LocalCrew(pipe.recv())
     except EOFError:
         return
     while True:
         try:
-            answers = pipe.recv()
-        except EOFError:
+            crew.send(pipe.recv())
+            pipe.send(crew.collect())
+        except (EOFError, BrokenPipeError):
             return
-        pipe.send(crew.step(answers))
 
 
 @dataclass(frozen=True)
 class Round:
-    """One turn of all analyses that are under way."""
+    """One turn of a shift of analyses."""
 
     number: int
     ended: dict[str, Discovery | Crash]
     """Analyses that ended before this round's cases."""
     running: int
-    """Analyses that want cases."""
+    """Analyses of the shift that want cases."""
     cases: int
     """Cases of their waves, all in one call."""
+
+    @classmethod
+    def of(cls, number: int, steps: Mapping[str, Step]) -> Round:
+        """What the analyses of a shift said."""
+        ended = {name: step for name, step in steps.items() if not isinstance(step, list)}
+        return cls(number, ended, len(steps) - len(ended), len(_points(steps)))
 
 
 def in_step(names: Sequence[str], crew: Crew, simulator: Simulator) -> Iterator[Round]:
     """Run analyses round by round until all have ended.
 
     A round is yielded before its cases run, so that whoever iterates may stop there; the simulator keeps what
-    it has run, and the same analyses then come to the same point again.
+    it has run, and the same analyses then come to the same point again. Where the simulator raises, what the
+    other shift has found by then is yielded first.
 
     Parameters
     ----------
@@ -198,16 +224,34 @@ def in_step(names: Sequence[str], crew: Crew, simulator: Simulator) -> Iterator[
     ------
     Round
     """
-    answers: dict[str, Outcomes | None] = dict.fromkeys(names)
+    answers: dict[str, Outcomes | None] = dict.fromkeys(names[0::2])
+    waiting: dict[str, Outcomes | None] = dict.fromkeys(names[1::2])
     number = 0
+    crew.send(answers)
     while answers:
-        steps = crew.step(answers)
-        waves = {name: step for name, step in steps.items() if isinstance(step, list)}
-        ended = {name: step for name, step in steps.items() if not isinstance(step, list)}
-        points = [point for wave in waves.values() for point in wave]
-        number += 1
-        yield Round(number, ended, len(waves), len(points))
-        answers = dict(_dealt(waves, simulator(points))) if waves else {}
+        steps, number = crew.collect(), number + 1
+        yield Round.of(number, steps)
+        crew.send(waiting)
+        try:
+            answers = _answered(steps, simulator)
+        except BaseException:
+            yield Round.of(number + 1, crew.collect())
+            raise
+        if waiting:
+            answers, waiting = waiting, answers
+        else:
+            crew.send(answers)
+
+
+def _points(steps: Mapping[str, Step]) -> list[Point]:
+    """The waves that are wanted, one after the other."""
+    return [point for step in steps.values() if isinstance(step, list) for point in step]
+
+
+def _answered(steps: Mapping[str, Step], simulator: Simulator) -> dict[str, Outcomes | None]:
+    """Run the waves of a round in one call."""
+    waves = {name: step for name, step in steps.items() if isinstance(step, list)}
+    return dict(_dealt(waves, simulator(_points(steps)))) if waves else {}
 
 
 def _dealt(waves: Mapping[str, list[Point]], outcomes: Outcomes) -> Iterator[tuple[str, Outcomes]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -29,7 +29,7 @@ from experiments.discover.trials.drawing import STRONG, Effect, Plan, draw
 from experiments.discover.trials.findings import EVERYTHING, PHOTOGRAPHS, read_findings
 from experiments.discover.trials.folder import Folder
 from experiments.discover.trials.heaps import cases_of
-from experiments.discover.trials.lockstep import Crash, LocalCrew, in_step, process_crew
+from experiments.discover.trials.lockstep import Crash, LocalCrew, Step, in_step, process_crew
 from experiments.discover.trials.truth import (
     Kind,
     Label,
@@ -234,14 +234,57 @@ def test_waves_of_many_analyses_run_in_one_call_and_come_home(crew: str) -> None
     else:
         with process_crew(counting, workers=2) as processes:
             rounds = list(in_step(names, processes, simulator))
-    assert simulator.calls == 3
-    assert [(turn.running, turn.cases) for turn in rounds] == [(3, 3), (2, 4), (1, 3), (0, 0)]
+    # The shifts are 3 with 0, and 1 with 2.
+    assert simulator.calls == 5
+    seen = [(turn.running, turn.cases) for turn in rounds]
+    assert seen == [(1, 1), (2, 2), (1, 2), (1, 2), (1, 3), (0, 0), (0, 0)]
     found = {name: end for turn in rounds for name, end in turn.ended.items()}
     assert isinstance(found["0"], Crash)
     assert found["0"].traceback.endswith("ValueError: no waves\n")
     for name in ("1", "2", "3"):
         assert isinstance(found[name], Discovery)
         assert found[name].reason == expected_reason(int(name))
+
+
+def test_one_shift_calculates_while_the_waves_of_the_other_run() -> None:
+    """Every call of the simulator finds the other shift at work, until that has ended."""
+    events: list[str] = []
+
+    class Watched(LocalCrew):
+        def send(self, answers: Mapping[str, Outcomes | None]) -> None:
+            events.append("+".join(answers))
+            super().send(answers)
+
+        def collect(self) -> dict[str, Step]:
+            events.append("collect")
+            return super().collect()
+
+    class Watching(Echo):
+        def __call__(self, points: Sequence[Point]) -> Outcomes:
+            events.append("run")
+            return super().__call__(points)
+
+    list(in_step(["2", "1"], Watched(counting), Watching()))
+    assert events == [
+        *("2", "collect", "1", "run", "collect", "2", "run", "collect", "1", "run"),
+        *("collect", "2", "collect", "", ""),
+    ]
+
+
+def test_what_the_other_shift_found_is_not_lost_when_the_time_is_up() -> None:
+    class TimeIsUp(Echo):
+        def __call__(self, points: Sequence[Point]) -> Outcomes:
+            raise OutOfTime
+
+    found: dict[str, Discovery | Crash] = {}
+
+    def run() -> None:
+        for turn in in_step(["3", "0"], LocalCrew(counting), TimeIsUp()):
+            found.update(turn.ended)
+
+    with pytest.raises(OutOfTime):
+        run()
+    assert list(found) == ["0"]
 
 
 def test_a_batch_after_the_deadline_is_not_begun() -> None:

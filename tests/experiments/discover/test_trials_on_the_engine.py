@@ -65,7 +65,8 @@ def test_only_the_hidden_effect_makes_the_analysis_ask_for_runs(measured: dict[s
     withheld: dict[str, tuple[str, ...]] = dict.fromkeys(measured, ())
     crew = LocalCrew(Desk(emulator, search.settings, measured, withheld))
     jobs = {label: f"{label.trial}.everything" for label in (NULL, ROLLING)}
-    steps = crew.step(dict.fromkeys(jobs.values()))
+    crew.send(dict.fromkeys(jobs.values()))
+    steps = crew.collect()
     none, wave = steps[jobs[NULL]], steps[jobs[ROLLING]]
     assert isinstance(none, Discovery)
     assert none.verdict is Verdict.NONE
