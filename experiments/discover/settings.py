@@ -80,7 +80,7 @@ class Settings:
     draws: int = 4000
     shortlist_share: float = 0.3
     shortlist: int = 3
-    refinement_points: int = 8
+    refinement_points: int = 6
     refinement_repeats: int = 2
     refinement_rounds: int = 3
     pair_candidates: int = 12
