@@ -84,12 +84,17 @@ def fit_noise(theta: np.ndarray, deviations: np.ndarray, floor: np.ndarray) -> N
         gradient = 0.5 * planes.T @ (squares / np.exp(planes @ coefficients) - 1.0) - penalty @ coefficients
         coefficients = coefficients + np.clip(np.linalg.solve(information, gradient), -1.0, 1.0)
     standard = deviations / np.exp(0.5 * planes @ coefficients)
-    size = squares.shape[1]
-    moments = standard.T @ standard / len(standard) + 1e-9 * np.eye(size)
+    correlation = correlation_of(standard, np.ones(len(standard)))
+    return Noise(coefficients, correlation, len(deviations), float(len(deviations)))
+
+
+def correlation_of(standard: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Correlation of deviations (n, observables) in standard deviations, (observables, observables)."""
+    size = standard.shape[1]
+    moments = (weights[:, None] * standard).T @ standard / weights.sum() + 1e-9 * np.eye(size)
     scale = np.sqrt(np.diag(moments))
     correlation = moments / (scale[:, None] * scale)
-    shrunk = (1.0 - CORRELATION_SHRINKAGE) * correlation + CORRELATION_SHRINKAGE * np.eye(size)
-    return Noise(coefficients, shrunk, len(deviations), float(len(deviations)))
+    return np.asarray((1.0 - CORRELATION_SHRINKAGE) * correlation + CORRELATION_SHRINKAGE * np.eye(size))
 
 
 def shared_correlations(noises: Sequence[Noise]) -> list[Noise]:

@@ -104,7 +104,7 @@ def correct(model: Model, runs: Runs, centre: np.ndarray) -> Model:
             one.x,
             one.missed,
             one.noise,
-            surfaces[name].noise.correlation,
+            surfaces[name].correlation(centre, model.mechanisms),
             np.sqrt(ratio),
         )
         for name, one in seen.items()

@@ -9,14 +9,21 @@ shows that a polynomial fails, the rest is kriged.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations_with_replacement
 
 import numpy as np
 from scipy import stats
 
 from experiments.discover.kriging import Kriging, fit_kriging
-from experiments.discover.noise import Noise, fit_growth, fit_noise, repeat_deviations
+from experiments.discover.noise import (
+    ALIKE,
+    Noise,
+    correlation_of,
+    fit_growth,
+    fit_noise,
+    repeat_deviations,
+)
 from experiments.errors import InputError
 
 FAILURE_LEVEL = 0.005
@@ -106,6 +113,8 @@ class Addition:
         Logarithm of the variance of one run at the largest size over that without the mechanism.
     variance : (observables,) array
         Of one run, mean over the mechanism's runs.
+    correlation : (observables, observables) array
+        Of one run at the largest size.
     """
 
     polynomial: Polynomial
@@ -113,6 +122,14 @@ class Addition:
     gram_inverse: np.ndarray
     growth: np.ndarray
     variance: np.ndarray
+    correlation: np.ndarray
+
+    def predict(self, theta: np.ndarray, size: np.ndarray) -> np.ndarray:
+        """What is added at coded factors (n, factors) and sizes (n,), (n, observables)."""
+        values = added(theta, size) @ self.polynomial.coefficients
+        if self.polynomial.kriging:
+            values += size[:, None] * self.polynomial.missed(np.column_stack([theta, size]))
+        return np.asarray(values)
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,10 +160,7 @@ class Surfaces:
         theta = x[:, : x.shape[1] - len(mechanisms)]
         values = cubic(theta) @ self.base.coefficients + self.base.missed(theta)
         for name, size in zip(mechanisms, x[:, theta.shape[1] :].T, strict=True):
-            part = self.additions[name].polynomial
-            values = values + added(theta, size) @ part.coefficients
-            if part.kriging:
-                values += size[:, None] * part.missed(np.column_stack([theta, size]))
+            values = values + self.additions[name].predict(theta, size)
         return np.asarray(values)
 
     def noise_covariance(self, x: np.ndarray, mechanisms: tuple[str, ...]) -> np.ndarray:
@@ -155,22 +169,31 @@ class Surfaces:
         growth = np.zeros(len(self.base.misfit))
         for name, size in zip(mechanisms, x[len(theta) :], strict=True):
             growth = growth + size * self.additions[name].growth
-        sd = np.exp(0.5 * growth)
-        return np.asarray(sd[:, None] * self.noise.covariance(theta) * sd)
+        sd = np.exp(0.5 * growth) * np.sqrt(self.noise.variance(theta))
+        return np.asarray(sd[:, None] * self.correlation(x, mechanisms) * sd)
+
+    def correlation(self, x: np.ndarray, mechanisms: tuple[str, ...]) -> np.ndarray:
+        """Correlation of one run at one row of coded parameters, (observables, observables).
+
+        A mechanism's own counts as much as its size is of the largest.
+        """
+        sizes = x[len(x) - len(mechanisms) :]
+        whole = max(float(sizes.sum()), 1.0)
+        out = (1.0 - sizes.sum() / whole) * self.noise.correlation
+        for name, size in zip(mechanisms, sizes, strict=True):
+            out = out + size / whole * self.additions[name].correlation
+        return np.asarray(out)
 
     def error(self, x: np.ndarray, mechanisms: tuple[str, ...]) -> np.ndarray:
         """Covariance of the prediction's error at one row of coded parameters, (observables, observables)."""
         theta = x[: len(x) - len(mechanisms)]
-        base, own = cubic(theta[None])[0], np.zeros(len(self.base.misfit))
+        base, own = cubic(theta[None])[0], np.diag(self.misfit_variance(x, mechanisms))
         for name, size in zip(mechanisms, x[len(theta) :], strict=True):
             part = self.additions[name]
-            terms = added(theta[None], np.array([size]))[0]
+            terms, sd = added(theta[None], np.array([size]))[0], np.sqrt(part.variance)
             base = base - part.base_terms.T @ terms
-            own += (terms @ part.gram_inverse @ terms) * part.variance
-        sd = np.sqrt(own)
-        shared = (base @ self.gram_inverse @ base) * self.noise.covariance(theta)
-        scatter = shared + sd[:, None] * self.noise.correlation * sd
-        return np.asarray(scatter + np.diag(self.misfit_variance(x, mechanisms)))
+            own += (terms @ part.gram_inverse @ terms) * (sd[:, None] * part.correlation * sd)
+        return np.asarray((base @ self.gram_inverse @ base) * self.noise.covariance(theta) + own)
 
     def coefficient_errors(self, theta: np.ndarray, mechanisms: tuple[str, ...]) -> np.ndarray:
         """Covariances of errors of all coefficients, of noise as at some factors (observables, terms, terms).
@@ -373,7 +396,25 @@ def fit_additions(conditions: Sequence[AddedRuns]) -> list[Addition]:
             for runs, variance in zip(conditions, variances, strict=True)
         ]
         scales = likeliest_scales(grams, moments)
-    return [_fit_addition(runs, scales) for runs in conditions]
+    return _with_correlations(conditions, [_fit_addition(runs, scales) for runs in conditions])
+
+
+def _with_correlations(conditions: Sequence[AddedRuns], additions: Sequence[Addition]) -> list[Addition]:
+    """Let all conditions say together how observables hang together under a mechanism.
+
+    They count by their sizes, and the correlation without the mechanism as `ALIKE` runs.
+    """
+    standard = [
+        (runs.difference - one.predict(runs.theta, runs.size))
+        / np.sqrt(runs.noise * np.exp(runs.size[:, None] * one.growth))
+        for runs, one in zip(conditions, additions, strict=True)
+    ]
+    sizes = np.concatenate([runs.size for runs in conditions])
+    seen, worth = correlation_of(np.concatenate(standard), sizes), sizes.sum() ** 2 / (sizes**2).sum()
+    return [
+        replace(one, correlation=(ALIKE * one.correlation + worth * seen) / (ALIKE + worth))
+        for one in additions
+    ]
 
 
 def _growth(runs: AddedRuns, fitted: _Shrunk) -> np.ndarray:
@@ -416,6 +457,7 @@ def _fit_addition(runs: AddedRuns, scales: np.ndarray) -> Addition:
         fitted.gram_inverse,
         growth,
         _mean_variance(runs, growth),
+        runs.base.noise.correlation,
     )
 
 

@@ -19,7 +19,7 @@ from experiments.discover.kriging import fit_kriging, krige
 from experiments.discover.model import Model, Stack
 from experiments.discover.noise import ALIKE, fit_noise, repeat_deviations, shared_correlations
 from experiments.discover.simulator import Outcomes
-from experiments.discover.surfaces import likeliest_scales
+from experiments.discover.surfaces import AddedRuns, BaseRuns, fit_additions, fit_bases, likeliest_scales
 from experiments.errors import InputError
 
 
@@ -223,3 +223,24 @@ def test_scales_of_coefficients_are_found_behind_their_noise() -> None:
         moments.append(terms.T @ data)
     # 2000 coefficients: a scale of 3 is known to 1.6 %, one of 0.5, as large as its noise, to some 4 %.
     np.testing.assert_allclose(likeliest_scales(grams, moments), true, rtol=0.15)
+
+
+def test_the_scatter_under_a_mechanism_has_a_correlation_of_its_own() -> None:
+    """By its size, as far as its runs outweigh those that the base's correlation is worth."""
+    rng, count = np.random.default_rng(11), 300
+    theta, size = rng.uniform(-1.0, 1.0, (count, 1)), rng.uniform(0.0, 1.0, count)
+    noise = fit_noise(theta, rng.standard_normal((count, 2)), np.full(2, 1e-9))
+    [base] = fit_bases([BaseRuns.of(theta, rng.standard_normal((count, 2)), noise)])
+    triangle = np.linalg.cholesky([[1.0, 0.8], [0.8, 1.0]])
+    alike = size[:, None] + rng.standard_normal((count, 2)) @ triangle.T
+    [addition] = fit_additions([AddedRuns(base, theta, size, alike)])
+    worth = size.sum() ** 2 / (size**2).sum()
+    # A correlation of .8 is known to (1 - .8^2) / sqrt(worth), that of the base to 1 / sqrt(300).
+    assert addition.correlation[0, 1] == pytest.approx(0.8 * worth / (worth + ALIKE), abs=0.06)
+    surfaces = replace(base, additions={"sticks": addition, "else": addition})
+    nothing, half, both = np.array([0.0, 0.0]), np.array([0.0, 0.5]), np.array([0.0, 1.0, 1.0])
+    np.testing.assert_array_equal(surfaces.correlation(nothing, ("sticks",)), noise.correlation)
+    between = (noise.correlation + addition.correlation) / 2.0
+    np.testing.assert_allclose(surfaces.correlation(half, ("sticks",)), between, rtol=1e-12)
+    two = surfaces.correlation(both, ("sticks", "else"))
+    np.testing.assert_allclose(two, addition.correlation, rtol=1e-12)
