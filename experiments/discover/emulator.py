@@ -11,15 +11,14 @@ import numpy as np
 from experiments.discover.bank import Bank, load_bank
 from experiments.discover.noise import shared_correlations
 from experiments.discover.space import SearchSpace
-from experiments.discover.surfaces import (
+from experiments.discover.surface_fits import (
     AddedRuns,
-    Addition,
     BaseRuns,
-    Surfaces,
     fit_additions,
     fit_bases,
     repeats_noise,
 )
+from experiments.discover.surfaces import Addition, Surfaces
 from experiments.discover.threads import in_one_thread
 from experiments.errors import InputError
 

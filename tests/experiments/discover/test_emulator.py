@@ -19,7 +19,13 @@ from experiments.discover.kriging import fit_kriging, krige
 from experiments.discover.model import Model, Stack
 from experiments.discover.noise import ALIKE, fit_noise, repeat_deviations, shared_correlations
 from experiments.discover.simulator import Outcomes
-from experiments.discover.surfaces import AddedRuns, BaseRuns, fit_additions, fit_bases, likeliest_scales
+from experiments.discover.surface_fits import (
+    AddedRuns,
+    BaseRuns,
+    fit_additions,
+    fit_bases,
+    likeliest_scales,
+)
 from experiments.errors import InputError
 
 

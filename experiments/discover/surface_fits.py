@@ -1,0 +1,311 @@
+"""Fits of response surfaces to the runs of a bank.
+
+What a few terms lack all observables lack alike, as if a parameter were another; so there are many, and those
+that all runs together show little of are shrunk. Where leave-one-out shows that a polynomial fails, the rest
+is kriged.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import stats
+
+from experiments.discover.kriging import fit_kriging
+from experiments.discover.noise import (
+    ALIKE,
+    Noise,
+    correlation_of,
+    fit_growth,
+    fit_noise,
+    repeat_deviations,
+)
+from experiments.discover.surfaces import Addition, Polynomial, Surfaces, added, cubic, quadratic
+from experiments.errors import InputError
+
+FAILURE_LEVEL = 0.005
+"""A polynomial fails if leave-one-out errors as large as its own have this probability under noise alone."""
+MISFIT_LEVEL = 0.05
+"""Errors of a larger probability are noise: a variance of the misfit would be chance."""
+BETTER = 0.97
+"""Kriging is kept where it lowers the mean square of what is left out to less than this."""
+EM_STEPS = 100
+FIRST_SCALE = 3.0
+"""Standard deviation of a coefficient, in that of one run, before the runs have said how large they are."""
+SCALE_ROUNDS = 2
+"""Times that scales and noise are found, each from the other."""
+LEAST_SCALE = 1e-3
+"""Least standard deviation of a coefficient, in that of one run: smaller ones are nothing."""
+LEAST_SIZE = 0.05
+"""Runs of smaller coded sizes say too little of what a mechanism adds to be divided by their size."""
+
+
+def repeats_noise(theta: np.ndarray, values: np.ndarray, floor: np.ndarray) -> Noise:
+    """Fit the noise to repeated runs without a mechanism.
+
+    Parameters
+    ----------
+    theta, values : (n, factors), (n, observables) array
+        Repeats have equal factors.
+    floor : (observables,) array
+        Standard deviation that each observable's resolution leaves at the least.
+
+    Raises
+    ------
+    InputError
+        With too few finished runs for the noise or the polynomial of `fit_base`.
+    """
+    points, groups = np.unique(theta, axis=0, return_inverse=True)
+    rows, deviations = repeat_deviations(groups.reshape(-1), values)
+    if len(rows) <= values.shape[1] + 1 or len(points) <= quadratic(points).shape[1]:
+        rule = "needs more points without a mechanism than polynomial terms, and repeats than observables"
+        raise InputError(rule, f"{len(points)} points, {len(rows)} repeats", "bank")
+    return fit_noise(theta[rows], deviations, floor)
+
+
+@dataclass(frozen=True, eq=False)
+class _Shrunk:
+    """A least squares fit with coefficients drawn towards nothing.
+
+    Attributes
+    ----------
+    gram_inverse : (terms, terms) array
+        Covariance of the coefficients, in variances of one run.
+    inverse : (terms, runs) array
+    coefficients : (terms, observables) array
+    residual : (runs, observables) array
+    leverage : (runs, 1) array
+    """
+
+    gram_inverse: np.ndarray
+    inverse: np.ndarray
+    coefficients: np.ndarray
+    residual: np.ndarray
+    leverage: np.ndarray
+
+    @classmethod
+    def of(cls, terms: np.ndarray, response: np.ndarray, scales: np.ndarray) -> _Shrunk:
+        """Fit with known standard deviations of the coefficients, in those of one run; infinite: free."""
+        gram_inverse = np.linalg.inv(terms.T @ terms + np.diag(1.0 / scales**2))
+        inverse = gram_inverse @ terms.T
+        coefficients = inverse @ response
+        leverage = np.einsum("ij,ji->i", terms, inverse)[:, None]
+        return cls(gram_inverse, inverse, coefficients, response - terms @ coefficients, leverage)
+
+
+@dataclass(frozen=True, eq=False)
+class BaseRuns:
+    """Runs without a mechanism in one condition, repeats taken together.
+
+    Attributes
+    ----------
+    theta : (n, factors) array
+        Each once.
+    repeats : (n,) array
+    means : (n, observables) array
+    noise : Noise
+        Of one run.
+    """
+
+    theta: np.ndarray
+    repeats: np.ndarray
+    means: np.ndarray
+    noise: Noise
+
+    @classmethod
+    def of(cls, theta: np.ndarray, values: np.ndarray, noise: Noise) -> BaseRuns:
+        """Take the repeats among runs (n, factors), (n, observables) together."""
+        points, groups, repeats = np.unique(theta, axis=0, return_inverse=True, return_counts=True)
+        sums = np.zeros((len(points), values.shape[1]))
+        np.add.at(sums, groups.reshape(-1), values)
+        return cls(points, repeats, sums / repeats[:, None], noise)
+
+    @property
+    def terms(self) -> np.ndarray:
+        """Terms of the base, each row as many times as its runs say it: by the root of their number."""
+        return np.asarray(np.sqrt(self.repeats)[:, None] * cubic(self.theta))
+
+    @property
+    def response(self) -> np.ndarray:
+        """The means likewise, with the noise of one run, (n, observables)."""
+        return np.asarray(np.sqrt(self.repeats)[:, None] * self.means)
+
+
+def fit_bases(conditions: Sequence[BaseRuns]) -> list[Surfaces]:
+    """Fit the emulators of all conditions without mechanisms.
+
+    The terms of third order are drawn towards nothing as those of the mechanisms are (`fit_additions`).
+    """
+    free = quadratic(conditions[0].theta).shape[1]
+    grams, moments = [], []
+    for runs in conditions:
+        linear, higher = runs.terms[:, :free], runs.terms[:, free:]
+        left = higher - linear @ (np.linalg.pinv(linear) @ higher)
+        grams.append(left.T @ left)
+        moments.append(left.T @ runs.response / np.sqrt(runs.noise.variance(runs.theta).mean(axis=0)))
+    scales = np.append(np.full(free, np.inf), likeliest_scales(grams, moments))
+    return [_fit_base(runs, scales) for runs in conditions]
+
+
+def _fit_base(runs: BaseRuns, scales: np.ndarray) -> Surfaces:
+    """Least squares and leave-one-out; what is smooth in the rest is kriged where they fail."""
+    fitted, noise = _Shrunk.of(runs.terms, runs.response, scales), runs.noise.variance(runs.theta)
+    excess = fitted.residual**2 / (1.0 - fitted.leverage)
+    freedom, degrees = len(noise) - fitted.leverage.sum(), runs.noise.degrees_of_freedom
+    ratio = excess.mean(axis=0) / noise.mean(axis=0)
+    repeats = runs.repeats[:, None]
+    beyond = ratio > stats.f.isf(MISFIT_LEVEL, freedom, degrees)
+    misfit = np.where(beyond, ((excess - noise) / repeats).mean(axis=0), 0.0).clip(min=0.0)
+    kriging = {}
+    for column in np.flatnonzero(ratio > stats.f.isf(FAILURE_LEVEL, freedom, degrees)):
+        missed, scatter = fitted.residual / np.sqrt(repeats), noise / repeats
+        smooth = fit_kriging(runs.theta, missed[:, column], scatter[:, column])
+        if np.mean(smooth.leave_one_out**2) < BETTER * np.mean(missed[:, column] ** 2):
+            kriging[int(column)] = smooth
+    base = Polynomial(fitted.coefficients, misfit, kriging)
+    return Surfaces(base, fitted.gram_inverse, runs.noise, {})
+
+
+@dataclass(frozen=True, eq=False)
+class AddedRuns:
+    """Runs with one mechanism in one condition.
+
+    Attributes
+    ----------
+    base : Surfaces
+        Of the condition.
+    theta : (n, factors) array
+    size : (n,) array
+        Coded.
+    values : (n, observables) array
+    """
+
+    base: Surfaces
+    theta: np.ndarray
+    size: np.ndarray
+    values: np.ndarray
+
+    @property
+    def terms(self) -> np.ndarray:
+        """Terms of what the mechanism adds, (n, terms)."""
+        return added(self.theta, self.size)
+
+    @property
+    def difference(self) -> np.ndarray:
+        """What it added, with noise, (n, observables)."""
+        return np.asarray(self.values - self.base.predict(self.theta, ()))
+
+    @property
+    def noise(self) -> np.ndarray:
+        """Variances of one run without the mechanism, (n, observables)."""
+        return self.base.noise.variance(self.theta)
+
+
+def fit_additions(conditions: Sequence[AddedRuns]) -> list[Addition]:
+    """Fit what one mechanism adds in every condition.
+
+    How large its coefficients are, in standard deviations of one run, all conditions and observables say
+    together (`likeliest_scales`); each is as much nearer to nothing as its noise makes it.
+    """
+    grams = [runs.terms.T @ runs.terms for runs in conditions]
+    scales = np.full(len(grams[0]), FIRST_SCALE)
+    for _ in range(SCALE_ROUNDS):
+        variances = [_addition_variance(runs, scales) for runs in conditions]
+        moments = [
+            runs.terms.T @ runs.difference / np.sqrt(variance)
+            for runs, variance in zip(conditions, variances, strict=True)
+        ]
+        scales = likeliest_scales(grams, moments)
+    return _with_correlations(conditions, [_fit_addition(runs, scales) for runs in conditions])
+
+
+def _with_correlations(conditions: Sequence[AddedRuns], additions: Sequence[Addition]) -> list[Addition]:
+    """Let all conditions say together how observables hang together under a mechanism.
+
+    They count by their sizes, and the correlation without the mechanism as `ALIKE` runs.
+    """
+    standard = [
+        (runs.difference - one.predict(runs.theta, runs.size))
+        / np.sqrt(runs.noise * np.exp(runs.size[:, None] * one.growth))
+        for runs, one in zip(conditions, additions, strict=True)
+    ]
+    sizes = np.concatenate([runs.size for runs in conditions])
+    seen, worth = correlation_of(np.concatenate(standard), sizes), sizes.sum() ** 2 / (sizes**2).sum()
+    return [
+        replace(one, correlation=(ALIKE * one.correlation + worth * seen) / (ALIKE + worth))
+        for one in additions
+    ]
+
+
+def _growth(runs: AddedRuns, fitted: _Shrunk) -> np.ndarray:
+    """A heap with a mechanism scatters more: an excess of the residuals is noise unless it is smooth."""
+    return fit_growth(runs.size, fitted.residual**2 / (1.0 - fitted.leverage) / runs.noise)
+
+
+def _mean_variance(runs: AddedRuns, growth: np.ndarray) -> np.ndarray:
+    return np.asarray((runs.noise * np.exp(runs.size[:, None] * growth)).mean(axis=0))
+
+
+def _addition_variance(runs: AddedRuns, scales: np.ndarray) -> np.ndarray:
+    fitted = _Shrunk.of(runs.terms, runs.difference, scales)
+    return _mean_variance(runs, _growth(runs, fitted))
+
+
+def _fit_addition(runs: AddedRuns, scales: np.ndarray) -> Addition:
+    theta, size, noise = runs.theta, runs.size, runs.noise
+    fitted = _Shrunk.of(runs.terms, runs.difference, scales)
+    growth = _growth(runs, fitted)
+    points = np.column_stack([theta, size])
+    left_out = fitted.residual / (1.0 - fitted.leverage)
+    freedom, kept = len(size) - fitted.leverage.sum(), size >= LEAST_SIZE
+    suspect = (left_out**2 * (1.0 - fitted.leverage) / noise).mean(axis=0) > stats.f.isf(
+        FAILURE_LEVEL, freedom, runs.base.noise.degrees_of_freedom
+    )
+    kriging = {}
+    for column in np.flatnonzero(suspect):
+        scatter = noise[:, column] * np.exp(size * growth[column])
+        missed = fitted.residual[kept, column] / size[kept]
+        smooth = fit_kriging(points[kept], missed, scatter[kept] / size[kept] ** 2)
+        alone = smooth.leave_one_out * size[kept]
+        plain = fitted.residual[kept, column]
+        if np.mean(alone**2 / scatter[kept]) < BETTER * np.mean(plain**2 / scatter[kept]):
+            kriging[int(column)] = smooth
+            growth[column] = fit_growth(size[kept], (alone**2 / noise[kept, column])[:, None])[0]
+    return Addition(
+        Polynomial(fitted.coefficients, np.zeros(len(growth)), kriging),
+        fitted.inverse @ cubic(theta),
+        fitted.gram_inverse,
+        growth,
+        _mean_variance(runs, growth),
+        runs.base.noise.correlation,
+    )
+
+
+def likeliest_scales(grams: Sequence[np.ndarray], moments: Sequence[np.ndarray]) -> np.ndarray:
+    """Standard deviations of coefficients of largest likelihood, given data y.
+
+    Data scatter about X times the coefficients with variance one, coefficients about nothing with the squares
+    of the scales (Efron and Morris 1973), which expectation and maximisation find.
+
+    Parameters
+    ----------
+    grams : sequence of (terms, terms) array
+        X'X of each condition.
+    moments : sequence of (terms, observables) array
+        X'y of each.
+
+    Returns
+    -------
+    (terms,) array
+    """
+    squares = np.ones(len(grams[0]))
+    for _ in range(EM_STEPS):
+        total = np.zeros_like(squares)
+        for gram, moment in zip(grams, moments, strict=True):
+            covariance = np.linalg.inv(gram + np.diag(1.0 / squares))
+            mean = covariance @ moment
+            total += np.mean(mean**2, axis=1) + np.diag(covariance)
+        squares = np.maximum(total / len(grams), LEAST_SCALE**2)
+    return np.sqrt(squares)
