@@ -136,6 +136,23 @@ def test_a_grain_that_leaves_the_domain_is_taken_out():
     assert solver.flags.numpy()[0] == 0
 
 
+def test_what_a_scene_sees_at_a_glance_is_of_the_living_grains_alone():
+    solver = solve(heap(1), heap(2), precision="mixed")
+    solver.advance(2)
+    solver.remove(1, np.array([0, 3]))
+    [second, first] = solver.view([1, 0])
+    for view, living in ((second, len(second.alive) - 2), (first, len(first.alive))):
+        speeds = np.linalg.norm(view.velocities[view.alive].astype(float), axis=1)
+        assert len(speeds) == living
+        # Speeds are summed in single precision.
+        assert view.rms_speed == pytest.approx(np.sqrt(np.mean(speeds**2)), rel=1e-5)
+        assert view.fastest == pytest.approx(speeds.max(), rel=1e-6)
+        assert view.highest == view.positions[view.alive, 2].max()
+    solver.remove(0, np.arange(len(first.alive)))
+    [empty] = solver.view([0])
+    assert (empty.rms_speed, empty.fastest, empty.highest) == (0.0, 0.0, -np.inf)
+
+
 def test_a_removed_grain_touches_nothing_more():
     # One ball on another that stands on the plane; without it, the upper one falls through its place.
     bodies = grains([[0.0, 0.0, RADIUS], [0.0, 0.0, 3.0 * RADIUS]])
