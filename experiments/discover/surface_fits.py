@@ -55,7 +55,7 @@ def repeats_noise(theta: np.ndarray, values: np.ndarray, floor: np.ndarray) -> N
     Raises
     ------
     InputError
-        With too few finished runs for the noise or the polynomial of `fit_base`.
+        With too few finished runs for the noise or the polynomial of `fit_bases`.
     """
     points, groups = np.unique(theta, axis=0, return_inverse=True)
     rows, deviations = repeat_deviations(groups.reshape(-1), values)

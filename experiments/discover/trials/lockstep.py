@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import sys
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -172,7 +173,8 @@ def _one_thread_each() -> Iterator[None]:
 def _serve(pipe: Connection) -> None:
     """Be told how analyses begin, and run them until the other end of the pipe closes."""
     # Whoever simulates meanwhile goes first: a GPU must not wait for a core.
-    os.nice(POLITE)
+    if sys.platform != "win32":
+        os.nice(POLITE)
     try:
         crew = LocalCrew(pipe.recv())
     except EOFError:

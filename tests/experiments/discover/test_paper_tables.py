@@ -9,7 +9,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from experiments.benchmarks.paper_disagreement import disagreement_page
+from experiments.benchmarks.paper_disagreement import PAGE, disagreement_page
+from experiments.benchmarks.paper_record import FOLDER
 from experiments.discover.discovery import Discovery, Verdict
 from experiments.discover.paper_tables import (
     CENTRE,
@@ -199,3 +200,7 @@ def test_runs_that_agree_lack_nothing(incomplete) -> None:
     found = concluded(published_heaps(), tables_emulator(agreeing, incomplete[1]), RULES)
     assert (found.verdict, found.candidates) == (Verdict.NONE, ())
     assert found.effort.fresh_cases == 0
+
+
+def test_the_page_in_the_record_was_made_by_the_default_rules() -> None:
+    assert Settings().sha256 in (FOLDER / PAGE).read_text(encoding="utf-8")
