@@ -21,12 +21,13 @@ from experiments.discover.discovery import (
     Effort,
     Gap,
     NextExperiment,
+    Question,
     Verdict,
 )
 from experiments.discover.emulator import Emulator
 from experiments.discover.evidence import Evidence, gather
 from experiments.discover.fitting import Fitted, fit, weigh
-from experiments.discover.gap import GapTest, find_gap
+from experiments.discover.gap import OF_A_CANDIDATE, OF_THE_BASE, GapTest, find_gap
 from experiments.discover.held_out import held_out_gain
 from experiments.discover.laboratory import Laboratory, Request
 from experiments.discover.measured import Measured
@@ -117,7 +118,7 @@ def _search(parts: _Parts, base: _Base) -> Analysis:
         return parts.discovery(base, Decision(Verdict.NONE, (), reason, None), [])
     singles = parts.assess(base, {names: one for names, one in contenders.items() if names})
     decision, assessments = decide(singles, settings), singles
-    if decision.verdict in (Verdict.UNKNOWN, Verdict.INCOMPLETE) and _nothing_fits(singles, settings):
+    if decision.verdict is Verdict.UNKNOWN and _nothing_fits(singles, settings):
         pairs = yield from _pairs(parts, base, singles)
         with_two = decide(pairs, settings) if pairs else decision
         if with_two.chosen is not None:
@@ -182,20 +183,20 @@ class _Parts:
     def base(self, fitted: Fitted) -> _Base:
         """Look at the calibrated base."""
         seen = signatures(fitted)
-        gap = self._gap(fitted, self.settings.false_alarm)
+        gap = self._gap(fitted, self.settings.false_alarm, OF_THE_BASE)
         effects = Effects.of(fitted, seen)
         return _Base(fitted, gap, seen, effects, visibilities(effects, seen.shares, self.settings))
 
-    def _gap(self, fitted: Fitted, level: float) -> GapTest:
+    def _gap(self, fitted: Fitted, level: float, questions: Sequence[Question]) -> GapTest:
         """Test a model on all conditions: those that it was fitted to, and those that it forecasts."""
         whole = weigh(Stack(fitted.model, (*self.evidence.training, *self.evidence.held_out)), fitted.x)
-        return find_gap(whole, signatures(whole), level, self.settings.draws, self.seed)
+        return find_gap(whole, signatures(whole), level, self.settings.draws, self.seed, questions)
 
     def assess(self, base: _Base, contenders: Contenders) -> list[Assessment]:
         """Look at contenders by every rule, best first."""
         settings, out = self.settings, []
         for names, one in contenders.items():
-            gap = self._gap(one.fitted, settings.fit_level)
+            gap = self._gap(one.fitted, settings.fit_level, OF_A_CANDIDATE)
             gain = held_out_gain(base.fitted, one.fitted, self.evidence.held_out, settings.draws, self.seed)
             share = explained_share(base.gap, gap)
             same = frozenset[str]()

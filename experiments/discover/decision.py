@@ -163,10 +163,8 @@ def decide(assessments: Sequence[Assessment], settings: Settings) -> Decision:
         return _named(assessments, order[0], order[1:])
     if passing:
         failed = ["it was declared that such data cannot tell it from others"]
-    elif _is_incomplete(best, len(close), failed, settings):
-        reason = f"{_title(best)} explains {best.explained:.0%} of the excess, but {failed[0]}"
-        return Decision(Verdict.INCOMPLETE, best.mechanisms, reason, order[0])
-    return Decision(Verdict.UNKNOWN, (), f"{_title(best)} comes closest, but {failed[0]}", None)
+    closest = f"{_title(best)} comes closest and removes {best.explained:.0%} of the excess"
+    return Decision(Verdict.UNKNOWN, (), f"{closest}, but {failed[0]}", None)
 
 
 def _named(assessments: Sequence[Assessment], chosen: int, others: Sequence[int]) -> Decision:
@@ -183,18 +181,12 @@ def _named(assessments: Sequence[Assessment], chosen: int, others: Sequence[int]
     return Decision(Verdict.NAMED, best.mechanisms, reason, chosen)
 
 
-def _is_incomplete(best: Assessment, close: int, failed: Sequence[str], settings: Settings) -> bool:
-    """Whether a single mechanism is to be named although the data still disagree a little."""
-    only_the_fit = best.gap.p < settings.fit_level and len(failed) == 1
-    alone = close == 1 and len(best.mechanisms) == 1 and best.declared
-    return only_the_fit and alone and best.explained >= settings.incomplete_share
-
-
 def _answer(answer: Answer) -> str:
     statistic = {
         Question.SIZE: "Q =",
         Question.FALL: f"{_spaced(answer.mechanism)} would lower Q by",
         Question.SCORES: "the squared scores sum to",
+        Question.COMMON: "what is off alike in all conditions has a sum of squares of",
     }[answer.question]
     return f"{statistic} {answer.value:.1f}, limit {answer.limit:.1f}"
 

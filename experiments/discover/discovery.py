@@ -25,8 +25,6 @@ class Verdict(StrEnum):
     """One mechanism, or one pair, explains the disagreement, and no other does."""
     TIE = "tie"
     """Several mechanisms explain it equally well."""
-    INCOMPLETE = "incomplete"
-    """A mechanism explains part of it beyond doubt; something else is missing too."""
     UNKNOWN = "unknown"
     """The model disagrees with the data, and nothing in the library explains it."""
     NOT_IDENTIFIABLE = "not_identifiable"
@@ -75,6 +73,8 @@ class Question(StrEnum):
     """Whether they point at one mechanism: the largest fall of Q that a positive size of one brings."""
     SCORES = "scores"
     """Whether they lie where mechanisms act at all, either way: the sum of all squared scores."""
+    COMMON = "common"
+    """Whether observables are off alike in all conditions: the sum of squares of what they have in common."""
 
 
 @dataclass(frozen=True)
@@ -192,7 +192,7 @@ class Candidate:
         Size of each mechanism in the joint refit.
     size_over_se : tuple of float
         Each size over its standard error.
-    q, degrees_of_freedom, q_limit : float
+    q, degrees_of_freedom, p_value : float
         Of the joint refit, as in ``Fit``.
     explained : float
         Share of the base's excess that it removes.
@@ -213,7 +213,7 @@ class Candidate:
     size_over_se: tuple[float, ...]
     q: float
     degrees_of_freedom: int
-    q_limit: float
+    p_value: float
     explained: float
     held_out_gain: Interval | None
     simulated: bool
@@ -296,7 +296,7 @@ class Discovery:
     reason : str
         The rule that gave the verdict, with its numbers, as a sentence.
     named : tuple of str
-        The mechanisms of the verdict: one or two if named or incomplete, all of them in a tie, else none.
+        The mechanisms of the verdict: one or two if named, all of them in a tie, else none.
     factors : tuple of str
         Names of theta.
     data : Data

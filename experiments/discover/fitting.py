@@ -109,7 +109,8 @@ def minimise(
     ----------
     stack : Stack
     whitening : (means, means) array
-    target : (means,) array
+    target : (means,) or (n, means) array
+        Of all, or of each.
     starts : (n, parameters) array
     lower, upper : (parameters,) or (n, parameters) array
         Equal ends fix a parameter.

@@ -2,23 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy import stats
+from scipy.linalg import orth
 
 from experiments.discover.discovery import Answer, Question
 from experiments.discover.fitting import Fitted, fit
 from experiments.discover.model import Stack
 from experiments.discover.ranking import Signatures, projector
 
+OF_THE_BASE = (Question.SIZE, Question.FALL, Question.SCORES)
+"""Asked of a model to which a mechanism of the library may be added. The last looks where mechanisms change
+heaps at all, whichever way: there lies, most likely, what the library lacks, too."""
+
+OF_A_CANDIDATE = (Question.SIZE, Question.COMMON)
+"""Asked of a model that is to be believed. What the library lacks moves an observable in all conditions, and
+an emulator errs here and there. At 10 % these refuse 36 of the 39 best candidates of the fourth blind trials
+whose hidden effect the library lacked, and 3 of 132 true ones; those asked of the base 33, and 13."""
+
 
 @dataclass(frozen=True, eq=False)
 class GapTest:
-    """Every `Question` to the whitened residuals at once.
-
-    The last one looks where mechanisms change heaps at all, whichever way: there lies, most likely, what the
-    library lacks, too.
+    """Questions to the whitened residuals of a model, all at once.
 
     Attributes
     ----------
@@ -34,7 +42,7 @@ class GapTest:
     mechanism : str
         Of that fall; empty without a library.
     p : float
-        Of the smallest of the three p values, by the same bootstrap.
+        Of the smallest p value of the questions asked, by the same bootstrap.
     clearest : Answer
         To the question of that smallest p value; beyond its limit where there is a gap.
     level : float
@@ -63,7 +71,14 @@ class GapTest:
         return max(self.q - self.freedom, 0.0)
 
 
-def find_gap(fitted: Fitted, seen: Signatures, level: float, draws: int, seed: int) -> GapTest:
+def find_gap(
+    fitted: Fitted,
+    seen: Signatures,
+    level: float,
+    draws: int,
+    seed: int,
+    questions: Sequence[Question] = OF_THE_BASE,
+) -> GapTest:
     """Test a calibrated model by parametric bootstrap, each draw refitted (linearised at the optimum).
 
     Conditions that took no part in the calibration may be among those of ``fitted``: what a linear refit to
@@ -79,15 +94,18 @@ def find_gap(fitted: Fitted, seen: Signatures, level: float, draws: int, seed: i
     level : float
         Probability of a gap where there is none.
     draws, seed : int
+    questions : sequence of Question
+        Which decide.
     """
     project = projector(fitted.sensitivities)
     noise = np.random.default_rng(seed).standard_normal((draws, len(project))) @ project
     left = project @ fitted.residuals
-    scores = seen.directions @ left
-    drawn, found = _statistics(noise, noise @ seen.directions.T), _statistics(left, scores)
+    common = _common_directions(fitted, project)
+    drawn, found = (_statistics(each, seen.directions, common) for each in (noise, left))
     limits = {of: float(np.quantile(values, 1.0 - level)) for of, values in drawn.items()}
-    p_values = {of: _exceeded(values, float(found[of])) for of, values in drawn.items()}
-    smallest = np.min([_own_p(values) for values in drawn.values()], axis=0)
+    p_values = {of: _exceeded(drawn[of], float(found[of])) for of in questions}
+    smallest = np.min([_own_p(drawn[of]) for of in questions], axis=0)
+    scores = seen.directions @ left
     clearest = min(p_values, key=p_values.__getitem__)
     mechanism = seen.names[int(np.argmax(scores))] if seen.names else ""
     return GapTest(
@@ -110,12 +128,27 @@ def find_gap(fitted: Fitted, seen: Signatures, level: float, draws: int, seed: i
     )
 
 
-def _statistics(residuals: np.ndarray, scores: np.ndarray) -> dict[Question, np.ndarray]:
-    """What answers each question, of residuals (..., n) and their scores (..., mechanisms)."""
+def _common_directions(fitted: Fitted, project: np.ndarray) -> np.ndarray:
+    """Basis of what a refit leaves of an observable's being off alike in all conditions, (k, means).
+
+    Alike: by as many standard deviations of its mean.
+    """
+    columns = np.concatenate([block.columns for block in fitted.stack.blocks])
+    deviations = np.sqrt(np.diag(fitted.covariance))
+    alike = (columns == np.unique(columns)[:, None]) * deviations
+    return orth(project @ fitted.whitening @ alike.T).T
+
+
+def _statistics(
+    residuals: np.ndarray, signatures: np.ndarray, common: np.ndarray
+) -> dict[Question, np.ndarray]:
+    """What answers each question, of residuals (..., n)."""
+    scores = residuals @ signatures.T
     return {
         Question.SIZE: (residuals**2).sum(axis=-1),
         Question.FALL: (np.maximum(scores, 0.0) ** 2).max(axis=-1, initial=0.0),
         Question.SCORES: (scores**2).sum(axis=-1),
+        Question.COMMON: ((residuals @ common.T) ** 2).sum(axis=-1),
     }
 
 

@@ -7,18 +7,24 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy import stats
+from scipy.interpolate import interp1d
 
 from experiments.discover.emulator import Emulator
 from experiments.discover.evidence import Block
-from experiments.discover.fitting import Fitted
+from experiments.discover.fitting import Fitted, minimise
 from experiments.discover.settings import Settings
 
 SECANT = 0.5
 """Coded size at which a signature is taken: an effect a unit of size."""
 SIZES = np.linspace(0.0, 1.0, 201)[1:]
 """Coded sizes that the smallest visible one is searched on."""
-SAME = 0.98
-"""Correlation from which two signatures are one: an emulator is not right to a fifth of an effect."""
+KNOTS = np.linspace(0.0, 1.0, 11)
+"""Coded sizes at which calibration is asked what it takes up; straight in between."""
+TRUSTED = 0.8
+"""Part of an effect that an emulator is right about. In the fourth blind trials wall adhesion, most of which
+looks like another friction, was seen with half of the standard deviations that it promised."""
+SAME = (1.0 - (1.0 - TRUSTED) ** 2) ** 0.5
+"""Correlation from which two signatures are one: they differ by less than that."""
 LEAST_LENGTH = 1e-6
 """A signature that is shorter (whitened) is not seen at all."""
 
@@ -106,25 +112,36 @@ class Effects:
     names : tuple of str
     visible : (mechanisms, sizes, means) array
         Whitened, at the coded `SIZES`.
+    whole : (mechanisms, sizes) array
+        Squared lengths without the refit.
     correlations : (mechanisms, mechanisms) array
         Between visible signatures.
     """
 
     names: tuple[str, ...]
     visible: np.ndarray
+    whole: np.ndarray
     correlations: np.ndarray
 
     @classmethod
     def of(cls, fitted: Fitted, seen: Signatures) -> Effects:
-        """Of the mechanisms that are not in a fitted model."""
-        project = projector(fitted.sensitivities) @ fitted.whitening
-        theta = fitted.x[: len(fitted.model.emulator.space.factors)]
-        visible = [
-            secants(fitted.model.emulator, fitted.stack.blocks, theta, name, SIZES) @ project.T
-            for name in seen.names
-        ]
-        shape = (len(seen.names), len(SIZES), len(project))
-        return cls(seen.names, np.array(visible).reshape(shape), seen.correlations)
+        """Of the mechanisms that are not in a fitted model.
+
+        The refit is one in full, within the ranges: what looks unlike any small change of the factors may be
+        like a large one, as an adhesion of the walls is like much more friction.
+        """
+        stack, theta = fitted.stack, fitted.x[: len(fitted.model.emulator.space.factors)]
+        shape = (len(seen.names), len(KNOTS), len(fitted.covariance))
+        added = np.reshape(
+            [secants(stack.model.emulator, stack.blocks, theta, name, KNOTS) for name in seen.names], shape
+        )
+        targets = added.reshape(-1, shape[-1]) + stack.predict(fitted.x[None])
+        starts = np.repeat(fitted.x[None], len(targets), axis=0)
+        bounds = fitted.model.lower, fitted.model.upper
+        x, _ = minimise(stack, fitted.whitening, targets, starts, *bounds)
+        left = (targets - stack.predict(x)).reshape(shape)
+        visible, whole = (interp1d(KNOTS, each @ fitted.whitening.T, axis=1)(SIZES) for each in (left, added))
+        return cls(seen.names, visible, (whole**2).sum(axis=2), seen.correlations)
 
     @property
     def squares(self) -> np.ndarray:
@@ -146,6 +163,25 @@ class Effects:
                 same = self.correlations[index, rival] >= SAME
                 out[rival] = 0.0 if same else np.clip(nearest, 0.0, squares[index])
         return out
+
+    def power(self, settings: Settings) -> np.ndarray:
+        """Probability that a mechanism of every size is found and told from every other.
+
+        It is found where its visible effect, less what an emulator may be wrong about, is ``least_ratio``
+        standard deviations. It is told from a rival where that is further behind in Q than a tie: the
+        difference in Q of models d apart is d^2 +- 2 d.
+
+        Returns
+        -------
+        (mechanisms, sizes) array
+            The smaller of the two probabilities.
+        """
+        trusted = np.maximum(self.squares - (1.0 - TRUSTED) ** 2 * self.whole, 0.0)
+        found = stats.norm.cdf(np.sqrt(trusted) - settings.least_ratio)
+        nearest = np.array([self.apart(index).min(axis=0) for index in range(len(self.names))])
+        nearest = np.maximum(nearest, LEAST_LENGTH**2).reshape(found.shape)
+        told = stats.norm.cdf((nearest - settings.tie_margin) / (2.0 * np.sqrt(nearest)))
+        return np.minimum(found, told)
 
 
 def alike(effects: Effects, name: str, size: float, margin: float) -> frozenset[str]:
@@ -184,10 +220,6 @@ class Visibility:
 def visibilities(effects: Effects, shares: np.ndarray, settings: Settings) -> tuple[Visibility, ...]:
     """Power of the data for every mechanism.
 
-    A mechanism is found where its visible effect is ``least_ratio`` standard deviations and what the power
-    asks beyond. It is told from a rival where that is further behind in Q than a tie: the difference in Q of
-    models d apart is d^2 +- 2 d.
-
     Parameters
     ----------
     effects : Effects
@@ -196,13 +228,22 @@ def visibilities(effects: Effects, shares: np.ndarray, settings: Settings) -> tu
         See `Visibility`.
     settings : Settings
     """
-    quantile = float(stats.norm.ppf(settings.power))
-    least = (settings.least_ratio + quantile) ** 2
-    least_apart = (quantile + np.sqrt(quantile**2 + settings.tie_margin)) ** 2
     out = []
-    for index, name in enumerate(effects.names):
-        shown = (effects.squares[index] >= least) & (effects.apart(index).min(axis=0) >= least_apart)
-        gamma80 = float(SIZES[shown.argmax()]) if shown.any() else float("inf")
-        resolvable = shown.any() if settings.resolvable is None else name in settings.resolvable
-        out.append(Visibility(name, gamma80, float(shares[index]), bool(resolvable)))
+    for name, power, share in zip(effects.names, effects.power(settings), shares, strict=True):
+        gamma80 = smallest_shown(power, settings)
+        resolvable = np.isfinite(gamma80) if settings.resolvable is None else name in settings.resolvable
+        out.append(Visibility(name, gamma80, float(share), bool(resolvable)))
     return tuple(out)
+
+
+def smallest_shown(power: np.ndarray, settings: Settings) -> float:
+    """Smallest coded size that is shown with the power of the settings, infinite if none is.
+
+    Parameters
+    ----------
+    power : (sizes,) array
+        At the coded `SIZES`.
+    settings : Settings
+    """
+    shown = power >= settings.power
+    return float(SIZES[shown.argmax()]) if shown.any() else float("inf")

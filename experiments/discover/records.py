@@ -148,7 +148,7 @@ def candidate_record(
         size_over_se=tuple(float(value) for value in assessment.ratios),
         q=assessment.gap.q,
         degrees_of_freedom=assessment.gap.freedom,
-        q_limit=assessment.gap.q_limit,
+        p_value=assessment.gap.p,
         explained=assessment.explained,
         held_out_gain=assessment.gain,
         simulated=assessment.simulated,

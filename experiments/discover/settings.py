@@ -40,8 +40,6 @@ class Settings:
         Mechanisms within so much of the best are a tie: in Q plus the logarithm of the determinant, less
         twice the held-out gain, which is minus twice a log-likelihood. Those that should look the same
         are one within somewhat more (`decision.is_open`).
-    incomplete_share : float
-        Least share of the excess that a mechanism explains which is named although something is left.
     power : float
         Probability at which ``gamma80`` is stated.
     systematic : float
@@ -66,15 +64,14 @@ class Settings:
         Mechanisms that may be named. None: any that the data tell from every other.
     """
 
-    bank_points: int = 160
+    bank_points: int = 128
     bank_repeats: int = 2
-    bank_mechanism_points: int = 64
+    bank_mechanism_points: int = 56
     false_alarm: float = 0.025
-    fit_level: float = 0.05
+    fit_level: float = 0.1
     least_ratio: float = 3.0
     pair_ratio: float = 5.0
     tie_margin: float = 8.0
-    incomplete_share: float = 0.97
     power: float = 0.8
     systematic: float = 0.1
     draws: int = 4000
@@ -88,7 +85,7 @@ class Settings:
     resolvable: tuple[str, ...] | None = None
 
     def __post_init__(self) -> None:
-        for name in ("false_alarm", "fit_level", "incomplete_share", "power"):
+        for name in ("false_alarm", "fit_level", "power"):
             if not 0.0 < getattr(self, name) < 1.0:
                 raise InputError("must lie between 0 and 1", getattr(self, name), f"Settings.{name}")
         least = {"bank_points": 10, "bank_repeats": 2, "bank_mechanism_points": 4, "draws": 100}

@@ -11,10 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from experiments.discover.analysis import analyse
-from experiments.discover.discovery import Discovery
+from experiments.discover.bank import sobol
 from experiments.discover.emulator import Emulator
-from experiments.discover.measured import Measured
+from experiments.discover.evidence import Block
+from experiments.discover.fitting import weigh
+from experiments.discover.model import Model, Stack
+from experiments.discover.ranking import Effects, signatures, smallest_shown
 from experiments.discover.settings import Settings
 from experiments.discover.trials.drawing import Effect, Plan
 from experiments.errors import InputError
@@ -22,6 +24,9 @@ from experiments.files import write_text
 
 KIN = 0.9
 """Mechanisms whose visible signatures correlate by more than this are alike: no data tell them apart."""
+
+THETAS = 32
+"""Points in the ranges of the factors at which the power is taken."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +43,7 @@ class Declaration:
     settings : Settings
         Of the analysis; what it may name is declared in it.
     library : tuple of Effect
-        Mechanisms with their gamma80, at the middle of the factors' ranges, with the plan's replicates.
+        Mechanisms with their gamma80, with the plan's replicates.
     strangers : tuple of Effect
         What the library never has.
     """
@@ -87,16 +92,23 @@ def _effect(record: dict[str, Any]) -> Effect:
 def declared_effects(emulator: Emulator, settings: Settings, replicates: int) -> tuple[Effect, ...]:
     """What so many replicates of every condition should show of each mechanism of the library.
 
-    An analysis of data that agree with the base model at the middle of every factor's range says so.
+    The power is the mean over the ranges of the factors, as truths are drawn from all of them.
     """
-    found = _found(analyse(perfect_data(emulator, replicates), emulator, settings, seed=0))
-    ranges = {mechanism.name: mechanism for mechanism in emulator.space.mechanisms}
-    kin, effects = _kin(found), []
-    for power in found.power:
-        span = ranges[power.mechanism]
-        gamma80 = abs(power.gamma80 - span.null)
-        effects.append(Effect(span.name, span.null, span.maximum, gamma80, power.resolvable, kin[span.name]))
-    return tuple(effects)
+    ranges = emulator.space
+    powers, correlations = [], []
+    for theta in 2.0 * sobol(THETAS, len(ranges.factors), seed=0) - 1.0:
+        stack = Stack(Model(emulator, (), settings.systematic), perfect_means(emulator, theta, replicates))
+        fitted = weigh(stack, theta)
+        effects = Effects.of(fitted, signatures(fitted))
+        powers.append(effects.power(settings))
+        correlations.append(np.abs(effects.correlations))
+    kin = _kin(ranges.names, np.mean(correlations, axis=0))
+    out = []
+    for span, power in zip(ranges.mechanisms, np.mean(powers, axis=0), strict=True):
+        size = smallest_shown(power, settings)
+        gamma80, told = size * abs(span.maximum - span.null), math.isfinite(size)
+        out.append(Effect(span.name, span.null, span.maximum, gamma80, told, kin[span.name]))
+    return tuple(out)
 
 
 def with_names(settings: Settings, library: Sequence[Effect]) -> Settings:
@@ -104,34 +116,32 @@ def with_names(settings: Settings, library: Sequence[Effect]) -> Settings:
     return replace(settings, resolvable=tuple(effect.name for effect in library if effect.resolvable))
 
 
-def perfect_data(emulator: Emulator, replicates: int) -> Measured:
-    """Replicates that scatter as the model's heaps do, about means that are exactly the model's."""
-    rng = np.random.default_rng(0)
-    middle = np.zeros(len(emulator.space.factors))
-    values = {}
-    for condition, surfaces in emulator.surfaces.items():
-        scatter = rng.multivariate_normal(
-            np.zeros(len(emulator.observables)), surfaces.noise.covariance(middle), replicates
+def perfect_means(emulator: Emulator, theta: np.ndarray, replicates: int) -> tuple[Block, ...]:
+    """Means of so many replicates in every training condition that are exactly the model's.
+
+    Parameters
+    ----------
+    emulator : Emulator
+    theta : (factors,) array
+        Coded.
+    replicates : int
+    """
+    count = len(emulator.observables)
+    return tuple(
+        Block(
+            condition,
+            np.arange(count),
+            surfaces.predict(theta[None], ())[0],
+            np.full((count, count), 1.0 / replicates),
+            np.ones(count),
         )
-        values[condition] = surfaces.predict(middle[None], ()) + scatter - scatter.mean(axis=0)
-    return Measured(tuple(values), emulator.observables, values)
+        for condition, surfaces in emulator.surfaces.items()
+        if not emulator.space.is_held_out(condition)
+    )
 
 
-def _found(analysis: Any) -> Discovery:
-    """End of an analysis that must not need a wave."""
-    try:
-        next(analysis)
-    except StopIteration as end:
-        found: Discovery = end.value
-        return found
-    raise InputError("the base model must agree with its own emulator", "a gap", "declaration")
-
-
-def _kin(found: Discovery) -> dict[str, tuple[str, ...]]:
+def _kin(names: Sequence[str], correlations: np.ndarray) -> dict[str, tuple[str, ...]]:
     """By mechanism: those that look like it after calibration."""
-    if found.confounding is None:
-        return {power.mechanism: () for power in found.power}
-    names, correlations = found.confounding.mechanisms, np.abs(found.confounding.correlations)
     return {
         name: tuple(other for j, other in enumerate(names) if j != i and correlations[i, j] > KIN)
         for i, name in enumerate(names)

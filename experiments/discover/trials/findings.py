@@ -72,7 +72,7 @@ class Finding:
         """Take what is kept from an analysis."""
         if isinstance(end, Crash):
             return cls(trial, view, CRASH, reason=end.traceback.strip().splitlines()[-1])
-        named = end.named if end.verdict in (Verdict.NAMED, Verdict.INCOMPLETE, Verdict.TIE) else ()
+        named = end.named if end.verdict in (Verdict.NAMED, Verdict.TIE) else ()
         size = Interval(math.nan, math.nan, math.nan)
         if end.chosen is not None and end.verdict is not Verdict.TIE and end.chosen.sizes:
             size = end.chosen.sizes[0]

@@ -128,7 +128,7 @@ def _view(rows: pd.DataFrame, view: str, heading: str, declared: Declaration, fo
         _figures(found) if view in _UNAIMED else _aims(found),
         f"![shares of alarms and names by effect](power-{view}.png)\n",
         f"![answers by truth](confusion-{view}.png)\n",
-        "Strong effects have a row each; *incomplete* counts by its name. In brackets: trials.\n",
+        "Strong effects have a row each. In brackets: trials.\n",
         "### Strong effects, by mechanism\n",
         markdown_table(by_mechanism(rows).reset_index()),
         "### Effects that may not be named\n",

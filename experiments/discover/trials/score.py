@@ -16,9 +16,6 @@ from experiments.discover.trials.drawing import STRONG, Effect
 from experiments.discover.trials.findings import CRASH
 from experiments.discover.trials.truth import Kind, Label, Sealed
 
-NAMING = (str(Verdict.NAMED), str(Verdict.INCOMPLETE))
-"""Verdicts that say of a mechanism that it is there."""
-
 _JUDGED = ("kind", "truth", "true_size", "strength", "right", "tied", "wrong")
 
 OTHERS = ("weak single", *map(str, Kind), "two names", *map(str, Verdict), CRASH)
@@ -105,7 +102,7 @@ def scored(findings: pd.DataFrame, labels: Mapping[str, Label], sealed: Sequence
 
 def _judged(finding: dict[Hashable, Any], label: Label) -> dict[str, object]:
     truth, named = set(label.mechanisms), set(str(finding["named"]).split())
-    naming = finding["verdict"] in NAMING
+    naming = finding["verdict"] == Verdict.NAMED
     known = label.kind in (Kind.SINGLE, Kind.UNRESOLVED, Kind.PAIR)
     return {
         "kind": str(label.kind),
@@ -137,7 +134,7 @@ def confusion(table: pd.DataFrame) -> pd.DataFrame:
     strong = (table["kind"] == Kind.SINGLE) & (table["strength"] > STRONG)
     weak = (table["kind"] == Kind.SINGLE) & ~strong
     truth = table["truth"].where(strong, table["kind"].mask(weak, "weak single"))
-    names, naming = table["named"].str.split(), table["verdict"].isin(NAMING)
+    names, naming = table["named"].str.split(), table["verdict"] == Verdict.NAMED
     answer = table["verdict"].mask(naming, table["named"]).mask(naming & (names.str.len() > 1), "two names")
     counts = pd.crosstab(truth, answer, rownames=["truth"], colnames=["answer"])
     return counts.reindex(index=_names_first(counts.index), columns=_names_first(counts.columns))
@@ -182,7 +179,6 @@ def by_mechanism(table: pd.DataFrame) -> pd.DataFrame:
         rows[name] = {
             "trials": len(members),
             "right": int(members["right"].sum()),
-            "right, incomplete": int(((verdicts == Verdict.INCOMPLETE) & ~members["wrong"]).sum()),
             "tied": int(members["tied"].sum()),
             "tie of others": int(((verdicts == Verdict.TIE) & ~members["tied"]).sum()),
             "wrong": int(members["wrong"].sum()),
@@ -296,7 +292,7 @@ def _naming_aims(strong: pd.DataFrame) -> tuple[Aim, ...]:
 
 def _honesty_aims(table: pd.DataFrame, unresolvable: Sequence[str]) -> tuple[Aim, ...]:
     outside = table[table["kind"].isin([Kind.WITHHELD, Kind.STRANGER])]
-    named = table.loc[table["verdict"].isin(NAMING), "named"].str.split()
+    named = table.loc[table["verdict"] == Verdict.NAMED, "named"].str.split()
     forbidden = share(named.map(lambda names: bool(set(names) & set(unresolvable))).astype(bool))
     unknown = share(outside["verdict"] == Verdict.UNKNOWN)
     return (

@@ -91,7 +91,7 @@ def candidates_table(found: Discovery, terms: Terms) -> Table:
                 "mechanism": terms.titles(candidate.mechanisms),
                 "explained": 100.0 * candidate.explained if excess else None,
                 "q": candidate.q,
-                "limit": candidate.q_limit,
+                "p": candidate.p_value,
                 "size": _sizes(candidate, terms),
                 "over_se": min(candidate.size_over_se),
                 "gain": _interval(candidate.held_out_gain, 1),
@@ -105,7 +105,7 @@ def candidates_table(found: Discovery, terms: Terms) -> Table:
         Column("mechanism", "mechanism"),
         Column("explained", "explains", "percent", "% of excess"),
         Column("q", "Q", "free"),
-        Column("limit", "limit of Q", "free"),
+        Column("p", "p of the fit", "p"),
         Column("size", "size [90 % interval]"),
         Column("over_se", "size / se", "ratio"),
         Column("gain", "held-out gain"),
@@ -113,10 +113,10 @@ def candidates_table(found: Discovery, terms: Terms) -> Table:
     ]
     note = (
         "Q: squared residuals in standard deviations, after factors and size were fitted together to the"
-        " training conditions; held-out conditions count by how far their forecast misses them. Its limit"
-        " is exceeded by a share, fit_level in the rules, of the data sets that the model itself makes."
-        " Held-out gain: rise of the log score of the conditions that took no part in any fit, with its 90 %"
-        " interval."
+        " training conditions; held-out conditions count by how far their forecast misses them."
+        " p: of Q and of what is off alike in all conditions, among data sets that the model itself makes;"
+        " fit_level is the least. Held-out gain: rise of the log score of the conditions that took no part in"
+        " any fit, with its 90 % interval."
         + (
             ""
             if excess
@@ -282,7 +282,7 @@ def _candidate_row(candidate: Candidate) -> dict[str, object]:
         "visible_share": candidate.visible_share,
         "q": candidate.q,
         "degrees_of_freedom": candidate.degrees_of_freedom,
-        "q_limit": candidate.q_limit,
+        "p_value": candidate.p_value,
     }
     for position, (size, over) in enumerate(zip(candidate.sizes, candidate.size_over_se, strict=True), 1):
         row |= {f"size_{position}": size.value, f"size_{position}_low": size.low}

@@ -34,7 +34,6 @@ def headline(found: Discovery, terms: Terms) -> str:
         Verdict.NONE: "Nothing is missing that these data could show",
         Verdict.NAMED: f"Missing: {named}",
         Verdict.TIE: f"A tie: {terms.titles(found.named, 'or')}",
-        Verdict.INCOMPLETE: f"Missing: {named}, and something else",
         Verdict.UNKNOWN: "Something is missing, and nothing in the library explains it",
         Verdict.NOT_IDENTIFIABLE: "These data cannot tell",
     }[found.verdict]
@@ -141,15 +140,8 @@ def _unknown(found: Discovery, terms: Terms) -> str:
     return text + "."
 
 
-def _incomplete(found: Discovery, terms: Terms) -> str:
-    if found.chosen is None:
-        return _added(found, terms)
-    left = f"What is left is still beyond the noise: {_beyond(found.chosen.clearest, terms)}."
-    return f"{_added(found, terms)} {left} Something else is missing too."
-
-
 def _beyond(answer: Answer, terms: Terms) -> str:
-    """Say by which of the questions residuals are beyond the noise, a clause."""
+    """Say by which of the questions to a base its residuals are beyond the noise, a clause."""
     statistic = {
         Question.SIZE: "Q is",
         Question.FALL: f"{terms.title(answer.mechanism)} would lower Q by",
@@ -193,14 +185,11 @@ def _margins(found: Discovery, terms: Terms, settings: Settings) -> Iterator[str
 
 
 def _room(found: Discovery, terms: Terms, settings: Settings) -> Iterator[str]:
-    chosen = found.chosen
-    if chosen is None:
-        return
-    room = chosen.q_limit - chosen.q
-    if room > 0.0:
+    if found.chosen is not None:
         yield (
-            f"The fit with it has Q = {trimmed(chosen.q, 3)}, {trimmed(room, 2)} below its limit: a"
-            " disagreement larger by that would mean that something else is missing too."
+            f"Of the data sets that the model with it makes, {percent(found.chosen.p_value)} disagree with"
+            f" it as much; were it less than {percent(settings.fit_level)}, something else would be missing"
+            " too, and nothing would be named."
         )
 
 
@@ -248,7 +237,6 @@ _SENTENCES: dict[Verdict, Callable[[Discovery, Terms], str]] = {
     Verdict.NONE: _none,
     Verdict.NAMED: _added,
     Verdict.TIE: _tie,
-    Verdict.INCOMPLETE: _incomplete,
     Verdict.UNKNOWN: _unknown,
     Verdict.NOT_IDENTIFIABLE: _not_identifiable,
 }
@@ -257,7 +245,6 @@ _CHANGES: dict[Verdict, tuple[Callable[[Discovery, Terms, Settings], Iterator[st
     Verdict.NONE: (_smaller_effects,),
     Verdict.NAMED: (_margins, _room, _rivals, _unresolved, _outside),
     Verdict.TIE: (_settle_by_experiment, _rivals, _unresolved),
-    Verdict.INCOMPLETE: (_margins, _widen, _rivals, _unresolved),
     Verdict.UNKNOWN: (_rivals, _widen, _unresolved),
     Verdict.NOT_IDENTIFIABLE: (_more_data,),
 }

@@ -12,7 +12,7 @@ from synthetic import SETTINGS, emulator, measure, space
 from experiments.discover.discovery import Answer, Question
 from experiments.discover.evidence import gather
 from experiments.discover.fitting import Fitted, fit, size_interval, weigh
-from experiments.discover.gap import drift_p, find_gap, holm
+from experiments.discover.gap import OF_A_CANDIDATE, OF_THE_BASE, drift_p, find_gap, holm
 from experiments.discover.held_out import forecast
 from experiments.discover.measured import Measured
 from experiments.discover.model import Model, Stack
@@ -32,13 +32,13 @@ def _visibilities(fitted: Fitted) -> dict[str, Visibility]:
     return {one.name: one for one in visibilities(Effects.of(fitted, seen), seen.shares, SETTINGS)}
 
 
-@pytest.fixture(scope="module")
-def nulls() -> list[tuple[float, float]]:
-    """Q and p of data sets that lack nothing."""
+@pytest.fixture(scope="module", params=[OF_THE_BASE, OF_A_CANDIDATE])
+def nulls(request: pytest.FixtureRequest) -> list[tuple[float, float]]:
+    """Q and p of data sets that lack nothing, by either questions."""
     out = []
     for seed in range(NULLS):
         fitted = _calibrated(measure({}, seed))
-        gap = find_gap(fitted, signatures(fitted), 0.025, 1000, seed)
+        gap = find_gap(fitted, signatures(fitted), 0.025, 1000, seed, request.param)
         out.append((fitted.q, gap.p))
     return out
 
@@ -98,7 +98,7 @@ def test_whatever_shows_a_gap_lies_beyond_its_own_limit() -> None:
         fitted = _calibrated(measure({"beta": 0.1}, seed))
         gaps.append(find_gap(fitted, signatures(fitted), 0.025, 1000, seed))
     answers = [gap.clearest for gap in gaps if gap.found]
-    assert {answer.question for answer in answers} == set(Question)
+    assert {answer.question for answer in answers} == set(OF_THE_BASE)
     assert all(answer.value > answer.limit for answer in answers)
 
 
@@ -140,6 +140,31 @@ def test_what_lies_between_the_signatures_the_other_way_is_a_gap_too() -> None:
     assert gap.clearest.question is Question.SCORES
     assert gap.clearest.value == pytest.approx(float(gap.scores @ gap.scores))
     assert gap.clearest.value > gap.clearest.limit
+
+
+@pytest.mark.parametrize(
+    ("signs", "length", "seen_by"),
+    [
+        # chi2 of 12 passes 36 in 3 of 10,000 cases, and chi2 of 44 in 8 of 10; 144 never.
+        ((1.0, 1.0, 1.0, 1.0), 6.0, Question.COMMON),
+        ((1.0, 1.0, -1.0, -1.0), 6.0, None),
+        ((1.0, 1.0, -1.0, -1.0), 12.0, Question.SIZE),
+    ],
+)
+def test_a_candidate_is_refused_for_less_where_conditions_are_off_alike(signs, length, seen_by) -> None:
+    fitted = _calibrated(measure({}, 1), "alpha")
+    conditions, count = len(fitted.stack.blocks), len(fitted.stack.blocks[0].mean)
+    # One observable by as many of its standard deviations in every condition, up or down.
+    shift = np.zeros((conditions, count))
+    shift[:, 0] = signs * np.sqrt(np.diag(fitted.covariance)).reshape(conditions, count)[:, 0]
+    left = projector(fitted.sensitivities) @ fitted.whitening @ shift.ravel()
+    moved = _without_noise(fitted, length * left / np.linalg.norm(left))
+    gap = find_gap(moved, signatures(fitted), 0.05, 1000, 0, OF_A_CANDIDATE)
+    assert gap.q == pytest.approx(length**2)
+    assert gap.found == (seen_by is not None)
+    if seen_by:
+        assert gap.clearest.question is seen_by
+        assert gap.clearest.value > gap.clearest.limit
 
 
 def test_a_projector_takes_out_what_calibration_can() -> None:

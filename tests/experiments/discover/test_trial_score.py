@@ -48,16 +48,15 @@ def label_of(kind: Kind, *names: str, strength: float = 2.0) -> Label:
         (label_of(Kind.SINGLE, "drag"), Verdict.NAMED, "drag", "right"),
         (label_of(Kind.SINGLE, "drag"), Verdict.NAMED, "twist", "wrong"),
         (label_of(Kind.SINGLE, "drag"), Verdict.NAMED, "drag twist", "wrong"),
-        (label_of(Kind.SINGLE, "drag"), Verdict.INCOMPLETE, "twist", "wrong"),
         (label_of(Kind.SINGLE, "drag"), Verdict.TIE, "drag twist", "tied"),
         (label_of(Kind.SINGLE, "drag"), Verdict.TIE, "spread twist", ""),
         (label_of(Kind.SINGLE, "drag"), Verdict.UNKNOWN, "", ""),
         (label_of(Kind.PAIR, "drag", "twist"), Verdict.NAMED, "drag twist", "right"),
-        (label_of(Kind.PAIR, "drag", "twist"), Verdict.INCOMPLETE, "drag", ""),
+        (label_of(Kind.PAIR, "drag", "twist"), Verdict.NAMED, "drag", ""),
         (label_of(Kind.PAIR, "drag", "twist"), Verdict.NAMED, "drag spread", "wrong"),
         (label_of(Kind.WITHHELD, "drag"), Verdict.UNKNOWN, "", ""),
         (label_of(Kind.WITHHELD, "drag"), Verdict.NAMED, "twist", "wrong"),
-        (label_of(Kind.STRANGER, "swollen"), Verdict.INCOMPLETE, "drag", "wrong"),
+        (label_of(Kind.STRANGER, "swollen"), Verdict.NAMED, "drag", "wrong"),
     ],
 )
 def test_a_verdict_is_judged_by_what_it_names(
@@ -180,8 +179,7 @@ def test_a_strong_trial_ends_in_one_way() -> None:
     findings, labels = ideal_trials()
     one = findings["trial"] == "a-3"
     for verdict, named, column in (
-        ("incomplete", "a", "right, incomplete"),
-        ("incomplete", "b", "wrong"),
+        ("named", "b", "wrong"),
         ("tie", "a b", "tied"),
         ("tie", "b c", "tie of others"),
         ("none", "", "unseen"),

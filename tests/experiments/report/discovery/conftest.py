@@ -136,7 +136,7 @@ def made_candidates(admitted: int) -> tuple[Candidate, ...]:
         size_over_se=(7.4,),
         q=48.3,
         degrees_of_freedom=45.0,
-        q_limit=66.1,
+        p_value=0.31,
         explained=0.985,
         held_out_gain=Interval(9.1, 14.2, 19.8),
         simulated=True,
@@ -162,7 +162,7 @@ def made_candidates(admitted: int) -> tuple[Candidate, ...]:
         held_out_gain=Interval(-3.1, 0.4, 2.8),
         simulated=False,
         admitted=False,
-        objection="with Q = 221 the fit lies outside its bootstrap band (limit 66.1)",
+        objection="its size is 2.1 standard errors, less than 3",
     )
     refused = {"admitted": False, "objection": "its held-out gain is not above zero (interval -1.2 to 13)"}
     return tuple(
@@ -188,11 +188,9 @@ def made_discovery(verdict: Verdict) -> Discovery:
     base = made_fit(data, noise + (0.0 if verdict is Verdict.NONE else 1.0) * signature)
     named = {
         Verdict.NAMED: ("contact_cohesion",),
-        Verdict.INCOMPLETE: ("contact_cohesion",),
         Verdict.TIE: ("contact_cohesion", "liquid_bridges"),
     }.get(verdict, ())
-    left = noise + (0.4 if verdict is Verdict.INCOMPLETE else 0.0) * signature
-    chosen = made_fit(data, left, named[:1]) if named else None
+    chosen = made_fit(data, noise, named[:1]) if named else None
     found = Discovery(
         verdict=verdict,
         reason=f"The rule that gives the verdict {verdict.value}, with its numbers.",

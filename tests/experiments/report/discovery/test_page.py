@@ -15,6 +15,7 @@ from experiments.discover.settings import Settings
 from experiments.report import HeapPicture
 from experiments.report.discovery import Terms, render_discovery, verdict_sentence
 from experiments.report.discovery.tables import SHOWN_PAIRS, data_table, shown_candidates
+from experiments.report.discovery.terms import percent
 from experiments.report.discovery.verdict import changes
 from experiments.study import Study
 
@@ -81,23 +82,23 @@ def test_no_share_is_told_of_an_excess_that_is_not_there(
         ),
     ],
 )
-def test_what_is_left_is_told_by_the_test_that_sees_it(
+def test_a_gap_is_told_by_the_test_that_sees_it(
     clearest: Answer, told: str, discovered: Discovered, terms: Terms
 ) -> None:
-    found = discovered(Verdict.INCOMPLETE)
+    found = discovered(Verdict.UNKNOWN)
     assert found.base is not None
-    assert found.chosen is not None
     # Q itself lies within its limit, which must not be called beyond the noise.
-    quiet = replace(found.chosen, q=43.8, q_limit=73.7, clearest=clearest)
-    sentence = verdict_sentence(replace(found, chosen=quiet), terms)
-    assert sentence.endswith(
-        f"What is left is still beyond the noise: {told}. Something else is missing too."
-    )
-    assert "43.8" not in sentence
-    assert not any("43.8" in change for change in changes(replace(found, chosen=quiet), terms, Settings()))
     base = replace(found.base, q=43.8, q_limit=73.7, clearest=clearest)
-    unknown = verdict_sentence(replace(found, base=base, verdict=Verdict.UNKNOWN), terms)
+    unknown = verdict_sentence(replace(found, base=base), terms)
     assert f"not by Q alone but in that {told}, and nothing in the library" in unknown
+
+
+def test_what_would_withdraw_a_name_is_the_fit_that_gave_it(discovered: Discovered, terms: Terms) -> None:
+    found = discovered(Verdict.NAMED)
+    assert found.chosen is not None
+    told = changes(replace(found, chosen=replace(found.chosen, p_value=0.31)), terms, Settings(fit_level=0.1))
+    wanted = f"makes, {percent(0.31)} disagree with it as much; were it less than {percent(0.1)},"
+    assert any(wanted in sentence for sentence in told)
 
 
 def test_the_page_shows_every_mechanism_and_the_first_pairs(discovered: Discovered) -> None:
