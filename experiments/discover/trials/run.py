@@ -102,10 +102,10 @@ def run_trials(
             _report(turn)
 
 
-def chosen(trials: Sequence[Sealed], part: str | None, first: int | None) -> list[Sealed]:
-    """Pick the trials of a part, None for all, and of each part so many, by their numbers."""
+def chosen(trials: Sequence[Sealed], part: str | None = None, every: int = 1) -> list[Sealed]:
+    """Pick the trials of a part, None for all, and of each part one of so many, by their numbers."""
     picked = [trial for trial in trials if part in (None, trial.part)]
-    return [trial for trial in picked if first is None or int(trial.trial.rpartition("-")[2]) <= first]
+    return [trial for trial in picked if int(trial.trial.rpartition("-")[2]) % every == 0]
 
 
 def plan_page(folder: Folder, bank: Path | None) -> str:
@@ -124,7 +124,7 @@ def main(
     folder: Annotated[Path, typer.Argument(help="Folder of the trials.")],
     bank: Annotated[Path | None, typer.Option(help="Bank of the trial study; left out: its own.")] = None,
     part: Annotated[str | None, typer.Option(help="Trials of one part; left out: all.")] = None,
-    first: Annotated[int | None, typer.Option(help="So many trials of each part; left out: all.")] = None,
+    every: Annotated[int, typer.Option(help="One trial of so many, by their numbers.", min=1)] = 1,
     view: Annotated[str | None, typer.Option(help="everything or photographs; left out: both.")] = None,
     device: Annotated[str | None, typer.Option(help="cpu, cuda, or several GPUs, as cuda:0,cuda:1.")] = None,
     workers: Annotated[int | None, typer.Option(help="Processes.")] = None,
@@ -139,7 +139,7 @@ def main(
         if plan_only:
             print(plan_page(place, bank))
             return
-        trials = chosen(read_sealed(place.sealed), part, first)
+        trials = chosen(read_sealed(place.sealed), part, every)
         try:
             run_trials(place, trials, bank, views, chosen_devices(device), workers, seconds)
         except OutOfTime:

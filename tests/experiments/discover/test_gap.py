@@ -16,7 +16,15 @@ from experiments.discover.gap import OF_A_CANDIDATE, OF_THE_BASE, drift_p, find_
 from experiments.discover.held_out import forecast
 from experiments.discover.measured import Measured
 from experiments.discover.model import Model, Stack
-from experiments.discover.ranking import Effects, Visibility, projector, signatures, visibilities
+from experiments.discover.ranking import (
+    SIZES,
+    Effects,
+    Visibility,
+    projector,
+    secants,
+    signatures,
+    visibilities,
+)
 
 NULLS = 100
 
@@ -174,6 +182,28 @@ def test_a_projector_takes_out_what_calibration_can() -> None:
     np.testing.assert_allclose(project @ slopes, 0.0, atol=1e-12)
     np.testing.assert_allclose(project @ project, project, atol=1e-12)
     assert np.trace(project) == pytest.approx(17.0)
+
+
+def test_what_an_effect_shows_is_the_q_that_a_calibration_leaves_of_it() -> None:
+    middle = tuple(space().natural_theta(np.zeros(3)))
+    fitted = _calibrated(measure({}, 1, theta=middle))
+    effects = Effects.of(fitted, signatures(fitted))
+    for name in ("beta", "delta"):
+        added = (
+            fitted.whitening
+            @ secants(fitted.model.emulator, fitted.stack.blocks, fitted.x, name, np.array([1.0]))[0]
+        )
+        moved = _without_noise(fitted, added)
+        # The fit weighs by the covariance where it ends, some per cent from that where the effect was drawn.
+        assert effects.squares[effects.names.index(name), -1] == pytest.approx(fit(moved.stack).q, rel=0.1)
+        assert effects.whole[effects.names.index(name), -1] == pytest.approx(added @ added)
+
+
+def test_of_a_large_effect_that_calibration_takes_up_a_small_rest_is_not_believed() -> None:
+    visible = 10.0 * SIZES[None, :, None]
+    for whole, power in ((1.0, 1.0), (30.0, stats.norm.cdf(-SETTINGS.least_ratio))):
+        effects = Effects(("one",), visible, whole * (visible**2).sum(axis=2), np.eye(1))
+        assert effects.power(SETTINGS)[0, -1] == pytest.approx(power, abs=1e-5)
 
 
 # Nothing is like delta, so its gamma80 is where it is found; that of beta is where it is told from epsilon.

@@ -30,6 +30,7 @@ from experiments.discover.trials.findings import EVERYTHING, PHOTOGRAPHS, read_f
 from experiments.discover.trials.folder import Folder
 from experiments.discover.trials.heaps import cases_of
 from experiments.discover.trials.lockstep import Crash, LocalCrew, Step, in_step, process_crew
+from experiments.discover.trials.run import chosen
 from experiments.discover.trials.truth import (
     Kind,
     Label,
@@ -111,6 +112,15 @@ def test_the_name_of_a_trial_says_nothing_of_its_kind() -> None:
     # 200 draws the count has a standard deviation of 5, and four of these are allowed.
     first = [draw_trials(seed)[0][0].kind is Kind.NULL for seed in range(200)]
     assert abs(sum(first) - 200 * 3 / 19) < 21
+
+
+def test_a_share_of_the_trials_is_that_share_of_every_part() -> None:
+    sealed = [trial for _, trial in draw_trials()]
+    halves = [trial.part for trial in chosen(sealed, every=2)]
+    for part in {trial.part for trial in sealed}:
+        assert halves.count(part) == sum(trial.part == part for trial in sealed) // 2
+        assert {trial.part for trial in chosen(sealed, part)} == {part}
+    assert chosen(sealed) == sealed
 
 
 def test_labels_are_held_to_their_seals(tmp_path: Path) -> None:
