@@ -27,7 +27,7 @@ BENCH = "bench"
 THETA = (0.6, 0.5, 0.3)
 NULL = Label("alone-001", Kind.NULL, THETA, (), (), seed=11, salt="")
 ROLLING = Label("alone-002", Kind.SINGLE, THETA, (("rolling_torque", 0.08),), (5.0,), seed=13, salt="")
-REPLICATES = 3
+REPLICATES = 2
 
 
 @pytest.fixture(scope="module")
