@@ -163,8 +163,7 @@ def decide(assessments: Sequence[Assessment], settings: Settings) -> Decision:
         return _named(assessments, order[0], order[1:])
     if passing:
         failed = ["it was declared that such data cannot tell it from others"]
-    closest = f"{_title(best)} comes closest and removes {best.explained:.0%} of the excess"
-    return Decision(Verdict.UNKNOWN, (), f"{closest}, but {failed[0]}", None)
+    return Decision(Verdict.UNKNOWN, (), f"{_title(best)} comes closest, but {failed[0]}", None)
 
 
 def _named(assessments: Sequence[Assessment], chosen: int, others: Sequence[int]) -> Decision:

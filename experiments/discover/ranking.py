@@ -22,7 +22,7 @@ KNOTS = np.linspace(0.0, 1.0, 11)
 """Coded sizes at which calibration is asked what it takes up; straight in between."""
 TRUSTED = 0.8
 """Part of an effect that an emulator is right about. In the fourth blind trials wall adhesion, most of which
-looks like another friction, was seen with half of the standard deviations that it promised."""
+looks like another friction, was seen with 0.7 (median) of the standard deviations that it promised."""
 SAME = (1.0 - (1.0 - TRUSTED) ** 2) ** 0.5
 """Correlation from which two signatures are one: they differ by less than that."""
 LEAST_LENGTH = 1e-6

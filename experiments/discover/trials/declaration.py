@@ -94,17 +94,17 @@ def declared_effects(emulator: Emulator, settings: Settings, replicates: int) ->
 
     The power is the mean over the ranges of the factors, as truths are drawn from all of them.
     """
-    ranges = emulator.space
+    space = emulator.space
     powers, correlations = [], []
-    for theta in 2.0 * sobol(THETAS, len(ranges.factors), seed=0) - 1.0:
+    for theta in 2.0 * sobol(THETAS, len(space.factors), seed=0) - 1.0:
         stack = Stack(Model(emulator, (), settings.systematic), perfect_means(emulator, theta, replicates))
         fitted = weigh(stack, theta)
         effects = Effects.of(fitted, signatures(fitted))
         powers.append(effects.power(settings))
         correlations.append(np.abs(effects.correlations))
-    kin = _kin(ranges.names, np.mean(correlations, axis=0))
+    kin = _kin(space.names, np.mean(correlations, axis=0))
     out = []
-    for span, power in zip(ranges.mechanisms, np.mean(powers, axis=0), strict=True):
+    for span, power in zip(space.mechanisms, np.mean(powers, axis=0), strict=True):
         size = smallest_shown(power, settings)
         gamma80, told = size * abs(span.maximum - span.null), math.isfinite(size)
         out.append(Effect(span.name, span.null, span.maximum, gamma80, told, kin[span.name]))
