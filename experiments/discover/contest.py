@@ -57,6 +57,8 @@ def simulate_again(
 ) -> Generator[list[Point], Outcomes, Contenders]:
     """Correct by fresh runs the models that may fit and may lead, half as many in every next round.
 
+    At last the leader runs against those that might still overtake it.
+
     Parameters
     ----------
     contenders : mapping
@@ -67,14 +69,19 @@ def simulate_again(
     error : float
         By how much the emulator may be wrong about Q.
     """
-    for number in range(settings.refinement_rounds):
-        chosen = _worth_running(contenders, settings, error, max(1, settings.shortlist >> number))
-        if not chosen:
-            break
+    last = settings.refinement_rounds
+    for number in range(last + 1):
+        points = settings.finish_points if number == last else settings.refinement_points
+        if number == last:
+            chosen = _undecided(contenders, settings)
+        else:
+            chosen = _worth_running(contenders, settings, error, max(1, settings.shortlist >> number))
+        if not (chosen and points):
+            continue
         requests = [
             Request(
                 names,
-                points_around(contenders[names].fitted, settings.refinement_points, laboratory.seed + number),
+                points_around(contenders[names].fitted, points, laboratory.seed + number),
                 settings.refinement_repeats,
             )
             for names in chosen
@@ -116,3 +123,21 @@ def _worth_running(
             near.append(names)
     others = sorted(filter(None, near), key=lambda names: contenders[names].fitted.score)
     return [names for names in near if not names] + others[:count]
+
+
+def _undecided(contenders: Contenders, settings: Settings) -> list[tuple[str, ...]]:
+    """The leader, and those that might overtake it if more were known of what they predict; none without.
+
+    The score of a model that little is known of suffers for its uncertain predictions.
+    """
+    run = {names: one.fitted for names, one in contenders.items() if names and one.simulated}
+    leader = min(run, key=lambda names: run[names].score, default=())
+    rivals = [
+        names
+        for names, fitted in run.items()
+        if names != leader
+        and fitted.promise <= run[leader].score + settings.tie_margin
+        and fitted.q <= stats.chi2.isf(settings.false_alarm, fitted.freedom)
+    ]
+    rivals = sorted(rivals, key=lambda names: run[names].score)[: settings.shortlist - 1]
+    return [leader, *rivals] if rivals else []

@@ -123,6 +123,16 @@ def is_open(behind: float, are_alike: bool, margin: float) -> bool:
     return behind < (margin + 2.0 * CHANCE * margin**0.5 if are_alike else margin)
 
 
+def lag(one: Assessment, best: Assessment, margin: float) -> float:
+    """By how much a model is behind the best in minus twice the log-likelihood.
+
+    The likelihood of a model suffers where its predictions are uncertain, as they are before it has been run
+    enough. That counts for half a tie at most: a model that is named is ahead in Q, too.
+    """
+    plain = one.gap.q - best.gap.q + margin / 2.0 if one.simulated else np.inf
+    return min(one.score - best.score, plain)
+
+
 def decide(assessments: Sequence[Assessment], settings: Settings) -> Decision:
     """Choose among candidates of equally many mechanisms.
 
@@ -139,15 +149,9 @@ def decide(assessments: Sequence[Assessment], settings: Settings) -> Decision:
         return Decision(Verdict.UNKNOWN, (), "nothing in the library could explain the gap", None)
     order = sorted(range(len(assessments)), key=lambda index: assessments[index].score)
     best = assessments[order[0]]
-    close = [
-        i
-        for i in order
-        if is_open(
-            assessments[i].score - best.score,
-            set(assessments[i].mechanisms) <= best.alike,
-            settings.tie_margin,
-        )
-    ]
+    margin = settings.tie_margin
+    by = [lag(assessment, best, margin) for assessment in assessments]
+    close = [i for i in order if is_open(by[i], set(assessments[i].mechanisms) <= best.alike, margin)]
     passing = [i for i in close if not objections(assessments[i], settings)]
     failed = objections(best, settings)
     titles = ", ".join(_title(assessments[i]) for i in close)
@@ -155,9 +159,9 @@ def decide(assessments: Sequence[Assessment], settings: Settings) -> Decision:
         if len(best.mechanisms) > 1:
             return Decision(Verdict.UNKNOWN, (), f"no one pair stands out: {titles}", None)
         names = tuple(assessments[i].mechanisms[0] for i in close)
-        margin = assessments[close[-1]].score - best.score
+        most = max(by[i] for i in close)
         return Decision(
-            Verdict.TIE, names, f"{titles} explain the data alike, within {margin:.1f} of Q", passing[0]
+            Verdict.TIE, names, f"{titles} explain the data alike, within {most:.1f} of Q", passing[0]
         )
     if passing and best.declared:
         return _named(assessments, order[0], order[1:])

@@ -78,6 +78,12 @@ class Fitted:
         return np.sqrt(np.diag(self.spread) + (0.0 if shift is None else np.diag(shift.spread)))
 
     @property
+    def promise(self) -> float:
+        """Score that it would have if all that is uncertain of its predictions were known, and q as it is."""
+        certain = np.linalg.slogdet(self.stack.noise(self.x))[1]
+        return self.score - float(np.linalg.slogdet(self.covariance)[1] - certain)
+
+    @property
     def freedom(self) -> int:
         """Degrees of freedom of q."""
         return max(len(self.covariance) - len(self.x), 0)

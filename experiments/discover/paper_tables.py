@@ -241,8 +241,15 @@ def _addition(signature: pd.Series, noise: Noise) -> Addition:
     coefficients, gram_inverse = np.zeros(terms), np.zeros((terms, terms))
     coefficients[0] = signature["shift"]
     gram_inverse[0, 0] = signature["spread"] / variance[0] if signature["lost"] else signature["share"]
-    base_terms = np.zeros((terms, _base_terms(noise)))
-    return Addition(_exact(coefficients), base_terms, gram_inverse, np.zeros(1), variance, noise.correlation)
+    return Addition(
+        _exact(coefficients),
+        base_terms=np.zeros((terms, _base_terms(noise))),
+        gram_inverse=gram_inverse,
+        chance=gram_inverse,
+        growth=np.zeros(1),
+        variance=variance,
+        correlation=noise.correlation,
+    )
 
 
 def _base_terms(noise: Noise) -> int:

@@ -114,6 +114,9 @@ class Effects:
         Whitened, at the coded `SIZES`.
     whole : (mechanisms, sizes) array
         Squared lengths without the refit.
+    chance : (mechanisms, sizes) array
+        What the noise of the bank adds to the squared visible lengths: where a mechanism does nothing, the
+        emulator still shows something.
     correlations : (mechanisms, mechanisms) array
         Between visible signatures.
     """
@@ -121,6 +124,7 @@ class Effects:
     names: tuple[str, ...]
     visible: np.ndarray
     whole: np.ndarray
+    chance: np.ndarray
     correlations: np.ndarray
 
     @classmethod
@@ -141,7 +145,8 @@ class Effects:
         x, _ = minimise(stack, fitted.whitening, targets, starts, *bounds)
         left = (targets - stack.predict(x)).reshape(shape)
         visible, whole = (interp1d(KNOTS, each @ fitted.whitening.T, axis=1)(SIZES) for each in (left, added))
-        return cls(seen.names, visible, (whole**2).sum(axis=2), seen.correlations)
+        chance = interp1d(KNOTS, _chance(fitted, seen.names, theta), axis=1)(SIZES)
+        return cls(seen.names, visible, (whole**2).sum(axis=2), chance, seen.correlations)
 
     @property
     def squares(self) -> np.ndarray:
@@ -167,21 +172,38 @@ class Effects:
     def power(self, settings: Settings) -> np.ndarray:
         """Probability that a mechanism of every size is found and told from every other.
 
-        It is found where its visible effect, less what an emulator may be wrong about, is ``least_ratio``
-        standard deviations. It is told from a rival where that is further behind in Q than a tie: the
-        difference in Q of models d apart is d^2 +- 2 d.
+        It is found where its visible effect, less what an emulator may be wrong about and what chance adds to
+        it, is ``least_ratio`` standard deviations. It is told from a rival where that is further behind in Q
+        than a tie: the difference in Q of models d apart is d^2 +- 2 d.
 
         Returns
         -------
         (mechanisms, sizes) array
             The smaller of the two probabilities.
         """
-        trusted = np.maximum(self.squares - (1.0 - TRUSTED) ** 2 * self.whole, 0.0)
+        trusted = np.maximum(self.squares - (1.0 - TRUSTED) ** 2 * self.whole - self.chance, 0.0)
         found = stats.norm.cdf(np.sqrt(trusted) - settings.least_ratio)
         nearest = np.array([self.apart(index).min(axis=0) for index in range(len(self.names))])
         nearest = np.maximum(nearest, LEAST_LENGTH**2).reshape(found.shape)
         told = stats.norm.cdf((nearest - settings.tie_margin) / (2.0 * np.sqrt(nearest)))
         return np.minimum(found, told)
+
+
+def _chance(fitted: Fitted, names: Sequence[str], theta: np.ndarray) -> np.ndarray:
+    """See `Effects`, at the coded `KNOTS`, (mechanisms, knots)."""
+    left = projector(fitted.sensitivities) @ fitted.whitening
+    out = np.zeros((len(names), len(KNOTS)))
+    start = 0
+    for block in fitted.stack.blocks:
+        end = start + len(block.columns)
+        metric = left[:, start:end].T @ left[:, start:end]
+        additions = fitted.model.emulator.surfaces[block.condition].additions
+        for i, name in enumerate(names):
+            for k, size in enumerate(KNOTS):
+                scatter = additions[name].scatter(additions[name].chance, theta, float(size))
+                out[i, k] += float(np.sum(metric * scatter[np.ix_(block.columns, block.columns)]))
+        start = end
+    return out
 
 
 def alike(effects: Effects, name: str, size: float, margin: float) -> frozenset[str]:

@@ -38,8 +38,9 @@ class Settings:
         wrong ones make up for much.
     tie_margin : float
         Mechanisms within so much of the best are a tie: in Q plus the logarithm of the determinant, less
-        twice the held-out gain, which is minus twice a log-likelihood. Those that should look the same
-        are one within somewhat more (`decision.is_open`).
+        twice the held-out gain, which is minus twice a log-likelihood; a prediction's being uncertain
+        counts for half of it at most (`decision.lag`). Those that should look the same are one within
+        somewhat more (`decision.is_open`).
     power : float
         Probability at which ``gamma80`` is stated.
     systematic : float
@@ -56,6 +57,8 @@ class Settings:
         Fresh points around an optimum, and runs of each, in every condition.
     refinement_rounds : int
         Most times that the optima are simulated again.
+    finish_points : int
+        Fresh points at last around the leader's optimum, and around those of models that might overtake it.
     pair_candidates : int
         So many pairs are tried: those that the residuals of their members promise most of.
     direct_runs : int
@@ -80,6 +83,7 @@ class Settings:
     refinement_points: int = 6
     refinement_repeats: int = 2
     refinement_rounds: int = 3
+    finish_points: int = 12
     pair_candidates: int = 12
     direct_runs: int = 8
     resolvable: tuple[str, ...] | None = None
@@ -90,7 +94,7 @@ class Settings:
                 raise InputError("must lie between 0 and 1", getattr(self, name), f"Settings.{name}")
         least = {"bank_points": 10, "bank_repeats": 2, "bank_mechanism_points": 4, "draws": 100}
         least |= {"shortlist": 1, "refinement_points": 2, "refinement_repeats": 2, "refinement_rounds": 1}
-        least |= {"pair_candidates": 0, "direct_runs": 2}
+        least |= {"finish_points": 0, "pair_candidates": 0, "direct_runs": 2}
         for name, value in least.items():
             if getattr(self, name) < value:
                 raise InputError(f"must be at least {value}", getattr(self, name), f"Settings.{name}")

@@ -277,6 +277,7 @@ def _fit_addition(runs: AddedRuns, scales: np.ndarray) -> Addition:
         Polynomial(fitted.coefficients, np.zeros(len(growth)), kriging),
         fitted.inverse @ cubic(theta),
         fitted.gram_inverse,
+        fitted.inverse @ fitted.inverse.T,
         growth,
         _mean_variance(runs, growth),
         runs.base.noise.correlation,

@@ -82,6 +82,9 @@ class Addition:
     base_terms : (terms, base terms) array
         Errors of the base's coefficients come through as minus this matrix times them.
     gram_inverse : (terms, terms) array
+    chance : (terms, terms) array
+        Covariance that the noise of the runs gives the coefficients, in variances of one run: that of their
+        error, ``gram_inverse``, less what drawing them towards nothing leaves open.
     growth : (observables,) array
         Logarithm of the variance of one run at the largest size over that without the mechanism.
     variance : (observables,) array
@@ -93,6 +96,7 @@ class Addition:
     polynomial: Polynomial
     base_terms: np.ndarray
     gram_inverse: np.ndarray
+    chance: np.ndarray
     growth: np.ndarray
     variance: np.ndarray
     correlation: np.ndarray
@@ -103,6 +107,11 @@ class Addition:
         if self.polynomial.kriging:
             values += size[:, None] * self.polynomial.missed(np.column_stack([theta, size]))
         return np.asarray(values)
+
+    def scatter(self, coefficients: np.ndarray, theta: np.ndarray, size: float) -> np.ndarray:
+        """What a covariance of the coefficients gives at one point, (observables, observables)."""
+        terms, sd = added(theta[None], np.array([size]))[0], np.sqrt(self.variance)
+        return np.asarray((terms @ coefficients @ terms) * (sd[:, None] * self.correlation * sd))
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,9 +172,8 @@ class Surfaces:
         base, own = cubic(theta[None])[0], np.diag(self.misfit_variance(x, mechanisms))
         for name, size in zip(mechanisms, x[len(theta) :], strict=True):
             part = self.additions[name]
-            terms, sd = added(theta[None], np.array([size]))[0], np.sqrt(part.variance)
-            base = base - part.base_terms.T @ terms
-            own += (terms @ part.gram_inverse @ terms) * (sd[:, None] * part.correlation * sd)
+            base = base - part.base_terms.T @ added(theta[None], np.array([size]))[0]
+            own += part.scatter(part.gram_inverse, theta, float(size))
         return np.asarray((base @ self.gram_inverse @ base) * self.noise.covariance(theta) + own)
 
     def coefficient_errors(self, theta: np.ndarray, mechanisms: tuple[str, ...]) -> np.ndarray:

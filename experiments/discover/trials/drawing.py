@@ -79,7 +79,8 @@ class Effect:
         Distance from the null that is found and told from every other with 80 % probability; infinite where
         the range has none.
     told_apart : bool
-        Whether the data tell it, at the end of its range, from every other.
+        Whether the data tell it, at the end of its range, from every other, nearly everywhere in the ranges
+        of the factors.
     kin : tuple of str
         Mechanisms that look like it after calibration.
     """

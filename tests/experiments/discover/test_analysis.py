@@ -94,6 +94,16 @@ def test_mechanisms_that_act_alike_are_a_tie_with_an_experiment_to_follow() -> N
     assert set(found.next_experiment.separates) == {"alpha", "twin"}
 
 
+def test_a_leader_runs_at_last_against_what_might_overtake_it() -> None:
+    _, waves = _run(measure({"alpha": 0.4}, 4), emulator())
+    one_model = SETTINGS.finish_points * SETTINGS.refinement_repeats * len(CONDITIONS)
+    assert {tuple(name for name, _ in point.sizes) for point in waves[-2]} == {("alpha",), ("twin",)}
+    assert len(waves[-2]) == 2 * one_model
+    # Nothing is like delta.
+    _, waves = _named()
+    assert all(len(wave) < one_model for wave in waves[1:])
+
+
 def test_two_mechanisms_at_once_are_both_named() -> None:
     found, _ = _run(measure({"alpha": 0.6, "delta": 0.8}, 5))
     assert found.verdict == Verdict.NAMED

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
-from experiments.discover.decision import is_open
+from experiments.discover.decision import is_open, lag
 
 MARGIN = 6.0
 DRAWS = 100_000
@@ -25,3 +28,17 @@ def test_models_that_look_the_same_are_told_apart_by_chance_in_one_case_of_twent
 def test_models_that_do_not_look_the_same_are_open_within_the_margin() -> None:
     assert is_open(MARGIN - 1e-9, False, MARGIN)
     assert not is_open(MARGIN, False, MARGIN)
+
+
+def _candidate(score: float, q: float, simulated: bool = True) -> Any:
+    return SimpleNamespace(score=score, gap=SimpleNamespace(q=q), simulated=simulated)
+
+
+def test_a_model_is_not_behind_for_predicting_uncertainly_alone() -> None:
+    best = _candidate(0.0, 50.0)
+    assert lag(_candidate(5.0, 90.0), best, MARGIN) == 5.0
+    assert lag(_candidate(90.0, 70.0), best, MARGIN) == 20.0 + MARGIN / 2.0
+    fits_better = _candidate(90.0, 40.0)
+    assert is_open(lag(fits_better, best, MARGIN), False, MARGIN)
+    # The emulator alone predicts everything uncertainly.
+    assert lag(_candidate(90.0, 40.0, simulated=False), best, MARGIN) == 90.0

@@ -250,3 +250,18 @@ def test_the_scatter_under_a_mechanism_has_a_correlation_of_its_own() -> None:
     np.testing.assert_allclose(surfaces.correlation(half, ("sticks",)), between, rtol=1e-12)
     two = surfaces.correlation(both, ("sticks", "else"))
     np.testing.assert_allclose(two, addition.correlation, rtol=1e-12)
+
+
+def test_what_the_noise_of_a_bank_adds_to_an_effect_is_as_stated() -> None:
+    rng, count, draws = np.random.default_rng(12), 60, 200
+    theta, size = rng.uniform(-1.0, 1.0, (count, 1)), rng.uniform(0.0, 1.0, count)
+    noise = fit_noise(theta, rng.standard_normal((count, 4)), np.full(4, 1e-9))
+    [base] = fit_bases([BaseRuns.of(theta, np.zeros((count, 4)), noise)])
+    at, half, shown, stated = np.array([0.3]), np.array([0.5]), [], []
+    for _ in range(draws):
+        values = 3.0 * size[:, None] * (1.0 + theta) + rng.standard_normal((count, 4))
+        [addition] = fit_additions([AddedRuns(base, theta, size, values)])
+        shown.append(addition.predict(at[None], half)[0])
+        stated.append(np.diag(addition.scatter(addition.chance, at, 0.5)))
+    # 800 squares: 5 %; twice as much for scales and variances, which each draw finds anew.
+    assert np.var(shown, axis=0).mean() == pytest.approx(np.mean(stated), rel=3 * 0.1)

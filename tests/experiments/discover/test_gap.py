@@ -201,8 +201,9 @@ def test_what_an_effect_shows_is_the_q_that_a_calibration_leaves_of_it() -> None
 
 def test_of_a_large_effect_that_calibration_takes_up_a_small_rest_is_not_believed() -> None:
     visible = 10.0 * SIZES[None, :, None]
-    for whole, power in ((1.0, 1.0), (30.0, stats.norm.cdf(-SETTINGS.least_ratio))):
-        effects = Effects(("one",), visible, whole * (visible**2).sum(axis=2), np.eye(1))
+    squares, nothing = (visible**2).sum(axis=2), stats.norm.cdf(-SETTINGS.least_ratio)
+    for whole, chance, power in ((1.0, 0.0, 1.0), (30.0, 0.0, nothing), (1.0, 0.96, nothing)):
+        effects = Effects(("one",), visible, whole * squares, chance * squares, np.eye(1))
         assert effects.power(SETTINGS)[0, -1] == pytest.approx(power, abs=1e-5)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from scipy import stats
 from synthetic import CONDITIONS, emulator, measure
 
@@ -67,3 +68,10 @@ def test_the_error_of_the_shift_widens_what_is_said_of_a_size() -> None:
     widths = [np.diff(size_interval(one, 0))[0] for one in (plain, shifted)]
     # Twice as wide where the profile is a parabola.
     assert 1.8 < widths[1] / widths[0] < 2.2
+
+
+def test_the_promise_of_a_model_is_its_score_but_for_what_is_uncertain_of_its_predictions() -> None:
+    fitted = fit(Stack(model(), gather(measure({"delta": 1.0}, 2), model().emulator).training))
+    noise = fitted.stack.noise(fitted.x)
+    assert fitted.promise < fitted.score
+    assert fitted.promise == pytest.approx(fitted.q + np.linalg.slogdet(noise)[1])

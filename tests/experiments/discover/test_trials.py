@@ -15,11 +15,14 @@ from doe.factors import Factor
 from experiments.discover.analysis import Analysis
 from experiments.discover.discovery import Data, Discovery, Effort, Verdict
 from experiments.discover.observables import OBSERVABLES, PHOTOGRAPHED
+from experiments.discover.ranking import SIZES
 from experiments.discover.settings import Settings
 from experiments.discover.simulator import Outcomes, Point
+from experiments.discover.space import MechanismRange
 from experiments.discover.trials.camera import Camera
 from experiments.discover.trials.declaration import (
     Declaration,
+    declared_effect,
     declared_effects,
     read_declaration,
     with_names,
@@ -328,6 +331,18 @@ def test_what_is_declared_comes_back_with_its_hash(tmp_path: Path) -> None:
     )
     with pytest.raises(InputError, match="settings must have the hash"):
         read_declaration(path)
+
+
+def test_a_mechanism_that_shows_in_a_part_of_the_ranges_only_may_not_be_named() -> None:
+    settings, span = Settings(), MechanismRange("glue", 1.0, 3.0)
+    shown = np.tile(SIZES >= 0.25, (20, 1)).astype(float)
+    everywhere = declared_effect(span, shown, settings)
+    assert everywhere.gamma80 == pytest.approx(0.5)
+    assert everywhere.resolvable
+    shown[:3] = 0.0
+    mostly = declared_effect(span, shown, settings)
+    assert mostly.gamma80 == pytest.approx(0.5)
+    assert not mostly.resolvable
 
 
 def test_trials_of_a_known_world_end_as_they_should(tmp_path: Path) -> None:
