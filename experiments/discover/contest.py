@@ -69,13 +69,8 @@ def simulate_again(
     error : float
         By how much the emulator may be wrong about Q.
     """
-    last = settings.refinement_rounds
-    for number in range(last + 1):
-        points = settings.finish_points if number == last else settings.refinement_points
-        if number == last:
-            chosen = _undecided(contenders, settings)
-        else:
-            chosen = _worth_running(contenders, settings, error, max(1, settings.shortlist >> number))
+    for number in range(settings.refinement_rounds + 1):
+        chosen, points = _round(contenders, settings, error, number)
         if not (chosen and points):
             continue
         requests = [
@@ -101,6 +96,16 @@ def _updated(contender: Contender, fresh: Runs) -> Contender:
     runs = fresh if contender.runs is None else contender.runs.joined(fresh)
     corrected = correct(before.model, runs, before.x)
     return Contender(fit(Stack(corrected, before.stack.blocks), before.x, count=2), runs, before.x)
+
+
+def _round(
+    contenders: Contenders, settings: Settings, error: float, number: int
+) -> tuple[list[tuple[str, ...]], int]:
+    """Who runs in the round of a number, and at how many points; the last round is the finish."""
+    if number == settings.refinement_rounds:
+        return _undecided(contenders, settings), settings.finish_points
+    count = max(1, settings.shortlist >> number)
+    return _worth_running(contenders, settings, error, count), settings.refinement_points
 
 
 def _worth_running(

@@ -69,7 +69,7 @@ class Settings:
 
     bank_points: int = 128
     bank_repeats: int = 2
-    bank_mechanism_points: int = 56
+    bank_mechanism_points: int = 48
     false_alarm: float = 0.025
     fit_level: float = 0.1
     least_ratio: float = 3.0
