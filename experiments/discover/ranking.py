@@ -13,6 +13,7 @@ from experiments.discover.emulator import Emulator
 from experiments.discover.evidence import Block
 from experiments.discover.fitting import Fitted, minimise
 from experiments.discover.settings import Settings
+from experiments.discover.surfaces import added
 
 SECANT = 0.5
 """Coded size at which a signature is taken: an effect a unit of size."""
@@ -136,15 +137,15 @@ class Effects:
         """
         stack, theta = fitted.stack, fitted.x[: len(fitted.model.emulator.space.factors)]
         shape = (len(seen.names), len(KNOTS), len(fitted.covariance))
-        added = np.reshape(
+        extra = np.reshape(
             [secants(stack.model.emulator, stack.blocks, theta, name, KNOTS) for name in seen.names], shape
         )
-        targets = added.reshape(-1, shape[-1]) + stack.predict(fitted.x[None])
+        targets = extra.reshape(-1, shape[-1]) + stack.predict(fitted.x[None])
         starts = np.repeat(fitted.x[None], len(targets), axis=0)
         bounds = fitted.model.lower, fitted.model.upper
         x, _ = minimise(stack, fitted.whitening, targets, starts, *bounds)
         left = (targets - stack.predict(x)).reshape(shape)
-        visible, whole = (interp1d(KNOTS, each @ fitted.whitening.T, axis=1)(SIZES) for each in (left, added))
+        visible, whole = (interp1d(KNOTS, each @ fitted.whitening.T, axis=1)(SIZES) for each in (left, extra))
         chance = interp1d(KNOTS, _chance(fitted, seen.names, theta), axis=1)(SIZES)
         return cls(seen.names, visible, (whole**2).sum(axis=2), chance, seen.correlations)
 
@@ -192,16 +193,16 @@ class Effects:
 def _chance(fitted: Fitted, names: Sequence[str], theta: np.ndarray) -> np.ndarray:
     """See `Effects`, at the coded `KNOTS`, (mechanisms, knots)."""
     left = projector(fitted.sensitivities) @ fitted.whitening
+    terms = added(np.repeat(theta[None], len(KNOTS), axis=0), KNOTS)
     out = np.zeros((len(names), len(KNOTS)))
     start = 0
     for block in fitted.stack.blocks:
         end = start + len(block.columns)
         metric = left[:, start:end].T @ left[:, start:end]
-        additions = fitted.model.emulator.surfaces[block.condition].additions
-        for i, name in enumerate(names):
-            for k, size in enumerate(KNOTS):
-                scatter = additions[name].scatter(additions[name].chance, theta, float(size))
-                out[i, k] += float(np.sum(metric * scatter[np.ix_(block.columns, block.columns)]))
+        for own, name in zip(out, names, strict=True):
+            part = fitted.model.emulator.surfaces[block.condition].additions[name]
+            seen = np.sum(metric * part.covariance[np.ix_(block.columns, block.columns)])
+            own += np.einsum("ks,st,kt->k", terms, part.chance, terms) * seen
         start = end
     return out
 

@@ -108,10 +108,11 @@ class Addition:
             values += size[:, None] * self.polynomial.missed(np.column_stack([theta, size]))
         return np.asarray(values)
 
-    def scatter(self, coefficients: np.ndarray, theta: np.ndarray, size: float) -> np.ndarray:
-        """What a covariance of the coefficients gives at one point, (observables, observables)."""
-        terms, sd = added(theta[None], np.array([size]))[0], np.sqrt(self.variance)
-        return np.asarray((terms @ coefficients @ terms) * (sd[:, None] * self.correlation * sd))
+    @property
+    def covariance(self) -> np.ndarray:
+        """Covariance of one run, mean over the mechanism's runs, (observables, observables)."""
+        sd = np.sqrt(self.variance)
+        return np.asarray(sd[:, None] * self.correlation * sd)
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,8 +173,9 @@ class Surfaces:
         base, own = cubic(theta[None])[0], np.diag(self.misfit_variance(x, mechanisms))
         for name, size in zip(mechanisms, x[len(theta) :], strict=True):
             part = self.additions[name]
-            base = base - part.base_terms.T @ added(theta[None], np.array([size]))[0]
-            own += part.scatter(part.gram_inverse, theta, float(size))
+            terms = added(theta[None], np.array([size]))[0]
+            base = base - part.base_terms.T @ terms
+            own += (terms @ part.gram_inverse @ terms) * part.covariance
         return np.asarray((base @ self.gram_inverse @ base) * self.noise.covariance(theta) + own)
 
     def coefficient_errors(self, theta: np.ndarray, mechanisms: tuple[str, ...]) -> np.ndarray:

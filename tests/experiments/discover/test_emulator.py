@@ -26,6 +26,7 @@ from experiments.discover.surface_fits import (
     fit_bases,
     likeliest_scales,
 )
+from experiments.discover.surfaces import added
 from experiments.errors import InputError
 
 
@@ -257,11 +258,12 @@ def test_what_the_noise_of_a_bank_adds_to_an_effect_is_as_stated() -> None:
     theta, size = rng.uniform(-1.0, 1.0, (count, 1)), rng.uniform(0.0, 1.0, count)
     noise = fit_noise(theta, rng.standard_normal((count, 4)), np.full(4, 1e-9))
     [base] = fit_bases([BaseRuns.of(theta, np.zeros((count, 4)), noise)])
-    at, half, shown, stated = np.array([0.3]), np.array([0.5]), [], []
+    at, half, shown, stated = np.array([[0.3]]), np.array([0.5]), [], []
+    [terms] = added(at, half)
     for _ in range(draws):
         values = 3.0 * size[:, None] * (1.0 + theta) + rng.standard_normal((count, 4))
         [addition] = fit_additions([AddedRuns(base, theta, size, values)])
-        shown.append(addition.predict(at[None], half)[0])
-        stated.append(np.diag(addition.scatter(addition.chance, at, 0.5)))
+        shown.append(addition.predict(at, half)[0])
+        stated.append(terms @ addition.chance @ terms * np.diag(addition.covariance))
     # 800 squares: 5 %; twice as much for scales and variances, which each draw finds anew.
     assert np.var(shown, axis=0).mean() == pytest.approx(np.mean(stated), rel=3 * 0.1)
