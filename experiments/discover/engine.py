@@ -82,6 +82,7 @@ class EngineSimulator:
         ValueError
             When a point names an unknown mechanism or condition, or has not one value for every factor.
         """
+        self._runner.expect(len(points))
         cases: dict[str, Case] = {}
         keys, refused = [], {}
         for point in points:

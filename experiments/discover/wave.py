@@ -12,6 +12,7 @@ from functools import cached_property, partial
 from multiprocessing.queues import Queue
 
 from dem_warp import Case, CaseResult, Progress, simulate
+from dem_warp.device import resolve_device
 from dem_warp.processes import end_with_parent
 from dem_warp.simulation import batches
 from experiments.discover.devices import resolve_devices
@@ -82,8 +83,16 @@ class WaveRunner:
             if pool := self.__dict__.pop(name, None):
                 pool.shutdown(cancel_futures=True)
 
+    def expect(self, count: int) -> None:
+        """Begin the processes that drive launches if so many cases need several, and do not wait for them."""
+        if len(self.drivers) > 1 and count > (self._worlds or WORLDS):
+            for _ in self.drivers:
+                self._driven.submit(_open_device)
+
     def heaps(self, cases: Sequence[Case]) -> list[CaseResult]:
-        """Simulate a few cases on the first device, measure nothing and keep nothing."""
+        """Simulate a few cases, measure nothing and keep nothing."""
+        if self._drives:
+            return [result for (result,) in self._driven.map(_simulate_here, [[case] for case in cases])]
         return simulate(cases, device=self._devices[0], workers=self._workers)
 
     def run(self, cases: Mapping[str, Case]) -> dict[str, Outcome]:
@@ -93,7 +102,8 @@ class WaveRunner:
         measured = _Measured(self._table)
         clock = _Clock(len(cases), self._progress)
         launches = self._launches(cases)
-        launch_all = self._drive if min(len(launches), len(self.drivers)) > 1 else self._launch
+        several = min(len(launches), len(self.drivers)) > 1
+        launch_all = self._drive if several or self._drives else self._launch
         try:
             launch_all(launches, cases, measured, clock)
             return measured.finish()
@@ -114,6 +124,11 @@ class WaveRunner:
         for device in self.drivers:
             devices.put(device)
         return ProcessPoolExecutor(len(self.drivers), _CONTEXT, _begin_driving, (devices,))
+
+    @property
+    def _drives(self) -> bool:
+        """Whether processes drive launches already: then this one needs no context on a GPU."""
+        return "_driven" in self.__dict__
 
     @property
     def _on_cpu(self) -> bool:
@@ -174,6 +189,11 @@ def _begin_driving(devices: Queue[str]) -> None:
     """Take a device, for good: a process that changes between two would hold memory on both."""
     end_with_parent()
     _mine.append(devices.get())
+
+
+def _open_device() -> None:
+    """Start what the first launch would start."""
+    resolve_device(_mine[0])
 
 
 def _simulate_here(cases: Sequence[Case]) -> list[CaseResult]:

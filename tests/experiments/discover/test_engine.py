@@ -92,8 +92,11 @@ def test_several_launches_at_once_give_the_same(study: Study, table: OutcomeTabl
         study, library_for(study), table, "cpu", workers=1, worlds=1, drivers=2, progress=seen.append
     ) as several:
         outcomes = several(POINTS[:2])
+        heaps = several.heaps(POINTS[:2])
     assert [progress.done for progress in seen] == [1, 2]
     alone = simulate([study.under(p.condition).case({"E": p.theta[0]}, p.seed) for p in POINTS[:2]], "cpu", 1)
+    for heap, result in zip(heaps, alone, strict=True):
+        np.testing.assert_array_equal(heap.positions, result.positions)
     expected = [measure(study.measurement, result)[0] for result in alone]
     np.testing.assert_array_equal(outcomes.values, expected)
 
