@@ -281,10 +281,15 @@ class Solver:
         key = (self.lanes, len(self._running), cycle)
         if key not in self._graphs:
             with wp.ScopedCapture(self.device) as capture:
-                for _ in range(CHUNK // cycle):
+                for _ in range(self._cycles_captured(cycle)):
                     self._cycle(cycle)
             self._graphs[key] = capture.graph
         return self._graphs[key]
+
+    def _cycles_captured(self, cycle: int) -> int:
+        """Cycles of a graph: a chunk's on a GPU, which takes its time to begin one; a single one on a CPU,
+        where they are begun at once, and capturing a launch takes longer than running it."""
+        return CHUNK // cycle if self.device.is_cuda else 1
 
     def _cycle_length(self, chunks: int) -> int:
         """Steps of a cycle, a power of two: as many as the lists allow the fastest grain of any world.
@@ -303,8 +308,9 @@ class Solver:
         """Take `chunks` times CHUNK steps in every running world."""
         while chunks > 0 and self._running:
             ahead = min(chunks, LOOK_CHUNKS)
-            graph = self._graph(self._cycle_length(ahead))
-            for _ in range(ahead):
+            cycle = self._cycle_length(ahead)
+            graph = self._graph(cycle)
+            for _ in range(ahead * CHUNK // (cycle * self._cycles_captured(cycle))):
                 wp.capture_launch(graph)
             chunks -= ahead
 
