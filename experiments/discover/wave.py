@@ -85,7 +85,7 @@ class WaveRunner:
 
     def expect(self, count: int) -> None:
         """Begin the processes that drive launches if so many cases need several, and do not wait for them."""
-        if len(self.drivers) > 1 and count > (self._worlds or WORLDS):
+        if not self._drives and len(self.drivers) > 1 and count > (self._worlds or WORLDS):
             for _ in self.drivers:
                 self._driven.submit(_open_device)
 
