@@ -287,9 +287,9 @@ class Solver:
         return self._graphs[key]
 
     def _cycles_captured(self, cycle: int) -> int:
-        """Cycles of a graph: a chunk's on a GPU, which takes its time to begin one; a single one on a CPU,
-        where they are begun at once, and capturing a launch takes longer than running it."""
-        return CHUNK // cycle if self.device.is_cuda else 1
+        """Cycles of a graph: several short ones on a GPU, which takes its time to begin a graph, a single one
+        on a CPU, which does not. What a longer graph saves is less than it takes to capture."""
+        return LONGEST_CYCLE // cycle if self.device.is_cuda else 1
 
     def _cycle_length(self, chunks: int) -> int:
         """Steps of a cycle, a power of two: as many as the lists allow the fastest grain of any world.

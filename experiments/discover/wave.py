@@ -24,7 +24,7 @@ from experiments.study.study import MeasurementSection
 WORLDS = 1024
 """Worlds that one launch on a GPU holds: enough to fill it, few enough that a killed run loses little."""
 
-DRIVERS = 3
+DRIVERS = 4
 """Launches at once on each GPU, each driven by a process of its own: while one's controllers decide on the
 host, the GPU works for the others."""
 
