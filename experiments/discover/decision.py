@@ -15,6 +15,9 @@ from experiments.discover.settings import Settings
 CHANCE = 1.645
 """Standard deviations that a normal number passes upwards in one case of twenty."""
 
+LIKELIHOOD = "minus twice the log-likelihood, held-out conditions included"
+"""What a score is, in reasons."""
+
 
 @dataclass(frozen=True, eq=False)
 class Assessment:
@@ -160,9 +163,8 @@ def decide(assessments: Sequence[Assessment], settings: Settings) -> Decision:
             return Decision(Verdict.UNKNOWN, (), f"no one pair stands out: {titles}", None)
         names = tuple(assessments[i].mechanisms[0] for i in close)
         most = max(by[i] for i in close)
-        return Decision(
-            Verdict.TIE, names, f"{titles} explain the data alike, within {most:.1f} of Q", passing[0]
-        )
+        reason = f"{titles} explain the data alike: at most {most:.1f} apart in {LIKELIHOOD}"
+        return Decision(Verdict.TIE, names, reason, passing[0])
     if passing and best.declared:
         return _named(assessments, order[0], order[1:])
     if passing:
@@ -180,7 +182,7 @@ def _named(assessments: Sequence[Assessment], chosen: int, others: Sequence[int]
     if others:
         second = assessments[others[0]]
         behind = second.score - best.score
-        reason += f", and the next, {_title(second)}, is {behind:.0f} behind in Q"
+        reason += f", and the next, {_title(second)}, is {behind:.0f} behind in {LIKELIHOOD}"
     return Decision(Verdict.NAMED, best.mechanisms, reason, chosen)
 
 

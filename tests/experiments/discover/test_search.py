@@ -148,7 +148,7 @@ def test_the_shipped_banks_know_what_made_them(scale: str | None) -> None:
     file = f"bank-{scale}.npz" if scale else "bank.npz"
     maker = Search.of(load_study(TRIAL, scale)).read_bank(TRIAL.with_name(file)).maker
     assert maker is not None
-    assert (maker.day, maker.commit) == ("2026-11-22", "aa5bb6c")
+    assert (maker.day, maker.commit) == ("2026-11-22", "71088ff")
     assert len(maker.engine) == 64
 
 
