@@ -150,6 +150,8 @@ def run_search(job: Job, resume: bool = False, watch: Watch = lambda title: null
     _, changes = open_folder(job.folder, job.study, resume)
     for change in changes:
         _log.warning("The study has changed since the earlier run: %s", change)
+    for note in measured.notes if measured else ():
+        _log.warning("The data: %s", note)
     search.settings.write(job.folder / SETTINGS)
     with _Watched(search, job, watch) as simulator:
         if bank is None:

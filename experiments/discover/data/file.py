@@ -6,18 +6,21 @@ Columns, in any order: ``condition`` (of the study), ``replicate`` (a label; one
 measured on the picture; without an observable, all that the picture shows. Several pictures of one heap are
 views of it: their mean counts. The observable ``clogged`` says that the tube held its grains, so that there
 is no heap. A row without value and picture says that nothing was measured.
+
+A value that the test cannot give, of a wrong unit most often, is set aside and noted; what cannot be read at
+all is an error.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
 from experiments.discover.data.notes import data_notes
-from experiments.discover.data.plausible import inversions, size_of_test
+from experiments.discover.data.plausible import SizeOfTest, inversions, size_of_test
 from experiments.discover.data.readings import CLOGGED_ROW, Reading, readings_of
 from experiments.discover.data.table import Row, read_rows
 from experiments.discover.measured import CLOGGED, Measured
@@ -48,30 +51,49 @@ def read_measured(path: Path, study: Study) -> Measured:
     ------
     InputError
         When the file cannot be read or breaks a rule: every rule, the values received, and their rows. When
-        the study's test leaves no heap.
+        no value is left. When the study's test leaves no heap.
     """
     sizes = {condition.name: size_of_test(study.under(condition.name)) for condition in study.conditions}
-    heaps: dict[tuple[str, str], list[Reading]] = {}
-    problems: list[Problem] = []
-    notes: list[str] = []
-    empty = 0
+    found = _Found()
     for row in read_rows(path, NEEDED, COLUMNS):
+        found.add(row, sizes, study.measurement.fit)
+    found.require_sound()
+    notes = [*found.notes, *_set_aside(found.doubts)]
+    notes += [f"{found.empty} rows are empty: not measured"] if found.empty else []
+    return _gather(path, {key: heap for key, heap in found.heaps.items() if heap}, study.conditions, notes)
+
+
+@dataclass
+class _Found:
+    """What the rows of a file say: heaps by condition and replicate, and what is wrong with others."""
+
+    heaps: dict[tuple[str, str], list[Reading]] = field(default_factory=dict)
+    doubts: list[tuple[int, Problem]] = field(default_factory=list)
+    """Values of wrong units, each with its row."""
+    problems: list[Problem] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    empty: int = 0
+
+    def add(self, row: Row, sizes: Mapping[str, SizeOfTest], fit: str) -> None:
+        """Read a row."""
         try:
-            heap = heaps.setdefault(_heap_of(row, sizes), [])
-            found = list(readings_of(row, sizes[row["condition"]], study.measurement.fit))
+            heap = self.heaps.setdefault(_heap_of(row, sizes), [])
+            readings = list(readings_of(row, sizes[row["condition"]], fit))
         except InputError as error:
-            problems += error.problems
+            self.problems += error.problems
         except PictureError as error:
-            notes.append(f"row {row.line}: the picture shows nothing to measure: {error}")
+            self.notes.append(f"row {row.line}: the picture shows nothing to measure: {error}")
         else:
-            heap += found
-            empty += not found
-    problems += [problem for heap in heaps.values() for problem in _wrong_way_round(heap)]
-    if problems:
-        first, *more = problems
-        raise InputError(first.rule, first.value, first.place, tuple(more))
-    notes += [f"{empty} rows are empty: not measured"] if empty else []
-    return _gather(path, {key: heap for key, heap in heaps.items() if heap}, study.conditions, notes)
+            heap += [reading for reading in readings if not reading.doubt]
+            self.doubts += [(row.line, reading.doubt) for reading in readings if reading.doubt]
+            self.empty += not readings
+
+    def require_sound(self) -> None:
+        """Raise an error with all that is wrong if a row cannot be read, or wrong units leave no value."""
+        doubts = [doubt for _, doubt in self.doubts]
+        if self.problems or (doubts and not any(self.heaps.values())):
+            first, *more = [*self.problems, *doubts]
+            raise InputError(first.rule, first.value, first.place, tuple(more))
 
 
 def _heap_of(row: Row, conditions: Collection[str]) -> tuple[str, str]:
@@ -84,15 +106,20 @@ def _heap_of(row: Row, conditions: Collection[str]) -> tuple[str, str]:
     return row["condition"], row["replicate"]
 
 
-def _wrong_way_round(heap: list[Reading]) -> Iterator[Problem]:
-    """Problems of a heap whose observables cannot be true together."""
-    values = {reading.observable: reading for reading in heap}
-    for small, large in inversions({name: reading.value for name, reading in values.items()}):
-        row = values[small].row
-        rule = f"{small} is never above {large} of the same heap: are the units right?"
-        yield Problem(
-            rule, f"{values[small].value:.6g} > {values[large].value:.6g}", f"{row.file}:{row.line}: value"
-        )
+def _set_aside(doubts: Sequence[tuple[int, Problem]]) -> Iterator[str]:
+    """Say which rows were set aside for their units: a note for all that break the same rule."""
+    for rule in dict.fromkeys(doubt.rule for _, doubt in doubts):
+        alike = [(line, doubt.value) for line, doubt in doubts if doubt.rule == rule]
+        received = alike[0][1] if len(alike) == 1 else f"{alike[0][1]}, ..."
+        yield f"{_rows([line for line, _ in alike])}: {rule} (received {received}); set aside"
+
+
+def _rows(lines: Sequence[int]) -> str:
+    """Rows by their lines; of many the first few."""
+    shown = ", ".join(str(line) for line in lines[:3])
+    if len(lines) > 3:
+        return f"rows {shown} and {len(lines) - 3} more"
+    return f"row {shown}" if len(lines) == 1 else f"rows {shown}"
 
 
 def _gather(
@@ -147,7 +174,18 @@ def _settle(key: tuple[str, str], readings: list[Reading], notes: list[str]) -> 
                 notes.append(f"{heap}: rows {lines} say the same of {name}; it counts once")
         else:
             notes.append(f"{heap}: rows {lines} contradict each other on {name}; it was set aside")
+    _drop_inversions(heap, values, notes)
     return values
+
+
+def _drop_inversions(heap: str, values: dict[str, float], notes: list[str]) -> None:
+    """Set aside observables of one heap that cannot be true together."""
+    for small, large in list(inversions(values)):
+        first, second = values.pop(small), values.pop(large)
+        notes.append(
+            f"{heap}: {small} is never above {large} of the same heap ({first:.6g} > {second:.6g}): are the "
+            "units right? Both were set aside"
+        )
 
 
 def _pictures(folder: Path, heaps: Mapping[tuple[str, str], list[Reading]]) -> dict[str, tuple[Path, ...]]:

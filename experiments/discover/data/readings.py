@@ -10,7 +10,7 @@ import numpy as np
 from experiments.discover.data.plausible import SizeOfTest
 from experiments.discover.data.table import Row
 from experiments.discover.observables import OBSERVABLES, Observable, photographed
-from experiments.errors import InputError
+from experiments.errors import Problem
 from experiments.study.schema import nearest_name
 from experiments.study.units import Quantity
 from imaging import find_outline, measure, read_picture
@@ -35,15 +35,18 @@ class Reading:
     observable : str
         Its name, or `CLOGGED_ROW`.
     value : float
-        In the unit of the observable; NaN without a heap.
+        In the unit of the observable; NaN without a heap, and where its unit is of another kind.
     picture : str
         The picture that it was measured on, empty if none.
+    doubt : Problem or None
+        Why its unit, or the size of the picture's pixels, cannot be right.
     """
 
     row: Row
     observable: str
     value: float
     picture: str = ""
+    doubt: Problem | None = None
 
 
 def readings_of(row: Row, size: SizeOfTest, fit: str) -> Iterator[Reading]:
@@ -76,25 +79,32 @@ def readings_of(row: Row, size: SizeOfTest, fit: str) -> Iterator[Reading]:
     elif row["value"]:
         if not name:
             raise row.error("must say what the value is of", "observable")
-        yield Reading(row, name, _value(row, BY_NAME[name], size))
+        yield _written(row, BY_NAME[name], size)
     elif row["picture"]:
         yield from _seen(row, size, fit)
 
 
-def _value(row: Row, observable: Observable, size: SizeOfTest) -> float:
-    """The value of a row in the base unit."""
-    unit = row["unit"]
-    if "," in row["value"]:
-        raise row.error("needs a decimal point, not a comma", "value")
+def _written(row: Row, observable: Observable, size: SizeOfTest) -> Reading:
+    """What a row gives as a number."""
+    quantity = _quantity(row)
+    if not quantity.unit and observable.unit != "1":
+        quantity = replace(quantity, unit=observable.unit)
     try:
-        quantity = Quantity.parse(f"{row['value']} {'' if unit == '1' else unit}")
-        if not quantity.unit and observable.unit != "1":
-            quantity = replace(quantity, unit=observable.unit)
         value = quantity.to_base(_DIMENSIONS[observable.unit])
     except ValueError as error:
+        doubt = Problem(f"{observable.name} {error}", str(quantity), _place(row))
+        return Reading(row, observable.name, np.nan, doubt=doubt)
+    return Reading(row, observable.name, value, doubt=_doubt(row, observable, value, size))
+
+
+def _quantity(row: Row) -> Quantity:
+    if "," in row["value"]:
+        raise row.error("needs a decimal point, not a comma", "value")
+    unit = "" if row["unit"] == "1" else row["unit"]
+    try:
+        return Quantity.parse(f"{row['value']} {unit}")
+    except ValueError as error:
         raise row.error(str(error), "value") from None
-    _check_size(row, observable, value, size)
-    return value
 
 
 def _seen(row: Row, size: SizeOfTest, fit: str) -> Iterator[Reading]:
@@ -111,8 +121,7 @@ def _seen(row: Row, size: SizeOfTest, fit: str) -> Iterator[Reading]:
     for shown, value in photographed([measure(outline, fit, str(path))]).items():
         observable = BY_NAME[shown]
         if shown == name or (not name and (observable.unit != "m" or pixel)):
-            _check_size(row, observable, value, size)
-            yield Reading(row, shown, value, row["picture"])
+            yield Reading(row, shown, value, row["picture"], _doubt(row, observable, value, size))
 
 
 def _pixel(row: Row) -> float | None:
@@ -127,12 +136,16 @@ def _pixel(row: Row) -> float | None:
     return pixel
 
 
-def _check_size(row: Row, observable: Observable, value: float, size: SizeOfTest) -> None:
+def _doubt(row: Row, observable: Observable, value: float, size: SizeOfTest) -> Problem | None:
+    """Why a value cannot be one of this test, if it cannot."""
     low, high = size.limits(observable.name, observable.unit)
     if low <= value <= high:
-        return
+        return None
     unit = "" if observable.unit == "1" else f" {observable.unit}"
     question = f"is the unit right (none given:{unit})?" if unit and not row["unit"] else "is the unit right?"
     rule = f"{observable.name} lies between {low:.3g} and {high:.3g}{unit} in this test: {question}"
-    column = "value" if row["value"] else "picture"
-    raise InputError(rule, f"{value:.6g}{unit}", f"{row.file}:{row.line}: {column}")
+    return Problem(rule, f"{value:.6g}{unit}", _place(row))
+
+
+def _place(row: Row) -> str:
+    return f"{row.file}:{row.line}: {'value' if row['value'] else 'picture'}"

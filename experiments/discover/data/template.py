@@ -26,7 +26,8 @@ LABORATORY_UNITS = {"m": "mm"}
 _HEAD = """\
 Heaps measured for the study {study}: a row a measurement. Fill in what was measured, then
     dem-warp discover {study} {file}
-A row without a value is not measured; whole rows may be left out or added, with other units too.
+A row without a value is not measured; whole rows may be left out or added, with other units too. A value
+that this test cannot give, of a wrong unit most often, is set aside, and the report says so.
 
 condition: how the test was done, a condition of the study.
 {conditions}

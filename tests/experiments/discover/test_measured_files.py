@@ -124,13 +124,6 @@ def test_a_picture_without_a_heap_is_noted_and_the_rest_stays(read, tmp_path: Pa
 @pytest.mark.parametrize(
     ("row", "message"),
     [
-        ("base,1,height,40,m,,", r"3: value: height lies between .* is the unit right\? \(received 40 m\)"),
-        ("base,1,height,12,,,", "none given: m"),
-        ("base,1,rolled_fraction,12,,,", "rolled_fraction lies between 0 and 1"),
-        ("base,1,t75,400,s,,", "t75 lies between"),
-        ("base,1,flank_angle,0.45,rad,,", None),
-        ("base,1,flank_angle,25,mm,,", "needs a unit of angle"),
-        ("base,1,concavity,0.1,mm,,", "must be a plain number"),
         ("base,1,flank_angle,nan,,,", "must be a number"),
         ('base,1,flank_angle,"25,5",,,', "decimal point"),
         ("bsae,1,flank_angle,25,,,", "did you mean 'base'"),
@@ -143,36 +136,71 @@ def test_a_picture_without_a_heap_is_noted_and_the_rest_stays(read, tmp_path: Pa
         ("base,1,flank_angle,25,,,,,a comma", "quotes"),
     ],
 )
-def test_what_cannot_be_right_is_refused_with_its_row(read, row: str, message: str | None) -> None:
-    rows = angles("fast", 25.0) + row + "\n"
-    if message is None:
-        assert read(rows).values["base"][0, 0] == pytest.approx(np.degrees(0.45), rel=1e-15)
-        return
+def test_what_cannot_be_read_is_refused_with_its_row(read, row: str, message: str) -> None:
     with pytest.raises(InputError, match=message) as error:
-        read(rows)
+        read(angles("fast", 25.0) + row + "\n")
     assert "measured.csv:3" in error.value.place
+
+
+@pytest.mark.parametrize(
+    ("row", "note"),
+    [
+        ("height,40,m", "is the unit right? (received 40 m); set aside"),
+        ("height,12,", "in this test: is the unit right (none given: m)? (received 12 m); set aside"),
+        ("rolled_fraction,12,", "rolled_fraction lies between 0 and 1 in this test: is the unit right?"),
+        ("t75,400,s", "(received 400 s); set aside"),
+        ("flank_angle,25,mm", "flank_angle needs a unit of angle"),
+        ("t75,0.4,furlong", "t75 needs a unit of time"),
+        ("concavity,0.1,mm", "concavity must be a plain number"),
+    ],
+)
+def test_a_value_whose_unit_cannot_be_right_is_set_aside_with_its_row(read, row: str, note: str) -> None:
+    data = read(angles("base", 25.0) + f"base,1,{row}\nbase,1,asymmetry,0.1\n")
+    assert data.observables == ("flank_angle", "asymmetry")
+    assert len(noted(data, "row 3:", note)) == 1
+
+
+def test_one_note_tells_of_all_values_of_one_wrong_unit(read) -> None:
+    data = read(angles("base", 25.0) + "".join(f"base,{i},height,1{i},m\n" for i in range(2, 7)))
+    assert noted(data, "rows 3, 4, 5 and 2 more: height lies between", "(received 12 m, ...); set aside")
+    # A heap of which nothing is left is none.
+    np.testing.assert_array_equal(data.values["base"], [[25.0]])
+
+
+def test_a_unit_of_the_right_kind_is_converted(read) -> None:
+    assert read("base,1,flank_angle,0.45,rad\n").values["base"][0, 0] == pytest.approx(
+        np.degrees(0.45), rel=1e-15
+    )
+
+
+def test_wrong_units_that_leave_no_value_are_refused(read) -> None:
+    with pytest.raises(InputError, match=r"3: value: .* is the unit right\? \(received 41 m\)"):
+        read("base,1,height,40,m\nbase,2,height,41,m\n")
 
 
 def test_a_length_on_a_picture_needs_a_scale(read, tmp_path: Path) -> None:
     save_picture(tmp_path / "heap.png", draw(DrawnHeap(27.0, 31.0), PLAIN))
     with pytest.raises(InputError, match="size of its pixels"):
         read("base,1,height,,,heap.png,\n")
-    with pytest.raises(InputError, match="lies between"):
-        read("base,1,,,,heap.png,1 cm\n")
+    data = read("base,1,,,,heap.png,1 cm\n")
+    assert "flank_angle" in data.observables
+    assert "height" not in data.observables
+    assert noted(data, "row 2: height lies between", "set aside")
 
 
 @pytest.mark.parametrize(("small", "large"), [("r50", "r90"), ("t75", "t55"), ("centre_height", "height")])
-def test_observables_of_a_heap_that_exclude_each_other_are_refused(read, small: str, large: str) -> None:
-    with pytest.raises(InputError, match=f"{small} is never above {large}"):
-        read(f"base,1,{small},0.03\nbase,1,{large},0.02\n")
+def test_observables_of_a_heap_that_exclude_each_other_are_set_aside(read, small: str, large: str) -> None:
+    data = read(angles("base", 25.0) + f"base,1,{small},0.03\nbase,1,{large},0.02\n")
+    assert data.observables == ("flank_angle",)
+    assert noted(data, "base, replicate 1", f"{small} is never above {large}", "(0.03 > 0.02)", "set aside")
 
 
 def test_every_wrong_row_is_named_at_once(read) -> None:
     with pytest.raises(InputError) as error:
         read("base,1,height,40,m,,\nbase,1,flank_angle,x,,,\n")
     assert [problem.place.rpartition("/")[2] for problem in error.value.problems] == [
-        "measured.csv:2: value",
         "measured.csv:3: value",
+        "measured.csv:2: value",
     ]
 
 
