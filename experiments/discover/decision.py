@@ -163,7 +163,9 @@ def decide(assessments: Sequence[Assessment], settings: Settings) -> Decision:
             return Decision(Verdict.UNKNOWN, (), f"no one pair stands out: {titles}", None)
         names = tuple(assessments[i].mechanisms[0] for i in close)
         most = max(by[i] for i in close)
-        reason = f"{titles} explain the data alike: at most {most:.1f} apart in {LIKELIHOOD}"
+        reason = (
+            f"{titles} explain the data alike: at most {most:.1f} apart as ties are judged, in {LIKELIHOOD}"
+        )
         return Decision(Verdict.TIE, names, reason, passing[0])
     if passing and best.declared:
         return _named(assessments, order[0], order[1:])

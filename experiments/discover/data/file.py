@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from operator import itemgetter
 from pathlib import Path
 
 import numpy as np
@@ -65,12 +66,13 @@ def read_measured(path: Path, study: Study) -> Measured:
 
 @dataclass
 class _Found:
-    """What the rows of a file say: heaps by condition and replicate, and what is wrong with others."""
+    """What the rows of a file say: heaps by condition and replicate, and what is wrong, each with its row."""
 
     heaps: dict[tuple[str, str], list[Reading]] = field(default_factory=dict)
     doubts: list[tuple[int, Problem]] = field(default_factory=list)
-    """Values of wrong units, each with its row."""
-    problems: list[Problem] = field(default_factory=list)
+    """Values of wrong units, which are set aside."""
+    problems: list[tuple[int, Problem]] = field(default_factory=list)
+    """What cannot be read."""
     notes: list[str] = field(default_factory=list)
     empty: int = 0
 
@@ -80,7 +82,7 @@ class _Found:
             heap = self.heaps.setdefault(_heap_of(row, sizes), [])
             readings = list(readings_of(row, sizes[row["condition"]], fit))
         except InputError as error:
-            self.problems += error.problems
+            self.problems += [(row.line, problem) for problem in error.problems]
         except PictureError as error:
             self.notes.append(f"row {row.line}: the picture shows nothing to measure: {error}")
         else:
@@ -90,9 +92,9 @@ class _Found:
 
     def require_sound(self) -> None:
         """Raise an error with all that is wrong if a row cannot be read, or wrong units leave no value."""
-        doubts = [doubt for _, doubt in self.doubts]
-        if self.problems or (doubts and not any(self.heaps.values())):
-            first, *more = [*self.problems, *doubts]
+        if self.problems or (self.doubts and not any(self.heaps.values())):
+            wrong = sorted([*self.problems, *self.doubts], key=itemgetter(0))
+            first, *more = (problem for _, problem in wrong)
             raise InputError(first.rule, first.value, first.place, tuple(more))
 
 

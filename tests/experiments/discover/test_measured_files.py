@@ -168,9 +168,8 @@ def test_one_note_tells_of_all_values_of_one_wrong_unit(read) -> None:
 
 
 def test_a_unit_of_the_right_kind_is_converted(read) -> None:
-    assert read("base,1,flank_angle,0.45,rad\n").values["base"][0, 0] == pytest.approx(
-        np.degrees(0.45), rel=1e-15
-    )
+    data = read("base,1,flank_angle,0.45,rad\n")
+    np.testing.assert_allclose(data.values["base"], [[np.degrees(0.45)]], rtol=1e-15)
 
 
 def test_wrong_units_that_leave_no_value_are_refused(read) -> None:
@@ -199,8 +198,8 @@ def test_every_wrong_row_is_named_at_once(read) -> None:
     with pytest.raises(InputError) as error:
         read("base,1,height,40,m,,\nbase,1,flank_angle,x,,,\n")
     assert [problem.place.rpartition("/")[2] for problem in error.value.problems] == [
-        "measured.csv:3: value",
         "measured.csv:2: value",
+        "measured.csv:3: value",
     ]
 
 
