@@ -169,9 +169,9 @@ def heap(
     --scene with a further scene of the study.
     """
     with clear_errors():
-        from experiments.calibrate.settings import TARGET_SCENE
         from experiments.cases import require_unused, simulate_heap, write_heap
         from experiments.commands.choices import chosen_device, chosen_study, default_folder
+        from experiments.studyfile.campaign import TARGET_SCENE
 
         device = chosen_device(device)
         chosen = chosen_study(study, scale, device)
@@ -262,12 +262,12 @@ def new(
     with clear_errors():
         if measured:
             from experiments.discover.data.template import write_measured_template
-            from experiments.study import load_study
+            from experiments.studyfile import load_study
 
             study = Path(name) if name.endswith(".toml") else Path(f"{name}.toml")
             path, then = write_measured_template(load_study(study)), f"dem-warp discover {study}"
         else:
-            from experiments.study import write_template
+            from experiments.studyfile import write_template
 
             path, then = write_template(name), "dem-warp calibrate"
     typer.echo(f"Wrote {path}. Fill it in, then: {then} {path}")
@@ -292,7 +292,7 @@ def _assignments(texts: list[str]) -> dict[str, str]:
 def _quantity(text: str, dimension: str, option: str) -> float:
     """Read an option's quantity in SI."""
     from experiments.errors import InputError
-    from experiments.study.units import Quantity
+    from experiments.studyfile.units import Quantity
 
     try:
         return Quantity.parse(text).to_base(dimension)

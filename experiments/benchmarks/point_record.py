@@ -28,7 +28,7 @@ from experiments.report.numbers import fixed, plain, prose
 from experiments.report.response_tables import response_tables
 from experiments.report.tables import Column, Table, make_table
 from experiments.studies.buckwheat import paper
-from experiments.study import Study, load_study
+from experiments.studyfile import Study, load_study
 
 STUDY = Path(paper.__file__).with_name("curve_to_point.toml")
 FOLDER = Path(paper.__file__).with_name("point")

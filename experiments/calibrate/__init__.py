@@ -3,7 +3,7 @@
 from experiments.calibrate.campaign import calibrate
 from experiments.calibrate.cases import Runner, case_seed
 from experiments.calibrate.results import Campaign, ClimbEnd, Decision, Outcome
-from experiments.calibrate.settings import CampaignSettings, CampaignStudy, MeasuredTarget, TwinTarget
+from experiments.studyfile.campaign import CampaignSettings, CampaignStudy, MeasuredTarget, TwinTarget
 
 __all__ = [
     "Campaign",

@@ -25,11 +25,11 @@ from experiments.calibrate.results import (
 )
 from experiments.calibrate.screening import analyse_screening, plan_screening, screening_design
 from experiments.calibrate.selection import require_kept, select_factors
-from experiments.calibrate.settings import CampaignStudy, MeasuredTarget
 from experiments.calibrate.surface import explore_surface, require_slope
 from experiments.calibrate.target import measured_target, plan_target, twin_target
 from experiments.calibrate.values import listed, p_text
 from experiments.calibrate.verification import verify
+from experiments.studyfile.campaign import CampaignStudy, MeasuredTarget
 
 Found = TypeVar("Found", bound=StageResult)
 

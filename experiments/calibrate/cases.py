@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from experiments.calibrate.results import STAGES, Outcome
-from experiments.calibrate.settings import ANGLE, TARGET_SCENE
+from experiments.studyfile.campaign import ANGLE, TARGET_SCENE
 
 if TYPE_CHECKING:
     from doe import Factor

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from experiments.calibrate.screening import screening_design
-from experiments.calibrate.settings import CampaignStudy, TwinTarget
 from experiments.calibrate.values import UNLIMITED, reach_limits
+from experiments.studyfile.campaign import CampaignStudy, TwinTarget
 
 
 def check_study(study: CampaignStudy) -> None:

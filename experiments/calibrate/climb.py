@@ -21,8 +21,8 @@ from experiments.calibrate.cases import (
     too_many_failed,
 )
 from experiments.calibrate.results import ClimbEnd, ClimbResult, Decision, Outcome
-from experiments.calibrate.settings import CampaignStudy, ClimbSettings
 from experiments.calibrate.values import fixed_values, kept_factors, listed, numbered_values, reach_limits
+from experiments.studyfile.campaign import CampaignStudy, ClimbSettings
 
 STAGE = "climb"
 

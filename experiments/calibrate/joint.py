@@ -9,8 +9,8 @@ import pandas as pd
 
 from doe import Goal, JointFit, joint_fit
 from experiments.calibrate.results import Decision, SurfaceResult, TargetResult
-from experiments.calibrate.settings import ANGLE, OptimumSettings
 from experiments.calibrate.values import fixed_values, p_text
+from experiments.studyfile.campaign import ANGLE, OptimumSettings
 
 STAGE = "optimum"
 

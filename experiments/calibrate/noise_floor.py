@@ -10,8 +10,8 @@ from doe import Factor, NoiseFloor, noise_floor
 from experiments.calibrate.cases import failure_summary, middle, plan_cases, scene_cases, values_of
 from experiments.calibrate.responses import each_response, scenes_of
 from experiments.calibrate.results import Decision, NoiseFloorResult
-from experiments.calibrate.settings import NoiseFloorSettings, Response, SeedSettings
 from experiments.calibrate.values import quantity
+from experiments.studyfile.campaign import NoiseFloorSettings, Response, SeedSettings
 
 STAGE = "noise_floor"
 

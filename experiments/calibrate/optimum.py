@@ -19,8 +19,8 @@ from experiments.calibrate.results import (
     TargetResult,
     TruthCheck,
 )
-from experiments.calibrate.settings import CampaignStudy, OptimumSettings
 from experiments.calibrate.values import fixed_values, listed, numbered_values
+from experiments.studyfile.campaign import CampaignStudy, OptimumSettings
 
 STAGE = "optimum"
 

@@ -8,7 +8,7 @@ from typing import TypeVar
 import pandas as pd
 
 from experiments.calibrate.cases import scene_cases
-from experiments.calibrate.settings import TARGET_SCENE, Response
+from experiments.studyfile.campaign import TARGET_SCENE, Response
 
 Found = TypeVar("Found")
 

@@ -18,11 +18,11 @@ import numpy as np
 import pandas as pd
 
 from experiments.calibrate.export import indexed, jsonable
-from experiments.calibrate.settings import TARGET_SCENE
+from experiments.studyfile.campaign import TARGET_SCENE
 
 if TYPE_CHECKING:
     from doe import Comparison, Design, Factor, JointFit, NoiseFloor, Region, Sample, ScreenResult, Surface
-    from experiments.calibrate.settings import CampaignSettings
+    from experiments.studyfile.campaign import CampaignSettings
 
 
 class Outcome(StrEnum):

@@ -17,8 +17,8 @@ from experiments.calibrate.cases import (
 )
 from experiments.calibrate.responses import each_response, scenes_of
 from experiments.calibrate.results import Decision, ScreeningResult
-from experiments.calibrate.settings import ANGLE, Response, ScreeningSettings, SeedSettings
 from experiments.calibrate.values import p_text
+from experiments.studyfile.campaign import ANGLE, Response, ScreeningSettings, SeedSettings
 
 STAGE = "screening"
 

@@ -16,8 +16,8 @@ from experiments.calibrate.results import (
     ScreeningResult,
     SelectionResult,
 )
-from experiments.calibrate.settings import ANGLE, SelectionSettings
 from experiments.calibrate.values import p_text
+from experiments.studyfile.campaign import ANGLE, SelectionSettings
 
 STAGE = "selection"
 

@@ -22,7 +22,6 @@ from experiments.calibrate.cases import (
 )
 from experiments.calibrate.responses import each_response, scenes_of
 from experiments.calibrate.results import ClimbResult, Decision, Outcome, ResponseSurface, SurfaceResult
-from experiments.calibrate.settings import ANGLE, CampaignStudy, SurfaceSettings
 from experiments.calibrate.values import (
     UNLIMITED,
     fixed_values,
@@ -31,6 +30,7 @@ from experiments.calibrate.values import (
     numbered_values,
     p_text,
 )
+from experiments.studyfile.campaign import ANGLE, CampaignStudy, SurfaceSettings
 
 STAGE = "surface"
 

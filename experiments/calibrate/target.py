@@ -11,11 +11,11 @@ from doe import Factor, Sample
 from experiments.calibrate.cases import failure_summary, middle, plan_cases, scene_cases, values_of
 from experiments.calibrate.responses import each_response, scenes_of
 from experiments.calibrate.results import Decision, TargetResult
-from experiments.calibrate.settings import MeasuredTarget, Response, SeedSettings, TwinTarget
 from experiments.calibrate.values import quantity
+from experiments.studyfile.campaign import MeasuredTarget, Response, SeedSettings, TwinTarget
 
 if TYPE_CHECKING:
-    from experiments.calibrate.settings import CampaignStudy
+    from experiments.studyfile.campaign import CampaignStudy
 
 STAGE = "target"
 

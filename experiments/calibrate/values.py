@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from doe import Factor
 
 if TYPE_CHECKING:
-    from experiments.calibrate.settings import CampaignStudy
+    from experiments.studyfile.campaign import CampaignStudy
 
 UNLIMITED = (float("-inf"), float("inf"))
 

@@ -17,8 +17,8 @@ from experiments.calibrate.cases import (
 )
 from experiments.calibrate.responses import scenes_of
 from experiments.calibrate.results import Decision, OptimumResult, TargetResult, VerificationResult
-from experiments.calibrate.settings import CampaignStudy, Response, VerificationSettings
 from experiments.calibrate.values import p_text, quantity
+from experiments.studyfile.campaign import CampaignStudy, Response, VerificationSettings
 
 STAGE = "verification"
 

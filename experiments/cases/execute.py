@@ -13,10 +13,10 @@ from typing import Any
 import pandas as pd
 
 from dem_warp import Case, CaseResult, Progress, simulate
-from experiments.calibrate.settings import TARGET_SCENE
 from experiments.cases.store import Store
 from experiments.errors import StudyError
-from experiments.study import Study
+from experiments.studyfile import Study
+from experiments.studyfile.campaign import TARGET_SCENE
 from imaging import HeapAngle, PictureError, heap_angle
 
 RESULT_COLUMNS = ("status", "reason", "angle", "angle_se", "case_key")

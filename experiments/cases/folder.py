@@ -11,8 +11,8 @@ from typing import Any
 from experiments.cases.store import Store
 from experiments.errors import StoreError
 from experiments.files import write_text
-from experiments.study import Study
-from experiments.study.places import KeyPath, dotted
+from experiments.studyfile import Study
+from experiments.studyfile.places import KeyPath, dotted
 
 MANIFEST = "study.json"
 """File that says which study the folder belongs to."""

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from dem_warp import CaseResult, Progress, simulate
-from experiments.calibrate.settings import TARGET_SCENE
 from experiments.cases.execute import heap_angle_or_reason
 from experiments.files import replacing, write_text
-from experiments.study import Study
+from experiments.studyfile import Study
+from experiments.studyfile.campaign import TARGET_SCENE
 from imaging import HeapAngle, overlay, save_picture, snapshot
 
 

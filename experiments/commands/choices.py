@@ -7,7 +7,7 @@ from pathlib import Path
 from dem_warp.device import resolve_device
 from experiments.discover.devices import resolve_devices
 from experiments.errors import InputError
-from experiments.study import Study, load_study, study_scales
+from experiments.studyfile import Study, load_study, study_scales
 
 
 def chosen_device(device: str | None) -> str:

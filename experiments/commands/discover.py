@@ -26,7 +26,7 @@ from experiments.report import HeapPicture
 from experiments.report.discovery import Terms, write_discovery
 from experiments.report.discovery.pictures import photograph, simulated_heaps
 from experiments.report.writer import source_commit
-from experiments.study import Study
+from experiments.studyfile import Study
 
 Watch = Callable[[str], AbstractContextManager[Callable[[Progress], None] | None]]
 """Opens the display of one wave, by its title, and hands out what its progress is reported to."""

@@ -26,7 +26,7 @@ from experiments.report.record import draw_heaps, write_record
 from experiments.report.writer import library_versions, source_commit
 from experiments.studies.buckwheat.replay import Replay
 from experiments.studies.buckwheat.runs import STAGES, planned_cases
-from experiments.study import Study
+from experiments.studyfile import Study
 
 Watch = Callable[[str], AbstractContextManager[Callable[[Progress], None] | None]]
 """Opens the display of one batch, named by its stages, and hands out what its progress is reported to."""

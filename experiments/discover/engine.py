@@ -15,7 +15,7 @@ from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.simulator import Outcomes, Point
 from experiments.discover.wave import WaveRunner
 from experiments.errors import StudyError
-from experiments.study import Study
+from experiments.studyfile import Study
 
 
 class EngineSimulator:

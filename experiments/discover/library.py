@@ -18,13 +18,13 @@ from pydantic import Field
 from dem_warp.case import Case
 from dem_warp.materials import effective_moduli
 from dem_warp.scenes.poured_scene import GRAVITY
-from experiments.study import Study, StudyError
-from experiments.study.factor_section import Parameters, dimension_at, merge
-from experiments.study.places import Places, drop, nested, value_at
-from experiments.study.schema import Section, field_at, validated
-from experiments.study.sections import Physics
-from experiments.study.toml_files import read_toml
-from experiments.study.units import Quantity
+from experiments.studyfile import Study, StudyError
+from experiments.studyfile.factor_section import Parameters, dimension_at, merge
+from experiments.studyfile.places import Places, drop, nested, value_at
+from experiments.studyfile.schema import Section, field_at, validated
+from experiments.studyfile.sections import Physics
+from experiments.studyfile.toml_files import read_toml
+from experiments.studyfile.units import Quantity
 
 FOLDER = Path(__file__).parent / "mechanisms"
 """The files of the library."""

@@ -12,7 +12,7 @@ from enum import StrEnum
 import numpy as np
 
 from dem_warp import CaseResult
-from experiments.study.study import MeasurementSection
+from experiments.studyfile.study import MeasurementSection
 from imaging import HeapAngle, PictureError, ReposeAngle, heap_angle, heap_shape
 
 

@@ -18,8 +18,8 @@ from experiments.discover.settings import Settings, settings_of
 from experiments.discover.simulator import Simulator
 from experiments.discover.space import SearchSpace
 from experiments.errors import InputError, StudyError
-from experiments.study import Study
-from experiments.study.schema import nearest_name
+from experiments.studyfile import Study
+from experiments.studyfile.schema import nearest_name
 
 WITHOUT_EFFECT = ("name", "note", "paper", "target", "response", "campaign", "discover", "factor")
 """Keys of a study that change no heap at given factors."""

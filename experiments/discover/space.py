@@ -15,7 +15,7 @@ import numpy as np
 from experiments.discover.library import Mechanism
 from experiments.discover.simulator import Point
 from experiments.errors import InputError
-from experiments.study import Study
+from experiments.studyfile import Study
 
 CODED_DIGITS = 9
 """Decimals of the coded parameters of a case."""

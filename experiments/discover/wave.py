@@ -19,7 +19,7 @@ from experiments.discover.devices import resolve_devices
 from experiments.discover.observables import measure
 from experiments.discover.outcome_table import Outcome, OutcomeTable
 from experiments.discover.threads import use_one_thread
-from experiments.study.study import MeasurementSection
+from experiments.studyfile.study import MeasurementSection
 
 WORLDS = 1024
 """Worlds that one launch on a GPU holds: enough to fill it, few enough that a killed run loses little."""

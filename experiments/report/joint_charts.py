@@ -6,7 +6,6 @@ import itertools
 
 from doe import JointFit, Surface
 from experiments.calibrate.results import OptimumResult, SurfaceResult, TargetResult
-from experiments.calibrate.settings import ANGLE
 from experiments.report.surfaces import REGION_FILL, Slice, add_contours, add_design, add_region, point_in
 from experiments.report.theme import (
     BLUE,
@@ -19,6 +18,7 @@ from experiments.report.theme import (
     add_points,
     new_figure,
 )
+from experiments.studyfile.campaign import ANGLE
 
 COLORS = (BLUE, ORANGE, "#7a5195", "#8c6d46", MUTED)
 """Of the responses, in order."""

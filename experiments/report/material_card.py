@@ -11,12 +11,12 @@ import numpy as np
 
 from doe import Region
 from experiments.calibrate.results import Campaign, OptimumResult
-from experiments.calibrate.settings import Response
 from experiments.files import replacing, write_text
-from experiments.study import Study
-from experiments.study.card import MATERIAL, SECTIONS, shapes_of
-from experiments.study.factor_section import with_factor_values
-from experiments.study.toml_files import toml_text
+from experiments.studyfile import Study
+from experiments.studyfile.campaign import Response
+from experiments.studyfile.card import MATERIAL, SECTIONS, shapes_of
+from experiments.studyfile.factor_section import with_factor_values
+from experiments.studyfile.toml_files import toml_text
 
 CARD = "material.toml"
 

@@ -24,7 +24,7 @@ from experiments.report.sections import (
     stage_sections,
 )
 from experiments.studies.buckwheat.replay import Replay
-from experiments.study import Study
+from experiments.studyfile import Study
 
 OUTCOMES = {
     Outcome.CALIBRATED: "Calibrated",

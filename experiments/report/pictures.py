@@ -15,7 +15,7 @@ from dem_warp import CaseResult
 from experiments.calibrate.results import Campaign
 from experiments.cases import measure_heap
 from experiments.report.numbers import trimmed
-from experiments.study import Study
+from experiments.studyfile import Study
 from imaging import HeapAngle, overlay, snapshot
 from imaging.render import Snapshot
 

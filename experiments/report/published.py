@@ -9,7 +9,7 @@ import pandas as pd
 
 from doe import Sample, Surface
 from experiments.studies.buckwheat import paper
-from experiments.study import Study
+from experiments.studyfile import Study
 
 QUALITY = ("r2", "r2_adjusted", "r2_predicted", "cv_percent", "adequate_precision")
 """Measures of a fit, by their names in ``Surface``."""

@@ -26,7 +26,7 @@ from experiments.report.tables import Column, Table, make_table
 from experiments.studies.buckwheat.replay import RUN, Replay
 from experiments.studies.buckwheat.runs import DESIGNS, STAGES
 from experiments.studies.buckwheat.sensitivities import Sensitivities
-from experiments.study import Study
+from experiments.studyfile import Study
 from imaging import save_picture
 
 PAGE, RUNS, PROVENANCE, CAMPAIGN = "README.md", "runs.csv", "provenance.json", "campaign.json"

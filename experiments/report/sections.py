@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from experiments.calibrate.results import Campaign
-from experiments.calibrate.settings import Response
 from experiments.report import charts, stage_tables, surfaces
 from experiments.report.joint_charts import joint_charts
 from experiments.report.published import Published
@@ -15,6 +14,7 @@ from experiments.report.response_tables import response_tables
 from experiments.report.tables import Table
 from experiments.report.theme import Chart
 from experiments.studies.buckwheat.replay import Replay
+from experiments.studyfile.campaign import Response
 
 TITLES = {
     "factors": "Factors",

@@ -17,7 +17,7 @@ from experiments.report.material_card import write_material_card
 from experiments.report.page import render_page
 from experiments.report.pictures import HeapPicture
 from experiments.studies.buckwheat.replay import Replay
-from experiments.study import Study
+from experiments.studyfile import Study
 
 LIBRARIES = ("warp-lang", "numpy", "scipy", "pandas", "statsmodels", "opencv-python-headless")
 """Packages whose version may change a number."""

@@ -12,7 +12,7 @@ from dem_warp import CaseResult, LiftedCylinder
 from dem_warp.device import resolve_device
 from experiments.benchmarks import columns as scene
 from experiments.benchmarks.columns import Columns
-from experiments.study import Study, load_study
+from experiments.studyfile import Study, load_study
 
 SMALL_STUDY = """
 name = "Small"

@@ -20,7 +20,7 @@ from experiments.benchmarks.record import record_page
 from experiments.benchmarks.roofline import step_traffic
 from experiments.benchmarks.tables import markdown_table, parse_counts
 from experiments.benchmarks.timing import run_in, start, time_steps
-from experiments.study import load_study
+from experiments.studyfile import load_study
 
 DEVICE = "cpu"
 

@@ -14,7 +14,7 @@ from experiments.benchmarks.problems.heap_angle import KINDS, SEGMENTS, shift, s
 from experiments.benchmarks.problems.janssen import FRICTION, WALL_FRICTION, Loads, column, draw
 from experiments.benchmarks.problems.stability import corners, ended_in_order, outcome
 from experiments.cases import Store
-from experiments.study import load_study
+from experiments.studyfile import load_study
 
 # ---- Janssen ---------------------------------------------------------------------------------------------
 

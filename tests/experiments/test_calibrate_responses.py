@@ -12,7 +12,7 @@ import pytest
 
 from doe import Factor
 from experiments.calibrate import CampaignSettings, MeasuredTarget, Outcome, TwinTarget, calibrate
-from experiments.calibrate.settings import MeasuredResponse, Response
+from experiments.studyfile.campaign import MeasuredResponse, Response
 
 FACTORS = (Factor("A", 0.1, 0.3), Factor("E", 0.3, 0.6), Factor("F", 0.2, 0.6), Factor("G", 0.02, 0.08))
 

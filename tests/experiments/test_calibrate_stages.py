@@ -12,10 +12,10 @@ from experiments.calibrate.cases import plan_cases, response_table
 from experiments.calibrate.climb import _Line
 from experiments.calibrate.results import STAGES
 from experiments.calibrate.screening import analyse_screening, screening_design
-from experiments.calibrate.settings import ScreeningSettings, SeedSettings
 from experiments.calibrate.surface import fit_inside
 from experiments.calibrate.target import plan_target
-from experiments.study import load_study
+from experiments.studyfile import load_study
+from experiments.studyfile.campaign import ScreeningSettings, SeedSettings
 
 
 def factors(count: int) -> list[Factor]:

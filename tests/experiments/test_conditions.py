@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from experiments.errors import StudyError
-from experiments.study import load_study
+from experiments.studyfile import load_study
 
 WriteStudy = Callable[..., Path]
 

@@ -15,7 +15,7 @@ import pytest
 
 from dem_warp import Case, CaseResult, Progress, simulate, simulation
 from experiments.cases import Store, execute, run_cases
-from experiments.study import Study
+from experiments.studyfile import Study
 
 Cone = Callable[..., CaseResult]
 

@@ -16,7 +16,7 @@ from experiments.errors import StudyError
 from experiments.studies.buckwheat import paper
 from experiments.studies.buckwheat.replay import ALL, Replay, published_noise
 from experiments.studies.buckwheat.runs import DESIGNS, OPTIMUM, STAGES, planned_cases, published_runs
-from experiments.study import Study, load_study
+from experiments.studyfile import Study, load_study
 
 
 def simulated(angle: Callable[[pd.DataFrame], pd.Series], replicates: int = 1) -> Replay:

@@ -13,7 +13,7 @@ import pytest
 from experiments.benchmarks.point_record import CASES, STUDY, KeptCases, gather, kept_campaign, write_page
 from experiments.calibrate import Campaign, calibrate
 from experiments.errors import InputError
-from experiments.study import Study, load_study
+from experiments.studyfile import Study, load_study
 
 
 def planes(study: Study, table: pd.DataFrame) -> pd.DataFrame:

@@ -19,7 +19,7 @@ from experiments.calibrate.campaign import StageHook
 from experiments.cases import execute
 from experiments.commands import run
 from experiments.commands.run import Desk
-from experiments.study import Study, load_study
+from experiments.studyfile import Study, load_study
 
 SLOPE = 30.0
 """Degrees that a unit of friction adds; the target of 30 is met at a friction of 0.5."""

@@ -19,7 +19,7 @@ from experiments.cases import Store, execute, run_cases
 from experiments.cli import app
 from experiments.commands import run
 from experiments.commands.run import Desk
-from experiments.study import Study, load_study
+from experiments.studyfile import Study, load_study
 
 BIN = """
 [response-scene.bin.hopper]

@@ -10,8 +10,8 @@ import pytest
 
 from dem_warp import DrawDown, Drum, Hopper
 from experiments.errors import StudyError
-from experiments.study import load_study
-from experiments.study.study import BUCKWHEAT
+from experiments.studyfile import load_study
+from experiments.studyfile.study import BUCKWHEAT
 
 WriteStudy = Callable[..., Path]
 

@@ -19,7 +19,7 @@ from experiments.studies.buckwheat import clumps, sensitivities
 from experiments.studies.buckwheat.replay import Replay
 from experiments.studies.buckwheat.sensitivities import Sensitivities
 from experiments.studies.buckwheat.variants import BASE, chosen_variants, variants
-from experiments.study import Study
+from experiments.studyfile import Study
 
 FREE = {"base", "fit-middle", "fit-lower", "fit-upper", "two-views"}
 """Variants that need no heaps but the base's."""

@@ -15,7 +15,7 @@ from experiments.cases import Store, open_folder
 from experiments.cases import key as key_module
 from experiments.errors import StoreError
 from experiments.files import replacing
-from experiments.study import Study, load_study
+from experiments.studyfile import Study, load_study
 
 Cone = Callable[..., CaseResult]
 WriteStudy = Callable[..., Path]

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from experiments.calibrate.settings import MeasuredTarget, TwinTarget
 from experiments.errors import StudyError
-from experiments.study import BUCKWHEAT, load_study, study_scales, write_template
-from experiments.study.units import UNITS, Quantity
+from experiments.studyfile import BUCKWHEAT, load_study, study_scales, write_template
+from experiments.studyfile.campaign import MeasuredTarget, TwinTarget
+from experiments.studyfile.units import UNITS, Quantity
 
 WriteStudy = Callable[..., Path]
 

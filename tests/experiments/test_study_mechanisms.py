@@ -10,7 +10,7 @@ import pytest
 from dem_warp.laws.elastic_plastic_rolling import ElasticPlasticRolling
 from dem_warp.laws.jkr import JKR
 from experiments.errors import StudyError
-from experiments.study import load_study
+from experiments.studyfile import load_study
 
 WriteStudy = Callable[..., Path]
 

@@ -10,12 +10,12 @@ import pandas as pd
 import pytest
 
 from dem_warp import DrawDown, Drum, Hopper, LiftedCylinder
-from experiments.calibrate.settings import MeasuredResponse, MeasuredTarget, Response, TwinTarget
 from experiments.cases import Store, execute, run_cases
 from experiments.errors import StudyError
-from experiments.study import BUCKWHEAT, load_study
-from experiments.study.target_section import DIMENSIONS
-from experiments.study.units import UNITS
+from experiments.studyfile import BUCKWHEAT, load_study
+from experiments.studyfile.campaign import MeasuredResponse, MeasuredTarget, Response, TwinTarget
+from experiments.studyfile.target_section import DIMENSIONS
+from experiments.studyfile.units import UNITS
 
 WriteStudy = Callable[..., Path]
 

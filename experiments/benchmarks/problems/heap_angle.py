@@ -12,7 +12,7 @@ from dem_warp.walls import Mesh, Wall
 from doe import Comparison, Sample, compare_means
 from experiments.benchmarks.problems.chapter import Chapter, Curve, Plot, Row, absolute_row
 from experiments.benchmarks.problems.stored import finished_cases, repose_angles
-from experiments.study import Study, load_study
+from experiments.studyfile import Study, load_study
 
 MARGIN = 1.0
 """Shift of the mean angle that does not matter [deg]: twice the standard deviation of the measured heaps."""

@@ -9,7 +9,7 @@ from experiments.benchmarks.problems.chapter import Chapter, Curve, Plot, Row, a
 from experiments.benchmarks.problems.heap_angle import with_numerics
 from experiments.benchmarks.problems.stored import finished_cases, repose_angles
 from experiments.studies.buckwheat.runs import planned_cases
-from experiments.study import Study, load_study
+from experiments.studyfile import Study, load_study
 
 FRACTIONS = (0.25, 0.5, 1.0)
 """Time steps over the Rayleigh time of the smallest sphere; the first is production's."""

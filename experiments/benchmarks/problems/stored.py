@@ -8,7 +8,7 @@ import numpy as np
 
 from dem_warp import Case, CaseResult, simulate
 from experiments.cases import Store, measure_heap
-from experiments.study import Study
+from experiments.studyfile import Study
 from imaging import PictureError
 
 CASES = Path("out") / "verification" / "cases"

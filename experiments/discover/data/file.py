@@ -27,9 +27,9 @@ from experiments.discover.data.table import Row, read_rows
 from experiments.discover.measured import CLOGGED, Measured
 from experiments.discover.observables import NAMES
 from experiments.errors import InputError, Problem
-from experiments.study import Study
-from experiments.study.conditions import Condition
-from experiments.study.schema import nearest_name
+from experiments.studyfile import Study
+from experiments.studyfile.conditions import Condition
+from experiments.studyfile.schema import nearest_name
 from imaging import PictureError
 
 COLUMNS = ("condition", "replicate", "observable", "value", "unit", "picture", "pixel")

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from dem_warp import LiftedCylinder
 from experiments.errors import StudyError
-from experiments.study import Study
+from experiments.studyfile import Study
 
 SHARES = {
     "concavity": (-1.0, 1.0),

@@ -11,8 +11,8 @@ from experiments.discover.data.plausible import SizeOfTest
 from experiments.discover.data.table import Row
 from experiments.discover.observables import OBSERVABLES, Observable, photographed
 from experiments.errors import Problem
-from experiments.study.schema import nearest_name
-from experiments.study.units import Quantity
+from experiments.studyfile.schema import nearest_name
+from experiments.studyfile.units import Quantity
 from imaging import find_outline, measure, read_picture
 
 CLOGGED_ROW = "clogged"

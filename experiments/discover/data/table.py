@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from experiments.errors import InputError
-from experiments.study.schema import nearest_name
+from experiments.studyfile.schema import nearest_name
 
 
 @dataclass(frozen=True)

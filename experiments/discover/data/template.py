@@ -14,8 +14,8 @@ from experiments.discover.data.readings import CLOGGED_ROW
 from experiments.discover.observables import OBSERVABLES
 from experiments.errors import InputError
 from experiments.files import write_text
-from experiments.study import Study
-from experiments.study.conditions import Condition
+from experiments.studyfile import Study
+from experiments.studyfile.conditions import Condition
 
 REPLICATES = 5
 """Heaps of each condition that the file has room for."""

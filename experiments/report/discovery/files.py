@@ -19,7 +19,7 @@ from experiments.report.discovery.terms import Terms
 from experiments.report.discovery.verdict import headline, verdict_sentence
 from experiments.report.pictures import HeapPicture
 from experiments.report.writer import library_versions
-from experiments.study import Study
+from experiments.studyfile import Study
 
 
 def write_discovery(

@@ -26,7 +26,7 @@ from experiments.report.page import environment, flat, study_facts
 from experiments.report.pictures import HeapPicture
 from experiments.report.tables import Table
 from experiments.report.theme import Chart
-from experiments.study import Study
+from experiments.studyfile import Study
 
 TITLES = {
     "gap": "Where the model disagrees",

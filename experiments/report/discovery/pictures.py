@@ -11,7 +11,7 @@ import numpy as np
 
 from dem_warp import CaseResult
 from experiments.report.pictures import HeapPicture, drawn_heap
-from experiments.study import Study
+from experiments.studyfile import Study
 from imaging import PictureError, ReposeAngle, measure_photograph, overlay, read_picture
 
 PIXELS = 800

@@ -14,9 +14,9 @@ from experiments.discover.library import Mechanism, with_mechanisms
 from experiments.files import replacing, write_text
 from experiments.report.discovery.terms import Terms
 from experiments.report.discovery.verdict import tied
-from experiments.study import Study
-from experiments.study.card import shapes_of
-from experiments.study.toml_files import toml_text
+from experiments.studyfile import Study
+from experiments.studyfile.card import shapes_of
+from experiments.studyfile.toml_files import toml_text
 
 HEAD = """\
 # Written by dem-warp discover: {name}, with {title} added as a factor that ranges over its 90 % interval.

@@ -10,7 +10,7 @@ from experiments.discover.discovery import Interval
 from experiments.discover.library import Mechanism
 from experiments.discover.observables import Observable
 from experiments.report.numbers import MISSING, enumeration, fixed, trimmed
-from experiments.study.factor_section import FactorSection
+from experiments.studyfile.factor_section import FactorSection
 
 SHOWN_UNITS = {"m": (1e3, "mm"), "deg": (1.0, "°"), "1": (1.0, "")}
 """Units that a reader likes better: the factor, and the unit."""

@@ -13,7 +13,7 @@ import typer
 
 from doe import Design, climb_table
 from experiments.cases import Store, run_cases
-from experiments.study import load_study
+from experiments.studyfile import load_study
 
 START = {"E": 0.30, "F": 0.15}
 STEP = {"E": 0.06, "F": 0.10}

@@ -11,7 +11,7 @@ import typer
 
 from doe import plackett_burman, screen
 from experiments.cases import Store, run_cases
-from experiments.study import load_study
+from experiments.studyfile import load_study
 
 RUNS = 12  # eight factors and three dummy columns, which are the error
 ALPHA = 0.10  # a factor is kept below this p value

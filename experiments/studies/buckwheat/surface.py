@@ -11,7 +11,7 @@ import typer
 
 from doe import Factor, Sample, TargetError, central_composite, fit_surface
 from experiments.cases import Store, run_cases
-from experiments.study import load_study
+from experiments.studyfile import load_study
 
 CENTER = {"E": 0.48, "F": 0.45}
 HALF_RANGE = {"E": 0.06, "F": 0.10}

@@ -13,10 +13,10 @@ from pydantic import Field
 
 from experiments.errors import InputError
 from experiments.studies.buckwheat.runs import DESIGNS, planned_cases
-from experiments.study import Study, load_study
-from experiments.study.factor_section import merge
-from experiments.study.places import Places
-from experiments.study.schema import Section, nearest_name, validated
+from experiments.studyfile import Study, load_study
+from experiments.studyfile.factor_section import merge
+from experiments.studyfile.places import Places
+from experiments.studyfile.schema import Section, nearest_name, validated
 
 BASE = "base"
 """The study as written, which every variant is held against."""

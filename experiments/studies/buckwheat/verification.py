@@ -12,7 +12,7 @@ import typer
 
 from doe import Sample, compare_means
 from experiments.cases import Store, run_cases
-from experiments.study import load_study
+from experiments.studyfile import load_study
 
 POINT = {"E": 0.482, "F": 0.446}
 REPLICATES = 5

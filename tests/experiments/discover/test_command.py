@@ -18,7 +18,7 @@ from experiments.discover.observables import PHOTOGRAPHED
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.wave import WaveRunner
 from experiments.report.discovery import Terms
-from experiments.study import load_study
+from experiments.studyfile import load_study
 
 TRIAL = Path(__file__).parents[3] / "experiments" / "studies" / "trial"
 STUDY = TRIAL / "study.toml"

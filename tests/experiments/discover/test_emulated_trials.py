@@ -9,9 +9,9 @@ from scipy import stats
 from synthetic import OBSERVABLES, SETTINGS, emulator, space
 
 from experiments.discover.emulated import EmulatedSimulator, emulated_heaps
-from experiments.discover.trials.declaration import declared_effects
-from experiments.discover.trials.drawing import STRONG
-from experiments.discover.trials.emulated import REPLICATES, World, draw_truths, run_trial, summary
+from experiments.trials.declaration import declared_effects
+from experiments.trials.drawing import STRONG
+from experiments.trials.emulated import REPLICATES, World, draw_truths, run_trial, summary
 
 KNOWN = emulator().without("twin")
 

@@ -16,7 +16,7 @@ from experiments.discover.observables import NAMES, measure
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.simulator import Point
 from experiments.errors import StoreError
-from experiments.study import Study, load_study
+from experiments.studyfile import Study, load_study
 
 CONDITIONS = """
 [condition.base]

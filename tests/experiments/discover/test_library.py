@@ -10,7 +10,7 @@ import pytest
 
 from experiments.discover.library import FOLDER, library_for, with_mechanisms
 from experiments.errors import StudyError
-from experiments.study import Study, load_study
+from experiments.studyfile import Study, load_study
 
 TRIAL = Path(FOLDER).parents[1] / "studies" / "trial" / "study.toml"
 WriteStudy = Callable[..., Path]

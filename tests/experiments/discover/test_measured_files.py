@@ -16,7 +16,7 @@ from experiments.discover.data.notes import SUSPICION
 from experiments.discover.measured import CLOGGED, Measured
 from experiments.discover.observables import NAMES
 from experiments.errors import InputError
-from experiments.study import Study, load_study
+from experiments.studyfile import Study, load_study
 from imaging import save_picture
 from imaging.synthetic import Camera, DrawnHeap, draw
 

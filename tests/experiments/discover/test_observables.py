@@ -10,7 +10,7 @@ import pytest
 
 from dem_warp import CaseResult
 from experiments.discover.observables import NAMES, OBSERVABLES, PHOTOGRAPHED, measure
-from experiments.study.study import MeasurementSection
+from experiments.studyfile.study import MeasurementSection
 
 BALANCE = {name: 0.1 * index for index, name in enumerate(NAMES) if name not in PHOTOGRAPHED}
 SETTINGS = MeasurementSection(azimuths=4, pixels=400)

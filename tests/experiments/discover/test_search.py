@@ -17,7 +17,7 @@ from experiments.discover.search import Search, drive
 from experiments.discover.simulator import Outcomes, Point
 from experiments.errors import InputError, StudyError
 from experiments.report.discovery import Terms, verdict_line, write_discovery
-from experiments.study import Study, load_study
+from experiments.studyfile import Study, load_study
 
 TRIAL = Path(__file__).parents[3] / "experiments" / "studies" / "trial" / "study.toml"
 

@@ -9,19 +9,20 @@ import pytest
 
 from experiments.discover.discovery import Verdict
 from experiments.discover.settings import Settings
-from experiments.discover.trials.declaration import Declaration
-from experiments.discover.trials.drawing import Effect, Plan
-from experiments.discover.trials.findings import (
+from experiments.errors import InputError
+from experiments.trials.declaration import Declaration
+from experiments.trials.drawing import Effect, Plan
+from experiments.trials.findings import (
     EVERYTHING,
     PHOTOGRAPHS,
     Finding,
     findings_table,
     write_findings,
 )
-from experiments.discover.trials.folder import Folder
-from experiments.discover.trials.page import write_page
-from experiments.discover.trials.record import gather
-from experiments.discover.trials.score import (
+from experiments.trials.folder import Folder
+from experiments.trials.page import write_page
+from experiments.trials.record import gather
+from experiments.trials.score import (
     Share,
     aims,
     by_mechanism,
@@ -31,8 +32,7 @@ from experiments.discover.trials.score import (
     removed,
     scored,
 )
-from experiments.discover.trials.truth import Kind, Label, Sealed, write_labels, write_sealed
-from experiments.errors import InputError
+from experiments.trials.truth import Kind, Label, Sealed, write_labels, write_sealed
 
 
 def label_of(kind: Kind, *names: str, strength: float = 2.0) -> Label:

@@ -19,22 +19,23 @@ from experiments.discover.ranking import SIZES
 from experiments.discover.settings import Settings
 from experiments.discover.simulator import Outcomes, Point
 from experiments.discover.space import MechanismRange
-from experiments.discover.trials.camera import Camera
-from experiments.discover.trials.declaration import (
+from experiments.errors import InputError
+from experiments.trials.camera import Camera
+from experiments.trials.declaration import (
     Declaration,
     declared_effect,
     declared_effects,
     read_declaration,
     with_names,
 )
-from experiments.discover.trials.desk import Desk, OutOfTime, TimedSimulator, job_name, keep
-from experiments.discover.trials.drawing import STRONG, Effect, Plan, draw
-from experiments.discover.trials.findings import EVERYTHING, PHOTOGRAPHS, read_findings
-from experiments.discover.trials.folder import Folder
-from experiments.discover.trials.heaps import cases_of
-from experiments.discover.trials.lockstep import Crash, LocalCrew, Step, in_step, process_crew
-from experiments.discover.trials.run import chosen
-from experiments.discover.trials.truth import (
+from experiments.trials.desk import Desk, OutOfTime, TimedSimulator, job_name, keep
+from experiments.trials.drawing import STRONG, Effect, Plan, draw
+from experiments.trials.findings import EVERYTHING, PHOTOGRAPHS, read_findings
+from experiments.trials.folder import Folder
+from experiments.trials.heaps import cases_of
+from experiments.trials.lockstep import Crash, LocalCrew, Step, in_step, process_crew
+from experiments.trials.run import chosen
+from experiments.trials.truth import (
     Kind,
     Label,
     Sealed,
@@ -44,7 +45,6 @@ from experiments.discover.trials.truth import (
     write_labels,
     write_sealed,
 )
-from experiments.errors import InputError
 
 FACTORS = (Factor("mu", 0.2, 0.6), Factor("e", 0.1, 0.5))
 LIBRARY = (

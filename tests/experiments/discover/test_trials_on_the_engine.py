@@ -14,14 +14,14 @@ from experiments.discover.observables import NAMES
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.search import Search
 from experiments.discover.settings import Settings
-from experiments.discover.trials.declaration import Declaration
-from experiments.discover.trials.desk import Desk, read_data
-from experiments.discover.trials.drawing import Plan
-from experiments.discover.trials.folder import Folder
-from experiments.discover.trials.generate import STUDY, bank_beside, generators_study, measure_trials
-from experiments.discover.trials.lockstep import LocalCrew
-from experiments.discover.trials.truth import Kind, Label, Sealed
-from experiments.study import load_study
+from experiments.studyfile import load_study
+from experiments.trials.declaration import Declaration
+from experiments.trials.desk import Desk, read_data
+from experiments.trials.drawing import Plan
+from experiments.trials.folder import Folder
+from experiments.trials.generate import STUDY, bank_beside, generators_study, measure_trials
+from experiments.trials.lockstep import LocalCrew
+from experiments.trials.truth import Kind, Label, Sealed
 
 BENCH = "bench"
 THETA = (0.6, 0.5, 0.3)

@@ -12,7 +12,7 @@ import pytest
 
 from experiments.calibrate import Campaign, CampaignSettings, calibrate
 from experiments.report import render_page
-from experiments.study import Study, load_study
+from experiments.studyfile import Study, load_study
 
 Angle = Callable[[Mapping[str, float]], float]
 Runner = Callable[[pd.DataFrame], pd.DataFrame]

@@ -9,7 +9,7 @@ import pytest
 from experiments.calibrate import Outcome, calibrate
 from experiments.report import render_page
 from experiments.report.numbers import prose
-from experiments.study import Study, load_study
+from experiments.studyfile import Study, load_study
 
 
 def never_climbing(row: Mapping[str, float]) -> float:

@@ -15,7 +15,7 @@ import pytest
 from dem_warp import CaseResult
 from experiments.calibrate import Campaign
 from experiments.report import heap_pictures, render_page, write_report
-from experiments.study import Study
+from experiments.studyfile import Study
 
 
 def test_files_hold_the_same_numbers(campaign: Campaign, study: Study, tmp_path: Path) -> None:

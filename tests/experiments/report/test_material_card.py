@@ -14,8 +14,8 @@ from doe import Sample
 from experiments.calibrate import Campaign
 from experiments.errors import StudyError
 from experiments.report.material_card import CARD, material_card, write_material_card
-from experiments.study import Study, load_study
-from experiments.study.toml_files import toml_text
+from experiments.studyfile import Study, load_study
+from experiments.studyfile.toml_files import toml_text
 
 TEST = """
 name = "Another test of the same material"

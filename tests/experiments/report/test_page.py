@@ -13,7 +13,7 @@ from experiments.report import HeapPicture, render_page
 from experiments.report.numbers import prose
 from experiments.report.page import study_facts
 from experiments.studies.buckwheat import paper
-from experiments.study import Study, load_study
+from experiments.studyfile import Study, load_study
 
 
 def test_the_page_is_well_formed_and_its_contents_lead_somewhere(page) -> None:

@@ -22,8 +22,8 @@ from experiments.report.tables import Column, make_table
 from experiments.studies.buckwheat.replay import Replay
 from experiments.studies.buckwheat.runs import planned_cases
 from experiments.studies.buckwheat.variants import variants
-from experiments.study import Study, load_study
-from experiments.study.card import read_card, with_material
+from experiments.studyfile import Study, load_study
+from experiments.studyfile.card import read_card, with_material
 
 WALLS = [{"stage": "paper, climb", "simulated": 6, "seconds": 44.7}]
 

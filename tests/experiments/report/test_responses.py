@@ -13,7 +13,7 @@ import pytest
 from experiments.calibrate import Campaign, calibrate
 from experiments.report import render_page
 from experiments.report.material_card import write_material_card
-from experiments.study import Study, load_study
+from experiments.studyfile import Study, load_study
 
 POINT = Path(__file__).parents[3] / "experiments" / "studies" / "buckwheat" / "curve_to_point.toml"
 

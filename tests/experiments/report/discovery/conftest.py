@@ -27,7 +27,7 @@ from experiments.discover.discovery import (
     Verdict,
 )
 from experiments.report.discovery import Terms
-from experiments.study import Study, load_study
+from experiments.studyfile import Study, load_study
 
 CONDITIONS = ("base", "fast", "wide", "rough", "fast-wide")
 HELD_OUT = (False, False, False, False, True)

@@ -17,7 +17,7 @@ from experiments.discover.library import library_for
 from experiments.discover.observables import OBSERVABLES
 from experiments.discover.settings import Settings
 from experiments.report.discovery import Terms, write_discovery
-from experiments.study import Study, load_study
+from experiments.studyfile import Study, load_study
 
 Discovered = Callable[[Verdict], Discovery]
 

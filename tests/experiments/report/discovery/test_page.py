@@ -17,7 +17,7 @@ from experiments.report.discovery import Terms, render_discovery, verdict_senten
 from experiments.report.discovery.tables import SHOWN_PAIRS, data_table, shown_candidates
 from experiments.report.discovery.terms import percent
 from experiments.report.discovery.verdict import changes
-from experiments.study import Study
+from experiments.studyfile import Study
 
 Discovered = Callable[[Verdict], Discovery]
 

@@ -13,7 +13,7 @@ import pytest
 from dem_warp import CaseResult
 from experiments.report.discovery import pictures
 from experiments.report.discovery.pictures import photograph, simulated_heaps
-from experiments.study import Study, load_study
+from experiments.studyfile import Study, load_study
 from imaging import measure, save_picture, snapshot
 
 TRIAL = Path(__file__).parents[4] / "experiments" / "studies" / "trial" / "study.toml"

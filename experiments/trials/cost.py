@@ -8,8 +8,8 @@ import pandas as pd
 
 from experiments.discover.bank import Bank
 from experiments.discover.settings import Settings
-from experiments.discover.trials.declaration import Declaration
-from experiments.discover.trials.truth import Sealed
+from experiments.trials.declaration import Declaration
+from experiments.trials.truth import Sealed
 
 PER_CASE = 0.0105
 """Seconds of an H200 that the steps of a case of 400 grains of three spheres take, with 512 at once."""

@@ -9,8 +9,8 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from doe.factors import Factor
-from experiments.discover.trials.truth import Kind, Label, Sealed
 from experiments.errors import InputError
+from experiments.trials.truth import Kind, Label, Sealed
 
 STRONG = 1.5
 """Effects above this many gamma80 are to be named."""

@@ -19,19 +19,19 @@ from experiments.discover.measured import Measured
 from experiments.discover.observables import PHOTOGRAPHED
 from experiments.discover.settings import Settings
 from experiments.discover.simulator import Outcomes, Point, Simulator
-from experiments.discover.trials.findings import (
+from experiments.errors import InputError
+from experiments.files import write_text
+from experiments.studyfile import Study
+from experiments.trials.findings import (
     PHOTOGRAPHS,
     Finding,
     findings_table,
     read_findings,
     write_findings,
 )
-from experiments.discover.trials.folder import Folder
-from experiments.discover.trials.lockstep import Crash
-from experiments.discover.trials.truth import Sealed
-from experiments.errors import InputError
-from experiments.files import write_text
-from experiments.study import Study
+from experiments.trials.folder import Folder
+from experiments.trials.lockstep import Crash
+from experiments.trials.truth import Sealed
 
 BATCH = 16384
 """Points between two looks at the clock."""

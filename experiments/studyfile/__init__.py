@@ -1,8 +1,8 @@
 """What a study is: one TOML file, its sections and units, every rule checked with the place of a breach."""
 
 from experiments.errors import StudyError
-from experiments.study.conditions import Condition
-from experiments.study.study import BUCKWHEAT, Study, load_study, study_scales
-from experiments.study.template import write_template
+from experiments.studyfile.conditions import Condition
+from experiments.studyfile.study import BUCKWHEAT, Study, load_study, study_scales
+from experiments.studyfile.template import write_template
 
 __all__ = ["BUCKWHEAT", "Condition", "Study", "StudyError", "load_study", "study_scales", "write_template"]

@@ -12,9 +12,9 @@ import pandas as pd
 from scipy.stats import binomtest
 
 from experiments.discover.discovery import Verdict
-from experiments.discover.trials.drawing import STRONG, Effect
-from experiments.discover.trials.findings import CRASH
-from experiments.discover.trials.truth import Kind, Label, Sealed
+from experiments.trials.drawing import STRONG, Effect
+from experiments.trials.findings import CRASH
+from experiments.trials.truth import Kind, Label, Sealed
 
 _JUDGED = ("kind", "truth", "true_size", "strength", "right", "tied", "wrong")
 

@@ -19,9 +19,9 @@ from experiments.discover.model import Model, Stack
 from experiments.discover.ranking import Effects, signatures, smallest_shown
 from experiments.discover.settings import Settings
 from experiments.discover.space import MechanismRange
-from experiments.discover.trials.drawing import Effect, Plan
 from experiments.errors import InputError
 from experiments.files import write_text
+from experiments.trials.drawing import Effect, Plan
 
 KIN = 0.9
 """Mechanisms whose visible signatures correlate by more than this are alike: no data tell them apart."""

@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from experiments.errors import StudyError
-from experiments.study.factor_section import merge
-from experiments.study.places import drop
-from experiments.study.toml_files import read_toml
+from experiments.studyfile.factor_section import merge
+from experiments.studyfile.places import drop
+from experiments.studyfile.toml_files import read_toml
 
 MATERIAL = "material"
 """Key of a study that names a card, and table of a card that holds the sections."""

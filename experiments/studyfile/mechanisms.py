@@ -9,7 +9,7 @@ from pydantic import Field, create_model
 
 from dem_warp.laws.library import MECHANISMS
 from dem_warp.laws.mechanism import Mechanism, clashes
-from experiments.study.schema import Number, Section
+from experiments.studyfile.schema import Number, Section
 
 
 def _section(kind: type[Mechanism]) -> Any:

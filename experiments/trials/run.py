@@ -1,7 +1,7 @@
 """Analyse the trials: all of them in both views side by side, their waves in one batch.
 
-    python -m experiments.discover.trials.run out/trials --part alone --device cuda --seconds 480
-    python -m experiments.discover.trials.run out/trials --plan-only
+    python -m experiments.trials.run out/trials --part alone --device cuda --seconds 480
+    python -m experiments.trials.run out/trials --plan-only
 
 It sees the measured heaps and the seals, never the labels. After ``--seconds`` it stops between two batches;
 called again, it goes on: analyses that have ended are not begun again, and the others take what was simulated
@@ -27,16 +27,16 @@ from experiments.discover.emulator import fit_emulator
 from experiments.discover.engine import EngineSimulator
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.search import Search
-from experiments.discover.trials.cost import planned_cases
-from experiments.discover.trials.declaration import read_declaration
-from experiments.discover.trials.desk import Desk, OutOfTime, TimedSimulator, job_name, keep, read_data
-from experiments.discover.trials.findings import VIEWS, read_findings
-from experiments.discover.trials.folder import Folder, Run
-from experiments.discover.trials.generate import STUDY, bank_beside
-from experiments.discover.trials.lockstep import Round, in_step, process_crew
-from experiments.discover.trials.truth import Sealed, read_sealed
 from experiments.errors import InputError
-from experiments.study import load_study
+from experiments.studyfile import load_study
+from experiments.trials.cost import planned_cases
+from experiments.trials.declaration import read_declaration
+from experiments.trials.desk import Desk, OutOfTime, TimedSimulator, job_name, keep, read_data
+from experiments.trials.findings import VIEWS, read_findings
+from experiments.trials.folder import Folder, Run
+from experiments.trials.generate import STUDY, bank_beside
+from experiments.trials.lockstep import Round, in_step, process_crew
+from experiments.trials.truth import Sealed, read_sealed
 
 UNFINISHED = 3
 """Exit code while analyses have not ended."""

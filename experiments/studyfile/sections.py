@@ -15,9 +15,9 @@ from dem_warp.case import Case, Numerics
 from dem_warp.clumps import ClumpShape
 from dem_warp.materials import Interaction, Material
 from dem_warp.population import FRACTION_TOLERANCE, GrainPopulation, ShapeMixture, size_of_mean_mass
-from experiments.study.mechanisms import MechanismsSection
-from experiments.study.scene_sections import SceneSection
-from experiments.study.schema import Density, Length, Number, Pressure, Section
+from experiments.studyfile.mechanisms import MechanismsSection
+from experiments.studyfile.scene_sections import SceneSection
+from experiments.studyfile.schema import Density, Length, Number, Pressure, Section
 
 
 class MaterialSection(Section):

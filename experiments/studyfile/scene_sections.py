@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 from dem_warp import DrawDown, Drum, Hopper, LiftedCylinder, Material
 from dem_warp.scenes.poured_scene import PouredScene
 from dem_warp.scenes.scene import Observable
-from experiments.study.schema import Angle, Frequency, Length, Number, Rate, Section, Speed, Time
+from experiments.studyfile.schema import Angle, Frequency, Length, Number, Rate, Section, Speed, Time
 
 _ANY_WALL = Material(density=7800.0, shear_modulus=70e9, poisson_ratio=0.3)
 """To try a scene with: none of its rules is about the material of its walls."""

@@ -1,6 +1,6 @@
 """Trials of the decision rules on a bank alone, in seconds: the truth is an emulator.
 
-    python -m experiments.discover.trials.emulated --scale bench --banks 8
+    python -m experiments.trials.emulated --scale bench --banks 8
 
 They tune and guard the rules without a simulation. From the emulator of the shipped bank, bent by what no
 polynomial follows, new banks are drawn, and an analysis knows no more than one of these: so their noise, and
@@ -28,10 +28,10 @@ from experiments.discover.emulator import Emulator, fit_emulator
 from experiments.discover.observables import NAMES, PHOTOGRAPHED
 from experiments.discover.search import Search, drive
 from experiments.discover.settings import Settings
-from experiments.discover.trials.declaration import declared_effects, with_names
-from experiments.discover.trials.drawing import STRONG, Effect
-from experiments.discover.trials.generate import STUDY, bank_beside
-from experiments.study import load_study
+from experiments.studyfile import load_study
+from experiments.trials.declaration import declared_effects, with_names
+from experiments.trials.drawing import STRONG, Effect
+from experiments.trials.generate import STUDY, bank_beside
 
 REPLICATES = 8
 """Heaps a condition, as in the sealed trials."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from experiments.study.schema import Section
+from experiments.studyfile.schema import Section
 
 
 class DiscoverSection(Section):

@@ -13,9 +13,9 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator
 
-from experiments.study.factor_section import merge
-from experiments.study.places import value_at
-from experiments.study.schema import Section
+from experiments.studyfile.factor_section import merge
+from experiments.studyfile.places import value_at
+from experiments.studyfile.schema import Section
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """Reveal the labels, score the findings, and write the record of the trials.
 
-    python -m experiments.discover.trials.record out/trials --out experiments/discover/record/first
-    python -m experiments.discover.trials.record --page-only --out experiments/discover/record/first
+    python -m experiments.trials.record out/trials --out experiments/trials/record/first
+    python -m experiments.trials.record --page-only --out experiments/trials/record/first
 
 The first takes over what was published, found and, now, hidden; the second writes the page again from the
 files of the record.
@@ -16,10 +16,10 @@ from typing import Annotated
 import typer
 
 from experiments.commands.console import clear_errors
-from experiments.discover.trials.folder import DECLARED, FINDINGS, LABELS, RUNS, SEALED, Folder
-from experiments.discover.trials.page import write_page
 from experiments.errors import InputError
 from experiments.files import replacing
+from experiments.trials.folder import DECLARED, FINDINGS, LABELS, RUNS, SEALED, Folder
+from experiments.trials.page import write_page
 
 
 def gather(folder: Folder, record: Path) -> None:

@@ -10,9 +10,9 @@ import numpy as np
 
 from experiments.discover.observables import OBSERVABLES
 from experiments.discover.simulator import Outcomes, Point
-from experiments.discover.trials.camera import Camera
-from experiments.discover.trials.truth import Label
 from experiments.files import replacing
+from experiments.trials.camera import Camera
+from experiments.trials.truth import Label
 
 _CLOGGED = "clogged"
 

@@ -10,8 +10,8 @@ from pydantic import Field, PlainValidator, ValidationInfo, field_validator, mod
 
 from doe.factors import Factor
 from experiments.errors import StudyError
-from experiments.study.places import KeyPath, Places, nested, value_at
-from experiments.study.schema import (
+from experiments.studyfile.places import KeyPath, Places, nested, value_at
+from experiments.studyfile.schema import (
     RawQuantity,
     Section,
     bounds,
@@ -19,8 +19,8 @@ from experiments.study.schema import (
     field_at,
     nearest_name,
 )
-from experiments.study.sections import Physics
-from experiments.study.units import Quantity, unit_size
+from experiments.studyfile.sections import Physics
+from experiments.studyfile.units import Quantity, unit_size
 
 
 def dimension_at(parameter: str) -> str:

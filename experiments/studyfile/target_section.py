@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 from pydantic import Field, model_validator
 
 from dem_warp.scenes.scene import Observable
-from experiments.calibrate.settings import (
+from experiments.errors import StudyError
+from experiments.studyfile.campaign import (
     ANGLE,
     TARGET_SCENE,
     MeasuredResponse,
@@ -15,10 +16,9 @@ from experiments.calibrate.settings import (
     Response,
     TwinTarget,
 )
-from experiments.errors import StudyError
-from experiments.study.places import Places
-from experiments.study.scene_sections import SceneSection
-from experiments.study.schema import Angle, RawQuantity, Section, nearest_name
+from experiments.studyfile.places import Places
+from experiments.studyfile.scene_sections import SceneSection
+from experiments.studyfile.schema import Angle, RawQuantity, Section, nearest_name
 
 MEASUREMENTS = ("mean", "sd", "n")
 """What a section tells of the physical test."""

@@ -17,18 +17,18 @@ from pydantic import Field, PrivateAttr, field_validator
 
 from dem_warp.case import Case
 from doe.factors import Factor
-from experiments.calibrate.settings import (
+from experiments.errors import StudyError
+from experiments.studyfile.campaign import (
     TARGET_SCENE,
     CampaignSettings,
     MeasuredTarget,
     Response,
     TwinTarget,
 )
-from experiments.errors import StudyError
-from experiments.study.card import with_material
-from experiments.study.conditions import BASE, Condition, ConditionSections, under_condition
-from experiments.study.discover_section import DiscoverSection
-from experiments.study.factor_section import (
+from experiments.studyfile.card import with_material
+from experiments.studyfile.conditions import BASE, Condition, ConditionSections, under_condition
+from experiments.studyfile.discover_section import DiscoverSection
+from experiments.studyfile.factor_section import (
     FactorSection,
     FactorTable,
     check_one_home,
@@ -36,12 +36,12 @@ from experiments.study.factor_section import (
     natural_settings,
     with_factor_values,
 )
-from experiments.study.places import Places, value_at
-from experiments.study.scene_sections import SceneSection
-from experiments.study.schema import Dimension, Section, nearest_name, validated
-from experiments.study.sections import Physics
-from experiments.study.target_section import ResponseSection, TargetSection, build_responses
-from experiments.study.toml_files import read_toml
+from experiments.studyfile.places import Places, value_at
+from experiments.studyfile.scene_sections import SceneSection
+from experiments.studyfile.schema import Dimension, Section, nearest_name, validated
+from experiments.studyfile.sections import Physics
+from experiments.studyfile.target_section import ResponseSection, TargetSection, build_responses
+from experiments.studyfile.toml_files import read_toml
 from imaging import FITS
 
 BUCKWHEAT = Path(__file__).parents[1] / "studies" / "buckwheat" / "study.toml"

@@ -10,8 +10,8 @@ from pathlib import Path
 import pandas as pd
 
 from experiments.discover.discovery import Discovery, Interval, Verdict
-from experiments.discover.trials.lockstep import Crash
 from experiments.files import replacing
+from experiments.trials.lockstep import Crash
 
 EVERYTHING = "everything"
 """View of an analysis that has every observable."""

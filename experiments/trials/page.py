@@ -12,11 +12,12 @@ import numpy as np
 import pandas as pd
 
 from experiments.benchmarks.tables import markdown_table
-from experiments.discover.trials.declaration import Declaration, read_declaration
-from experiments.discover.trials.drawing import STRONG
-from experiments.discover.trials.findings import EVERYTHING, PHOTOGRAPHS, read_findings
-from experiments.discover.trials.folder import DECLARED, FINDINGS, LABELS, NOTES, PAGE, RUNS, SEALED
-from experiments.discover.trials.score import (
+from experiments.files import write_text
+from experiments.trials.declaration import Declaration, read_declaration
+from experiments.trials.drawing import STRONG
+from experiments.trials.findings import EVERYTHING, PHOTOGRAPHS, read_findings
+from experiments.trials.folder import DECLARED, FINDINGS, LABELS, NOTES, PAGE, RUNS, SEALED
+from experiments.trials.score import (
     OTHERS,
     Aim,
     aims,
@@ -27,8 +28,7 @@ from experiments.discover.trials.score import (
     power_curve,
     scored,
 )
-from experiments.discover.trials.truth import read_labels, read_sealed, revealed
-from experiments.files import write_text
+from experiments.trials.truth import read_labels, read_sealed, revealed
 
 TITLES = {EVERYTHING: "With every observable", PHOTOGRAPHS: "With photographs only"}
 

@@ -1,7 +1,7 @@
 """The generator of the trials, apart from the analysis: it draws and seals truths, and simulates their heaps.
 
-    python -m experiments.discover.trials.generate seal out/trials
-    python -m experiments.discover.trials.generate measure out/trials --part alone --device cuda
+    python -m experiments.trials.generate seal out/trials
+    python -m experiments.trials.generate measure out/trials --part alone --device cuda
 
 The first writes what is known beforehand (``declared.json``, ``sealed.csv``) into FOLDER/record, to be
 published before the second runs, and the labels into FOLDER/hidden, where no analysis looks. The second
@@ -27,16 +27,19 @@ from experiments.discover.library import library_for
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.search import Search
 from experiments.discover.simulator import Outcomes, Simulator
-from experiments.discover.trials.declaration import (
+from experiments.errors import InputError
+from experiments.studyfile import Study, load_study
+from experiments.studyfile.toml_files import read_toml
+from experiments.trials.declaration import (
     Declaration,
     declared_effects,
     read_declaration,
     with_names,
 )
-from experiments.discover.trials.drawing import Effect, Plan, draw
-from experiments.discover.trials.folder import Folder, Run
-from experiments.discover.trials.heaps import cases_of, write_heaps
-from experiments.discover.trials.truth import (
+from experiments.trials.drawing import Effect, Plan, draw
+from experiments.trials.folder import Folder, Run
+from experiments.trials.heaps import cases_of, write_heaps
+from experiments.trials.truth import (
     Label,
     read_labels,
     read_sealed,
@@ -44,11 +47,8 @@ from experiments.discover.trials.truth import (
     write_labels,
     write_sealed,
 )
-from experiments.errors import InputError
-from experiments.study import Study, load_study
-from experiments.study.toml_files import read_toml
 
-STUDY = Path(__file__).parents[2] / "studies" / "trial" / "study.toml"
+STUDY = Path(__file__).parents[1] / "studies" / "trial" / "study.toml"
 """The study that the trials are about."""
 
 STRANGERS = Path(__file__).parent / "strangers"

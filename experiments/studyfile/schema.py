@@ -13,8 +13,8 @@ from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, ErrorDetails, core_schema
 
 from experiments.errors import Problem, StudyError
-from experiments.study.places import KeyPath, Places, value_at
-from experiments.study.units import Quantity
+from experiments.studyfile.places import KeyPath, Places, value_at
+from experiments.studyfile.units import Quantity
 
 SectionT = TypeVar("SectionT", bound=BaseModel)
 
