@@ -11,10 +11,29 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.discover.before_after import compare
-from experiments.discover.contest import Contender, Contenders, simulate_again
-from experiments.discover.decision import Assessment, Decision, decide, explained_share
-from experiments.discover.discovery import (
+from doe.discrepancy.contest.gap import OF_A_CANDIDATE, OF_THE_BASE, GapTest, find_gap
+from doe.discrepancy.contest.held_out import held_out_gain
+from doe.discrepancy.contest.laboratory import Laboratory, Request
+from doe.discrepancy.contest.rounds import Contender, Contenders, simulate_again
+from doe.discrepancy.contest.signatures import (
+    Effects,
+    Signatures,
+    Visibility,
+    alike,
+    signatures,
+    visibilities,
+)
+from doe.discrepancy.emulation.emulator import Emulator
+from doe.discrepancy.fitting.evidence import Evidence, gather
+from doe.discrepancy.fitting.fit import Fitted, fit, weigh
+from doe.discrepancy.fitting.model import Model, Stack
+from doe.discrepancy.problem.measured import Measured
+from doe.discrepancy.problem.settings import Settings
+from doe.discrepancy.problem.simulator import Outcomes, Point, Simulator
+from doe.discrepancy.threads import steps_in_one_thread
+from doe.discrepancy.verdict.before_after import compare
+from doe.discrepancy.verdict.conclusion import Assessment, Decision, decide, explained_share
+from doe.discrepancy.verdict.discovery import (
     BeforeAfter,
     Confounding,
     Discovery,
@@ -24,26 +43,14 @@ from experiments.discover.discovery import (
     Question,
     Verdict,
 )
-from experiments.discover.emulator import Emulator
-from experiments.discover.evidence import Evidence, gather
-from experiments.discover.fitting import Fitted, fit, weigh
-from experiments.discover.gap import OF_A_CANDIDATE, OF_THE_BASE, GapTest, find_gap
-from experiments.discover.held_out import held_out_gain
-from experiments.discover.laboratory import Laboratory, Request
-from experiments.discover.measured import Measured
-from experiments.discover.model import Model, Stack
-from experiments.discover.next_experiment import propose
-from experiments.discover.ranking import Effects, Signatures, Visibility, alike, signatures, visibilities
-from experiments.discover.records import (
+from doe.discrepancy.verdict.next_experiment import propose
+from doe.discrepancy.verdict.records import (
     candidate_record,
     data_record,
     drift_records,
     fit_record,
     power_records,
 )
-from experiments.discover.settings import Settings
-from experiments.discover.simulator import Outcomes, Point
-from experiments.discover.threads import steps_in_one_thread
 
 Analysis = Generator[list[Point], Outcomes, Discovery]
 
@@ -136,6 +143,17 @@ def _search(parts: _Parts, base: _Base) -> Analysis:
             compare(base.fitted, chosen, direct[0], direct[1], blocks, held_out, settings.draws, parts.seed)
         )
     return parts.discovery(base, decision, assessments, [one for one in compared if one is not None])
+
+
+def drive(analysis: Analysis, simulator: Simulator) -> Discovery:
+    """Run an analysis to its end, its waves answered by a simulator."""
+    try:
+        points = next(analysis)
+        while True:
+            points = analysis.send(simulator(points))
+    except StopIteration as end:
+        found: Discovery = end.value
+        return found
 
 
 def _nothing_fits(singles: Sequence[Assessment], settings: Settings) -> bool:

@@ -18,9 +18,10 @@ import numpy as np
 import pandas as pd
 import typer
 
+from doe.discrepancy.emulation.emulator import Emulator
+from doe.discrepancy.problem.settings import Settings
+from doe.discrepancy.verdict.discovery import Candidate, Discovery, Fit, Interval
 from experiments.benchmarks.paper_record import FOLDER
-from experiments.discover.discovery import Candidate, Discovery, Fit, Interval
-from experiments.discover.emulator import Emulator
 from experiments.discover.paper_tables import (
     base_q,
     concluded,
@@ -29,7 +30,6 @@ from experiments.discover.paper_tables import (
     published_heaps,
     tables_emulator,
 )
-from experiments.discover.settings import Settings
 from experiments.files import write_text
 from experiments.report.markdown import markdown_table
 from experiments.report.numbers import fixed, interval

@@ -6,22 +6,24 @@ import logging
 import time
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from dem_warp import Progress
 from dem_warp.provenance import engine_fingerprint
+from doe.discrepancy.analysis import drive
+from doe.discrepancy.emulation.bank import Bank
+from doe.discrepancy.problem.measured import Measured
+from doe.discrepancy.problem.simulator import Outcomes, Point
+from doe.discrepancy.verdict.discovery import Discovery, Fit
 from experiments.cases import open_folder, require_unused
-from experiments.discover.bank import Bank, Maker
 from experiments.discover.data.file import read_measured
-from experiments.discover.discovery import Discovery, Fit
 from experiments.discover.engine import EngineSimulator
-from experiments.discover.measured import Measured
+from experiments.discover.maker import maker_of_today
 from experiments.discover.observables import OBSERVABLES, PHOTOGRAPHED
 from experiments.discover.outcome_table import OutcomeTable
-from experiments.discover.search import Search, drive
-from experiments.discover.simulator import Outcomes, Point
+from experiments.discover.search import Search
 from experiments.report import HeapPicture
 from experiments.report.discovery import Terms, write_discovery
 from experiments.report.discovery.pictures import photograph, simulated_heaps
@@ -155,7 +157,7 @@ def run_search(job: Job, resume: bool = False, watch: Watch = lambda title: null
     search.settings.write(job.folder / SETTINGS)
     with _Watched(search, job, watch) as simulator:
         if bank is None:
-            bank = search.make_bank(simulator, Maker.of_today(source_commit() or ""))
+            bank = search.make_bank(simulator, maker_of_today(source_commit() or ""))
             bank.save(job.folder / BANK)
         if measured is None:
             return Ended(None, terms, job.folder / BANK)
@@ -217,7 +219,7 @@ def _provenance(job: Job, bank: Bank, walls: Sequence[dict[str, Any]]) -> dict[s
         "workers": job.workers,
         "commit": source_commit(),
         "engine": engine_fingerprint(),
-        "bank": asdict(bank.maker) if bank.maker else None,
+        "bank": dict(bank.maker) or None,
         "photographs only": job.photographs_only,
         "data": job.measured.name if job.measured else None,
         "waves": list(walls),

@@ -29,6 +29,9 @@ from experiments.studyfile.units import Quantity
 FOLDER = Path(__file__).parent / "mechanisms"
 """The files of the library."""
 
+FORMER_NAMES = {"contact_cohesion": "contact_adhesion"}
+"""Names by which older studies and banks know mechanisms."""
+
 ScaleName = Literal["grain weight / radius", "grain volume", "grain stiffness"]
 
 

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from doe.discrepancy.analysis import Analysis, analyse
+from doe.discrepancy.emulation.bank import Bank, bank_points, load_bank, make_bank
+from doe.discrepancy.emulation.emulator import fit_emulator
+from doe.discrepancy.problem.measured import Measured
+from doe.discrepancy.problem.settings import Settings, settings_of
+from doe.discrepancy.problem.simulator import Simulator
+from doe.discrepancy.problem.space import MechanismRange, SearchSpace
 from experiments.cases.folder import describe
-from experiments.discover.analysis import Analysis, analyse
-from experiments.discover.bank import Bank, Maker, bank_points, load_bank, make_bank
-from experiments.discover.discovery import Discovery
-from experiments.discover.emulator import fit_emulator
-from experiments.discover.library import Mechanism, library_for
-from experiments.discover.measured import Measured
-from experiments.discover.settings import Settings, settings_of
-from experiments.discover.simulator import Simulator
-from experiments.discover.space import SearchSpace
+from experiments.discover.library import FORMER_NAMES, Mechanism, library_for
+from experiments.discover.maker import notes_on
 from experiments.errors import InputError, StudyError
 from experiments.studyfile import Study
 from experiments.studyfile.schema import nearest_name
@@ -27,13 +28,12 @@ WITHOUT_EFFECT = ("name", "note", "paper", "target", "response", "campaign", "di
 
 @dataclass(frozen=True)
 class Search:
-    """What is looked for, and by which rules; settled before the data are opened.
+    """Mechanisms that are looked for, and the rules; settled before the data are opened.
 
     Attributes
     ----------
     study : Study
     library : tuple of Mechanism
-        Effects that are looked for.
     settings : Settings
     """
 
@@ -64,8 +64,16 @@ class Search:
 
     @property
     def space(self) -> SearchSpace:
-        """What varies."""
-        return SearchSpace.of(self.study, self.library)
+        """Names and ranges of all that varies."""
+        factors, conditions = self.study.factors, self.study.conditions
+        return SearchSpace(
+            tuple(factor.name for factor in factors),
+            tuple(factor.low for factor in factors),
+            tuple(factor.high for factor in factors),
+            tuple(condition.name for condition in conditions),
+            tuple(condition.held_out for condition in conditions),
+            tuple(MechanismRange(one.name, one.null, one.maximum) for one in self.library),
+        )
 
     @property
     def fingerprint(self) -> str:
@@ -75,7 +83,7 @@ class Search:
         text = json.dumps([document, described["clump_sha256"]], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
 
-    def make_bank(self, simulator: Simulator, maker: Maker | None = None) -> Bank:
+    def make_bank(self, simulator: Simulator, maker: Mapping[str, str] | None = None) -> Bank:
         """Run the library waves, all in one call.
 
         Parameters
@@ -83,7 +91,7 @@ class Search:
         simulator
             Answers them.
         maker
-            What it is; None for what is no engine.
+            Engine behind it; None for what is no engine.
         """
         points = bank_points(self.space, self.settings)
         outcomes = simulator(points)
@@ -97,7 +105,7 @@ class Search:
         InputError
             When the file is no bank, or that of another study.
         """
-        bank = load_bank(path)
+        bank = load_bank(path).renamed(FORMER_NAMES)
         mine = self.space
         if bank.study not in ("", self.fingerprint) or bank.space.without(*bank.space.names) != mine.without(
             *mine.names
@@ -119,37 +127,17 @@ class Search:
         foreign = [one.name for one in emulator.space.mechanisms if one not in known]
         lacking = [one.name for one in known if one not in bank.space.mechanisms]
         notes = [f"{name} is not in the bank, so it was not looked for" for name in lacking]
-        notes += _notes_on(bank.maker)
+        notes += notes_on(bank.maker)
         emulator = replace(emulator.without(*foreign), notes=(*emulator.notes, *notes))
         return analyse(measured, emulator, self.settings, seed)
-
-
-def drive(analysis: Analysis, simulator: Simulator) -> Discovery:
-    """Run an analysis to its end, its waves answered by a simulator."""
-    try:
-        points = next(analysis)
-        while True:
-            points = analysis.send(simulator(points))
-    except StopIteration as end:
-        found: Discovery = end.value
-        return found
-
-
-def _notes_on(maker: Maker | None) -> list[str]:
-    if maker is None:
-        return ["the bank does not say which engine made it"]
-    if not maker.is_another_engine:
-        return []
-    commit = f" (commit {maker.commit})" if maker.commit else ""
-    return [f"the bank was made on {maker.day} by another engine{commit} than the fresh runs"]
 
 
 def _wanted(study: Study) -> tuple[Mechanism, ...]:
     library = {mechanism.name: mechanism for mechanism in library_for(study)}
     if not library:
         raise StudyError("a search needs a mechanism that the study can have", "none", str(study.file))
-    names = study.discover.mechanisms
-    for name in names or ():
+    names = [FORMER_NAMES.get(name, name) for name in study.discover.mechanisms or ()]
+    for name in names:
         if name not in library:
             rule = f"must name mechanisms that the study can have, {nearest_name(name, list(library))}"
             raise StudyError(rule, name, f"{study.file}: discover.mechanisms")

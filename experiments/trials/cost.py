@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import pandas as pd
 
-from experiments.discover.bank import Bank
-from experiments.discover.settings import Settings
+from doe.discrepancy.emulation.bank import Bank
+from doe.discrepancy.problem.settings import Settings
 from experiments.trials.declaration import Declaration
 from experiments.trials.truth import Sealed
 

@@ -11,14 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from experiments.discover.bank import sobol
-from experiments.discover.emulator import Emulator
-from experiments.discover.evidence import Block
-from experiments.discover.fitting import weigh
-from experiments.discover.model import Model, Stack
-from experiments.discover.ranking import Effects, signatures, smallest_shown
-from experiments.discover.settings import Settings
-from experiments.discover.space import MechanismRange
+from doe.discrepancy.contest.signatures import Effects, signatures, smallest_shown
+from doe.discrepancy.emulation.bank import sobol
+from doe.discrepancy.emulation.emulator import Emulator
+from doe.discrepancy.fitting.evidence import Block
+from doe.discrepancy.fitting.fit import weigh
+from doe.discrepancy.fitting.model import Model, Stack
+from doe.discrepancy.problem.settings import Settings
+from doe.discrepancy.problem.space import MechanismRange
 from experiments.errors import InputError
 from experiments.files import write_text
 from experiments.trials.drawing import Effect, Plan

@@ -11,14 +11,15 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from experiments.discover.analysis import Analysis, analyse
+from doe.discrepancy.analysis import Analysis, analyse
+from doe.discrepancy.emulation.emulator import Emulator
+from doe.discrepancy.problem.measured import Measured
+from doe.discrepancy.problem.settings import Settings
+from doe.discrepancy.problem.simulator import Outcomes, Point, Simulator
+from doe.discrepancy.verdict.discovery import Discovery
+from doe.errors import RuleError
 from experiments.discover.data.file import read_measured
-from experiments.discover.discovery import Discovery
-from experiments.discover.emulator import Emulator
-from experiments.discover.measured import Measured
 from experiments.discover.observables import PHOTOGRAPHED
-from experiments.discover.settings import Settings
-from experiments.discover.simulator import Outcomes, Point, Simulator
 from experiments.errors import InputError
 from experiments.files import write_text
 from experiments.studyfile import Study
@@ -124,7 +125,7 @@ def read_data(
     for trial in trials:
         try:
             measured[trial.trial] = read_measured(folder.measured(trial.trial), study)
-        except InputError as error:
+        except (InputError, RuleError) as error:
             refused[trial.trial] = Crash(str(error))
     return measured, refused
 

@@ -21,16 +21,16 @@ import numpy as np
 import pandas as pd
 import typer
 
-from experiments.discover.analysis import analyse
-from experiments.discover.discovery import Discovery, Verdict
-from experiments.discover.emulated import EmulatedSimulator, emulated_heaps, redrawn_bank
-from experiments.discover.emulator import Emulator, fit_emulator
+from doe.discrepancy.analysis import analyse, drive
+from doe.discrepancy.emulation.emulator import Emulator, fit_emulator
+from doe.discrepancy.problem.settings import Settings
+from doe.discrepancy.verdict.discovery import Discovery, Verdict
 from experiments.discover.observables import NAMES, PHOTOGRAPHED
-from experiments.discover.search import Search, drive
-from experiments.discover.settings import Settings
+from experiments.discover.search import Search
 from experiments.studyfile import load_study
 from experiments.trials.declaration import declared_effects, with_names
 from experiments.trials.drawing import STRONG, Effect
+from experiments.trials.emulated_simulator import EmulatedSimulator, emulated_heaps, redrawn_bank
 from experiments.trials.generate import STUDY, bank_beside
 
 REPLICATES = 8

@@ -13,11 +13,11 @@ from zlib import crc32
 
 import numpy as np
 
-from experiments.discover.bank import Bank, bank_points, make_bank
-from experiments.discover.emulator import Emulator
-from experiments.discover.measured import Measured
-from experiments.discover.settings import Settings
-from experiments.discover.simulator import Outcomes, Point
+from doe.discrepancy.emulation.bank import Bank, bank_points, make_bank
+from doe.discrepancy.emulation.emulator import Emulator
+from doe.discrepancy.problem.measured import Measured
+from doe.discrepancy.problem.settings import Settings
+from doe.discrepancy.problem.simulator import Outcomes, Point
 
 BEND_LENGTH = 0.7
 """Length over which a bend changes, in half ranges: a polynomial follows the larger part of it."""

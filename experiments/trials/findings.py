@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from experiments.discover.discovery import Discovery, Interval, Verdict
+from doe.discrepancy.verdict.discovery import Discovery, Interval, Verdict
 from experiments.files import replacing
 from experiments.trials.lockstep import Crash
 

@@ -18,15 +18,15 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
+from doe.discrepancy.emulation.bank import Bank
+from doe.discrepancy.emulation.emulator import fit_emulator
+from doe.discrepancy.problem.simulator import Outcomes, Simulator
 from experiments.commands.choices import chosen_devices
 from experiments.commands.console import clear_errors
-from experiments.discover.bank import Bank
-from experiments.discover.emulator import fit_emulator
 from experiments.discover.engine import EngineSimulator
 from experiments.discover.library import library_for
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.search import Search
-from experiments.discover.simulator import Outcomes, Simulator
 from experiments.errors import InputError
 from experiments.studyfile import Study, load_study
 from experiments.studyfile.toml_files import read_toml

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+from doe.discrepancy.problem.simulator import Outcomes, Point
 from experiments.discover.observables import OBSERVABLES
-from experiments.discover.simulator import Outcomes, Point
 from experiments.files import replacing
 from experiments.trials.camera import Camera
 from experiments.trials.truth import Label

@@ -17,9 +17,9 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from typing import Protocol
 
-from experiments.discover.analysis import Analysis
-from experiments.discover.discovery import Discovery
-from experiments.discover.simulator import Outcomes, Point, Simulator
+from doe.discrepancy.analysis import Analysis
+from doe.discrepancy.problem.simulator import Outcomes, Point, Simulator
+from doe.discrepancy.verdict.discovery import Discovery
 
 POLITE = 10
 """Niceness of the processes of the analyses."""

@@ -19,11 +19,11 @@ from typing import Annotated
 
 import typer
 
+from doe.discrepancy.emulation.bank import load_bank
+from doe.discrepancy.emulation.emulator import fit_emulator
 from experiments.benchmarks.tables import markdown_table
 from experiments.commands.choices import chosen_devices
 from experiments.commands.console import clear_errors
-from experiments.discover.bank import load_bank
-from experiments.discover.emulator import fit_emulator
 from experiments.discover.engine import EngineSimulator
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.search import Search

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from scipy.stats import binomtest
 
-from experiments.discover.discovery import Verdict
+from doe.discrepancy.verdict.discovery import Verdict
 from experiments.trials.drawing import STRONG, Effect
 from experiments.trials.findings import CRASH
 from experiments.trials.truth import Kind, Label, Sealed

@@ -9,10 +9,10 @@ import numpy as np
 from scipy import stats
 from scipy.linalg import orth
 
-from experiments.discover.discovery import Answer, Question
-from experiments.discover.fitting import Fitted, fit
-from experiments.discover.model import Stack
-from experiments.discover.ranking import Signatures, projector
+from doe.discrepancy.contest.signatures import Signatures, projector
+from doe.discrepancy.fitting.fit import Fitted, fit
+from doe.discrepancy.fitting.model import Stack
+from doe.discrepancy.verdict.discovery import Answer, Question
 
 OF_THE_BASE = (Question.SIZE, Question.FALL, Question.SCORES)
 """Asked of a model to which a mechanism of the library may be added. The last looks where mechanisms change

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.discover.discovery import Interval
-from experiments.discover.evidence import Block
-from experiments.discover.fitting import Fitted, whiten
-from experiments.discover.model import Stack
+from doe.discrepancy.fitting.evidence import Block
+from doe.discrepancy.fitting.fit import Fitted, whiten
+from doe.discrepancy.fitting.model import Stack
+from doe.discrepancy.verdict.discovery import Interval
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.discover.emulator import Emulator
-from experiments.discover.refinement import Runs
-from experiments.discover.simulator import Outcomes, Point
-from experiments.errors import InputError
+from doe.discrepancy.emulation.emulator import Emulator
+from doe.discrepancy.fitting.refinement import Runs
+from doe.discrepancy.problem.simulator import Outcomes, Point
+from doe.errors import RuleError
 
 DIGITS = 4
 """Decimals of the coded points of fresh runs: fits whose last bits differ by the host ask for the same."""
@@ -65,7 +65,7 @@ class Laboratory:
 
         Raises
         ------
-        InputError
+        RuleError
             When there are not as many outcomes as points.
         """
         cases = [
@@ -84,7 +84,7 @@ class Laboratory:
         ]
         if len(outcomes.reasons) != len(cases):
             rule = f"needs an outcome for each of {len(cases)} points"
-            raise InputError(rule, len(outcomes.reasons), "wave")
+            raise RuleError(rule, len(outcomes.reasons), "wave")
         self.cases += len(cases)
         self.failures += int((~outcomes.finished).sum())
         owners = np.array([number for number, _, _ in cases])

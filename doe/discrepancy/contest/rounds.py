@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
-from experiments.discover.fitting import Fitted, fit
-from experiments.discover.laboratory import Laboratory, Request
-from experiments.discover.model import Stack
-from experiments.discover.refinement import Runs, correct, has_moved, points_around
-from experiments.discover.settings import Settings
-from experiments.discover.simulator import Outcomes, Point
+from doe.discrepancy.contest.laboratory import Laboratory, Request
+from doe.discrepancy.fitting.fit import Fitted, fit
+from doe.discrepancy.fitting.model import Stack
+from doe.discrepancy.fitting.refinement import Runs, correct, has_moved, points_around
+from doe.discrepancy.problem.settings import Settings
+from doe.discrepancy.problem.simulator import Outcomes, Point
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,11 +9,11 @@ import numpy as np
 from scipy import stats
 from scipy.interpolate import interp1d
 
-from experiments.discover.emulator import Emulator
-from experiments.discover.evidence import Block
-from experiments.discover.fitting import Fitted, minimise
-from experiments.discover.settings import Settings
-from experiments.discover.surfaces import added
+from doe.discrepancy.emulation.emulator import Emulator
+from doe.discrepancy.emulation.surfaces import added
+from doe.discrepancy.fitting.evidence import Block
+from doe.discrepancy.fitting.fit import Fitted, minimise
+from doe.discrepancy.problem.settings import Settings
 
 SECANT = 0.5
 """Coded size at which a signature is taken: an effect a unit of size."""

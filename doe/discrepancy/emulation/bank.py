@@ -1,6 +1,6 @@
-"""The bank: simulated heaps over factors and mechanisms in every condition, made once for a study.
+"""The bank: runs over factors and mechanisms in every condition, made once.
 
-Every data set on the same grain is analysed from it. Points are Sobol points. Those without a mechanism are
+Every data set is analysed from it. Points are Sobol points. Those without a mechanism are
 run more than once, so that the noise is known apart from what a polynomial cannot follow; those with one
 vary its size together with the factors.
 """
@@ -8,19 +8,17 @@ vary its size together with the factors.
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from datetime import date
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 from scipy.stats import qmc
 
-from dem_warp.provenance import engine_fingerprint
-from experiments.discover.settings import Settings
-from experiments.discover.simulator import Outcomes, Point
-from experiments.discover.space import MechanismRange, SearchSpace
-from experiments.errors import InputError
+from doe.discrepancy.problem.settings import Settings
+from doe.discrepancy.problem.simulator import Outcomes, Point
+from doe.discrepancy.problem.space import MechanismRange, SearchSpace
+from doe.errors import RuleError
 
 
 def sobol(count: int, columns: int, seed: int) -> np.ndarray:
@@ -56,41 +54,6 @@ def bank_points(space: SearchSpace, settings: Settings, seed: int = 0) -> list[P
     return [space.point(row, names, c, int(s)) for (row, names, c), s in zip(cases, seeds, strict=True)]
 
 
-@dataclass(frozen=True)
-class Maker:
-    """What made the heaps of a bank.
-
-    Attributes
-    ----------
-    engine : str
-        Fingerprint of the engine.
-    day : str
-        As 2026-03-14.
-    commit : str
-        Commit of the source; empty where it is not known.
-    """
-
-    engine: str
-    day: str
-    commit: str = ""
-
-    def __post_init__(self) -> None:
-        try:
-            date.fromisoformat(self.day)
-        except ValueError:
-            raise InputError("is a date, as 2026-03-14", self.day, "Maker.day") from None
-
-    @classmethod
-    def of_today(cls, commit: str = "") -> Maker:
-        """This engine, today."""
-        return cls(engine_fingerprint(), date.today().isoformat(), commit)
-
-    @property
-    def is_another_engine(self) -> bool:
-        """Whether fresh runs are made by an engine of other sources."""
-        return self.engine != engine_fingerprint()
-
-
 @dataclass(frozen=True, eq=False)
 class Bank:
     """Finished library waves as a table, one row a case.
@@ -113,9 +76,9 @@ class Bank:
     reasons : (n,) array of str
         Why a case failed, empty where it did not.
     study : str
-        Fingerprint of the study whose heaps these are; empty where it is not known.
-    maker : Maker or None
-        What made them; None where it is not known.
+        Fingerprint of what was simulated; empty where it is not known.
+    maker : dict of str
+        What made them, in the words of whoever ran them; empty where it is not known.
     """
 
     space: SearchSpace
@@ -127,14 +90,14 @@ class Bank:
     values: np.ndarray
     reasons: np.ndarray
     study: str = ""
-    maker: Maker | None = None
+    maker: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if self.values.shape != (len(self.theta), len(self.observables)):
             rule = "needs a row a case and a column an observable"
-            raise InputError(rule, self.values.shape, "Bank.values")
+            raise RuleError(rule, self.values.shape, "Bank.values")
         if not np.isfinite(self.values[self.finished]).all():
-            raise InputError("is finite wherever a case finished", "NaN", "Bank.values")
+            raise RuleError("is finite wherever a case finished", "NaN", "Bank.values")
 
     @property
     def finished(self) -> np.ndarray:
@@ -144,6 +107,11 @@ class Bank:
     def rows(self, condition: int, mechanism: int) -> np.ndarray:
         """Numbers of the finished cases of a condition with a mechanism (-1: without)."""
         return np.flatnonzero(self.finished & (self.condition == condition) & (self.mechanism == mechanism))
+
+    def renamed(self, names: Mapping[str, str]) -> Bank:
+        """Return the same bank with mechanisms of other names, by their names here."""
+        mechanisms = tuple(replace(one, name=names.get(one.name, one.name)) for one in self.space.mechanisms)
+        return replace(self, space=replace(self.space, mechanisms=mechanisms))
 
     def save(self, path: Path) -> None:
         """Write the bank to one compressed .npz file."""
@@ -158,7 +126,7 @@ class Bank:
             values=self.values.astype(np.float32),
             reasons=self.reasons,
             study=np.array(self.study),
-            maker=np.array(json.dumps(asdict(self.maker) if self.maker else None)),
+            maker=np.array(json.dumps(dict(self.maker) or None)),
         )
 
 
@@ -167,7 +135,7 @@ def load_bank(path: Path) -> Bank:
 
     Raises
     ------
-    InputError
+    RuleError
         When the file is no bank.
     """
     try:
@@ -179,10 +147,10 @@ def load_bank(path: Path) -> Bank:
         names = tuple(str(name) for name in columns.pop("observables"))
         columns["values"] = columns["values"].astype(float)
         made_for = str(columns.pop("study", ""))
-        made_by = json.loads(str(columns.pop("maker", "null")))
-        return Bank(space, names, **columns, study=made_for, maker=Maker(**made_by) if made_by else None)
+        made_by = json.loads(str(columns.pop("maker", "null"))) or {}
+        return Bank(space, names, **columns, study=made_for, maker=made_by)
     except (KeyError, TypeError, ValueError, OSError) as error:
-        raise InputError("must be a bank that this program wrote", str(error), str(path)) from error
+        raise RuleError("must be a bank that this program wrote", str(error), str(path)) from error
 
 
 def make_bank(
@@ -191,17 +159,17 @@ def make_bank(
     points: Sequence[Point],
     outcomes: Outcomes,
     study: str = "",
-    maker: Maker | None = None,
+    maker: Mapping[str, str] | None = None,
 ) -> Bank:
     """Table of finished library waves.
 
     Raises
     ------
-    InputError
+    RuleError
         For a point with two mechanisms: a bank knows none or one at a time.
     """
     if any(len(point.sizes) > 1 for point in points):
-        raise InputError("has at most one mechanism in a case", "two", "points of a bank")
+        raise RuleError("has at most one mechanism in a case", "two", "points of a bank")
     names = space.names
     sizes = [point.sizes[0] if point.sizes else None for point in points]
     coded = [0.0 if entry is None else space.coded_size(*entry) for entry in sizes]
@@ -215,5 +183,5 @@ def make_bank(
         values=np.asarray(outcomes.values, dtype=float),
         reasons=np.array(outcomes.reasons, dtype=np.str_),
         study=study,
-        maker=maker,
+        maker=maker or {},
     )

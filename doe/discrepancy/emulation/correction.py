@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.discover.kriging import squared_exponential
-from experiments.discover.surfaces import all_terms
+from doe.discrepancy.emulation.kriging import squared_exponential
+from doe.discrepancy.emulation.surfaces import all_terms
 
 
 @dataclass(frozen=True, eq=False)

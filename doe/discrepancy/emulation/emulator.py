@@ -4,23 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
-from experiments.discover.bank import Bank, load_bank
-from experiments.discover.noise import shared_correlations
-from experiments.discover.space import SearchSpace
-from experiments.discover.surface_fits import (
+from doe.discrepancy.emulation.bank import Bank
+from doe.discrepancy.emulation.noise import shared_correlations
+from doe.discrepancy.emulation.surface_fits import (
     AddedRuns,
     BaseRuns,
     fit_additions,
     fit_bases,
     repeats_noise,
 )
-from experiments.discover.surfaces import Addition, Surfaces
-from experiments.discover.threads import in_one_thread
-from experiments.errors import InputError
+from doe.discrepancy.emulation.surfaces import Addition, Surfaces
+from doe.discrepancy.problem.space import SearchSpace
+from doe.discrepancy.threads import in_one_thread
+from doe.errors import RuleError
 
 LEAST_RUNS = 10
 """Of a mechanism, in every condition."""
@@ -65,12 +64,12 @@ def fit_emulator(bank: Bank) -> Emulator:
 
     Raises
     ------
-    InputError
+    RuleError
         When a condition has too few finished runs.
     """
     finished = bank.values[bank.finished]
     if not len(finished):
-        raise InputError("needs finished cases", "none", "bank")
+        raise RuleError("needs finished cases", "none", "bank")
     spread = np.ptp(finished, axis=0)
     columns = np.flatnonzero(spread > 0.0)
     notes = [
@@ -116,8 +115,8 @@ def _bases(bank: Bank, columns: np.ndarray, floor: np.ndarray) -> list[Surfaces]
         theta, values = bank.theta[rows], bank.values[np.ix_(rows, columns)]
         try:
             data.append((theta, values, repeats_noise(theta, values, floor)))
-        except InputError as error:
-            raise InputError(error.rule, error.value, f"condition {condition} of the bank") from error
+        except RuleError as error:
+            raise RuleError(error.rule, error.value, f"condition {condition} of the bank") from error
     noises = shared_correlations([noise for _, _, noise in data])
     runs = [BaseRuns.of(theta, values, noise) for (theta, values, _), noise in zip(data, noises, strict=True)]
     return fit_bases(runs)
@@ -131,8 +130,3 @@ def _too_few(bank: Bank) -> list[str]:
         for index, name in enumerate(bank.space.names)
         if min(len(bank.rows(condition, index)) for condition in conditions) < LEAST_RUNS
     ]
-
-
-def read_emulator(path: Path) -> Emulator:
-    """Fit the emulator of a bank file."""
-    return fit_emulator(load_bank(path))

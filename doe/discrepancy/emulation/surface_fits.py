@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import stats
 
-from experiments.discover.kriging import fit_kriging
-from experiments.discover.noise import (
+from doe.discrepancy.emulation.kriging import fit_kriging
+from doe.discrepancy.emulation.noise import (
     ALIKE,
     Noise,
     correlation_of,
@@ -22,8 +22,8 @@ from experiments.discover.noise import (
     fit_noise,
     repeat_deviations,
 )
-from experiments.discover.surfaces import Addition, Polynomial, Surfaces, added, cubic, quadratic
-from experiments.errors import InputError
+from doe.discrepancy.emulation.surfaces import Addition, Polynomial, Surfaces, added, cubic, quadratic
+from doe.errors import RuleError
 
 FAILURE_LEVEL = 0.005
 """A polynomial fails if leave-one-out errors as large as its own have this probability under noise alone."""
@@ -54,14 +54,14 @@ def repeats_noise(theta: np.ndarray, values: np.ndarray, floor: np.ndarray) -> N
 
     Raises
     ------
-    InputError
+    RuleError
         With too few finished runs for the noise or the polynomial of `fit_bases`.
     """
     points, groups = np.unique(theta, axis=0, return_inverse=True)
     rows, deviations = repeat_deviations(groups.reshape(-1), values)
     if len(rows) <= values.shape[1] + 1 or len(points) <= quadratic(points).shape[1]:
         rule = "needs more points without a mechanism than polynomial terms, and repeats than observables"
-        raise InputError(rule, f"{len(points)} points, {len(rows)} repeats", "bank")
+        raise RuleError(rule, f"{len(points)} points, {len(rows)} repeats", "bank")
     return fit_noise(theta[rows], deviations, floor)
 
 

@@ -12,8 +12,8 @@ from itertools import combinations_with_replacement
 
 import numpy as np
 
-from experiments.discover.kriging import Kriging
-from experiments.discover.noise import Noise
+from doe.discrepancy.emulation.kriging import Kriging
+from doe.discrepancy.emulation.noise import Noise
 
 
 def quadratic(theta: np.ndarray) -> np.ndarray:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
-from experiments.discover.emulator import Emulator
-from experiments.discover.measured import Measured
+from doe.discrepancy.emulation.emulator import Emulator
+from doe.discrepancy.problem.measured import Measured
 
 SCATTER_LEVEL = 0.01
 """Replicates that scatter more than the model's with this probability or less count by their own scatter."""

@@ -8,8 +8,8 @@ import numpy as np
 from scipy import stats
 from scipy.linalg import cholesky, solve_triangular
 
-from experiments.discover.bank import sobol
-from experiments.discover.model import Model, Stack
+from doe.discrepancy.emulation.bank import sobol
+from doe.discrepancy.fitting.model import Model, Stack
 
 ITERATIONS = 40
 SCOUTING = 6

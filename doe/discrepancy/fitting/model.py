@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.linalg import block_diag
 
-from experiments.discover.correction import Correction
-from experiments.discover.emulator import Emulator
-from experiments.discover.evidence import Block
+from doe.discrepancy.emulation.correction import Correction
+from doe.discrepancy.emulation.emulator import Emulator
+from doe.discrepancy.fitting.evidence import Block
 
 STEP = 0.02
 """Half the step of derivatives, in coded units."""

@@ -13,11 +13,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import stats
 
-from experiments.discover.bank import sobol
-from experiments.discover.correction import Prior, condition_on, log_likelihood
-from experiments.discover.fitting import Fitted, whiten
-from experiments.discover.model import STEP, Model, Shift
-from experiments.discover.noise import repeat_deviations
+from doe.discrepancy.emulation.bank import sobol
+from doe.discrepancy.emulation.correction import Prior, condition_on, log_likelihood
+from doe.discrepancy.emulation.noise import repeat_deviations
+from doe.discrepancy.fitting.fit import Fitted, whiten
+from doe.discrepancy.fitting.model import STEP, Model, Shift
 
 LENGTH = 0.7
 """Length over which the smooth function changes, in half ranges: what the emulator's terms leave over."""

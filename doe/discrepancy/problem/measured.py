@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.errors import InputError
+from doe.errors import RuleError
 
 CLOGGED = "the tube clogged"
 """Reason of a replicate that left no heap because the grains stayed in the tube."""
@@ -45,9 +45,9 @@ class Measured:
     def __post_init__(self) -> None:
         for what, names in (("conditions", self.conditions), ("observables", self.observables)):
             if not names or len(set(names)) < len(names):
-                raise InputError("needs at least one, each once", names, f"Measured.{what}")
+                raise RuleError("needs at least one, each once", names, f"Measured.{what}")
         if set(self.values) != set(self.conditions):
-            raise InputError("holds every condition and no other", sorted(self.values), "Measured.values")
+            raise RuleError("holds every condition and no other", sorted(self.values), "Measured.values")
         formed = {name: tuple("" for _ in rows) for name, rows in self.values.items()}
         object.__setattr__(self, "reasons", {**formed, **self.reasons})
         for name, rows in self.values.items():
@@ -57,14 +57,14 @@ class Measured:
         place = f"Measured.values[{name!r}]"
         if rows.ndim != 2 or len(rows) == 0 or rows.shape[1] != len(self.observables):
             rule = f"is a row a replicate, with a column for each of {len(self.observables)} observables"
-            raise InputError(rule, f"shape {rows.shape}", place)
+            raise RuleError(rule, f"shape {rows.shape}", place)
         if np.isinf(rows).any():
-            raise InputError("is finite, or NaN where nothing was measured", "an infinite value", place)
+            raise RuleError("is finite, or NaN where nothing was measured", "an infinite value", place)
         if len(self.reasons[name]) != len(rows):
             rule = "has one entry a replicate, empty where a heap formed"
-            raise InputError(rule, self.reasons[name], f"Measured.reasons[{name!r}]")
+            raise RuleError(rule, self.reasons[name], f"Measured.reasons[{name!r}]")
         if np.isfinite(rows[[bool(reason) for reason in self.reasons[name]]]).any():
-            raise InputError("is NaN in the row of a replicate that left no heap", "a number", place)
+            raise RuleError("is NaN in the row of a replicate that left no heap", "a number", place)
 
     def heap_count(self, condition: str) -> int:
         """Replicates of a condition that left a heap."""
@@ -102,14 +102,14 @@ class Measured:
 
         Raises
         ------
-        InputError
+        RuleError
             When none of them was measured.
         """
         wanted = set(observables)
         kept = [index for index, name in enumerate(self.observables) if name in wanted]
         if not kept:
             rule = f"must name measured observables, of {', '.join(self.observables)}"
-            raise InputError(rule, sorted(wanted), "observables")
+            raise RuleError(rule, sorted(wanted), "observables")
         names = tuple(self.observables[index] for index in kept)
         return replace(
             self, observables=names, values={name: rows[:, kept] for name, rows in self.values.items()}

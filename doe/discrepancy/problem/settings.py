@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from experiments.errors import InputError
+from doe.errors import RuleError
 
 
 @dataclass(frozen=True)
@@ -91,16 +91,16 @@ class Settings:
     def __post_init__(self) -> None:
         for name in ("false_alarm", "fit_level", "power"):
             if not 0.0 < getattr(self, name) < 1.0:
-                raise InputError("must lie between 0 and 1", getattr(self, name), f"Settings.{name}")
+                raise RuleError("must lie between 0 and 1", getattr(self, name), f"Settings.{name}")
         least = {"bank_points": 10, "bank_repeats": 2, "bank_mechanism_points": 4, "draws": 100}
         least |= {"shortlist": 1, "refinement_points": 2, "refinement_repeats": 2, "refinement_rounds": 1}
         least |= {"finish_points": 0, "pair_candidates": 0, "direct_runs": 2}
         for name, value in least.items():
             if getattr(self, name) < value:
-                raise InputError(f"must be at least {value}", getattr(self, name), f"Settings.{name}")
+                raise RuleError(f"must be at least {value}", getattr(self, name), f"Settings.{name}")
         for name in ("least_ratio", "pair_ratio", "tie_margin", "systematic", "shortlist_share"):
             if not getattr(self, name) >= 0.0:
-                raise InputError("must not be negative", getattr(self, name), f"Settings.{name}")
+                raise RuleError("must not be negative", getattr(self, name), f"Settings.{name}")
 
     @property
     def text(self) -> str:
@@ -122,13 +122,13 @@ def read_settings(path: Path) -> Settings:
 
     Raises
     ------
-    InputError
+    RuleError
         For text that is not JSON, an unknown name or a value out of its range.
     """
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
     except json.JSONDecodeError as error:
-        raise InputError("must be a JSON object", str(error), str(path)) from None
+        raise RuleError("must be a JSON object", str(error), str(path)) from None
     return settings_of(document, str(path))
 
 
@@ -137,12 +137,12 @@ def settings_of(document: Mapping[str, Any], place: str) -> Settings:
 
     Raises
     ------
-    InputError
+    RuleError
         For an unknown name or a value out of its range, with its place.
     """
     known = {field.name for field in fields(Settings)}
     for name in document:
         if name not in known:
-            raise InputError(f"must be one of {', '.join(sorted(known))}", name, place)
+            raise RuleError(f"must be one of {', '.join(sorted(known))}", name, place)
     named = document.get("resolvable")
     return Settings(**{**document, "resolvable": None if named is None else tuple(named)})

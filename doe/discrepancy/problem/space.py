@@ -1,21 +1,19 @@
-"""What is free in a search for a missing mechanism: factors, sizes of mechanisms, conditions.
+"""The space of a search: factors, sizes of mechanisms, conditions.
 
-The statistics work in coded units: factors from -1 to 1 over their range, sizes from 0 at the null to 1 at
-the maximum. A row of coded parameters is all factors, then the sizes of the mechanisms that are in the model.
+A size is in natural units, a coded size is 0 at the null and 1 at the maximum; coded factors run from
+-1 to 1 over their range. A row of coded parameters is all factors, then the coded sizes of the mechanisms in
+the model.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from experiments.discover.library import Mechanism
-from experiments.discover.simulator import Point
-from experiments.errors import InputError
-from experiments.studyfile import Study
+from doe.discrepancy.problem.simulator import Point
+from doe.errors import RuleError
 
 CODED_DIGITS = 9
 """Decimals of the coded parameters of a case."""
@@ -23,7 +21,7 @@ CODED_DIGITS = 9
 
 @dataclass(frozen=True)
 class MechanismRange:
-    """A mechanism of the library, as the statistics see it.
+    """A mechanism of the library: something that the simulator can have beyond its base model.
 
     Attributes
     ----------
@@ -38,7 +36,7 @@ class MechanismRange:
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.null) and math.isfinite(self.maximum)) or self.null == self.maximum:
-            raise InputError("needs a null and another maximum", (self.null, self.maximum), self.name)
+            raise RuleError("needs a null and another maximum", (self.null, self.maximum), self.name)
 
 
 @dataclass(frozen=True)
@@ -48,7 +46,7 @@ class SearchSpace:
     Attributes
     ----------
     factors : tuple of str
-        Names of the study's factors.
+        Names of what every calibration adjusts.
     lower, upper : tuple of float
         Their ranges in natural units.
     conditions : tuple of str
@@ -67,31 +65,17 @@ class SearchSpace:
 
     def __post_init__(self) -> None:
         if not len(self.factors) == len(self.lower) == len(self.upper) or not self.factors:
-            raise InputError(
+            raise RuleError(
                 "needs a range for each of at least one factor", self.factors, "SearchSpace.factors"
             )
         for name, low, high in zip(self.factors, self.lower, self.upper, strict=True):
             if not low < high:
-                raise InputError("must run from its lower to its upper end", (low, high), f"factor {name}")
+                raise RuleError("must run from its lower to its upper end", (low, high), f"factor {name}")
         if len(self.held_out) != len(self.conditions) or all(self.held_out):
-            raise InputError("needs at least one condition to fit", self.conditions, "SearchSpace.conditions")
+            raise RuleError("needs at least one condition to fit", self.conditions, "SearchSpace.conditions")
         names = [*self.conditions, *self.factors, *(m.name for m in self.mechanisms)]
         if len(set(names)) < len(names):
-            raise InputError(
-                "are named once each", names, "conditions, factors and mechanisms of SearchSpace"
-            )
-
-    @classmethod
-    def of(cls, study: Study, library: Sequence[Mechanism]) -> SearchSpace:
-        """Collect what varies in a search with a study and mechanisms of its library."""
-        return cls(
-            tuple(factor.name for factor in study.factors),
-            tuple(factor.low for factor in study.factors),
-            tuple(factor.high for factor in study.factors),
-            tuple(condition.name for condition in study.conditions),
-            tuple(condition.held_out for condition in study.conditions),
-            tuple(MechanismRange(one.name, one.null, one.maximum) for one in library),
-        )
+            raise RuleError("are named once each", names, "conditions, factors and mechanisms of SearchSpace")
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -103,7 +87,7 @@ class SearchSpace:
         for mechanism in self.mechanisms:
             if mechanism.name == name:
                 return mechanism
-        raise InputError(f"must be a mechanism of the library, one of {', '.join(self.names)}", name, "name")
+        raise RuleError(f"must be a mechanism of the library, one of {', '.join(self.names)}", name, "name")
 
     def without(self, *names: str) -> SearchSpace:
         """Return the same space with some mechanisms withheld."""

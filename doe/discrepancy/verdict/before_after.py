@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from experiments.discover.discovery import BeforeAfter, Interval
-from experiments.discover.evidence import Block
-from experiments.discover.fitting import Fitted, whiten
-from experiments.discover.model import Model, Stack
-from experiments.discover.refinement import Runs
+from doe.discrepancy.fitting.evidence import Block
+from doe.discrepancy.fitting.fit import Fitted, whiten
+from doe.discrepancy.fitting.model import Model, Stack
+from doe.discrepancy.fitting.refinement import Runs
+from doe.discrepancy.verdict.discovery import BeforeAfter, Interval
 
 COVERAGE = 0.9
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.discover.discovery import Answer, Interval, Question, Verdict
-from experiments.discover.fitting import Fitted
-from experiments.discover.gap import GapTest
-from experiments.discover.settings import Settings
+from doe.discrepancy.contest.gap import GapTest
+from doe.discrepancy.fitting.fit import Fitted
+from doe.discrepancy.problem.settings import Settings
+from doe.discrepancy.verdict.discovery import Answer, Interval, Question, Verdict
 
 CHANCE = 1.645
 """Standard deviations that a normal number passes upwards in one case of twenty."""

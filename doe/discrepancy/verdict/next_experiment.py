@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from experiments.discover.discovery import NextExperiment
-from experiments.discover.evidence import Block
-from experiments.discover.fitting import Fitted, whiten
-from experiments.discover.model import Stack
-from experiments.discover.ranking import projector
+from doe.discrepancy.contest.signatures import projector
+from doe.discrepancy.fitting.evidence import Block
+from doe.discrepancy.fitting.fit import Fitted, whiten
+from doe.discrepancy.fitting.model import Stack
+from doe.discrepancy.verdict.discovery import NextExperiment
 
 
 def propose(first: Fitted, second: Fitted, replicates: int) -> NextExperiment:

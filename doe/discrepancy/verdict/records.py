@@ -7,15 +7,15 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import stats
 
-from experiments.discover.decision import Assessment, objections
-from experiments.discover.discovery import Candidate, Data, Drift, Fit, Interval, Power
-from experiments.discover.emulator import Emulator
-from experiments.discover.evidence import Block, Evidence
-from experiments.discover.fitting import AT_BOUND, Fitted, size_interval
-from experiments.discover.gap import GapTest, condition_fits, drift_p, holm
-from experiments.discover.held_out import forecast
-from experiments.discover.ranking import Signatures, Visibility, projector
-from experiments.discover.settings import Settings
+from doe.discrepancy.contest.gap import GapTest, condition_fits, drift_p, holm
+from doe.discrepancy.contest.held_out import forecast
+from doe.discrepancy.contest.signatures import Signatures, Visibility, projector
+from doe.discrepancy.emulation.emulator import Emulator
+from doe.discrepancy.fitting.evidence import Block, Evidence
+from doe.discrepancy.fitting.fit import AT_BOUND, Fitted, size_interval
+from doe.discrepancy.problem.settings import Settings
+from doe.discrepancy.verdict.conclusion import Assessment, objections
+from doe.discrepancy.verdict.discovery import Candidate, Data, Drift, Fit, Interval, Power
 
 
 def data_record(emulator: Emulator, evidence: Evidence) -> Data:

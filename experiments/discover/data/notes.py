@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from scipy import stats
 
-from experiments.discover.measured import Measured
+from doe.discrepancy.problem.measured import Measured
 
 ENOUGH = 5
 """Heaps of a condition; fewer show large effects only."""

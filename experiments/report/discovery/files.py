@@ -8,9 +8,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from doe.discrepancy.problem.settings import Settings
+from doe.discrepancy.verdict.discovery import Discovery
 from experiments.calibrate.export import jsonable
-from experiments.discover.discovery import Discovery
-from experiments.discover.settings import Settings
 from experiments.files import write_text
 from experiments.report.discovery.page import render_discovery
 from experiments.report.discovery.study_file import write_study_files

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from experiments.discover.discovery import BeforeAfter, Candidate, Discovery, Fit, Interval
+from doe.discrepancy.verdict.discovery import BeforeAfter, Candidate, Discovery, Fit, Interval
 from experiments.report.discovery.terms import GAP, Terms, condition_name
 from experiments.report.numbers import MISSING, fixed, interval, trimmed
 from experiments.report.tables import Column, Table, make_table

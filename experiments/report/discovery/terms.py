@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from experiments.discover.discovery import Interval
+from doe.discrepancy.verdict.discovery import Interval
 from experiments.discover.library import Mechanism
 from experiments.discover.observables import Observable
 from experiments.report.numbers import MISSING, enumeration, fixed, trimmed

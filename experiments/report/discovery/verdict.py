@@ -6,7 +6,8 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from experiments.discover.discovery import (
+from doe.discrepancy.problem.settings import Settings
+from doe.discrepancy.verdict.discovery import (
     Answer,
     BeforeAfter,
     Candidate,
@@ -16,7 +17,6 @@ from experiments.discover.discovery import (
     Question,
     Verdict,
 )
-from experiments.discover.settings import Settings
 from experiments.report.discovery.terms import Terms, percent, spaced
 from experiments.report.numbers import capital, fixed, p_value, trimmed
 

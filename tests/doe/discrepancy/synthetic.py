@@ -8,12 +8,12 @@ from functools import cache
 
 import numpy as np
 
-from experiments.discover.bank import Bank, bank_points, make_bank
-from experiments.discover.emulator import Emulator, fit_emulator
-from experiments.discover.measured import Measured
-from experiments.discover.settings import Settings
-from experiments.discover.simulator import Outcomes, Point
-from experiments.discover.space import MechanismRange, SearchSpace
+from doe.discrepancy.emulation.bank import Bank, bank_points, make_bank
+from doe.discrepancy.emulation.emulator import Emulator, fit_emulator
+from doe.discrepancy.problem.measured import Measured
+from doe.discrepancy.problem.settings import Settings
+from doe.discrepancy.problem.simulator import Outcomes, Point
+from doe.discrepancy.problem.space import MechanismRange, SearchSpace
 
 OBSERVABLES = (
     "flank_angle", "concavity", "height", "r50", "r90", "asymmetry",

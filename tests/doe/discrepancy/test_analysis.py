@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from synthetic import CONDITIONS, OBSERVABLES, SETTINGS, SyntheticSimulator, emulator, measure, space
 
-from experiments.discover.analysis import analyse
-from experiments.discover.discovery import Discovery, Verdict
-from experiments.discover.emulator import Emulator
-from experiments.discover.measured import CLOGGED, Measured
-from experiments.discover.simulator import Outcomes, Point
-from experiments.errors import InputError
+from doe.discrepancy.analysis import analyse
+from doe.discrepancy.emulation.emulator import Emulator
+from doe.discrepancy.problem.measured import CLOGGED, Measured
+from doe.discrepancy.problem.simulator import Outcomes, Point
+from doe.discrepancy.verdict.discovery import Discovery, Verdict
+from doe.errors import RuleError
 
 ALONE = emulator().without("twin")
 """The library without the mechanism that cannot be told from another."""
@@ -231,5 +231,5 @@ def test_what_is_declared_unresolvable_is_never_named() -> None:
 def test_a_wave_needs_an_outcome_for_every_point() -> None:
     analysis = analyse(measure({"delta": 0.6}, 3), ALONE, SETTINGS, seed=5)
     next(analysis)
-    with pytest.raises(InputError, match="an outcome for each of"):
+    with pytest.raises(RuleError, match="an outcome for each of"):
         analysis.send(Outcomes(np.zeros((1, len(OBSERVABLES))), ("",)))

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.discover.decision import is_open, lag
+from doe.discrepancy.verdict.conclusion import is_open, lag
 
 MARGIN = 6.0
 DRAWS = 100_000

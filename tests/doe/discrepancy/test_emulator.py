@@ -10,24 +10,24 @@ import pytest
 from scipy import stats
 from synthetic import CONDITIONS, OBSERVABLES, SETTINGS, SyntheticSimulator, bank, emulator, measure, space
 
-from experiments.discover.bank import Bank, bank_points, load_bank, make_bank
-from experiments.discover.emulated import EmulatedSimulator
-from experiments.discover.emulator import fit_emulator
-from experiments.discover.evidence import gather
-from experiments.discover.fitting import fit, whiten
-from experiments.discover.kriging import fit_kriging, krige
-from experiments.discover.model import Model, Stack
-from experiments.discover.noise import ALIKE, fit_noise, repeat_deviations, shared_correlations
-from experiments.discover.simulator import Outcomes
-from experiments.discover.surface_fits import (
+from doe.discrepancy.emulation.bank import Bank, bank_points, load_bank, make_bank
+from doe.discrepancy.emulation.emulator import fit_emulator
+from doe.discrepancy.emulation.kriging import fit_kriging, krige
+from doe.discrepancy.emulation.noise import ALIKE, fit_noise, repeat_deviations, shared_correlations
+from doe.discrepancy.emulation.surface_fits import (
     AddedRuns,
     BaseRuns,
     fit_additions,
     fit_bases,
     likeliest_scales,
 )
-from experiments.discover.surfaces import added
-from experiments.errors import InputError
+from doe.discrepancy.emulation.surfaces import added
+from doe.discrepancy.fitting.evidence import gather
+from doe.discrepancy.fitting.fit import fit, whiten
+from doe.discrepancy.fitting.model import Model, Stack
+from doe.discrepancy.problem.simulator import Outcomes
+from doe.errors import RuleError
+from experiments.trials.emulated_simulator import EmulatedSimulator
 
 
 def test_points_are_the_same_whenever_asked_and_every_case_has_its_own_seed() -> None:
@@ -49,7 +49,7 @@ def test_a_bank_comes_back_from_its_file(tmp_path: Path) -> None:
 def test_a_file_that_is_no_bank_is_refused_with_its_name(tmp_path: Path) -> None:
     path = tmp_path / "photo.npz"
     path.write_text("no bank")
-    with pytest.raises(InputError, match=r"photo\.npz: must be a bank"):
+    with pytest.raises(RuleError, match=r"photo\.npz: must be a bank"):
         load_bank(path)
 
 
@@ -195,7 +195,7 @@ def test_a_mechanism_that_always_clogs_leaves_the_library() -> None:
 
 
 def test_a_condition_that_always_clogs_is_an_error_with_its_name() -> None:
-    with pytest.raises(InputError, match="condition wide of the bank"):
+    with pytest.raises(RuleError, match="condition wide of the bank"):
         fit_emulator(_with_failures(bank().condition == 2))
 
 

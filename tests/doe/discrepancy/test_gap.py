@@ -9,14 +9,9 @@ import pytest
 from scipy import stats
 from synthetic import SETTINGS, emulator, measure, space
 
-from experiments.discover.discovery import Answer, Question
-from experiments.discover.evidence import gather
-from experiments.discover.fitting import Fitted, fit, size_interval, weigh
-from experiments.discover.gap import OF_A_CANDIDATE, OF_THE_BASE, drift_p, find_gap, holm
-from experiments.discover.held_out import forecast
-from experiments.discover.measured import Measured
-from experiments.discover.model import Model, Stack
-from experiments.discover.ranking import (
+from doe.discrepancy.contest.gap import OF_A_CANDIDATE, OF_THE_BASE, drift_p, find_gap, holm
+from doe.discrepancy.contest.held_out import forecast
+from doe.discrepancy.contest.signatures import (
     SIZES,
     Effects,
     Visibility,
@@ -25,6 +20,11 @@ from experiments.discover.ranking import (
     signatures,
     visibilities,
 )
+from doe.discrepancy.fitting.evidence import gather
+from doe.discrepancy.fitting.fit import Fitted, fit, size_interval, weigh
+from doe.discrepancy.fitting.model import Model, Stack
+from doe.discrepancy.problem.measured import Measured
+from doe.discrepancy.verdict.discovery import Answer, Question
 
 NULLS = 100
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from experiments.discover.measured import CLOGGED, Measured
-from experiments.errors import InputError
+from doe.discrepancy.problem.measured import CLOGGED, Measured
+from doe.errors import RuleError
 
 NAN = np.nan
 NAMES = ("flank_angle", "height")
@@ -62,10 +62,10 @@ def test_fewer_observables_leave_the_rest_as_it_is() -> None:
     ],
 )
 def test_tables_that_contradict_themselves_are_refused(rows, more, message) -> None:
-    with pytest.raises(InputError, match=message):
+    with pytest.raises(RuleError, match=message):
         measured(rows, **more)
 
 
 def test_an_unmeasured_subset_is_refused() -> None:
-    with pytest.raises(InputError, match="must name measured observables"):
+    with pytest.raises(RuleError, match="must name measured observables"):
         measured([[20.0, 1.0]]).only(["r50"])

@@ -9,10 +9,10 @@ import pytest
 from scipy import stats
 from synthetic import CONDITIONS, emulator, measure
 
-from experiments.discover.evidence import gather
-from experiments.discover.fitting import fit, size_interval, weigh
-from experiments.discover.model import Model, Shift, Stack
-from experiments.discover.refinement import Runs, correct, likeliest_shift
+from doe.discrepancy.fitting.evidence import gather
+from doe.discrepancy.fitting.fit import fit, size_interval, weigh
+from doe.discrepancy.fitting.model import Model, Shift, Stack
+from doe.discrepancy.fitting.refinement import Runs, correct, likeliest_shift
 
 OFF = np.array([0.1, -0.05, 0.08, -0.06])
 """The world is the emulator at parameters that are larger by this."""

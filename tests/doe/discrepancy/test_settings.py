@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from experiments.discover.settings import Settings, read_settings
-from experiments.errors import InputError
+from doe.discrepancy.problem.settings import Settings, read_settings
+from doe.errors import RuleError
 
 
 def test_rules_come_back_from_their_file_with_their_hash(tmp_path: Path) -> None:
@@ -36,7 +36,7 @@ def test_every_rule_is_in_the_hash() -> None:
     ],
 )
 def test_a_rule_without_sense_is_refused(rule: dict[str, float], message: str) -> None:
-    with pytest.raises(InputError, match=message):
+    with pytest.raises(RuleError, match=message):
         replace(Settings(), **rule)
 
 
@@ -44,7 +44,7 @@ def test_an_unknown_rule_is_refused_with_its_file(tmp_path: Path) -> None:
     path = tmp_path / "settings.json"
     path.write_text('{"tie_margn": 3.0}')
     with pytest.raises(
-        InputError, match=r"settings\.json: must be one of .*tie_margin.* \(received tie_margn\)"
+        RuleError, match=r"settings\.json: must be one of .*tie_margin.* \(received tie_margn\)"
     ):
         read_settings(path)
 
@@ -52,5 +52,5 @@ def test_an_unknown_rule_is_refused_with_its_file(tmp_path: Path) -> None:
 def test_a_file_that_is_no_json_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "settings.json"
     path.write_text("tie_margin = 3")
-    with pytest.raises(InputError, match="must be a JSON object"):
+    with pytest.raises(RuleError, match="must be a JSON object"):
         read_settings(path)

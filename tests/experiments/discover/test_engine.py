@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from dem_warp import Case, CaseResult, Progress, simulate
+from doe.discrepancy.problem.simulator import Point
 from experiments.discover import wave
 from experiments.discover.engine import EngineSimulator
 from experiments.discover.library import library_for
 from experiments.discover.observables import NAMES, measure
 from experiments.discover.outcome_table import OutcomeTable
-from experiments.discover.simulator import Point
 from experiments.errors import StoreError
 from experiments.studyfile import Study, load_study
 

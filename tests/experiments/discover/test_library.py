@@ -63,13 +63,13 @@ high = 0.01
 """
     others = {m.name for m in library_for(load_study(write_study(add=varied)))}
     # Nor can it have what excludes that.
-    assert names - others == {"contact_cohesion", "plastic_contact"}
+    assert names - others == {"contact_adhesion", "plastic_contact"}
 
 
 def test_a_range_in_scales_of_the_grain_follows_the_grain(write_study: WriteStudy) -> None:
     def cohesion(*replacements: tuple[str, str]) -> float:
         library = library_for(load_study(write_study(*replacements)))
-        return next(m.maximum for m in library if m.name == "contact_cohesion")
+        return next(m.maximum for m in library if m.name == "contact_adhesion")
 
     # Weight over radius goes as the square of the radius; a few roundings.
     assert cohesion(('"2 mm"', '"4 mm"')) / cohesion() == pytest.approx(4.0, rel=1e-12)

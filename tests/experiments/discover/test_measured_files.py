@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from doe.discrepancy.problem.measured import CLOGGED, Measured
 from experiments.cli import app
 from experiments.discover.data.file import read_measured
 from experiments.discover.data.notes import SUSPICION
-from experiments.discover.measured import CLOGGED, Measured
 from experiments.discover.observables import NAMES
 from experiments.errors import InputError
 from experiments.studyfile import Study, load_study

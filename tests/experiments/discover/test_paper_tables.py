@@ -9,9 +9,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from doe.discrepancy.problem.settings import Settings
+from doe.discrepancy.verdict.discovery import Discovery, Verdict
 from experiments.benchmarks.paper_disagreement import PAGE, disagreement_page
 from experiments.benchmarks.paper_record import FOLDER
-from experiments.discover.discovery import Discovery, Verdict
 from experiments.discover.paper_tables import (
     CENTRE,
     READING,
@@ -23,7 +24,6 @@ from experiments.discover.paper_tables import (
     published_settings,
     tables_emulator,
 )
-from experiments.discover.settings import Settings
 from experiments.studies.buckwheat import paper
 from experiments.studies.buckwheat.replay import Replay
 from experiments.studies.buckwheat.runs import DESIGNS, planned_cases

@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.discover.bank import Maker
-from experiments.discover.discovery import Verdict
-from experiments.discover.measured import Measured
+from doe.discrepancy.analysis import drive
+from doe.discrepancy.problem.measured import Measured
+from doe.discrepancy.problem.simulator import Outcomes, Point
+from doe.discrepancy.verdict.discovery import Verdict
+from experiments.discover.maker import maker_of_today
 from experiments.discover.observables import NAMES, OBSERVABLES
-from experiments.discover.search import Search, drive
-from experiments.discover.simulator import Outcomes, Point
+from experiments.discover.search import Search
 from experiments.errors import InputError, StudyError
 from experiments.report.discovery import Terms, verdict_line, write_discovery
 from experiments.studyfile import Study, load_study
@@ -122,16 +123,16 @@ def test_what_changes_no_heap_leaves_the_bank_in_use(bank: Path) -> None:
 @pytest.mark.parametrize(
     ("maker", "said"),
     [
-        (Maker.of_today("abc"), []),
-        (None, ["the bank does not say which engine made it"]),
+        (maker_of_today("abc"), []),
+        ({}, ["the bank does not say which engine made it"]),
         (
-            Maker("0" * 64, "2026-03-14", "abc"),
+            {"engine": "0" * 64, "day": "2026-03-14", "commit": "abc"},
             ["the bank was made on 2026-03-14 by another engine (commit abc) than the fresh runs"],
         ),
     ],
 )
 def test_the_report_says_when_another_engine_made_the_bank(
-    maker: Maker | None, said: list[str], tmp_path: Path
+    maker: dict[str, str], said: list[str], tmp_path: Path
 ) -> None:
     search = Search.of(trial())
     world = Linear(search)
@@ -147,9 +148,8 @@ def test_the_report_says_when_another_engine_made_the_bank(
 def test_the_shipped_banks_know_what_made_them(scale: str | None) -> None:
     file = f"bank-{scale}.npz" if scale else "bank.npz"
     maker = Search.of(load_study(TRIAL, scale)).read_bank(TRIAL.with_name(file)).maker
-    assert maker is not None
-    assert (maker.day, maker.commit) == ("2026-11-22", "71088ff")
-    assert len(maker.engine) == 64
+    assert (maker["day"], maker["commit"]) == ("2026-11-22", "71088ff")
+    assert len(maker["engine"]) == 64
 
 
 def test_no_bank_at_all_is_said_so(tmp_path: Path) -> None:

@@ -8,10 +8,10 @@ import pytest
 from scipy import stats
 from synthetic import OBSERVABLES, SETTINGS, emulator, space
 
-from experiments.discover.emulated import EmulatedSimulator, emulated_heaps
 from experiments.trials.declaration import declared_effects
 from experiments.trials.drawing import STRONG
 from experiments.trials.emulated import REPLICATES, World, draw_truths, run_trial, summary
+from experiments.trials.emulated_simulator import EmulatedSimulator, emulated_heaps
 
 KNOWN = emulator().without("twin")
 

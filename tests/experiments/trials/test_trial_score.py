@@ -7,8 +7,8 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from experiments.discover.discovery import Verdict
-from experiments.discover.settings import Settings
+from doe.discrepancy.problem.settings import Settings
+from doe.discrepancy.verdict.discovery import Verdict
 from experiments.errors import InputError
 from experiments.trials.declaration import Declaration
 from experiments.trials.drawing import Effect, Plan

@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 import synthetic
 
+from doe.discrepancy.analysis import Analysis
+from doe.discrepancy.contest.signatures import SIZES
+from doe.discrepancy.problem.settings import Settings
+from doe.discrepancy.problem.simulator import Outcomes, Point
+from doe.discrepancy.problem.space import MechanismRange
+from doe.discrepancy.verdict.discovery import Data, Discovery, Effort, Verdict
 from doe.factors import Factor
-from experiments.discover.analysis import Analysis
-from experiments.discover.discovery import Data, Discovery, Effort, Verdict
 from experiments.discover.observables import OBSERVABLES, PHOTOGRAPHED
-from experiments.discover.ranking import SIZES
-from experiments.discover.settings import Settings
-from experiments.discover.simulator import Outcomes, Point
-from experiments.discover.space import MechanismRange
 from experiments.errors import InputError
 from experiments.trials.camera import Camera
 from experiments.trials.declaration import (

@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from experiments.discover.discovery import Discovery, Verdict
-from experiments.discover.emulator import fit_emulator
+from doe.discrepancy.emulation.emulator import fit_emulator
+from doe.discrepancy.problem.measured import Measured
+from doe.discrepancy.problem.settings import Settings
+from doe.discrepancy.verdict.discovery import Discovery, Verdict
 from experiments.discover.engine import EngineSimulator
 from experiments.discover.library import library_for
-from experiments.discover.measured import Measured
 from experiments.discover.observables import NAMES
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.search import Search
-from experiments.discover.settings import Settings
 from experiments.studyfile import load_study
 from experiments.trials.declaration import Declaration
 from experiments.trials.desk import Desk, read_data

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from experiments.discover.discovery import (
+from doe.discrepancy.verdict.discovery import (
     Answer,
     BeforeAfter,
     Candidate,
@@ -48,7 +48,7 @@ OBSERVABLES = {
 """Unit, value and standard error of the mean of every observable."""
 
 MECHANISMS = {
-    "contact_cohesion": ("contact cohesion", "J/m^2", 0.2),
+    "contact_adhesion": ("contact adhesion", "J/m^2", 0.2),
     "liquid_bridges": ("liquid bridges", "N/m", 0.07),
     "plate_tilt": ("tilt of the plate", "deg", 6.0),
     "size_spread": ("spread of sizes", "1", 0.3),
@@ -106,7 +106,7 @@ def made_data(rng: np.random.Generator) -> Data:
 def made_fit(data: Data, residuals: np.ndarray, mechanisms: tuple[str, ...] = ()) -> Fit:
     """A fit whose residuals are known; predictions are known half as well as the data."""
     training = residuals[: HELD_OUT.index(True)]
-    sizes = {"contact_cohesion": Interval(0.041, 0.052, 0.064), "plate_tilt": Interval(1.2, 2.1, 3.1)}
+    sizes = {"contact_adhesion": Interval(0.041, 0.052, 0.064), "plate_tilt": Interval(1.2, 2.1, 3.1)}
     p = np.where(np.abs(residuals) > 3.4, 1e-3, 0.4)
     return Fit(
         mechanisms,
@@ -129,7 +129,7 @@ def made_fit(data: Data, residuals: np.ndarray, mechanisms: tuple[str, ...] = ()
 def made_candidates(admitted: int) -> tuple[Candidate, ...]:
     """Three mechanisms, of which so many are admitted."""
     base = Candidate(
-        mechanisms=("contact_cohesion",),
+        mechanisms=("contact_adhesion",),
         score=14.2,
         visible_share=0.61,
         sizes=(Interval(0.041, 0.052, 0.064),),
@@ -172,7 +172,7 @@ def made_candidates(admitted: int) -> tuple[Candidate, ...]:
 
 
 def made_power() -> tuple[Power, ...]:
-    shares = {"contact_cohesion": 0.18, "liquid_bridges": 0.34, "plate_tilt": 0.22, "size_spread": 0.41}
+    shares = {"contact_adhesion": 0.18, "liquid_bridges": 0.34, "plate_tilt": 0.22, "size_spread": 0.41}
     return tuple(
         Power(name, shares.get(name, 1.9) * maximum, maximum, 0.6, name in shares)
         for name, (_, _, maximum) in MECHANISMS.items()
@@ -187,8 +187,8 @@ def made_discovery(verdict: Verdict) -> Discovery:
     signature = 7.0 * rng.standard_normal(len(OBSERVABLES)) * (rng.random(len(OBSERVABLES)) < 0.5)
     base = made_fit(data, noise + (0.0 if verdict is Verdict.NONE else 1.0) * signature)
     named = {
-        Verdict.NAMED: ("contact_cohesion",),
-        Verdict.TIE: ("contact_cohesion", "liquid_bridges"),
+        Verdict.NAMED: ("contact_adhesion",),
+        Verdict.TIE: ("contact_adhesion", "liquid_bridges"),
     }.get(verdict, ())
     chosen = made_fit(data, noise, named[:1]) if named else None
     found = Discovery(
@@ -199,7 +199,7 @@ def made_discovery(verdict: Verdict) -> Discovery:
         data=data,
         base=base,
         chosen=chosen,
-        gap=Gap(verdict is not Verdict.NONE, 320.0, 7.1, "contact_cohesion"),
+        gap=Gap(verdict is not Verdict.NONE, 320.0, 7.1, "contact_adhesion"),
         drifts=tuple(
             Drift(name, CONDITIONS[:4], (0.45, 0.46, 0.31, 0.44), (0.02, 0.03, 0.02, 0.02), 1e-5)
             for name in FACTORS
@@ -218,7 +218,7 @@ def made_discovery(verdict: Verdict) -> Discovery:
         if named
         else (),
         next_experiment=NextExperiment(
-            "wide", (("scene.lifted-cylinder.diameter", "44 mm"),), ("contact_cohesion", "liquid_bridges"),
+            "wide", (("scene.lifted-cylinder.diameter", "44 mm"),), ("contact_adhesion", "liquid_bridges"),
             23.0, 8, "t55",
         )
         if named

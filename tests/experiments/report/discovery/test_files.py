@@ -11,11 +11,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from doe.discrepancy.problem.settings import Settings
+from doe.discrepancy.verdict.discovery import Discovery, Interval, Verdict
 from experiments.commands.run import check_runs
-from experiments.discover.discovery import Discovery, Interval, Verdict
 from experiments.discover.library import library_for
 from experiments.discover.observables import OBSERVABLES
-from experiments.discover.settings import Settings
 from experiments.report.discovery import Terms, write_discovery
 from experiments.studyfile import Study, load_study
 
@@ -49,7 +49,7 @@ def test_the_files_hold_the_same_numbers(
     assert page.read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
     results = json.loads((tmp_path / "results.json").read_text(encoding="utf-8"))
     assert results["discovery"] == json.loads(json.dumps(found.to_dict()))
-    assert results["sentence"].startswith("Adding contact cohesion at 0.052 J/m²")
+    assert results["sentence"].startswith("Adding contact adhesion at 0.052 J/m²")
     compared = pd.read_csv(tmp_path / "tables" / "compared.csv")
     measured = np.isfinite(found.data.means)
     np.testing.assert_array_equal(compared["measured"], found.data.means[measured])
@@ -62,22 +62,22 @@ def test_the_files_hold_the_same_numbers(
 def test_the_study_with_the_mechanism_loads_and_can_be_calibrated(
     trial: Study, trial_terms: Terms, discovered: Discovered, tmp_path: Path
 ) -> None:
-    most = trial_terms.mechanisms["contact_cohesion"].maximum
+    most = trial_terms.mechanisms["contact_adhesion"].maximum
     found = found_on(trial, discovered, Verdict.NAMED)
     assert found.chosen is not None
     size = Interval(0.4 * most, 0.5 * most, 1.2 * most)
     found = replace(found, chosen=replace(found.chosen, sizes=(size,)))
     write_discovery(found, trial, trial_terms, Settings(), tmp_path)
-    study = load_study(tmp_path / "study-with-contact_cohesion.toml")
+    study = load_study(tmp_path / "study-with-contact_adhesion.toml")
     check_runs(study)
     added = study.factors[-1]
-    assert added.name == "contact_cohesion"
+    assert added.name == "contact_adhesion"
     # Written with four digits; the interval ends where the library does.
     assert (added.low, added.high) == pytest.approx((0.4 * most, most), rel=1e-3)
     assert [factor.name for factor in study.factors[:-1]] == [factor.name for factor in trial.factors]
     # A case of it is the one that the analysis ran: the rest of the study is as it was.
     at = {factor.name: factor.center for factor in trial.factors}
-    case = study.case(at | {"contact_cohesion": added.low}, seed=1)
+    case = study.case(at | {"contact_adhesion": added.low}, seed=1)
     assert case.mechanisms
     target = study.target.model_dump()
     column = found.data.observables.index("flank_angle")
@@ -90,7 +90,7 @@ def test_a_tie_gives_a_study_for_each(
 ) -> None:
     write_discovery(found_on(trial, discovered, Verdict.TIE), trial, trial_terms, Settings(), tmp_path)
     names = sorted(path.name for path in tmp_path.glob("study-with-*.toml"))
-    assert names == ["study-with-contact_cohesion.toml", "study-with-liquid_bridges.toml"]
+    assert names == ["study-with-contact_adhesion.toml", "study-with-liquid_bridges.toml"]
     for name in names:
         assert load_study(tmp_path / name).factors[-1].name in name
 

@@ -10,8 +10,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.discover.discovery import Answer, Discovery, Question, Verdict
-from experiments.discover.settings import Settings
+from doe.discrepancy.problem.settings import Settings
+from doe.discrepancy.verdict.discovery import Answer, Discovery, Question, Verdict
 from experiments.report import HeapPicture
 from experiments.report.discovery import Terms, render_discovery, verdict_sentence
 from experiments.report.discovery.tables import SHOWN_PAIRS, data_table, shown_candidates
@@ -48,7 +48,7 @@ def test_a_named_effect_is_told_with_its_size_and_what_it_removed(
 ) -> None:
     sentence = verdict_sentence(discovered(Verdict.NAMED), terms).replace("\u00a0", " ")
     assert sentence == (
-        "Adding contact cohesion at 0.052 J/m² (90 % interval 0.041 to 0.064) removed 98 % (94 to 100 %) of"
+        "Adding contact adhesion at 0.052 J/m² (90 % interval 0.041 to 0.064) removed 98 % (94 to 100 %) of"
         " the excess; held out, Q fell from 121 (98 to 143) to 11 (7.1 to 16)."
     )
 
@@ -65,7 +65,7 @@ def test_no_share_is_told_of_an_excess_that_is_not_there(
         assert ("explained-chart" in page.charts) is told
         assert (page.rows("candidates")[0][2][1] is not None) is told
     sentence = verdict_sentence(replace(quiet, verdict=Verdict.UNKNOWN), terms)
-    assert sentence.endswith("the best, contact cohesion, leaves Q = 48.3.")
+    assert sentence.endswith("the best, contact adhesion, leaves Q = 48.3.")
 
 
 @pytest.mark.parametrize(
@@ -129,7 +129,7 @@ def test_the_other_verdicts_name_nothing_as_missing(discovered: Discovered, term
     )
     assert "agrees with the data" in none
     assert "nothing in the library explains it" in unknown
-    assert "contact cohesion at 0.052" in tie
+    assert "contact adhesion at 0.052" in tie
     assert "liquid bridges at 0.034" in tie
     assert unclear == discovered(Verdict.NOT_IDENTIFIABLE).reason
 

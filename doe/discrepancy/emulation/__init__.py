@@ -1,0 +1,1 @@
+"""A bank of runs, and the emulator that is fitted to it."""

@@ -1,0 +1,1 @@
+"""Models fitted to measured means, and corrected by fresh runs around their optimum."""

@@ -1,0 +1,1 @@
+"""What an analysis is given: what may vary, measured replicates, rules, and whatever answers points."""
