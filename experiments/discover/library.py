@@ -75,39 +75,27 @@ class MechanismFile(Section):
 
 @dataclass(frozen=True)
 class Mechanism:
-    """A physical effect that a study may lack, in the units of that study.
-
-    Attributes
-    ----------
-    name : str
-        Name in every table; that of the factor too which the study has with it.
-    title, sentence : str
-        Its name in physics, and what it is in plain language.
-    kind : {"law", "scene", "population"}
-        Whether it acts in the contacts, in the test, or is a property of the grains.
-    parameters : tuple of str
-        Place, or places of one value, in the study.
-    unit : str
-        Unit of the sizes, ``1`` for none.
-    null, maximum : float
-        Size that the study has without it, and the largest that is searched.
-    source, confirm : str
-        Where law and range come from, and the further experiment that would show it.
-    companions : tuple of (str, float or str)
-        What else it needs in the study, by place.
-    """
+    """A physical effect that a study may lack, in the units of that study."""
 
     name: str
+    """Name in every table; that of the factor too which the study has with it."""
     title: str
     sentence: str
+    """Its name in physics, and what it is in plain language."""
     kind: str
+    """Whether it acts in the contacts, in the test, or is a property of the grains."""
     parameters: tuple[str, ...]
+    """Place, or places of one value, in the study."""
     unit: str
+    """Unit of the sizes, ``1`` for none."""
     null: float
     maximum: float
+    """Size that the study has without it, and the largest that is searched."""
     source: str
     confirm: str
+    """Where law and range come from, and the further experiment that would show it."""
     companions: tuple[tuple[str, float | str], ...] = ()
+    """What else it needs in the study, by place."""
 
     def factor(self, low: float | None = None, high: float | None = None) -> dict[str, Any]:
         """Write it as a ``[[factor]]`` of a study, its range this one or the whole."""

@@ -28,14 +28,7 @@ WITHOUT_EFFECT = ("name", "note", "paper", "target", "response", "campaign", "di
 
 @dataclass(frozen=True)
 class Search:
-    """Mechanisms that are looked for, and the rules; settled before the data are opened.
-
-    Attributes
-    ----------
-    study : Study
-    library : tuple of Mechanism
-    settings : Settings
-    """
+    """Mechanisms that are looked for, and the rules; settled before the data are opened."""
 
     study: Study
     library: tuple[Mechanism, ...]

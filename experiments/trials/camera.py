@@ -19,18 +19,12 @@ READING = {"deg": 0.1, "m": 5.0e-5, "1": 0.002}
 
 @dataclass(frozen=True)
 class Camera:
-    """One set-up of a camera.
-
-    Attributes
-    ----------
-    scale : float
-        Its lengths over the true ones.
-    roll : float
-        Turn about the line of sight, clockwise in the picture [rad].
-    """
+    """One set-up of a camera."""
 
     scale: float
+    """Its lengths over the true ones."""
     roll: float
+    """Turn about the line of sight, clockwise in the picture [rad]."""
 
     @classmethod
     def drawn(cls, rng: np.random.Generator) -> Camera:

@@ -36,30 +36,20 @@ trials plate roughness, which does nothing on a plate of high friction, was miss
 
 @dataclass(frozen=True)
 class Declaration:
-    """Everything that is fixed before the trials.
-
-    Attributes
-    ----------
-    study, scale : str
-        Name of the study, and its scale ("" for the study as written).
-    drawn_on : str
-        Date.
-    plan : Plan
-    settings : Settings
-        Of the analysis; what it may name is declared in it.
-    library : tuple of Effect
-        Mechanisms with their gamma80, with the plan's replicates.
-    strangers : tuple of Effect
-        What the library never has.
-    """
+    """Everything that is fixed before the trials."""
 
     study: str
     scale: str
+    """Name of the study, and its scale ("" for the study as written)."""
     drawn_on: str
+    """Date."""
     plan: Plan
     settings: Settings
+    """Of the analysis; what it may name is declared in it."""
     library: tuple[Effect, ...]
+    """Mechanisms with their gamma80, with the plan's replicates."""
     strangers: tuple[Effect, ...]
+    """What the library never has."""
 
     def write(self, path: Path) -> None:
         """Write it as JSON."""

@@ -85,22 +85,14 @@ class TimedSimulator:
 
 @dataclass(frozen=True, eq=False)
 class Desk:
-    """Begins analyses by the name of their job, ``TRIAL.VIEW``; goes to other processes as a whole.
-
-    Attributes
-    ----------
-    emulator : Emulator
-    settings : Settings
-    measured : dict of Measured
-        By trial.
-    withheld : dict of tuple of str
-        By trial: mechanisms that the analysis must do without.
-    """
+    """Begins analyses by the name of their job, ``TRIAL.VIEW``; goes to other processes as a whole."""
 
     emulator: Emulator
     settings: Settings
     measured: Mapping[str, Measured]
+    """By trial."""
     withheld: Mapping[str, tuple[str, ...]]
+    """By trial: mechanisms that the analysis must do without."""
 
     def __call__(self, job: str) -> Analysis:
         """Begin an analysis."""

@@ -24,37 +24,25 @@ UPPER = 0.5
 
 @dataclass(frozen=True)
 class Plan:
-    """How many trials of each kind, and how many heaps each has.
-
-    Attributes
-    ----------
-    nulls : int
-        With nothing hidden.
-    strong, weak : int
-        A resolvable mechanism: with an effect above 1.5 gamma80, and between 0.3 and 1.5.
-    unresolved : int
-        A mechanism that was declared not resolvable, anywhere in its range.
-    withheld : int
-        A resolvable mechanism, strong, which the analysis must do without.
-    strangers : int
-        An effect that the library never has.
-    pairs : int
-        Of two resolvable mechanisms, both strong.
-    replicates : int
-        Heaps a condition.
-    mechanisms : tuple of str
-        Those of the library that are hidden; none: all. The analysis knows the whole library.
-    """
+    """How many trials of each kind, and how many heaps each has."""
 
     nulls: int = 100
+    """With nothing hidden."""
     strong: int = 15
     weak: int = 4
+    """A resolvable mechanism: with an effect above 1.5 gamma80, and between 0.3 and 1.5."""
     unresolved: int = 3
+    """A mechanism that was declared not resolvable, anywhere in its range."""
     withheld: int = 5
+    """A resolvable mechanism, strong, which the analysis must do without."""
     strangers: int = 7
+    """An effect that the library never has."""
     pairs: int = 30
+    """Of two resolvable mechanisms, both strong."""
     replicates: int = 8
+    """Heaps a condition."""
     mechanisms: tuple[str, ...] = ()
+    """Those of the library that are hidden; none: all. The analysis knows the whole library."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "mechanisms", tuple(self.mechanisms))  # a list, where it comes from a file
@@ -68,29 +56,20 @@ class Plan:
 
 @dataclass(frozen=True)
 class Effect:
-    """What the drawing knows of a mechanism.
-
-    Attributes
-    ----------
-    name : str
-    null, maximum : float
-        Its range.
-    gamma80 : float
-        Distance from the null that is found and told from every other with 80 % probability; infinite where
-        the range has none.
-    told_apart : bool
-        Whether the data tell it, at the end of its range, from every other, nearly everywhere in the ranges
-        of the factors.
-    kin : tuple of str
-        Mechanisms that look like it after calibration.
-    """
+    """What the drawing knows of a mechanism."""
 
     name: str
     null: float
     maximum: float
+    """Its range."""
     gamma80: float = math.inf
+    """Distance from the null that is found and told from every other with 80 % probability; infinite where
+    the range has none."""
     told_apart: bool = True
+    """Whether the data tell it, at the end of its range, from every other, nearly everywhere in the ranges of
+    the factors."""
     kin: tuple[str, ...] = ()
+    """Mechanisms that look like it after calibration."""
 
     @property
     def strongest(self) -> float:

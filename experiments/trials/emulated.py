@@ -41,24 +41,15 @@ STRONGEST = 6.0
 
 @dataclass(frozen=True)
 class Truth:
-    """What a trial hides.
-
-    Attributes
-    ----------
-    kind : str
-        ``none``, ``one``, ``two`` or ``withheld`` (one that the library lacks).
-    sizes : tuple of (str, float)
-    theta : tuple of float
-    seed : int
-    library_lacks : tuple of str
-        What is withheld: the mechanism, and those that look like it.
-    """
+    """What a trial hides."""
 
     kind: str
+    """``none``, ``one``, ``two`` or ``withheld`` (one that the library lacks)."""
     sizes: tuple[tuple[str, float], ...]
     theta: tuple[float, ...]
     seed: int
     library_lacks: tuple[str, ...] = ()
+    """What is withheld: the mechanism, and those that look like it."""
 
 
 def draw_truths(emulator: Emulator, effects: tuple[Effect, ...], count: int, seed: int) -> Iterator[Truth]:
@@ -96,24 +87,16 @@ def _size(effect: Effect, rng: np.random.Generator) -> float:
 
 @dataclass(frozen=True, eq=False)
 class World:
-    """An emulated world, and what its bank lets one know of it.
-
-    Attributes
-    ----------
-    truth : EmulatedSimulator
-        Makes the heaps and the fresh runs.
-    known : Emulator
-        Fitted to a bank that was drawn from the truth; the analysis has no other.
-    effects : tuple of Effect
-        Of the library, as that emulator declares them.
-    settings : Settings
-        Which let the resolvable ones be named.
-    """
+    """An emulated world, and what its bank lets one know of it."""
 
     truth: EmulatedSimulator
+    """Makes the heaps and the fresh runs."""
     known: Emulator
+    """Fitted to a bank that was drawn from the truth; the analysis has no other."""
     effects: tuple[Effect, ...]
+    """Of the library, as that emulator declares them."""
     settings: Settings
+    """Which let the resolvable ones be named."""
 
     @classmethod
     def of(cls, truth: EmulatedSimulator, settings: Settings, seed: int) -> World:

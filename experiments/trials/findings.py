@@ -27,45 +27,31 @@ CRASH = "crash"
 
 @dataclass(frozen=True)
 class Finding:
-    """What is kept of one analysis.
-
-    Attributes
-    ----------
-    trial, view : str
-    verdict : str
-        A `Verdict`, or "crash".
-    named : str
-        Mechanisms of the verdict, parted by blanks.
-    alarm : bool
-        Whether the base model was found to disagree.
-    size, size_low, size_high : float
-        Of the first named mechanism, with its 90 % interval; NaN where none is named.
-    q, degrees_of_freedom : float
-        Of the base.
-    held_out_before, held_out_after : float
-        Q of the held-out conditions without and with the mechanism, from fresh runs; NaN without.
-    held_out_degrees : float
-        Their degrees of freedom.
-    fresh_cases : int
-    reason : str
-        Rule that gave the verdict, or the last line of the crash.
-    """
+    """What is kept of one analysis."""
 
     trial: str
     view: str
     verdict: str
+    """A `Verdict`, or "crash"."""
     named: str = ""
+    """Mechanisms of the verdict, parted by blanks."""
     alarm: bool = False
+    """Whether the base model was found to disagree."""
     size: float = math.nan
     size_low: float = math.nan
     size_high: float = math.nan
+    """Of the first named mechanism, with its 90 % interval; NaN where none is named."""
     q: float = math.nan
     degrees_of_freedom: float = math.nan
+    """Of the base."""
     held_out_before: float = math.nan
     held_out_after: float = math.nan
+    """Q of the held-out conditions without and with the mechanism, from fresh runs; NaN without."""
     held_out_degrees: float = math.nan
+    """Their degrees of freedom."""
     fresh_cases: int = 0
     reason: str = ""
+    """Rule that gave the verdict, or the last line of the crash."""
 
     @classmethod
     def of(cls, trial: str, view: str, end: Discovery | Crash) -> Finding:

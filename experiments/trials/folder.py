@@ -26,12 +26,7 @@ DECLARED, SEALED, LABELS, FINDINGS, RUNS, NOTES, PAGE = (
 
 @dataclass(frozen=True)
 class Folder:
-    """Where everything lies.
-
-    Attributes
-    ----------
-    root : Path
-    """
+    """Where everything lies."""
 
     root: Path
 

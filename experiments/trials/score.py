@@ -54,23 +54,15 @@ class Share:
 
 @dataclass(frozen=True)
 class Aim:
-    """One thing that the trials must show.
-
-    Attributes
-    ----------
-    question : str
-    wanted : str
-        In words, as it was fixed beforehand.
-    found : str
-        With its interval.
-    passed : bool or None
-        None where too few trials ran to say.
-    """
+    """One thing that the trials must show."""
 
     question: str
     wanted: str
+    """In words, as it was fixed beforehand."""
     found: str
+    """With its interval."""
     passed: bool | None
+    """None where too few trials ran to say."""
 
 
 def scored(findings: pd.DataFrame, labels: Mapping[str, Label], sealed: Sequence[Sealed]) -> pd.DataFrame:

@@ -38,32 +38,21 @@ class Kind(StrEnum):
 
 @dataclass(frozen=True)
 class Label:
-    """What is true of one trial; known to nobody before the end.
-
-    Attributes
-    ----------
-    trial : str
-    kind : Kind
-    theta : tuple of float
-        True values of the study's factors, natural units.
-    sizes : tuple of (str, float)
-        Mechanisms in the truth, sorted by name, with their sizes in natural units.
-    strengths : tuple of float
-        Effect of each of these: the distance of its size from the null in units of the gamma80 that was
-        stated beforehand; 0 where there was none.
-    seed : int
-        Root of the seeds of the trial's cases and of its camera.
-    salt : str
-        Random text that makes the seal impossible to guess.
-    """
+    """What is true of one trial; known to nobody before the end."""
 
     trial: str
     kind: Kind
     theta: tuple[float, ...]
+    """True values of the study's factors, natural units."""
     sizes: tuple[tuple[str, float], ...]
+    """Mechanisms in the truth, sorted by name, with their sizes in natural units."""
     strengths: tuple[float, ...]
+    """Effect of each of these: the distance of its size from the null in units of the gamma80 that was stated
+    beforehand; 0 where there was none."""
     seed: int
+    """Root of the seeds of the trial's cases and of its camera."""
     salt: str
+    """Random text that makes the seal impossible to guess."""
 
     @property
     def mechanisms(self) -> tuple[str, ...]:
@@ -79,23 +68,15 @@ class Label:
 
 @dataclass(frozen=True)
 class Sealed:
-    """What is known of a trial beforehand.
-
-    Attributes
-    ----------
-    trial : str
-    part : str
-        Set of trials that it is run with.
-    withheld : tuple of str
-        Mechanisms that the analysis must do without.
-    hash : str
-        Seal of its label.
-    """
+    """What is known of a trial beforehand."""
 
     trial: str
     part: str
+    """Set of trials that it is run with."""
     withheld: tuple[str, ...]
+    """Mechanisms that the analysis must do without."""
     hash: str
+    """Seal of its label."""
 
 
 _COLUMNS = ("trial", "part", "withheld", "sha256")

@@ -26,38 +26,25 @@ best candidates, single or pair, for what the library lacked, and 15 of the 310 
 
 @dataclass(frozen=True, eq=False)
 class GapTest:
-    """Questions to the whitened residuals of a model, all at once.
-
-    Attributes
-    ----------
-    q, freedom : float
-        Sum of squares of what a refit leaves, and its degrees of freedom.
-    q_limit : float
-        The point that ``level`` of the bootstrap exceeds.
-    mechanisms : tuple of str
-    scores : (mechanisms,) array
-        z of the visible signature of each in the residuals.
-    drop, drop_limit : float
-        Largest fall of Q that a positive size of one mechanism brings, and its limit.
-    mechanism : str
-        Of that fall; empty without a library.
-    p : float
-        Of the smallest p value of the questions asked, by the same bootstrap.
-    clearest : Answer
-        To the question of that smallest p value; beyond its limit where there is a gap.
-    level : float
-    """
+    """Questions to the whitened residuals of a model, all at once."""
 
     q: float
     freedom: int
+    """Sum of squares of what a refit leaves, and its degrees of freedom."""
     q_limit: float
+    """The point that ``level`` of the bootstrap exceeds."""
     mechanisms: tuple[str, ...]
     scores: np.ndarray
+    """z of the visible signature of each in the residuals, (mechanisms,)."""
     drop: float
     drop_limit: float
+    """Largest fall of Q that a positive size of one mechanism brings, and its limit."""
     mechanism: str
+    """Of that fall; empty without a library."""
     p: float
+    """Of the smallest p value of the questions asked, by the same bootstrap."""
     clearest: Answer
+    """To the question of that smallest p value; beyond its limit where there is a gap."""
     level: float
 
     @property

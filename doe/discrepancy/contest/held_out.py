@@ -14,21 +14,15 @@ from doe.discrepancy.verdict.discovery import Interval
 
 @dataclass(frozen=True, eq=False)
 class Forecast:
-    """Predicted means of some conditions, with what is unknown of them.
-
-    Attributes
-    ----------
-    measured, predicted : (means,) array
-    covariance : (means, means) array
-        Of their difference: noise, emulator and the fitted parameters.
-    noise : (means, means) array
-        Of the measured means alone.
-    """
+    """Predicted means of some conditions, with what is unknown of them."""
 
     measured: np.ndarray
     predicted: np.ndarray
+    """(means,)."""
     covariance: np.ndarray
+    """Of their difference: noise, emulator and the fitted parameters, (means, means)."""
     noise: np.ndarray
+    """Of the measured means alone, (means, means)."""
 
     def log_score(self, measured: np.ndarray) -> np.ndarray:
         """Logarithm of the predicted density of measured means (..., means), but for a constant."""

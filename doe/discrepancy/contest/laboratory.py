@@ -20,20 +20,13 @@ Waves = Generator[list[Point], Outcomes, list[Runs]]
 
 @dataclass(frozen=True, eq=False)
 class Request:
-    """Runs of one model.
-
-    Attributes
-    ----------
-    mechanisms : tuple of str
-    x : (n, parameters) array
-        Coded points.
-    repeats : int
-        Runs of each point, in every condition.
-    """
+    """Runs of one model."""
 
     mechanisms: tuple[str, ...]
     x: np.ndarray
+    """Coded points, (n, parameters)."""
     repeats: int
+    """Runs of each point, in every condition."""
 
 
 class Laboratory:

@@ -18,20 +18,13 @@ from doe.discrepancy.problem.simulator import Outcomes, Point
 
 @dataclass(frozen=True, eq=False)
 class Contender:
-    """A model at its optimum.
-
-    Attributes
-    ----------
-    fitted : Fitted
-    runs : Runs or None
-        Fresh runs that correct it.
-    centre : (parameters,) array or None
-        What the last of them lie around.
-    """
+    """A model at its optimum."""
 
     fitted: Fitted
     runs: Runs | None = None
+    """Fresh runs that correct it."""
     centre: np.ndarray | None = None
+    """What the last of them lie around, (parameters,); None where there is none."""
 
     @property
     def simulated(self) -> bool:

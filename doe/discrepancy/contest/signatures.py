@@ -55,20 +55,13 @@ def projector(sensitivities: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Signatures:
-    """Mechanisms beside a fitted model, whitened by its covariance.
-
-    Attributes
-    ----------
-    names : tuple of str
-    whole : (mechanisms, means) array
-        Effect of a unit of coded size.
-    visible : (mechanisms, means) array
-        What a refit leaves of it.
-    """
+    """Mechanisms beside a fitted model, whitened by its covariance."""
 
     names: tuple[str, ...]
     whole: np.ndarray
+    """Effect of a unit of coded size, (mechanisms, means)."""
     visible: np.ndarray
+    """What a refit leaves of it, (mechanisms, means)."""
 
     @property
     def directions(self) -> np.ndarray:
@@ -106,27 +99,18 @@ def signatures(fitted: Fitted) -> Signatures:
 
 @dataclass(frozen=True, eq=False)
 class Effects:
-    """What mechanisms of every size show beside a fitted model, a refit of which takes up its part.
-
-    Attributes
-    ----------
-    names : tuple of str
-    visible : (mechanisms, sizes, means) array
-        Whitened, at the coded `SIZES`.
-    whole : (mechanisms, sizes) array
-        Squared lengths without the refit.
-    chance : (mechanisms, sizes) array
-        What the noise of the bank adds to the squared visible lengths: where a mechanism does nothing, the
-        emulator still shows something.
-    correlations : (mechanisms, mechanisms) array
-        Between visible signatures.
-    """
+    """What mechanisms of every size show beside a fitted model, a refit of which takes up its part."""
 
     names: tuple[str, ...]
     visible: np.ndarray
+    """Whitened, at the coded `SIZES`, (mechanisms, sizes, means)."""
     whole: np.ndarray
+    """Squared lengths without the refit, (mechanisms, sizes)."""
     chance: np.ndarray
+    """What the noise of the bank adds to the squared visible lengths: where a mechanism does nothing, the
+    emulator still shows something, (mechanisms, sizes)."""
     correlations: np.ndarray
+    """Between visible signatures, (mechanisms, mechanisms)."""
 
     @classmethod
     def of(cls, fitted: Fitted, seen: Signatures) -> Effects:
@@ -220,24 +204,16 @@ def alike(effects: Effects, name: str, size: float, margin: float) -> frozenset[
 
 @dataclass(frozen=True)
 class Visibility:
-    """What the data could show of a mechanism.
-
-    Attributes
-    ----------
-    name : str
-    gamma80 : float
-        Smallest coded size that is found, and told from every other, with the power of the settings; infinite
-        if the largest is not.
-    share : float
-        Share of its squared signature that calibration cannot take up.
-    resolvable : bool
-        Whether a size in its range is; or what was declared.
-    """
+    """What the data could show of a mechanism."""
 
     name: str
     gamma80: float
+    """Smallest coded size that is found, and told from every other, with the power of the settings; infinite
+    if the largest is not."""
     share: float
+    """Share of its squared signature that calibration cannot take up."""
     resolvable: bool
+    """Whether a size in its range is; or what was declared."""
 
 
 def visibilities(effects: Effects, shares: np.ndarray, settings: Settings) -> tuple[Visibility, ...]:

@@ -56,41 +56,27 @@ def bank_points(space: SearchSpace, settings: Settings, seed: int = 0) -> list[P
 
 @dataclass(frozen=True, eq=False)
 class Bank:
-    """Finished library waves as a table, one row a case.
-
-    Attributes
-    ----------
-    space : SearchSpace
-    observables : tuple of str
-        Columns of the values.
-    theta : (n, factors) array
-        Factors in coded units.
-    mechanism : (n,) int array
-        Number of the mechanism in the space; -1 without one.
-    size : (n,) array
-        Its coded size; 0 without one.
-    condition : (n,) int array
-        Number of the condition.
-    values : (n, observables) array
-        Natural units; NaN in rows that failed.
-    reasons : (n,) array of str
-        Why a case failed, empty where it did not.
-    study : str
-        Fingerprint of what was simulated; empty where it is not known.
-    maker : dict of str
-        What made them, in the words of whoever ran them; empty where it is not known.
-    """
+    """Finished library waves as a table, one row a case."""
 
     space: SearchSpace
     observables: tuple[str, ...]
+    """Columns of the values."""
     theta: np.ndarray
+    """Factors in coded units, (n, factors)."""
     mechanism: np.ndarray
+    """Number of the mechanism in the space; -1 without one, (n,)."""
     size: np.ndarray
+    """Its coded size; 0 without one, (n,)."""
     condition: np.ndarray
+    """Number of the condition, (n,)."""
     values: np.ndarray
+    """Natural units; NaN in rows that failed, (n, observables)."""
     reasons: np.ndarray
+    """Why a case failed, empty where it did not, (n,)."""
     study: str = ""
+    """Fingerprint of what was simulated; empty where it is not known."""
     maker: Mapping[str, str] = field(default_factory=dict)
+    """What made them, in the words of whoever ran them; empty where it is not known."""
 
     def __post_init__(self) -> None:
         if self.values.shape != (len(self.theta), len(self.observables)):

@@ -16,24 +16,16 @@ from doe.discrepancy.emulation.surfaces import all_terms
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """What is known of the emulator's error in one condition before fresh runs.
-
-    Attributes
-    ----------
-    factors : int
-        Number of the factors; the other parameters are sizes.
-    coefficients : (observables, terms, terms) array
-        Covariances of the errors of the coefficients.
-    amplitude : (observables,) array
-        Variances of the smooth function.
-    length : (parameters,) array
-        Over which it changes, in coded units.
-    """
+    """What is known of the emulator's error in one condition before fresh runs."""
 
     factors: int
+    """Number of the factors; the other parameters are sizes."""
     coefficients: np.ndarray
+    """Covariances of the errors of the coefficients, (observables, terms, terms)."""
     amplitude: np.ndarray
+    """Variances of the smooth function, (observables,)."""
     length: np.ndarray
+    """Over which it changes, in coded units, (parameters,)."""
 
     def covariance(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Covariance of errors at coded (m, parameters) and (n, parameters), (observables, m, n)."""
@@ -44,32 +36,21 @@ class Prior:
 
 @dataclass(frozen=True, eq=False)
 class Correction:
-    """The emulator's error in one condition, given fresh runs around an optimum.
-
-    Attributes
-    ----------
-    prior : Prior
-    points : (n, parameters) array
-        Of the runs, coded.
-    coefficients : (terms, observables) array
-        What is added to the emulator's.
-    weights : (n, observables) array
-        Of the smooth function.
-    inverse : (observables, n, n) array
-        Inverse covariances of the runs.
-    correlation : (observables, observables) array
-        Of errors.
-    noise_ratio : (observables,) array
-        Standard deviations of one run around the optimum over those of the emulator.
-    """
+    """The emulator's error in one condition, given fresh runs around an optimum."""
 
     prior: Prior
     points: np.ndarray
+    """Of the runs, coded, (n, parameters)."""
     coefficients: np.ndarray
+    """What is added to the emulator's, (terms, observables)."""
     weights: np.ndarray
+    """Of the smooth function, (n, observables)."""
     inverse: np.ndarray
+    """Inverse covariances of the runs, (observables, n, n)."""
     correlation: np.ndarray
+    """Of errors, (observables, observables)."""
     noise_ratio: np.ndarray
+    """Standard deviations of one run around the optimum over those of the emulator, (observables,)."""
 
     def mean(self, x: np.ndarray) -> np.ndarray:
         """What is added to the emulator, (n, observables)."""

@@ -29,29 +29,19 @@ RESOLUTION = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Emulator:
-    """Surfaces of every condition.
-
-    Attributes
-    ----------
-    space : SearchSpace
-    observables : tuple of str
-        Columns of every prediction; those that never vary in the bank are left out.
-    surfaces : dict of Surfaces
-        By condition.
-    columns : tuple of int
-        Where they stand in the outcomes of the simulator.
-    cases : int
-        Cases of the bank.
-    notes : tuple of str
-        What was left out of the bank, and why.
-    """
+    """Surfaces of every condition."""
 
     space: SearchSpace
     observables: tuple[str, ...]
+    """Columns of every prediction; those that never vary in the bank are left out."""
     surfaces: Mapping[str, Surfaces]
+    """By condition."""
     columns: tuple[int, ...]
+    """Where they stand in the outcomes of the simulator."""
     cases: int
+    """Cases of the bank."""
     notes: tuple[str, ...] = ()
+    """What was left out of the bank, and why."""
 
     def without(self, *mechanisms: str) -> Emulator:
         """Return the same emulator with some mechanisms withheld from the library."""

@@ -22,25 +22,18 @@ AMPLITUDE_RANGE = (1e-3, 1e2)
 
 @dataclass(frozen=True, eq=False)
 class Kriging:
-    """A smooth function known at noisy points.
-
-    Attributes
-    ----------
-    points : (n, parameters) array
-    length : (parameters,) array
-    amplitude : float
-        Variance of the function before the data.
-    weights : (n,) array
-        Inverse covariance of the data times the data.
-    inverse : (n, n) array
-        That inverse.
-    """
+    """A smooth function known at noisy points."""
 
     points: np.ndarray
+    """(n, parameters)."""
     length: np.ndarray
+    """(parameters,)."""
     amplitude: float
+    """Variance of the function before the data."""
     weights: np.ndarray
+    """Inverse covariance of the data times the data, (n,)."""
     inverse: np.ndarray
+    """That inverse, (n, n)."""
 
     def mean(self, x: np.ndarray) -> np.ndarray:
         """Expected value at points (m, parameters), (m,)."""

@@ -24,23 +24,16 @@ NEWTON_STEPS = 30
 
 @dataclass(frozen=True, eq=False)
 class Noise:
-    """Covariance of one run as a function of the coded factors.
-
-    Attributes
-    ----------
-    coefficients : (1 + factors, observables) array
-        Of the log-variances.
-    correlation : (observables, observables) array
-    degrees_of_freedom : int
-        Number of independent deviations that the variances come from.
-    correlation_freedom : float
-        Number of those that the correlation is worth.
-    """
+    """Covariance of one run as a function of the coded factors."""
 
     coefficients: np.ndarray
+    """Of the log-variances, (1 + factors, observables)."""
     correlation: np.ndarray
+    """(observables, observables)."""
     degrees_of_freedom: int
+    """Number of independent deviations that the variances come from."""
     correlation_freedom: float
+    """Number of those that the correlation is worth."""
 
     def variance(self, theta: np.ndarray) -> np.ndarray:
         """Variance of one run, (..., observables), at coded factors (..., factors) kept to their ranges."""

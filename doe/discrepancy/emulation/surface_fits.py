@@ -67,23 +67,18 @@ def repeats_noise(theta: np.ndarray, values: np.ndarray, floor: np.ndarray) -> N
 
 @dataclass(frozen=True, eq=False)
 class _Shrunk:
-    """A least squares fit with coefficients drawn towards nothing.
-
-    Attributes
-    ----------
-    gram_inverse : (terms, terms) array
-        Covariance of the coefficients, in variances of one run.
-    inverse : (terms, runs) array
-    coefficients : (terms, observables) array
-    residual : (runs, observables) array
-    leverage : (runs, 1) array
-    """
+    """A least squares fit with coefficients drawn towards nothing."""
 
     gram_inverse: np.ndarray
+    """Covariance of the coefficients, in variances of one run, (terms, terms)."""
     inverse: np.ndarray
+    """(terms, runs)."""
     coefficients: np.ndarray
+    """(terms, observables)."""
     residual: np.ndarray
+    """(runs, observables)."""
     leverage: np.ndarray
+    """(runs, 1)."""
 
     @classmethod
     def of(cls, terms: np.ndarray, response: np.ndarray, scales: np.ndarray) -> _Shrunk:
@@ -97,22 +92,16 @@ class _Shrunk:
 
 @dataclass(frozen=True, eq=False)
 class BaseRuns:
-    """Runs without a mechanism in one condition, repeats taken together.
-
-    Attributes
-    ----------
-    theta : (n, factors) array
-        Each once.
-    repeats : (n,) array
-    means : (n, observables) array
-    noise : Noise
-        Of one run.
-    """
+    """Runs without a mechanism in one condition, repeats taken together."""
 
     theta: np.ndarray
+    """Each once, (n, factors)."""
     repeats: np.ndarray
+    """(n,)."""
     means: np.ndarray
+    """(n, observables)."""
     noise: Noise
+    """Of one run."""
 
     @classmethod
     def of(cls, theta: np.ndarray, values: np.ndarray, noise: Noise) -> BaseRuns:
@@ -170,22 +159,16 @@ def _fit_base(runs: BaseRuns, scales: np.ndarray) -> Surfaces:
 
 @dataclass(frozen=True, eq=False)
 class AddedRuns:
-    """Runs with one mechanism in one condition.
-
-    Attributes
-    ----------
-    base : Surfaces
-        Of the condition.
-    theta : (n, factors) array
-    size : (n,) array
-        Coded.
-    values : (n, observables) array
-    """
+    """Runs with one mechanism in one condition."""
 
     base: Surfaces
+    """Of the condition."""
     theta: np.ndarray
+    """(n, factors)."""
     size: np.ndarray
+    """Coded, (n,)."""
     values: np.ndarray
+    """(n, observables)."""
 
     @property
     def terms(self) -> np.ndarray:

@@ -42,20 +42,14 @@ def all_terms(x: np.ndarray, factors: int) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Polynomial:
-    """A least squares fit of all observables.
-
-    Attributes
-    ----------
-    coefficients : (terms, observables) array
-    misfit : (observables,) array
-        Variance of what neither the noise nor the kriging accounts for.
-    kriging : dict of Kriging
-        By number of the observable: what the polynomial misses, where it fails.
-    """
+    """A least squares fit of all observables."""
 
     coefficients: np.ndarray
+    """(terms, observables)."""
     misfit: np.ndarray
+    """Variance of what neither the noise nor the kriging accounts for, (observables,)."""
     kriging: Mapping[int, Kriging]
+    """By number of the observable: what the polynomial misses, where it fails."""
 
     def missed(self, x: np.ndarray) -> np.ndarray:
         """Kriged part at coded parameters, (n, observables)."""
@@ -74,32 +68,23 @@ class Polynomial:
 
 @dataclass(frozen=True, eq=False)
 class Addition:
-    """What a mechanism adds, with how its error hangs on that of the base.
-
-    Attributes
-    ----------
-    polynomial : Polynomial
-    base_terms : (terms, base terms) array
-        Errors of the base's coefficients come through as minus this matrix times them.
-    gram_inverse : (terms, terms) array
-    chance : (terms, terms) array
-        Covariance that the noise of the runs gives the coefficients, in variances of one run: that of their
-        error, ``gram_inverse``, less what drawing them towards nothing leaves open.
-    growth : (observables,) array
-        Logarithm of the variance of one run at the largest size over that without the mechanism.
-    variance : (observables,) array
-        Of one run, mean over the mechanism's runs.
-    correlation : (observables, observables) array
-        Of one run at the largest size.
-    """
+    """What a mechanism adds, with how its error hangs on that of the base."""
 
     polynomial: Polynomial
     base_terms: np.ndarray
+    """Errors of the base's coefficients come through as minus this matrix times them, (terms, base terms)."""
     gram_inverse: np.ndarray
+    """(terms, terms)."""
     chance: np.ndarray
+    """Covariance that the noise of the runs gives the coefficients, in variances of one run: that of their
+    error, ``gram_inverse``, less what drawing them towards nothing leaves open, (terms, terms)."""
     growth: np.ndarray
+    """Logarithm of the variance of one run at the largest size over that without the mechanism,
+    (observables,)."""
     variance: np.ndarray
+    """Of one run, mean over the mechanism's runs, (observables,)."""
     correlation: np.ndarray
+    """Of one run at the largest size, (observables, observables)."""
 
     def predict(self, theta: np.ndarray, size: np.ndarray) -> np.ndarray:
         """What is added at coded factors (n, factors) and sizes (n,), (n, observables)."""
@@ -117,23 +102,15 @@ class Addition:
 
 @dataclass(frozen=True, eq=False)
 class Surfaces:
-    """The emulator of one condition.
-
-    Attributes
-    ----------
-    base : Polynomial
-    gram_inverse : (terms, terms) array
-        Of the base's fit.
-    noise : Noise
-        Of one run near the base.
-    additions : dict of Addition
-        By mechanism.
-    """
+    """The emulator of one condition."""
 
     base: Polynomial
     gram_inverse: np.ndarray
+    """Of the base's fit, (terms, terms)."""
     noise: Noise
+    """Of one run near the base."""
     additions: Mapping[str, Addition]
+    """By mechanism."""
 
     def predict(self, x: np.ndarray, mechanisms: tuple[str, ...]) -> np.ndarray:
         """Expected observables at coded parameters (n, factors + mechanisms), (n, observables).

@@ -16,25 +16,17 @@ SCATTER_LEVEL = 0.01
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """The means of one condition.
-
-    Attributes
-    ----------
-    condition : str
-    columns : (k,) int array
-        Observables of the emulator that were measured.
-    mean : (k,) array
-    share : (k, k) array
-        Covariance of the means over that of one replicate: 1 / n where all have n replicates.
-    inflation : (k,) array
-        How many times more the measured replicates scatter than the model's (standard deviations).
-    """
+    """The means of one condition."""
 
     condition: str
     columns: np.ndarray
+    """Observables of the emulator that were measured, (k,)."""
     mean: np.ndarray
+    """(k,)."""
     share: np.ndarray
+    """Covariance of the means over that of one replicate: 1 / n where all have n replicates, (k, k)."""
     inflation: np.ndarray
+    """How many times more the measured replicates scatter than the model's (standard deviations), (k,)."""
 
     @property
     def replicates(self) -> np.ndarray:
@@ -48,13 +40,7 @@ class Block:
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """What was measured, cut to what the emulator knows.
-
-    Attributes
-    ----------
-    training, held_out : tuple of Block
-    notes : tuple of str
-    """
+    """What was measured, cut to what the emulator knows."""
 
     training: tuple[Block, ...]
     held_out: tuple[Block, ...]

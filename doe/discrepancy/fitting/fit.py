@@ -24,32 +24,21 @@ PROFILE_POINTS = 61
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """A model at its optimum.
-
-    Attributes
-    ----------
-    stack : Stack
-    x : (parameters,) array
-        Coded.
-    covariance : (means, means) array
-        Of measured less predicted means, which the fit was weighted with.
-    whitening : (means, means) array
-        W with W' W its inverse.
-    q : float
-        Sum of squares of the whitened residuals.
-    score : float
-        q plus the logarithm of the determinant: minus twice the log-likelihood, but for a constant.
-    spread : (parameters, parameters) array
-        Covariance of the parameters, but for the error of the model's shift.
-    """
+    """A model at its optimum."""
 
     stack: Stack
     x: np.ndarray
+    """Coded, (parameters,)."""
     covariance: np.ndarray
+    """Of measured less predicted means, which the fit was weighted with, (means, means)."""
     whitening: np.ndarray
+    """W with W' W its inverse, (means, means)."""
     q: float
+    """Sum of squares of the whitened residuals."""
     score: float
+    """q plus the logarithm of the determinant: minus twice the log-likelihood, but for a constant."""
     spread: np.ndarray
+    """Covariance of the parameters, but for the error of the model's shift, (parameters, parameters)."""
 
     @property
     def model(self) -> Model:

@@ -18,41 +18,26 @@ STEP = 0.02
 
 @dataclass(frozen=True, eq=False)
 class Shift:
-    """The emulator at one point is the engine at another: they differ by so much, in all conditions.
-
-    Attributes
-    ----------
-    value : (parameters,) array
-        Coded.
-    spread : (parameters, parameters) array
-        Covariance of its error.
-    """
+    """The emulator at one point is the engine at another: they differ by so much, in all conditions."""
 
     value: np.ndarray
+    """Coded, (parameters,)."""
     spread: np.ndarray
+    """Covariance of its error, (parameters, parameters)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """Predictions of the base with some mechanisms.
-
-    Attributes
-    ----------
-    emulator : Emulator
-    mechanisms : tuple of str
-    systematic : float
-        Standard deviation, in units of that of one run, that is added to the error of every mean.
-    shift : Shift or None
-        By how much the emulator's parameters are off; None for the emulator alone.
-    corrections : dict of Correction
-        By condition, what it misses besides; empty for the emulator alone.
-    """
+    """Predictions of the base with some mechanisms."""
 
     emulator: Emulator
     mechanisms: tuple[str, ...]
     systematic: float
+    """Standard deviation, in units of that of one run, that is added to the error of every mean."""
     shift: Shift | None = None
+    """By how much the emulator's parameters are off; None for the emulator alone."""
     corrections: Mapping[str, Correction] = field(default_factory=dict)
+    """By condition, what it misses besides; empty for the emulator alone."""
 
     @property
     def lower(self) -> np.ndarray:
@@ -101,13 +86,7 @@ class Model:
 
 @dataclass(frozen=True, eq=False)
 class Stack:
-    """A model against the means of some conditions, as one vector.
-
-    Attributes
-    ----------
-    model : Model
-    blocks : tuple of Block
-    """
+    """A model against the means of some conditions, as one vector."""
 
     model: Model
     blocks: tuple[Block, ...]

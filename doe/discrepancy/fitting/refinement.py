@@ -37,20 +37,14 @@ MOVED = 1.5
 
 @dataclass(frozen=True, eq=False)
 class Runs:
-    """Fresh runs of one model that finished.
-
-    Attributes
-    ----------
-    x : (n, parameters) array
-        Coded.
-    conditions : (n,) array of str
-    values : (n, observables) array
-        Of the emulator's observables.
-    """
+    """Fresh runs of one model that finished."""
 
     x: np.ndarray
+    """Coded, (n, parameters)."""
     conditions: np.ndarray
+    """(n,)."""
     values: np.ndarray
+    """Of the emulator's observables, (n, observables)."""
 
     def joined(self, other: Runs) -> Runs:
         """These and other runs."""
@@ -155,29 +149,20 @@ def _slope(model: Model, x: np.ndarray, direction: np.ndarray, condition: str) -
 
 @dataclass(frozen=True, eq=False)
 class _Seen:
-    """What the emulator missed in one condition.
-
-    Attributes
-    ----------
-    x : (n, parameters) array
-        Points, each once.
-    missed, noise : (n, observables) array
-        Mean of its runs less the emulated, and the variance of its noise.
-    coefficients : (observables, terms, terms) array
-        Covariances of the emulator's errors.
-    misfit, variance : (observables,) array
-        What the emulator states of what no coefficient follows, and variance of one run.
-    factors : int
-        Number of the factors; the other parameters are sizes.
-    """
+    """What the emulator missed in one condition."""
 
     x: np.ndarray
+    """Points, each once, (n, parameters)."""
     missed: np.ndarray
     noise: np.ndarray
+    """Mean of its runs less the emulated, and the variance of its noise, (n, observables)."""
     coefficients: np.ndarray
+    """Covariances of the emulator's errors, (observables, terms, terms)."""
     misfit: np.ndarray
     variance: np.ndarray
+    """What the emulator states of what no coefficient follows, and variance of one run, (observables,)."""
     factors: int
+    """Number of the factors; the other parameters are sizes."""
 
     def prior(self, amplitude: float) -> Prior:
         """What is known without the runs."""

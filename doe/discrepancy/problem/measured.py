@@ -16,31 +16,21 @@ CLOGGED = "the tube clogged"
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """Heaps measured under a few conditions, all in the base units of `experiments` (SI; degrees).
-
-    Attributes
-    ----------
-    conditions : tuple of str
-        Conditions with at least one replicate, in the order of the study.
-    observables : tuple of str
-        Columns of the values: what was measured in at least one replicate.
-    values : dict of (replicates, observables) arrays
-        By condition; NaN where an observable was not measured, and everywhere in the row of a replicate that
-        left no heap.
-    reasons : dict of tuple of str
-        By condition: why each replicate left no heap, empty where it did; left out: every one did.
-    pictures : dict of tuple of Path
-        By condition: photographs that came with the data.
-    notes : tuple of str
-        What a reader must know about the data: too few replicates, values that contradict one another, ...
-    """
+    """Heaps measured under a few conditions, all in the base units of `experiments` (SI; degrees)."""
 
     conditions: tuple[str, ...]
+    """Conditions with at least one replicate, in the order of the study."""
     observables: tuple[str, ...]
+    """Columns of the values: what was measured in at least one replicate."""
     values: Mapping[str, np.ndarray]
+    """By condition; NaN where an observable was not measured, and everywhere in the row of a replicate that
+    left no heap, each (replicates, observables)."""
     reasons: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """By condition: why each replicate left no heap, empty where it did; left out: every one did."""
     pictures: Mapping[str, tuple[Path, ...]] = field(default_factory=dict)
+    """By condition: photographs that came with the data."""
     notes: tuple[str, ...] = ()
+    """What a reader must know about the data: too few replicates, values that contradict one another, ..."""
 
     def __post_init__(self) -> None:
         for what, names in (("conditions", self.conditions), ("observables", self.observables)):

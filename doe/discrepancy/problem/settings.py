@@ -18,75 +18,53 @@ from doe.errors import RuleError
 
 @dataclass(frozen=True)
 class Settings:
-    """Levels, margins and numbers of runs.
-
-    Attributes
-    ----------
-    bank_points, bank_repeats : int
-        Points of the library waves without a mechanism, and runs of each (their scatter is the noise).
-    bank_mechanism_points : int
-        Points for each mechanism, one run each.
-    false_alarm : float
-        Probability that a model that lacks nothing is said to lack something.
-    fit_level : float
-        A model whose disagreement with the data has a smaller p value is not admitted. It is the share of
-        true models that are lost; the larger it is, the more of what the library lacks is seen to lack.
-    least_ratio : float
-        Least size over standard error of a mechanism that is named.
-    pair_ratio : float
-        The same for each of two mechanisms named together: there are many more pairs to choose among, and two
-        wrong ones make up for much.
-    tie_margin : float
-        Mechanisms within so much of the best are a tie: in Q plus the logarithm of the determinant, less
-        twice the held-out gain, which is minus twice a log-likelihood; a prediction's being uncertain
-        counts for half of it at most (`decision.lag`). Those that should look the same are one within
-        somewhat more (`decision.is_open`).
-    power : float
-        Probability at which ``gamma80`` is stated.
-    systematic : float
-        Standard deviation, in units of that of one run, of what cameras and time steps add to every mean. In
-        the first blind trials it was 0.06, but for the drag on the tube, which has been mended since.
-    draws : int
-        Draws of every bootstrap.
-    shortlist_share : float
-        By so much of the base's excess the emulator may be wrong: models within it of the best, and of a fit,
-        are simulated again.
-    shortlist : int
-        Most models that are simulated again at first; half as many in every next round.
-    refinement_points, refinement_repeats : int
-        Fresh points around an optimum, and runs of each, in every condition.
-    refinement_rounds : int
-        Most times that the optima are simulated again.
-    finish_points : int
-        Fresh points at last around the leader's optimum, and around those of models that might overtake it.
-    pair_candidates : int
-        So many pairs are tried: those that the residuals of their members promise most of.
-    direct_runs : int
-        Fresh runs a model and condition at the final optimum.
-    resolvable : tuple of str or None
-        Mechanisms that may be named. None: any that the data tell from every other.
-    """
+    """Levels, margins and numbers of runs."""
 
     bank_points: int = 128
     bank_repeats: int = 2
+    """Points of the library waves without a mechanism, and runs of each (their scatter is the noise)."""
     bank_mechanism_points: int = 48
+    """Points for each mechanism, one run each."""
     false_alarm: float = 0.025
+    """Probability that a model that lacks nothing is said to lack something."""
     fit_level: float = 0.1
+    """A model whose disagreement with the data has a smaller p value is not admitted. It is the share of true
+    models that are lost; the larger it is, the more of what the library lacks is seen to lack."""
     least_ratio: float = 3.0
+    """Least size over standard error of a mechanism that is named."""
     pair_ratio: float = 5.0
+    """The same for each of two mechanisms named together: there are many more pairs to choose among, and two
+    wrong ones make up for much."""
     tie_margin: float = 8.0
+    """Mechanisms within so much of the best are a tie: in Q plus the logarithm of the determinant, less twice
+    the held-out gain, which is minus twice a log-likelihood; a prediction's being uncertain counts for half
+    of it at most (`decision.lag`). Those that should look the same are one within somewhat more
+    (`decision.is_open`)."""
     power: float = 0.8
+    """Probability at which ``gamma80`` is stated."""
     systematic: float = 0.1
+    """Standard deviation, in units of that of one run, of what cameras and time steps add to every mean. In
+    the first blind trials it was 0.06, but for the drag on the tube, which has been mended since."""
     draws: int = 4000
+    """Draws of every bootstrap."""
     shortlist_share: float = 0.3
+    """By so much of the base's excess the emulator may be wrong: models within it of the best, and of a fit,
+    are simulated again."""
     shortlist: int = 3
+    """Most models that are simulated again at first; half as many in every next round."""
     refinement_points: int = 6
     refinement_repeats: int = 2
+    """Fresh points around an optimum, and runs of each, in every condition."""
     refinement_rounds: int = 3
+    """Most times that the optima are simulated again."""
     finish_points: int = 12
+    """Fresh points at last around the leader's optimum, and around those of models that might overtake it."""
     pair_candidates: int = 12
+    """So many pairs are tried: those that the residuals of their members promise most of."""
     direct_runs: int = 8
+    """Fresh runs a model and condition at the final optimum."""
     resolvable: tuple[str, ...] | None = None
+    """Mechanisms that may be named. None: any that the data tell from every other."""
 
     def __post_init__(self) -> None:
         for name in ("false_alarm", "fit_level", "power"):

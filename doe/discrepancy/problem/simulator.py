@@ -15,40 +15,27 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Point:
-    """One case: the parameters, the effects that are in the model, where it is tested, and the seed.
-
-    Attributes
-    ----------
-    theta : tuple of float
-        Values of the study's factors in natural units, in their order.
-    sizes : tuple of (str, float)
-        Mechanisms by name with their sizes in natural units, sorted by name; every other is at its null.
-    condition : str
-        Name of the condition.
-    seed : int
-        Seed of everything random in the case.
-    """
+    """One case: the parameters, the effects that are in the model, where it is tested, and the seed."""
 
     theta: tuple[float, ...]
+    """Values of the study's factors in natural units, in their order."""
     sizes: tuple[tuple[str, float], ...]
+    """Mechanisms by name with their sizes in natural units, sorted by name; every other is at its null."""
     condition: str
+    """Name of the condition."""
     seed: int
+    """Seed of everything random in the case."""
 
 
 @dataclass(frozen=True, eq=False)
 class Outcomes:
-    """What came out at a list of points, in their order.
-
-    Attributes
-    ----------
-    values : (n, observables) array
-        Observables in their natural units; rows of cases that failed are NaN, and no one may read them.
-    reasons : tuple of str
-        Why each case failed ("the tube is clogged ..."); empty where it did not.
-    """
+    """What came out at a list of points, in their order."""
 
     values: np.ndarray
+    """Observables in their natural units; rows of cases that failed are NaN, and no one may read them, (n,
+    observables)."""
     reasons: tuple[str, ...]
+    """Why each case failed ("the tube is clogged ..."); empty where it did not."""
 
     @property
     def finished(self) -> np.ndarray:

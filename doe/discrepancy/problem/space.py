@@ -21,18 +21,12 @@ CODED_DIGITS = 9
 
 @dataclass(frozen=True)
 class MechanismRange:
-    """A mechanism of the library: something that the simulator can have beyond its base model.
-
-    Attributes
-    ----------
-    name : str
-    null, maximum : float
-        Where it is absent and the end of its range, in its natural units.
-    """
+    """A mechanism of the library: something that the simulator can have beyond its base model."""
 
     name: str
     null: float
     maximum: float
+    """Where it is absent and the end of its range, in its natural units."""
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.null) and math.isfinite(self.maximum)) or self.null == self.maximum:
@@ -41,27 +35,18 @@ class MechanismRange:
 
 @dataclass(frozen=True)
 class SearchSpace:
-    """Names and ranges of everything that may vary.
-
-    Attributes
-    ----------
-    factors : tuple of str
-        Names of what every calibration adjusts.
-    lower, upper : tuple of float
-        Their ranges in natural units.
-    conditions : tuple of str
-    held_out : tuple of bool
-        Whether each condition takes no part in any fit.
-    mechanisms : tuple of MechanismRange
-        The library.
-    """
+    """Names and ranges of everything that may vary."""
 
     factors: tuple[str, ...]
+    """Names of what every calibration adjusts."""
     lower: tuple[float, ...]
     upper: tuple[float, ...]
+    """Their ranges in natural units."""
     conditions: tuple[str, ...]
     held_out: tuple[bool, ...]
+    """Whether each condition takes no part in any fit."""
     mechanisms: tuple[MechanismRange, ...] = field(default=())
+    """The library."""
 
     def __post_init__(self) -> None:
         if not len(self.factors) == len(self.lower) == len(self.upper) or not self.factors:

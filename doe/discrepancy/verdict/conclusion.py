@@ -21,32 +21,21 @@ LIKELIHOOD = "minus twice the log-likelihood, held-out conditions included"
 
 @dataclass(frozen=True, eq=False)
 class Assessment:
-    """A candidate with everything that the rules look at.
-
-    Attributes
-    ----------
-    fitted : Fitted
-    gap : GapTest
-        Of all conditions with the candidate in the model, those held out by forecast.
-    gain : Interval or None
-        Of the held-out log score over the base.
-    explained : float
-        Share of the base's excess that it removes.
-    simulated : bool
-        Whether fresh runs around its optimum stand behind it.
-    declared : bool
-        Whether all its mechanisms may be named by what was declared.
-    alike : frozenset of str
-        Mechanisms that these data cannot tell from it at its size.
-    """
+    """A candidate with everything that the rules look at."""
 
     fitted: Fitted
     gap: GapTest
+    """Of all conditions with the candidate in the model, those held out by forecast."""
     gain: Interval | None
+    """Of the held-out log score over the base."""
     explained: float
+    """Share of the base's excess that it removes."""
     simulated: bool
+    """Whether fresh runs around its optimum stand behind it."""
     declared: bool
+    """Whether all its mechanisms may be named by what was declared."""
     alike: frozenset[str] = frozenset()
+    """Mechanisms that these data cannot tell from it at its size."""
 
     @property
     def mechanisms(self) -> tuple[str, ...]:
@@ -66,21 +55,13 @@ class Assessment:
 
 @dataclass(frozen=True)
 class Decision:
-    """A verdict with its reason.
-
-    Attributes
-    ----------
-    verdict : Verdict
-    named : tuple of str
-    reason : str
-    chosen : int or None
-        Which of the assessments is the model to go on with.
-    """
+    """A verdict with its reason."""
 
     verdict: Verdict
     named: tuple[str, ...]
     reason: str
     chosen: int | None
+    """Which of the assessments is the model to go on with."""
 
 
 def explained_share(base: GapTest, with_it: GapTest) -> float:

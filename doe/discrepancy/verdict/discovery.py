@@ -42,26 +42,18 @@ class Interval:
 
 @dataclass(frozen=True, eq=False)
 class Data:
-    """The measured means that were compared with the model.
-
-    Attributes
-    ----------
-    conditions, observables : tuple of str
-        Rows and columns of every array of a discovery.
-    held_out : tuple of bool
-        Whether a condition took no part in any fit.
-    means, standard_errors : (conditions, observables) array
-        In natural units.
-    replicates : (conditions, observables) int array
-        Measurements that each mean is made of.
-    """
+    """The measured means that were compared with the model."""
 
     conditions: tuple[str, ...]
     observables: tuple[str, ...]
+    """Rows and columns of every array of a discovery."""
     held_out: tuple[bool, ...]
+    """Whether a condition took no part in any fit."""
     means: np.ndarray
     standard_errors: np.ndarray
+    """In natural units, (conditions, observables)."""
     replicates: np.ndarray
+    """Measurements that each mean is made of, (conditions, observables)."""
 
 
 class Question(StrEnum):
@@ -79,63 +71,46 @@ class Question(StrEnum):
 
 @dataclass(frozen=True)
 class Answer:
-    """What one question to the residuals gave.
-
-    Attributes
-    ----------
-    question : Question
-    value, limit : float
-        The statistic, and the point that the bootstrap exceeds at the level of the rules.
-    mechanism : str
-        Of the fall; empty with the other questions.
-    """
+    """What one question to the residuals gave."""
 
     question: Question
     value: float
     limit: float
+    """The statistic, and the point that the bootstrap exceeds at the level of the rules."""
     mechanism: str = ""
+    """Of the fall; empty with the other questions."""
 
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """A model as close to the training conditions as it comes.
-
-    Attributes
-    ----------
-    mechanisms : tuple of str
-        What was added to the base; empty for the base itself.
-    theta, theta_se : tuple of float
-        The study's factors and their standard errors.
-    sizes : tuple of Interval
-        Size of each mechanism.
-    at_bounds : tuple of str
-        Factors and mechanisms that ended at an end of their range.
-    q, degrees_of_freedom, q_limit, p_value : float
-        Sum of squares of the whitened residuals of all conditions (of those held out: by how far the forecast
-        misses them), its degrees of freedom, the point that the bootstrap exceeds at the level of the rules,
-        and the p value of the whole disagreement, of which Q is one part.
-    clearest : Answer
-        Of the questions that the p value is made of, the one that noise alone answers so most seldom.
-    predicted, predicted_se : (conditions, observables) array
-        What the model says, held-out conditions included, and how well its means are known.
-    residuals, adjusted_p : (conditions, observables) array
-        Measured less predicted over the standard deviation of that difference, and its p value after Holm.
-    """
+    """A model as close to the training conditions as it comes."""
 
     mechanisms: tuple[str, ...]
+    """What was added to the base; empty for the base itself."""
     theta: tuple[float, ...]
     theta_se: tuple[float, ...]
+    """The study's factors and their standard errors."""
     sizes: tuple[Interval, ...]
+    """Size of each mechanism."""
     at_bounds: tuple[str, ...]
+    """Factors and mechanisms that ended at an end of their range."""
     q: float
     degrees_of_freedom: int
     q_limit: float
     p_value: float
+    """Sum of squares of the whitened residuals of all conditions (of those held out: by how far the forecast
+    misses them), its degrees of freedom, the point that the bootstrap exceeds at the level of the rules, and
+    the p value of the whole disagreement, of which Q is one part."""
     clearest: Answer
+    """Of the questions that the p value is made of, the one that noise alone answers so most seldom."""
     predicted: np.ndarray
     predicted_se: np.ndarray
+    """What the model says, held-out conditions included, and how well its means are known, (conditions,
+    observables)."""
     residuals: np.ndarray
     adjusted_p: np.ndarray
+    """Measured less predicted over the standard deviation of that difference, and its p value after Holm,
+    (conditions, observables)."""
 
     @property
     def excess(self) -> float:
@@ -145,23 +120,16 @@ class Fit:
 
 @dataclass(frozen=True)
 class Gap:
-    """Whether the calibrated base disagrees with the data beyond the noise.
-
-    Attributes
-    ----------
-    found : bool
-        True if the base disagrees by its Q, by the largest drop, or by all its scores together.
-    largest_drop, drop_limit : float
-        Largest fall of Q that a mechanism of the library brings, and the point that 2.5 % of the bootstrap
-        exceeds.
-    drop_mechanism : str
-        The mechanism of that drop.
-    """
+    """Whether the calibrated base disagrees with the data beyond the noise."""
 
     found: bool
+    """True if the base disagrees by its Q, by the largest drop, or by all its scores together."""
     largest_drop: float
     drop_limit: float
+    """Largest fall of Q that a mechanism of the library brings, and the point that 2.5 % of the bootstrap
+    exceeds."""
     drop_mechanism: str
+    """The mechanism of that drop."""
 
 
 @dataclass(frozen=True)
@@ -178,47 +146,32 @@ class Drift:
 
 @dataclass(frozen=True)
 class Candidate:
-    """A mechanism (or a pair) of the library, as an explanation of the gap.
-
-    Attributes
-    ----------
-    mechanisms : tuple of str
-        One name, or two.
-    score : float
-        z of its signature in the residuals that calibration cannot take up.
-    visible_share : float
-        Share of its signature that calibration cannot take up, in [0, 1].
-    sizes : tuple of Interval
-        Size of each mechanism in the joint refit.
-    size_over_se : tuple of float
-        Each size over its standard error.
-    q, degrees_of_freedom, p_value : float
-        Of the joint refit, as in ``Fit``.
-    explained : float
-        Share of the base's excess that it removes.
-    held_out_gain : Interval or None
-        What the log score of the held-out conditions gains over the base; None where none was measured.
-    simulated : bool
-        True if these are figures of fresh runs around its optimum, False if the emulator's.
-    admitted : bool
-        Whether it passes every rule.
-    objection : str
-        The first rule that it fails, as a sentence; empty if admitted.
-    """
+    """A mechanism (or a pair) of the library, as an explanation of the gap."""
 
     mechanisms: tuple[str, ...]
+    """One name, or two."""
     score: float
+    """z of its signature in the residuals that calibration cannot take up."""
     visible_share: float
+    """Share of its signature that calibration cannot take up, in [0, 1]."""
     sizes: tuple[Interval, ...]
+    """Size of each mechanism in the joint refit."""
     size_over_se: tuple[float, ...]
+    """Each size over its standard error."""
     q: float
     degrees_of_freedom: int
     p_value: float
+    """Of the joint refit, as in ``Fit``."""
     explained: float
+    """Share of the base's excess that it removes."""
     held_out_gain: Interval | None
+    """What the log score of the held-out conditions gains over the base; None where none was measured."""
     simulated: bool
+    """True if these are figures of fresh runs around its optimum, False if the emulator's."""
     admitted: bool
+    """Whether it passes every rule."""
     objection: str
+    """The first rule that it fails, as a sentence; empty if admitted."""
 
 
 @dataclass(frozen=True)
@@ -288,51 +241,32 @@ class Effort:
 
 @dataclass(frozen=True, eq=False)
 class Discovery:
-    """Everything that an analysis found.
-
-    Attributes
-    ----------
-    verdict : Verdict
-    reason : str
-        The rule that gave the verdict, with its numbers, as a sentence.
-    named : tuple of str
-        The mechanisms of the verdict: one or two if named, all of them in a tie, else none.
-    factors : tuple of str
-        Names of theta.
-    data : Data
-    base, chosen : Fit or None
-        The calibrated base, and the model with the mechanism. None where there was nothing to fit; of a tie,
-        ``chosen`` is the one of lowest Q.
-    gap : Gap or None
-    drifts : tuple of Drift
-    candidates : tuple of Candidate
-        Best first.
-    power : tuple of Power
-        One a mechanism of the library.
-    confounding : Confounding or None
-    before_after : tuple of BeforeAfter
-        Training conditions, then held-out ones if measured; empty where no model was chosen.
-    next_experiment : NextExperiment or None
-    notes : tuple of str
-        What was wrong with the data or the runs, and what was done about it.
-    effort : Effort
-    """
+    """Everything that an analysis found."""
 
     verdict: Verdict
     reason: str
+    """The rule that gave the verdict, with its numbers, as a sentence."""
     named: tuple[str, ...]
+    """The mechanisms of the verdict: one or two if named, all of them in a tie, else none."""
     factors: tuple[str, ...]
+    """Names of theta."""
     data: Data
     base: Fit | None
     chosen: Fit | None
+    """The calibrated base, and the model with the mechanism. None where there was nothing to fit; of a tie,
+    ``chosen`` is the one of lowest Q."""
     gap: Gap | None
     drifts: tuple[Drift, ...]
     candidates: tuple[Candidate, ...]
+    """Best first."""
     power: tuple[Power, ...]
+    """One a mechanism of the library."""
     confounding: Confounding | None
     before_after: tuple[BeforeAfter, ...]
+    """Training conditions, then held-out ones if measured; empty where no model was chosen."""
     next_experiment: NextExperiment | None
     notes: tuple[str, ...]
+    """What was wrong with the data or the runs, and what was done about it."""
     effort: Effort
 
     def __post_init__(self) -> None:
