@@ -1,7 +1,7 @@
-"""The whole analysis of measured heaps: is something missing from the model, and what?
+"""The whole analysis of measured data: is something missing from the model, and what?
 
-It is a generator. It yields waves of points, is sent their outcomes, and returns what it found; so a command
-runs one with the engine, and trials run hundreds side by side with all their waves in one batch.
+It is a generator. It yields waves of points, is sent their outcomes, and returns what it found; so one can be
+run with any simulator, and hundreds side by side with all their waves in one batch.
 """
 
 from __future__ import annotations
@@ -11,18 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from doe.discrepancy.contest.gap import OF_A_CANDIDATE, OF_THE_BASE, GapTest, find_gap
+from doe.discrepancy.contest.gap import OF_A_CANDIDATE, OF_THE_BASE, GapTest, Question, find_gap
 from doe.discrepancy.contest.held_out import held_out_gain
 from doe.discrepancy.contest.laboratory import Laboratory, Request
+from doe.discrepancy.contest.power import Effects, Power, alike, powers
 from doe.discrepancy.contest.rounds import Contender, Contenders, simulate_again
-from doe.discrepancy.contest.signatures import (
-    Effects,
-    Signatures,
-    Visibility,
-    alike,
-    signatures,
-    visibilities,
-)
+from doe.discrepancy.contest.signatures import Signatures, signatures
 from doe.discrepancy.emulation.emulator import Emulator
 from doe.discrepancy.fitting.evidence import Evidence, gather
 from doe.discrepancy.fitting.fit import Fitted, fit, weigh
@@ -31,25 +25,21 @@ from doe.discrepancy.problem.measured import Measured
 from doe.discrepancy.problem.settings import Settings
 from doe.discrepancy.problem.simulator import Outcomes, Point, Simulator
 from doe.discrepancy.threads import steps_in_one_thread
-from doe.discrepancy.verdict.before_after import compare
-from doe.discrepancy.verdict.conclusion import Assessment, Decision, decide, explained_share
+from doe.discrepancy.verdict.before_after import BeforeAfter, compare
+from doe.discrepancy.verdict.conclusion import Assessment, Conclusion, conclude, explained_share
 from doe.discrepancy.verdict.discovery import (
-    BeforeAfter,
     Confounding,
     Discovery,
     Effort,
     Gap,
-    NextExperiment,
-    Question,
     Verdict,
 )
-from doe.discrepancy.verdict.next_experiment import propose
+from doe.discrepancy.verdict.next_experiment import NextExperiment, propose
 from doe.discrepancy.verdict.records import (
     candidate_record,
     data_record,
     drift_records,
     fit_record,
-    power_records,
 )
 
 Analysis = Generator[list[Point], Outcomes, Discovery]
@@ -66,18 +56,18 @@ class _Base:
     gap: GapTest
     seen: Signatures
     effects: Effects
-    visible: tuple[Visibility, ...]
+    power: tuple[Power, ...]
 
 
 @steps_in_one_thread
 def analyse(measured: Measured, emulator: Emulator, settings: Settings, seed: int) -> Analysis:
-    """Analyse measured heaps.
+    """Analyse measured data.
 
     Parameters
     ----------
     measured : Measured
     emulator : Emulator
-        Of the study's bank; what it was told to leave out (``without``) is not in the library.
+        Of the bank; what it was told to leave out (``without``) is not in the library.
     settings : Settings
     seed : int
         Of the bootstraps and of the fresh runs.
@@ -93,10 +83,10 @@ def analyse(measured: Measured, emulator: Emulator, settings: Settings, seed: in
     """
     evidence = gather(measured, emulator)
     if not evidence.training:
-        decision = Decision(
-            Verdict.NOT_IDENTIFIABLE, (), "no training condition left a heap to compare", None
+        conclusion = Conclusion(
+            Verdict.NOT_IDENTIFIABLE, (), "no training condition has a value to compare", None
         )
-        return _empty(emulator, evidence, settings, seed, decision)
+        return _empty(emulator, evidence, settings, seed, conclusion)
     laboratory = Laboratory(emulator, emulator.space.conditions, seed)
     parts = _Parts(emulator, evidence, settings, seed, laboratory)
     base = parts.base(fit(Stack(Model(emulator, (), settings.systematic), evidence.training)))
@@ -106,10 +96,10 @@ def analyse(measured: Measured, emulator: Emulator, settings: Settings, seed: in
             f"{evidence.count} measured mean{'s' * (evidence.count > 1)}, {factors} factors and the size of a"
             " mechanism: other values of the factors can take any such disagreement up"
         )
-        return parts.discovery(base, Decision(Verdict.NOT_IDENTIFIABLE, (), reason, None), [])
+        return parts.discovery(base, Conclusion(Verdict.NOT_IDENTIFIABLE, (), reason, None), [])
     if not base.gap.found:
         reason = f"the calibrated model agrees with the data within the noise (p = {base.gap.p:.2g})"
-        return parts.discovery(base, Decision(Verdict.NONE, (), reason, None), [])
+        return parts.discovery(base, Conclusion(Verdict.NONE, (), reason, None), [])
     return (yield from _search(parts, base))
 
 
@@ -122,19 +112,19 @@ def _search(parts: _Parts, base: _Base) -> Analysis:
     base = parts.base(contenders[()].fitted)
     if not base.gap.found:
         reason = f"fresh runs at the optimum agree with the data within the noise (p = {base.gap.p:.2g})"
-        return parts.discovery(base, Decision(Verdict.NONE, (), reason, None), [])
+        return parts.discovery(base, Conclusion(Verdict.NONE, (), reason, None), [])
     singles = parts.assess(base, {names: one for names, one in contenders.items() if names})
-    decision, assessments = decide(singles, settings), singles
-    if decision.verdict is Verdict.UNKNOWN and _nothing_fits(singles, settings):
+    conclusion, assessments = conclude(singles, settings), singles
+    if conclusion.verdict is Verdict.UNKNOWN and _nothing_fits(singles, settings):
         pairs = yield from _pairs(parts, base, singles)
-        with_two = decide(pairs, settings) if pairs else decision
+        with_two = conclude(pairs, settings) if pairs else conclusion
         if with_two.chosen is not None:
-            decision, assessments = with_two, [*pairs, *singles]
+            conclusion, assessments = with_two, [*pairs, *singles]
         else:
             assessments = [*singles, *pairs]
-    if decision.chosen is None:
-        return parts.discovery(base, decision, assessments)
-    chosen = assessments[decision.chosen].fitted
+    if conclusion.chosen is None:
+        return parts.discovery(base, conclusion, assessments)
+    chosen = assessments[conclusion.chosen].fitted
     requests = [Request(one.mechanisms, one.x[None], settings.direct_runs) for one in (base.fitted, chosen)]
     direct = yield from parts.laboratory.wave(requests)
     compared = []
@@ -142,7 +132,7 @@ def _search(parts: _Parts, base: _Base) -> Analysis:
         compared.append(
             compare(base.fitted, chosen, direct[0], direct[1], blocks, held_out, settings.draws, parts.seed)
         )
-    return parts.discovery(base, decision, assessments, [one for one in compared if one is not None])
+    return parts.discovery(base, conclusion, assessments, [one for one in compared if one is not None])
 
 
 def drive(analysis: Analysis, simulator: Simulator) -> Discovery:
@@ -157,7 +147,7 @@ def drive(analysis: Analysis, simulator: Simulator) -> Discovery:
 
 
 def _nothing_fits(singles: Sequence[Assessment], settings: Settings) -> bool:
-    """Whether even the best single mechanism leaves a gap: only then two are asked for."""
+    """True if even the best single mechanism leaves a gap: only then two are asked for."""
     best = min(singles, key=lambda one: one.score, default=None)
     return best is not None and best.gap.p < settings.fit_level
 
@@ -184,7 +174,7 @@ def _promising_pairs(singles: Sequence[Assessment]) -> list[tuple[str, ...]]:
 
 @dataclass(frozen=True, eq=False)
 class _Parts:
-    """What every step of one analysis shares."""
+    """Everything that the steps of one analysis share."""
 
     emulator: Emulator
     evidence: Evidence
@@ -203,7 +193,9 @@ class _Parts:
         seen = signatures(fitted)
         gap = self._gap(fitted, self.settings.false_alarm, OF_THE_BASE)
         effects = Effects.of(fitted, seen)
-        return _Base(fitted, gap, seen, effects, visibilities(effects, seen.shares, self.settings))
+        return _Base(
+            fitted, gap, seen, effects, powers(effects, seen.shares, self.emulator.space, self.settings)
+        )
 
     def _gap(self, fitted: Fitted, level: float, questions: Sequence[Question]) -> GapTest:
         """Test a model on all conditions: those that it was fitted to, and those that it forecasts."""
@@ -227,19 +219,19 @@ class _Parts:
     def discovery(
         self,
         base: _Base,
-        decision: Decision,
+        conclusion: Conclusion,
         assessments: Sequence[Assessment],
         before_after: Sequence[BeforeAfter] = (),
     ) -> Discovery:
         """The record of all that was found."""
-        chosen = None if decision.chosen is None else assessments[decision.chosen]
+        chosen = None if conclusion.chosen is None else assessments[conclusion.chosen]
         failures = self.laboratory.failures
-        notes = [f"{failures} of {self.laboratory.cases} fresh runs left no heap"] if failures else []
+        notes = [f"{failures} of {self.laboratory.cases} fresh runs failed"] if failures else []
         drop = base.gap
         return Discovery(
-            verdict=decision.verdict,
-            reason=decision.reason,
-            named=decision.named,
+            verdict=conclusion.verdict,
+            reason=conclusion.reason,
+            named=conclusion.named,
             factors=self.emulator.space.factors,
             data=data_record(self.emulator, self.evidence),
             base=fit_record(base.fitted, base.gap, self.evidence),
@@ -249,19 +241,19 @@ class _Parts:
             candidates=tuple(
                 candidate_record(one, base.seen, base.gap.scores, self.settings) for one in assessments
             ),
-            power=power_records(self.emulator, base.visible),
+            power=base.power,
             confounding=Confounding(base.seen.names, base.seen.correlations),
             before_after=tuple(before_after),
-            next_experiment=self._next(base, decision, assessments),
+            next_experiment=self._next(base, conclusion, assessments),
             notes=(*self.evidence.notes, *self.emulator.notes, *notes),
             effort=Effort(self.seed, self.settings.sha256, self.emulator.cases, self.laboratory.cases),
         )
 
     def _next(
-        self, base: _Base, decision: Decision, assessments: Sequence[Assessment]
+        self, base: _Base, conclusion: Conclusion, assessments: Sequence[Assessment]
     ) -> NextExperiment | None:
         """For the two best explanations, where there are two; else for the best against the base."""
-        if decision.verdict in (Verdict.NONE, Verdict.NOT_IDENTIFIABLE) or not assessments:
+        if conclusion.verdict in (Verdict.NONE, Verdict.NOT_IDENTIFIABLE) or not assessments:
             return None
         ranked = [one.fitted for one in sorted(assessments, key=lambda one: one.score)]
         second = ranked[1] if len(ranked) > 1 else base.fitted
@@ -270,12 +262,12 @@ class _Parts:
 
 
 def _empty(
-    emulator: Emulator, evidence: Evidence, settings: Settings, seed: int, decision: Decision
+    emulator: Emulator, evidence: Evidence, settings: Settings, seed: int, conclusion: Conclusion
 ) -> Discovery:
     """The record of data that nothing can be fitted to."""
     return Discovery(
-        verdict=decision.verdict,
-        reason=decision.reason,
+        verdict=conclusion.verdict,
+        reason=conclusion.reason,
         named=(),
         factors=emulator.space.factors,
         data=data_record(emulator, evidence),

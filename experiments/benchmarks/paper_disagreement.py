@@ -18,10 +18,9 @@ import numpy as np
 import pandas as pd
 import typer
 
-from doe.discrepancy.emulation.emulator import Emulator
-from doe.discrepancy.problem.settings import Settings
-from doe.discrepancy.verdict.discovery import Candidate, Discovery, Fit, Interval
+from doe.discrepancy import Candidate, Discovery, Emulator, Fit, Interval, Settings
 from experiments.benchmarks.paper_record import FOLDER
+from experiments.calibrate.export import jsonable
 from experiments.discover.paper_tables import (
     base_q,
     concluded,
@@ -181,7 +180,9 @@ def _power(found: Discovery) -> list[str]:
     rows = [
         {
             "mechanism": _title(power.mechanism),
-            "gamma80": fixed(power.gamma80, 2) if np.isfinite(power.gamma80) else "none within its range",
+            "detectable": fixed(power.detectable_size, 2)
+            if np.isfinite(power.detectable_size)
+            else "none within its range",
             "visible": 100.0 * power.visible_share,
             "resolvable": "yes" if power.resolvable else "no",
         }
@@ -189,7 +190,7 @@ def _power(found: Discovery) -> list[str]:
     ]
     columns = [
         Column("mechanism", "effect"),
-        Column("gamma80", "smallest size named with 80 % probability"),
+        Column("detectable", "smallest size named with 80 % probability"),
         Column("visible", "of its signature, a shift of all angles cannot imitate", "percent", "%"),
         Column("resolvable", "may be named"),
     ]
@@ -213,7 +214,7 @@ def main(
     emulator, settings = tables_emulator(record.replay, record.sensitivities), Settings()
     tables = concluded(published_heaps(), emulator, settings)
     physical = concluded(physical_heaps(), physical_emulator(record.replay, record.sensitivities), settings)
-    results = {"tables": tables.to_dict(), "measured angle": physical.to_dict()}
+    results = {"tables": jsonable(tables), "measured angle": jsonable(physical)}
     write_text(out / RESULTS, json.dumps(results, indent=1, allow_nan=False) + "\n")
     write_text(out / PAGE, disagreement_page(tables, physical, emulator, settings))
     print(out / PAGE)

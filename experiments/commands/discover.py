@@ -12,11 +12,7 @@ from typing import Any
 
 from dem_warp import Progress
 from dem_warp.provenance import engine_fingerprint
-from doe.discrepancy.analysis import drive
-from doe.discrepancy.emulation.bank import Bank
-from doe.discrepancy.problem.measured import Measured
-from doe.discrepancy.problem.simulator import Outcomes, Point
-from doe.discrepancy.verdict.discovery import Discovery, Fit
+from doe.discrepancy import Bank, Discovery, Fit, Measured, Outcomes, Point, drive
 from experiments.cases import open_folder, require_unused
 from experiments.discover.data.file import read_measured
 from experiments.discover.engine import EngineSimulator

@@ -1,1 +1,1 @@
-"""Where the calibrated model and measured data still disagree, and which physical effect is missing."""
+"""The search for a physical effect that a model lacks: `doe.discrepancy` with the engine as its simulator."""

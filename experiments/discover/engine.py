@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from dem_warp import Case, CaseResult, Progress
-from doe.discrepancy.problem.simulator import Outcomes, Point
+from doe.discrepancy import Outcomes, Point
 from experiments.cases.key import case_key
 from experiments.discover.library import Mechanism, with_mechanisms
 from experiments.discover.observables import NAMES, VERSION

@@ -49,14 +49,14 @@ class Scaled(Section):
 
 
 class MechanismFile(Section):
-    """What a file of the library says."""
+    """A file of the library."""
 
     title: str
     """Its name in physics."""
     sentence: str
-    """What it is, in plain language."""
+    """Explanation in plain language."""
     kind: Literal["law", "scene", "population"]
-    """Whether it acts in the contacts, in the test, or is a property of the grains."""
+    """Place where it acts: in the contacts, in the test, or as a property of the grains."""
     parameters: Parameters
     """Place of the parameter in a study; of one value, where there are several."""
     unit: str
@@ -66,11 +66,11 @@ class MechanismFile(Section):
     maximum: Scaled | Annotated[float, Field(gt=0.0)]
     """Largest size that is searched."""
     source: str
-    """Where law and range come from."""
+    """Source of law and range."""
     confirm: str
     """The further experiment that would show it."""
     companions: dict[str, Scaled | float | str] = Field(default_factory=dict)
-    """What else it needs in a study, by place; without effect while it is at its null."""
+    """Further settings that it needs in a study, by place; without effect while it is at its null."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ class Mechanism:
     sentence: str
     """Its name in physics, and what it is in plain language."""
     kind: str
-    """Whether it acts in the contacts, in the test, or is a property of the grains."""
+    """Place where it acts: in the contacts, in the test, or as a property of the grains."""
     parameters: tuple[str, ...]
     """Place, or places of one value, in the study."""
     unit: str
@@ -93,9 +93,9 @@ class Mechanism:
     """Size that the study has without it, and the largest that is searched."""
     source: str
     confirm: str
-    """Where law and range come from, and the further experiment that would show it."""
+    """Source of law and range, and the further experiment that would show it."""
     companions: tuple[tuple[str, float | str], ...] = ()
-    """What else it needs in the study, by place."""
+    """Further settings that it needs in the study, by place."""
 
     def factor(self, low: float | None = None, high: float | None = None) -> dict[str, Any]:
         """Write it as a ``[[factor]]`` of a study, its range this one or the whole."""

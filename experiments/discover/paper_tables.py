@@ -15,18 +15,22 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 import pandas as pd
 
-from doe.discrepancy.analysis import analyse
-from doe.discrepancy.emulation.emulator import Emulator
+from doe.discrepancy import (
+    Discovery,
+    Emulator,
+    Measured,
+    MechanismRange,
+    Outcomes,
+    Point,
+    SearchSpace,
+    Settings,
+    analyse,
+)
 from doe.discrepancy.emulation.noise import Noise
 from doe.discrepancy.emulation.surfaces import Addition, Polynomial, Surfaces, added, cubic
 from doe.discrepancy.fitting.evidence import gather
 from doe.discrepancy.fitting.fit import minimise, whiten
 from doe.discrepancy.fitting.model import Model, Stack
-from doe.discrepancy.problem.measured import Measured
-from doe.discrepancy.problem.settings import Settings
-from doe.discrepancy.problem.simulator import Outcomes, Point
-from doe.discrepancy.problem.space import MechanismRange, SearchSpace
-from doe.discrepancy.verdict.discovery import Discovery
 from experiments.studies.buckwheat import paper
 from experiments.studies.buckwheat.replay import Replay
 from experiments.studies.buckwheat.runs import DESIGNS, published_runs

@@ -8,13 +8,21 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from doe.discrepancy.analysis import Analysis, analyse
-from doe.discrepancy.emulation.bank import Bank, bank_points, load_bank, make_bank
-from doe.discrepancy.emulation.emulator import fit_emulator
-from doe.discrepancy.problem.measured import Measured
-from doe.discrepancy.problem.settings import Settings, settings_of
-from doe.discrepancy.problem.simulator import Simulator
-from doe.discrepancy.problem.space import MechanismRange, SearchSpace
+from doe.discrepancy import (
+    Analysis,
+    Bank,
+    Measured,
+    MechanismRange,
+    SearchSpace,
+    Settings,
+    Simulator,
+    analyse,
+    bank_points,
+    fit_emulator,
+    load_bank,
+    make_bank,
+    settings_of,
+)
 from experiments.cases.folder import describe
 from experiments.discover.library import FORMER_NAMES, Mechanism, library_for
 from experiments.discover.maker import notes_on

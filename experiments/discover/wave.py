@@ -29,7 +29,7 @@ DRIVERS = 4
 host, the GPU works for the others."""
 
 _CONTEXT = multiprocessing.get_context("spawn")
-"""How processes begin: a process with a GPU must not be forked. They end with this one."""
+"""Start of processes: a process with a GPU must not be forked. They end with this one."""
 
 _mine: list[str] = []
 """The device of this process, where it drives one."""
@@ -127,7 +127,7 @@ class WaveRunner:
 
     @property
     def _drives(self) -> bool:
-        """Whether processes drive launches already: then this one needs no context on a GPU."""
+        """True if processes drive launches already: then this one needs no context on a GPU."""
         return "_driven" in self.__dict__
 
     @property

@@ -1,4 +1,4 @@
-"""What the trials cost, before they run."""
+"""Cost of the trials, before they run."""
 
 from __future__ import annotations
 
@@ -6,8 +6,7 @@ from collections.abc import Sequence
 
 import pandas as pd
 
-from doe.discrepancy.emulation.bank import Bank
-from doe.discrepancy.problem.settings import Settings
+from doe.discrepancy import Bank, Settings
 from experiments.trials.declaration import Declaration
 from experiments.trials.truth import Sealed
 

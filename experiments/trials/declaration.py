@@ -1,4 +1,4 @@
-"""What is declared before a trial is drawn: which mechanisms the data should show, and from which size on."""
+"""Declarations before a trial is drawn: which mechanisms the data should show, and from which size on."""
 
 from __future__ import annotations
 
@@ -11,17 +11,16 @@ from typing import Any
 
 import numpy as np
 
-from doe.discrepancy.contest.signatures import Effects, signatures, smallest_shown
+from doe.discrepancy import Emulator, MechanismRange, Settings
+from doe.discrepancy.contest.power import Effects, detectable_coded_size
+from doe.discrepancy.contest.signatures import signatures
 from doe.discrepancy.emulation.bank import sobol
-from doe.discrepancy.emulation.emulator import Emulator
 from doe.discrepancy.fitting.evidence import Block
 from doe.discrepancy.fitting.fit import weigh
 from doe.discrepancy.fitting.model import Model, Stack
-from doe.discrepancy.problem.settings import Settings
-from doe.discrepancy.problem.space import MechanismRange
 from experiments.errors import InputError
 from experiments.files import write_text
-from experiments.trials.drawing import Effect, Plan
+from experiments.trials.drawing import Declared, Plan
 
 KIN = 0.9
 """Mechanisms whose visible signatures correlate by more than this are alike: no data tell them apart."""
@@ -46,16 +45,16 @@ class Declaration:
     plan: Plan
     settings: Settings
     """Of the analysis; what it may name is declared in it."""
-    library: tuple[Effect, ...]
-    """Mechanisms with their gamma80, with the plan's replicates."""
-    strangers: tuple[Effect, ...]
-    """What the library never has."""
+    library: tuple[Declared, ...]
+    """Mechanisms with their detectable sizes, with the plan's replicates."""
+    strangers: tuple[Declared, ...]
+    """Mechanisms that the library never has."""
 
     def write(self, path: Path) -> None:
         """Write it as JSON."""
         document = asdict(self) | {"settings_sha256": self.settings.sha256}
         for effect in (*document["library"], *document["strangers"]):
-            effect["gamma80"] = effect["gamma80"] if math.isfinite(effect["gamma80"]) else None
+            effect["detectable"] = effect["detectable"] if math.isfinite(effect["detectable"]) else None
         write_text(path, json.dumps(document, indent=1, allow_nan=False) + "\n")
 
 
@@ -79,13 +78,16 @@ def read_declaration(path: Path) -> Declaration:
     return Declaration(**document, plan=plan, settings=fixed, library=library, strangers=strangers)
 
 
-def _effect(record: dict[str, Any]) -> Effect:
-    gamma80 = math.inf if record["gamma80"] is None else record["gamma80"]
-    return Effect(**record | {"gamma80": gamma80, "kin": tuple(record["kin"])})
+def _effect(record: dict[str, Any]) -> Declared:
+    # Declarations of the first six trials call it gamma80.
+    found = record.pop("gamma80") if "gamma80" in record else record.pop("detectable")
+    return Declared(
+        **record | {"detectable": math.inf if found is None else found, "kin": tuple(record["kin"])}
+    )
 
 
-def declared_effects(emulator: Emulator, settings: Settings, replicates: int) -> tuple[Effect, ...]:
-    """What so many replicates of every condition should show of each mechanism of the library.
+def declared_effects(emulator: Emulator, settings: Settings, replicates: int) -> tuple[Declared, ...]:
+    """Declare what so many replicates of every condition should show of each mechanism of the library.
 
     The power is the mean over the ranges of the factors, as truths are drawn from all of them. A mechanism
     is told apart that the end of its range shows nearly everywhere in them.
@@ -107,8 +109,8 @@ def declared_effects(emulator: Emulator, settings: Settings, replicates: int) ->
 
 def declared_effect(
     span: MechanismRange, powers: np.ndarray, settings: Settings, kin: tuple[str, ...] = ()
-) -> Effect:
-    """What is declared of a mechanism with some power at several points in the ranges of the factors.
+) -> Declared:
+    """Declare a mechanism of some power at several points in the ranges of the factors.
 
     Parameters
     ----------
@@ -119,12 +121,12 @@ def declared_effect(
     kin : tuple of str
         Mechanisms that look like it.
     """
-    gamma80 = smallest_shown(powers.mean(axis=0), settings) * abs(span.maximum - span.null)
-    told = math.isfinite(smallest_shown(np.quantile(powers, BLIND, axis=0), settings))
-    return Effect(span.name, span.null, span.maximum, gamma80, told, kin)
+    detectable = detectable_coded_size(powers.mean(axis=0), settings) * abs(span.maximum - span.null)
+    told = math.isfinite(detectable_coded_size(np.quantile(powers, BLIND, axis=0), settings))
+    return Declared(span.name, span.null, span.maximum, detectable, told, kin)
 
 
-def with_names(settings: Settings, library: Sequence[Effect]) -> Settings:
+def with_names(settings: Settings, library: Sequence[Declared]) -> Settings:
     """Settings that let an analysis name the resolvable mechanisms and no other."""
     return replace(settings, resolvable=tuple(effect.name for effect in library if effect.resolvable))
 

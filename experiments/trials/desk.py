@@ -1,4 +1,4 @@
-"""Where analyses begin and end: the data they get, the time they have, what is written down of them."""
+"""The desk where analyses begin and end: their data, their time, what is written down of them."""
 
 from __future__ import annotations
 
@@ -11,13 +11,19 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from doe.discrepancy.analysis import Analysis, analyse
-from doe.discrepancy.emulation.emulator import Emulator
-from doe.discrepancy.problem.measured import Measured
-from doe.discrepancy.problem.settings import Settings
-from doe.discrepancy.problem.simulator import Outcomes, Point, Simulator
-from doe.discrepancy.verdict.discovery import Discovery
+from doe.discrepancy import (
+    Analysis,
+    Discovery,
+    Emulator,
+    Measured,
+    Outcomes,
+    Point,
+    Settings,
+    Simulator,
+    analyse,
+)
 from doe.errors import RuleError
+from experiments.calibrate.export import jsonable
 from experiments.discover.data.file import read_measured
 from experiments.discover.observables import PHOTOGRAPHED
 from experiments.errors import InputError
@@ -128,7 +134,7 @@ def keep(folder: Folder, ended: Mapping[str, Discovery | Crash]) -> None:
         return
     for job, end in ended.items():
         if isinstance(end, Discovery):
-            write_text(folder.discovery(job), json.dumps(end.to_dict(), allow_nan=False) + "\n")
+            write_text(folder.discovery(job), json.dumps(jsonable(end), allow_nan=False) + "\n")
     fresh = findings_table(_finding(job, end) for job, end in ended.items())
     known = read_findings([folder.findings]) if folder.findings.exists() else fresh.iloc[:0]
     write_findings(folder.findings, pd.concat([known, fresh]) if len(known) else fresh)

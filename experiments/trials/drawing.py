@@ -13,10 +13,10 @@ from experiments.errors import InputError
 from experiments.trials.truth import Kind, Label, Sealed
 
 STRONG = 1.5
-"""Effects above this many gamma80 are to be named."""
+"""Sizes above this many detectable ones are to be named."""
 
 WEAK = 0.3
-"""Least effect of a weak trial, in gamma80."""
+"""Least size of a weak trial, in detectable ones."""
 
 UPPER = 0.5
 """Strangers have at least this part of their range."""
@@ -24,13 +24,13 @@ UPPER = 0.5
 
 @dataclass(frozen=True)
 class Plan:
-    """How many trials of each kind, and how many heaps each has."""
+    """Numbers of trials of each kind, and of heaps that each has."""
 
     nulls: int = 100
     """With nothing hidden."""
     strong: int = 15
     weak: int = 4
-    """A resolvable mechanism: with an effect above 1.5 gamma80, and between 0.3 and 1.5."""
+    """A resolvable mechanism: above 1.5 detectable sizes, and between 0.3 and 1.5."""
     unresolved: int = 3
     """A mechanism that was declared not resolvable, anywhere in its range."""
     withheld: int = 5
@@ -55,35 +55,35 @@ class Plan:
 
 
 @dataclass(frozen=True)
-class Effect:
-    """What the drawing knows of a mechanism."""
+class Declared:
+    """A mechanism with what was declared of it."""
 
     name: str
     null: float
     maximum: float
     """Its range."""
-    gamma80: float = math.inf
+    detectable: float = math.inf
     """Distance from the null that is found and told from every other with 80 % probability; infinite where
     the range has none."""
     told_apart: bool = True
-    """Whether the data tell it, at the end of its range, from every other, nearly everywhere in the ranges of
+    """True if the data tell it, at the end of its range, from every other, nearly everywhere in the ranges of
     the factors."""
     kin: tuple[str, ...] = ()
     """Mechanisms that look like it after calibration."""
 
     @property
     def strongest(self) -> float:
-        """Effect at the end of the range, in gamma80."""
-        return abs(self.maximum - self.null) / self.gamma80
+        """Size at the end of the range, in detectable ones."""
+        return abs(self.maximum - self.null) / self.detectable
 
     @property
     def resolvable(self) -> bool:
-        """Whether it may be named: it is told apart, and its range has strong effects."""
+        """True if it may be named: it is told apart, and its range has strong sizes."""
         return self.told_apart and self.strongest > STRONG
 
-    def size(self, strength: float) -> float:
-        """Size with an effect of so many gamma80."""
-        return self.null + math.copysign(strength * self.gamma80, self.maximum - self.null)
+    def size(self, multiple: float) -> float:
+        """Size of so many detectable ones."""
+        return self.null + math.copysign(multiple * self.detectable, self.maximum - self.null)
 
     def size_at(self, share: float) -> float:
         """Size at a part of the range."""
@@ -97,15 +97,15 @@ class _Draft:
     part: str
     kind: Kind
     sizes: tuple[tuple[str, float], ...] = ()
-    strengths: tuple[float, ...] = ()
+    multiples: tuple[float, ...] = ()
     withheld: tuple[str, ...] = ()
 
 
 def draw(
     plan: Plan,
     factors: Sequence[Factor],
-    library: Sequence[Effect],
-    strangers: Sequence[Effect],
+    library: Sequence[Declared],
+    strangers: Sequence[Declared],
     rng: np.random.Generator,
     salt: Callable[[], str],
 ) -> tuple[tuple[Label, Sealed], ...]:
@@ -157,11 +157,11 @@ def _sealed(
 ) -> tuple[Label, Sealed]:
     theta = tuple(float(rng.uniform(factor.low, factor.high)) for factor in factors)
     seed = int(rng.integers(2**31))
-    label = Label(name, draft.kind, theta, draft.sizes, draft.strengths, seed, salt)
+    label = Label(name, draft.kind, theta, draft.sizes, draft.multiples, seed, salt)
     return label, Sealed(name, draft.part, draft.withheld, label.hash)
 
 
-def _alone(plan: Plan, library: Sequence[Effect], rng: np.random.Generator) -> Iterator[_Draft]:
+def _alone(plan: Plan, library: Sequence[Declared], rng: np.random.Generator) -> Iterator[_Draft]:
     """Nothing hidden, or one mechanism of the library."""
     yield from (_Draft("alone", Kind.NULL) for _ in range(plan.nulls))
     for effect in library:
@@ -177,9 +177,9 @@ def _alone(plan: Plan, library: Sequence[Effect], rng: np.random.Generator) -> I
 
 
 def _outside(
-    plan: Plan, library: Sequence[Effect], strangers: Sequence[Effect], rng: np.random.Generator
+    plan: Plan, library: Sequence[Declared], strangers: Sequence[Declared], rng: np.random.Generator
 ) -> Iterator[_Draft]:
-    """What the analysis does not have in its library."""
+    """Trials of what the analysis does not have in its library."""
     for effect in library:
         if effect.resolvable:
             for _ in range(plan.withheld):
@@ -189,7 +189,7 @@ def _outside(
         yield from (_somewhere("outside", Kind.STRANGER, effect, rng, UPPER) for _ in range(plan.strangers))
 
 
-def _pairs(plan: Plan, resolvable: Sequence[Effect], rng: np.random.Generator) -> Iterator[_Draft]:
+def _pairs(plan: Plan, resolvable: Sequence[Declared], rng: np.random.Generator) -> Iterator[_Draft]:
     """Two mechanisms that can be told apart."""
     partners = [
         (first, second)
@@ -203,21 +203,21 @@ def _pairs(plan: Plan, resolvable: Sequence[Effect], rng: np.random.Generator) -
         halves = [
             _strong("pairs", Kind.PAIR, effect, rng) for effect in partners[rng.integers(len(partners))]
         ]
-        drawn = sorted((half.sizes[0], half.strengths[0]) for half in halves)
+        drawn = sorted((half.sizes[0], half.multiples[0]) for half in halves)
         yield _Draft("pairs", Kind.PAIR, tuple(size for size, _ in drawn), tuple(s for _, s in drawn))
 
 
-def _strong(part: str, kind: Kind, effect: Effect, rng: np.random.Generator) -> _Draft:
+def _strong(part: str, kind: Kind, effect: Declared, rng: np.random.Generator) -> _Draft:
     """Draw an effect above the limit, uniform in its logarithm: as many close above it as far from it."""
     return _of(part, kind, effect, float(np.exp(rng.uniform(np.log(STRONG), np.log(effect.strongest)))))
 
 
-def _somewhere(part: str, kind: Kind, effect: Effect, rng: np.random.Generator, least: float) -> _Draft:
+def _somewhere(part: str, kind: Kind, effect: Declared, rng: np.random.Generator, least: float) -> _Draft:
     size = effect.size_at(rng.uniform(least, 1.0))
     return _Draft(
-        part, kind, ((effect.name, float(size)),), (float(abs(size - effect.null) / effect.gamma80),)
+        part, kind, ((effect.name, float(size)),), (float(abs(size - effect.null) / effect.detectable),)
     )
 
 
-def _of(part: str, kind: Kind, effect: Effect, strength: float) -> _Draft:
-    return _Draft(part, kind, ((effect.name, float(effect.size(strength))),), (float(strength),))
+def _of(part: str, kind: Kind, effect: Declared, multiple: float) -> _Draft:
+    return _Draft(part, kind, ((effect.name, float(effect.size(multiple))),), (float(multiple),))

@@ -21,10 +21,7 @@ import numpy as np
 import pandas as pd
 import typer
 
-from doe.discrepancy.analysis import analyse, drive
-from doe.discrepancy.emulation.emulator import Emulator, fit_emulator
-from doe.discrepancy.problem.settings import Settings
-from doe.discrepancy.verdict.discovery import Discovery, Verdict
+from doe.discrepancy import Discovery, Emulator, Settings, Verdict, analyse, drive, fit_emulator
 from experiments.discover.observables import NAMES, PHOTOGRAPHED
 from experiments.discover.search import Search
 from experiments.studyfile import load_study

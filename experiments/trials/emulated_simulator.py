@@ -13,11 +13,7 @@ from zlib import crc32
 
 import numpy as np
 
-from doe.discrepancy.emulation.bank import Bank, bank_points, make_bank
-from doe.discrepancy.emulation.emulator import Emulator
-from doe.discrepancy.problem.measured import Measured
-from doe.discrepancy.problem.settings import Settings
-from doe.discrepancy.problem.simulator import Outcomes, Point
+from doe.discrepancy import Bank, Emulator, Measured, Outcomes, Point, Settings, bank_points, make_bank
 
 BEND_LENGTH = 0.7
 """Length over which a bend changes, in half ranges: a polynomial follows the larger part of it."""

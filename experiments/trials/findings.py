@@ -1,4 +1,4 @@
-"""What the analyses of the trials found: one row a trial and view."""
+"""Findings of the analyses of the trials: one row a trial and view."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from doe.discrepancy.verdict.discovery import Discovery, Interval, Verdict
+from doe.discrepancy import Discovery, Interval, Verdict
 from experiments.files import replacing
 from experiments.trials.lockstep import Crash
 
@@ -27,7 +27,7 @@ CRASH = "crash"
 
 @dataclass(frozen=True)
 class Finding:
-    """What is kept of one analysis."""
+    """The part of an analysis that is kept."""
 
     trial: str
     view: str
@@ -36,7 +36,7 @@ class Finding:
     named: str = ""
     """Mechanisms of the verdict, parted by blanks."""
     alarm: bool = False
-    """Whether the base model was found to disagree."""
+    """True if the base model was found to disagree."""
     size: float = math.nan
     size_low: float = math.nan
     size_high: float = math.nan

@@ -26,18 +26,18 @@ DECLARED, SEALED, LABELS, FINDINGS, RUNS, NOTES, PAGE = (
 
 @dataclass(frozen=True)
 class Folder:
-    """Where everything lies."""
+    """A folder of trials."""
 
     root: Path
 
     @property
     def record(self) -> Path:
-        """What may be seen by all."""
+        """Folder of all that may be seen."""
         return self.root / "record"
 
     @property
     def hidden(self) -> Path:
-        """What only the generator sees."""
+        """Folder that only the generator sees."""
         return self.root / "hidden"
 
     @property
@@ -47,7 +47,7 @@ class Folder:
 
     @property
     def declared(self) -> Path:
-        """What was declared before the trials."""
+        """File of the declaration."""
         return self.record / DECLARED
 
     @property
@@ -62,7 +62,7 @@ class Folder:
 
     @property
     def findings(self) -> Path:
-        """What the analyses found."""
+        """Table of what the analyses found."""
         return self.record / FINDINGS
 
     def measured(self, trial: str) -> Path:

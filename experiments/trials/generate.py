@@ -18,9 +18,7 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from doe.discrepancy.emulation.bank import Bank
-from doe.discrepancy.emulation.emulator import fit_emulator
-from doe.discrepancy.problem.simulator import Outcomes, Simulator
+from doe.discrepancy import Bank, Outcomes, Simulator, fit_emulator
 from experiments.commands.choices import chosen_devices
 from experiments.commands.console import clear_errors
 from experiments.discover.engine import EngineSimulator
@@ -36,7 +34,7 @@ from experiments.trials.declaration import (
     read_declaration,
     with_names,
 )
-from experiments.trials.drawing import Effect, Plan, draw
+from experiments.trials.drawing import Declared, Plan, draw
 from experiments.trials.folder import Folder, Run
 from experiments.trials.heaps import cases_of, write_heaps
 from experiments.trials.truth import (
@@ -105,7 +103,7 @@ def seal_trials(folder: Folder, search: Search, bank: Bank, plan: Plan, seed: in
         )
     study = search.study
     library = declared_effects(fit_emulator(bank), search.settings, plan.replicates)
-    strangers = tuple(Effect(m.name, m.null, m.maximum) for m in library_for(study, STRANGERS))
+    strangers = tuple(Declared(m.name, m.null, m.maximum) for m in library_for(study, STRANGERS))
     declaration = Declaration(
         study=study.name,
         scale=study.scale or "",

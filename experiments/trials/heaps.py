@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from doe.discrepancy.problem.simulator import Outcomes, Point
+from doe.discrepancy import Outcomes, Point
 from experiments.discover.observables import OBSERVABLES
 from experiments.files import replacing
 from experiments.trials.camera import Camera

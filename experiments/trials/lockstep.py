@@ -17,9 +17,7 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from typing import Protocol
 
-from doe.discrepancy.analysis import Analysis
-from doe.discrepancy.problem.simulator import Outcomes, Point, Simulator
-from doe.discrepancy.verdict.discovery import Discovery
+from doe.discrepancy import Analysis, Discovery, Outcomes, Point, Simulator
 
 POLITE = 10
 """Niceness of the processes of the analyses."""
@@ -35,7 +33,7 @@ class Crash:
 
 
 Step = list[Point] | Discovery | Crash
-"""What an analysis answers: a wave that it wants, or how it ended."""
+"""Answer of an analysis: a wave that it wants, or how it ended."""
 
 
 class Crew(Protocol):
@@ -67,7 +65,7 @@ class LocalCrew:
         self._said = {name: self._step(name, answer) for name, answer in answers.items()}
 
     def collect(self) -> dict[str, Step]:
-        """What they said."""
+        """Return what they said."""
         return self._said
 
     def _step(self, name: str, answer: Outcomes | None) -> Step:
@@ -201,7 +199,7 @@ class Round:
 
     @classmethod
     def of(cls, number: int, steps: Mapping[str, Step]) -> Round:
-        """What the analyses of a shift said."""
+        """Count what the analyses of a shift said."""
         ended = {name: step for name, step in steps.items() if not isinstance(step, list)}
         return cls(number, ended, len(steps) - len(ended), len(_points(steps)))
 

@@ -100,8 +100,8 @@ def _declared(declared: Declaration) -> str:
             "mechanism": effect.name,
             "null": effect.null,
             "maximum": effect.maximum,
-            "gamma80, from the null": effect.gamma80,
-            "of the range": effect.gamma80 / abs(effect.maximum - effect.null),
+            "gamma80, from the null": effect.detectable,
+            "of the range": effect.detectable / abs(effect.maximum - effect.null),
             "told apart": "yes" if effect.told_apart else "no",
             "resolvable": "yes" if effect.resolvable else "no",
             "looks like": ", ".join(effect.kin),
@@ -204,5 +204,5 @@ def _draw_confusion(counts: pd.DataFrame, path: Path) -> None:
 
 
 def _mechanisms(names: Iterable[str]) -> int:
-    """How many of a confusion's labels, which come first, name a mechanism."""
+    """Count the labels of a confusion that name a mechanism; they come first."""
     return sum(name not in OTHERS for name in names)

@@ -19,8 +19,7 @@ from typing import Annotated
 
 import typer
 
-from doe.discrepancy.emulation.bank import load_bank
-from doe.discrepancy.emulation.emulator import fit_emulator
+from doe.discrepancy import fit_emulator, load_bank
 from experiments.benchmarks.tables import markdown_table
 from experiments.commands.choices import chosen_devices
 from experiments.commands.console import clear_errors

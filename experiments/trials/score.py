@@ -1,4 +1,4 @@
-"""How good the analysis is: findings against the revealed truths, and both against what was aimed at."""
+"""The score of the analysis: findings against the revealed truths, and both against what was aimed at."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ import numpy as np
 import pandas as pd
 from scipy.stats import binomtest
 
-from doe.discrepancy.verdict.discovery import Verdict
-from experiments.trials.drawing import STRONG, Effect
+from doe.discrepancy import Verdict
+from experiments.trials.drawing import STRONG, Declared
 from experiments.trials.findings import CRASH
 from experiments.trials.truth import Kind, Label, Sealed
 
-_JUDGED = ("kind", "truth", "true_size", "strength", "right", "tied", "wrong")
+_JUDGED = ("kind", "truth", "true_size", "multiple", "right", "tied", "wrong")
 
 OTHERS = ("weak single", *map(str, Kind), "two names", *map(str, Verdict), CRASH)
 """Labels of a confusion that name no mechanism."""
 
 POWER_EDGES = (0.0, 0.5, 1.0, 1.5, 2.0, 3.0, math.inf)
-"""Ends of the classes of effect, in gamma80."""
+"""Ends of the classes of size, in detectable ones."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ def scored(findings: pd.DataFrame, labels: Mapping[str, Label], sealed: Sequence
     -------
     pandas.DataFrame
         The findings with ``part``, ``kind``, ``truth`` (names parted by blanks), ``true_size`` and
-        ``strength`` (of a pair its weaker effect), and the judgement: ``right`` (that name, or both, and no
+        ``multiple`` (of a pair the smaller), and the judgement: ``right`` (that name, or both, and no
         other), ``tied`` (a tie with the truth in it), ``wrong`` (a name that is not in the truth).
     """
     parts = {trial.trial: trial.part for trial in sealed}
@@ -100,7 +100,7 @@ def _judged(finding: dict[Hashable, Any], label: Label) -> dict[str, object]:
         "kind": str(label.kind),
         "truth": " ".join(label.mechanisms),
         "true_size": label.sizes[0][1] if label.sizes else math.nan,
-        "strength": min(label.strengths, default=0.0),
+        "multiple": min(label.multiples, default=0.0),
         "right": bool(known and finding["verdict"] == Verdict.NAMED and named == truth),
         "tied": bool(known and finding["verdict"] == Verdict.TIE and truth <= named),
         "wrong": bool(naming and not (known and named <= truth)),
@@ -109,21 +109,21 @@ def _judged(finding: dict[Hashable, Any], label: Label) -> dict[str, object]:
 
 def strong_singles(table: pd.DataFrame) -> pd.DataFrame:
     """Trials of one mechanism that was to be named."""
-    return table[(table["kind"] == Kind.SINGLE) & (table["strength"] > STRONG)]
+    return table[(table["kind"] == Kind.SINGLE) & (table["multiple"] > STRONG)]
 
 
 def share(column: pd.Series) -> Share:
-    """How many of a boolean column are true."""
+    """Count the true of a boolean column."""
     return Share(int(column.sum()), len(column))
 
 
 def confusion(table: pd.DataFrame) -> pd.DataFrame:
     """Count answers (columns) by truth (rows).
 
-    A mechanism's row has its trials above 1.5 gamma80; the weaker ones of all are one row. Two names are one
-    column, as are the verdicts without a name.
+    A mechanism's row has its trials above 1.5 detectable sizes; the weaker ones of all are one row. Two names
+    are one column, as are the verdicts without a name.
     """
-    strong = (table["kind"] == Kind.SINGLE) & (table["strength"] > STRONG)
+    strong = (table["kind"] == Kind.SINGLE) & (table["multiple"] > STRONG)
     weak = (table["kind"] == Kind.SINGLE) & ~strong
     truth = table["truth"].where(strong, table["kind"].mask(weak, "weak single"))
     names, naming = table["named"].str.split(), table["verdict"] == Verdict.NAMED
@@ -143,12 +143,12 @@ def power_curve(table: pd.DataFrame) -> pd.DataFrame:
     Returns
     -------
     pandas.DataFrame
-        One row a class of effect: its ends ``least`` and ``most`` (in gamma80), ``trials``, and for ``alarm``
-        and ``right`` the share with the ends of its interval.
+        One row a class of size: its ends ``least`` and ``most`` (in detectable ones), ``trials``, and for
+        ``alarm`` and ``right`` the share with the ends of its interval.
     """
-    singles = table[(table["kind"] == Kind.SINGLE) & (table["strength"] > 0)]
+    singles = table[(table["kind"] == Kind.SINGLE) & (table["multiple"] > 0)]
     rows = []
-    classes = pd.cut(singles["strength"], POWER_EDGES, labels=False)
+    classes = pd.cut(singles["multiple"], POWER_EDGES, labels=False)
     for number, members in singles.groupby(classes):
         least, most = POWER_EDGES[int(number) : int(number) + 2]  # type: ignore[call-overload]
         row = {"least": least, "most": most, "trials": len(members)}
@@ -201,7 +201,7 @@ def removed(table: pd.DataFrame) -> np.ndarray:
 
 
 def covered(table: pd.DataFrame) -> Share:
-    """How many stated 90 % intervals hold the true size, over right names of single mechanisms."""
+    """Count the stated 90 % intervals that hold the true size, over right names of single mechanisms."""
     right = table[table["right"] & (table["kind"] == Kind.SINGLE)]
     inside = (right["size_low"] <= right["true_size"]) & (right["true_size"] <= right["size_high"])
     return share(inside)
@@ -240,7 +240,7 @@ MUST_RESOLVE = (
 """Mechanisms that must be resolvable at half of their range; that of rolling is missing from the base."""
 
 
-def declared_aim(library: Sequence[Effect]) -> Aim:
+def declared_aim(library: Sequence[Declared]) -> Aim:
     """Hold what was declared beforehand against the mechanisms that must be resolvable."""
     seen = {effect.name for effect in library if effect.resolvable and effect.strongest >= 2.0}
     missing = [name for name in MUST_RESOLVE if name not in seen]

@@ -20,7 +20,7 @@ from experiments.files import write_text
 
 
 class Kind(StrEnum):
-    """What is hidden in a trial."""
+    """Kinds of trials, by what is hidden."""
 
     NULL = "null"
     """Nothing: the base model is the truth."""
@@ -38,7 +38,7 @@ class Kind(StrEnum):
 
 @dataclass(frozen=True)
 class Label:
-    """What is true of one trial; known to nobody before the end."""
+    """The truth of one trial; known to nobody before the end."""
 
     trial: str
     kind: Kind
@@ -46,9 +46,9 @@ class Label:
     """True values of the study's factors, natural units."""
     sizes: tuple[tuple[str, float], ...]
     """Mechanisms in the truth, sorted by name, with their sizes in natural units."""
-    strengths: tuple[float, ...]
-    """Effect of each of these: the distance of its size from the null in units of the gamma80 that was stated
-    beforehand; 0 where there was none."""
+    multiples: tuple[float, ...]
+    """Distance of each of these from its null in detectable ones, as they were stated beforehand; 0 where
+    there was none."""
     seed: int
     """Root of the seeds of the trial's cases and of its camera."""
     salt: str
@@ -60,15 +60,20 @@ class Label:
         return tuple(name for name, _ in self.sizes)
 
     @property
+    def record(self) -> dict[str, Any]:
+        """The label as it is sealed and written: seals keep the name that the first had for multiples."""
+        return {"strengths" if name == "multiples" else name: v for name, v in asdict(self).items()}
+
+    @property
     def hash(self) -> str:
         """SHA-256 of everything in the label."""
-        text = json.dumps(asdict(self), sort_keys=True, separators=(",", ":"), allow_nan=False)
+        text = json.dumps(self.record, sort_keys=True, separators=(",", ":"), allow_nan=False)
         return hashlib.sha256(text.encode()).hexdigest()
 
 
 @dataclass(frozen=True)
 class Sealed:
-    """What is known of a trial beforehand."""
+    """Everything that is known of a trial beforehand."""
 
     trial: str
     part: str
@@ -107,7 +112,7 @@ def read_sealed(path: Path) -> tuple[Sealed, ...]:
 
 def write_labels(path: Path, labels: Sequence[Label]) -> None:
     """Write labels as JSON: floats keep every bit, so that their hashes can be checked."""
-    write_text(path, json.dumps([asdict(label) for label in labels], indent=1) + "\n")
+    write_text(path, json.dumps([label.record for label in labels], indent=1) + "\n")
 
 
 def read_labels(path: Path) -> tuple[Label, ...]:
@@ -139,7 +144,7 @@ def _label(record: dict[str, Any]) -> Label:
         kind=Kind(record["kind"]),
         theta=tuple(record["theta"]),
         sizes=sizes,
-        strengths=tuple(record["strengths"]),
+        multiples=tuple(record["strengths"]),
         seed=record["seed"],
         salt=record["salt"],
     )

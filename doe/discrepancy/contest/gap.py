@@ -1,9 +1,10 @@
-"""Whether and where a calibrated model disagrees with the data beyond the noise."""
+"""The gap: disagreement of a calibrated model with the data beyond the noise, and where it lies."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 
 import numpy as np
 from scipy import stats
@@ -12,11 +13,36 @@ from scipy.linalg import orth
 from doe.discrepancy.contest.signatures import Signatures, projector
 from doe.discrepancy.fitting.fit import Fitted, fit
 from doe.discrepancy.fitting.model import Stack
-from doe.discrepancy.verdict.discovery import Answer, Question
+
+
+class Question(StrEnum):
+    """Questions to the residuals of a model."""
+
+    SIZE = "size"
+    """Are they too large? Q."""
+    FALL = "fall"
+    """Do they point at one mechanism? The largest fall of Q that a positive size of one brings."""
+    SCORES = "scores"
+    """Do they lie where mechanisms act at all, either way? The sum of all squared scores."""
+    COMMON = "common"
+    """Are observables off alike in all conditions? The sum of squares of what they have in common."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Answer to one question to the residuals."""
+
+    question: Question
+    value: float
+    limit: float
+    """The statistic, and the point that the bootstrap exceeds at the level of the rules."""
+    mechanism: str = ""
+    """Of the fall; empty with the other questions."""
+
 
 OF_THE_BASE = (Question.SIZE, Question.FALL, Question.SCORES)
-"""Asked of a model to which a mechanism of the library may be added. The last looks where mechanisms change
-heaps at all, whichever way: there lies, most likely, what the library lacks, too."""
+"""Asked of a model to which a mechanism of the library may be added. The last looks where mechanisms act at
+all, whichever way: there lies, most likely, what the library lacks, too."""
 
 OF_A_CANDIDATE = (Question.SIZE, Question.COMMON)
 """Asked of a model that is to be believed. What the library lacks moves an observable in all conditions, and
@@ -49,12 +75,12 @@ class GapTest:
 
     @property
     def found(self) -> bool:
-        """Whether there is a gap."""
+        """True if there is a gap."""
         return self.p < self.level
 
     @property
     def excess(self) -> float:
-        """What of Q the noise does not account for."""
+        """Part of Q that the noise does not account for."""
         return max(self.q - self.freedom, 0.0)
 
 
@@ -129,7 +155,7 @@ def _common_directions(fitted: Fitted, project: np.ndarray) -> np.ndarray:
 def _statistics(
     residuals: np.ndarray, signatures: np.ndarray, common: np.ndarray
 ) -> dict[Question, np.ndarray]:
-    """What answers each question, of residuals (..., n)."""
+    """Compute the statistic of each question, of residuals (..., n)."""
     scores = residuals @ signatures.T
     return {
         Question.SIZE: (residuals**2).sum(axis=-1),

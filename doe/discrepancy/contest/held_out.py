@@ -1,4 +1,4 @@
-"""How well a model predicts the conditions that took no part in its fit."""
+"""Forecasts of the conditions that took no part in a fit, and their score."""
 
 from __future__ import annotations
 
@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from doe.discrepancy.fitting.evidence import Block
-from doe.discrepancy.fitting.fit import Fitted, whiten
+from doe.discrepancy.fitting.fit import Fitted, Interval, whiten
 from doe.discrepancy.fitting.model import Stack
-from doe.discrepancy.verdict.discovery import Interval
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +41,7 @@ def forecast(fitted: Fitted, blocks: tuple[Block, ...]) -> Forecast:
 def held_out_gain(
     base: Fitted, fitted: Fitted, blocks: tuple[Block, ...], draws: int, seed: int
 ) -> Interval | None:
-    """What the log score gains over the base, with its 90 % interval over the replicates' noise.
+    """Compute the gain of the log score over the base, with its 90 % interval over the replicates' noise.
 
     Returns
     -------

@@ -50,7 +50,7 @@ class Laboratory:
 
     @property
     def runs_end(self) -> bool:
-        """Whether any run has ended; of published tables none can be had."""
+        """True if any run has ended; of published tables none can be had."""
         return self.failures < self.cases
 
     def wave(self, requests: Sequence[Request]) -> Waves:

@@ -24,21 +24,21 @@ class Contender:
     runs: Runs | None = None
     """Fresh runs that correct it."""
     centre: np.ndarray | None = None
-    """What the last of them lie around, (parameters,); None where there is none."""
+    """Centre of the last of them, (parameters,); None where there is none."""
 
     @property
     def simulated(self) -> bool:
-        """Whether fresh runs stand behind it."""
+        """True if fresh runs stand behind it."""
         return self.centre is not None
 
     @property
     def fails(self) -> bool:
-        """Whether no fresh run of it has ended: a study may refuse a model, or all its tubes clog."""
+        """True if no fresh run of it has ended: a simulator may refuse it, or fail everywhere."""
         return self.runs is not None and not len(self.runs.conditions)
 
     @property
     def settled(self) -> bool:
-        """Whether they lie around its optimum."""
+        """True if they lie around its optimum."""
         return self.centre is not None and not has_moved(self.fitted, self.centre)
 
 
@@ -94,7 +94,7 @@ def _updated(contender: Contender, fresh: Runs) -> Contender:
 def _round(
     contenders: Contenders, settings: Settings, error: float, number: int
 ) -> tuple[list[tuple[str, ...]], int]:
-    """Who runs in the round of a number, and at how many points; the last round is the finish."""
+    """Choose who runs in the round of a number, and at how many points; the last round is the finish."""
     if number == settings.refinement_rounds:
         return _undecided(contenders, settings), settings.finish_points
     count = max(1, settings.shortlist >> number)

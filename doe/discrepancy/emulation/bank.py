@@ -76,7 +76,7 @@ class Bank:
     study: str = ""
     """Fingerprint of what was simulated; empty where it is not known."""
     maker: Mapping[str, str] = field(default_factory=dict)
-    """What made them, in the words of whoever ran them; empty where it is not known."""
+    """Maker of the runs, in the words of whoever ran them; empty where it is not known."""
 
     def __post_init__(self) -> None:
         if self.values.shape != (len(self.theta), len(self.observables)):
@@ -87,7 +87,7 @@ class Bank:
 
     @property
     def finished(self) -> np.ndarray:
-        """Whether each case has observables, (n,)."""
+        """True where a case has observables, (n,)."""
         return np.asarray(self.reasons == "")
 
     def rows(self, condition: int, mechanism: int) -> np.ndarray:

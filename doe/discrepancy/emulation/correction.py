@@ -1,4 +1,4 @@
-"""What fresh runs say beyond the emulator: its coefficients anew, and what no coefficients follow.
+"""Corrections of the emulator by fresh runs: its coefficients anew, and what no coefficients follow.
 
 The emulator is the mean of what its bank leaves open, and its stated error the covariance. Fresh runs narrow
 that down as more runs of the bank would; besides, they show a smooth function that the polynomials lack.
@@ -16,7 +16,7 @@ from doe.discrepancy.emulation.surfaces import all_terms
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """What is known of the emulator's error in one condition before fresh runs."""
+    """Knowledge of the emulator's error in one condition before fresh runs."""
 
     factors: int
     """Number of the factors; the other parameters are sizes."""
@@ -42,7 +42,7 @@ class Correction:
     points: np.ndarray
     """Of the runs, coded, (n, parameters)."""
     coefficients: np.ndarray
-    """What is added to the emulator's, (terms, observables)."""
+    """Addition to the emulator's, (terms, observables)."""
     weights: np.ndarray
     """Of the smooth function, (n, observables)."""
     inverse: np.ndarray
@@ -53,7 +53,7 @@ class Correction:
     """Standard deviations of one run around the optimum over those of the emulator, (observables,)."""
 
     def mean(self, x: np.ndarray) -> np.ndarray:
-        """What is added to the emulator, (n, observables)."""
+        """Addition to the emulator, (n, observables)."""
         smooth = squared_exponential(x / self.prior.length, self.points / self.prior.length)
         return np.asarray(all_terms(x, self.prior.factors) @ self.coefficients + smooth @ self.weights)
 

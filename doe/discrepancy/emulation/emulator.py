@@ -37,11 +37,11 @@ class Emulator:
     surfaces: Mapping[str, Surfaces]
     """By condition."""
     columns: tuple[int, ...]
-    """Where they stand in the outcomes of the simulator."""
+    """Their columns in the outcomes of the simulator."""
     cases: int
     """Cases of the bank."""
     notes: tuple[str, ...] = ()
-    """What was left out of the bank, and why."""
+    """Remarks on what was left out of the bank, and why."""
 
     def without(self, *mechanisms: str) -> Emulator:
         """Return the same emulator with some mechanisms withheld from the library."""
@@ -67,7 +67,7 @@ def fit_emulator(bank: Bank) -> Emulator:
     ]
     failed = int((~bank.finished).sum())
     if failed:
-        notes.append(f"{failed} of {len(bank.reasons)} cases of the bank left no heap")
+        notes.append(f"{failed} of {len(bank.reasons)} cases of the bank failed")
     thin = _too_few(bank)
     notes += [f"{name} has too few finished cases in the bank: left out of the library" for name in thin]
     bases = _bases(bank, columns, RESOLUTION * spread[columns])

@@ -15,7 +15,7 @@ from scipy.linalg import cho_factor, cho_solve
 LENGTH_RANGE = (0.3, 6.0)
 """Lengths that a fit may find, in coded units: shorter ones would follow the noise."""
 START_LENGTH = 0.6
-"""Where the search for lengths begins: from longer ones it may end where nothing is smooth."""
+"""Start of the search for lengths: from longer ones it may end where nothing is smooth."""
 AMPLITUDE_RANGE = (1e-3, 1e2)
 """Amplitudes that a fit may find, in units of the variance of the data."""
 

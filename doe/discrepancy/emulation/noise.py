@@ -1,6 +1,6 @@
-"""The scatter of heaps from seed to seed: a covariance over the factors, from repeated runs.
+"""The scatter of runs from seed to seed: a covariance over the factors, from repeated runs.
 
-Variances vary over the factors (slippery grains scatter otherwise than rough ones), so each observable's is
+Variances vary over the factors, so each observable's is
 the exponential of a plane; correlations are taken as the same over the factors, and as alike between
 conditions.
 """

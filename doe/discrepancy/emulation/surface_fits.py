@@ -177,7 +177,7 @@ class AddedRuns:
 
     @property
     def difference(self) -> np.ndarray:
-        """What it added, with noise, (n, observables)."""
+        """Part that it added, with noise, (n, observables)."""
         return np.asarray(self.values - self.base.predict(self.theta, ()))
 
     @property
@@ -223,7 +223,7 @@ def _with_correlations(conditions: Sequence[AddedRuns], additions: Sequence[Addi
 
 
 def _growth(runs: AddedRuns, fitted: _Shrunk) -> np.ndarray:
-    """A heap with a mechanism scatters more: an excess of the residuals is noise unless it is smooth."""
+    """Runs with a mechanism scatter more: an excess of the residuals is noise unless it is smooth."""
     return fit_growth(runs.size, fitted.residual**2 / (1.0 - fitted.leverage) / runs.noise)
 
 

@@ -68,7 +68,7 @@ class Polynomial:
 
 @dataclass(frozen=True, eq=False)
 class Addition:
-    """What a mechanism adds, with how its error hangs on that of the base."""
+    """A mechanism's addition to the base, with how its error hangs on that of the base."""
 
     polynomial: Polynomial
     base_terms: np.ndarray
@@ -87,7 +87,7 @@ class Addition:
     """Of one run at the largest size, (observables, observables)."""
 
     def predict(self, theta: np.ndarray, size: np.ndarray) -> np.ndarray:
-        """What is added at coded factors (n, factors) and sizes (n,), (n, observables)."""
+        """Predict what is added at coded factors (n, factors) and sizes (n,), (n, observables)."""
         values = added(theta, size) @ self.polynomial.coefficients
         if self.polynomial.kriging:
             values += size[:, None] * self.polynomial.missed(np.column_stack([theta, size]))

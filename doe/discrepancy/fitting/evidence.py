@@ -26,7 +26,7 @@ class Block:
     share: np.ndarray
     """Covariance of the means over that of one replicate: 1 / n where all have n replicates, (k, k)."""
     inflation: np.ndarray
-    """How many times more the measured replicates scatter than the model's (standard deviations), (k,)."""
+    """Standard deviations of the measured replicates over the model's, (k,)."""
 
     @property
     def replicates(self) -> np.ndarray:
@@ -40,7 +40,7 @@ class Block:
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """What was measured, cut to what the emulator knows."""
+    """Measured means, cut to what the emulator knows."""
 
     training: tuple[Block, ...]
     held_out: tuple[Block, ...]
@@ -71,7 +71,7 @@ def gather(measured: Measured, emulator: Emulator) -> Evidence:
         if len(block.mean):
             blocks.append(block)
         else:
-            notes.append(f"condition {condition} left no heap to compare: left out")
+            notes.append(f"condition {condition} has no value to compare: left out")
     held_out = tuple(block for block in blocks if emulator.space.is_held_out(block.condition))
     training = tuple(block for block in blocks if not emulator.space.is_held_out(block.condition))
     present = {block.condition for block in blocks}

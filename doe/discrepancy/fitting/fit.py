@@ -22,6 +22,15 @@ AT_BOUND = 1e-3
 PROFILE_POINTS = 61
 
 
+@dataclass(frozen=True)
+class Interval:
+    """An estimate with the ends of its 90 % interval."""
+
+    low: float
+    value: float
+    high: float
+
+
 @dataclass(frozen=True, eq=False)
 class Fitted:
     """A model at its optimum."""

@@ -18,7 +18,7 @@ STEP = 0.02
 
 @dataclass(frozen=True, eq=False)
 class Shift:
-    """The emulator at one point is the engine at another: they differ by so much, in all conditions."""
+    """The emulator at one point is the simulator at another: they differ by so much, in all conditions."""
 
     value: np.ndarray
     """Coded, (parameters,)."""

@@ -71,7 +71,7 @@ def points_around(fitted: Fitted, count: int, seed: int) -> np.ndarray:
 
 
 def has_moved(fitted: Fitted, centre: np.ndarray) -> bool:
-    """Whether an optimum lies outside the fresh points around a centre."""
+    """Say if an optimum lies outside the fresh points around a centre."""
     return bool((np.abs(fitted.x - centre) > MOVED * point_spread(fitted)).any())
 
 
@@ -149,7 +149,7 @@ def _slope(model: Model, x: np.ndarray, direction: np.ndarray, condition: str) -
 
 @dataclass(frozen=True, eq=False)
 class _Seen:
-    """What the emulator missed in one condition."""
+    """Misses of the emulator in one condition."""
 
     x: np.ndarray
     """Points, each once, (n, parameters)."""
@@ -160,12 +160,12 @@ class _Seen:
     """Covariances of the emulator's errors, (observables, terms, terms)."""
     misfit: np.ndarray
     variance: np.ndarray
-    """What the emulator states of what no coefficient follows, and variance of one run, (observables,)."""
+    """Its statement of what no coefficient follows, and variance of one run, (observables,)."""
     factors: int
     """Number of the factors; the other parameters are sizes."""
 
     def prior(self, amplitude: float) -> Prior:
-        """What is known without the runs."""
+        """Knowledge without the runs."""
         # Sizes run from 0 to 1, factors from -1 to 1.
         length = np.where(np.arange(self.x.shape[1]) < self.factors, LENGTH, LENGTH / 2.0)
         return Prior(self.factors, self.coefficients, self.misfit + amplitude * self.variance, length)

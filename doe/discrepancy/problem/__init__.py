@@ -1,1 +1,1 @@
-"""What an analysis is given: what may vary, measured replicates, rules, and whatever answers points."""
+"""Input of an analysis: what may vary, measured replicates, the rules, and whatever answers points."""

@@ -1,4 +1,4 @@
-"""Measured heaps: what was observed in each replicate of each condition."""
+"""Measured data: the observables of each replicate of each condition."""
 
 from __future__ import annotations
 
@@ -10,27 +10,24 @@ import numpy as np
 
 from doe.errors import RuleError
 
-CLOGGED = "the tube clogged"
-"""Reason of a replicate that left no heap because the grains stayed in the tube."""
-
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """Heaps measured under a few conditions, all in the base units of `experiments` (SI; degrees)."""
+    """Replicates measured under a few conditions, in the units of the simulator."""
 
     conditions: tuple[str, ...]
-    """Conditions with at least one replicate, in the order of the study."""
+    """Conditions with at least one replicate."""
     observables: tuple[str, ...]
     """Columns of the values: what was measured in at least one replicate."""
     values: Mapping[str, np.ndarray]
     """By condition; NaN where an observable was not measured, and everywhere in the row of a replicate that
-    left no heap, each (replicates, observables)."""
+    failed, each (replicates, observables)."""
     reasons: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    """By condition: why each replicate left no heap, empty where it did; left out: every one did."""
+    """By condition: reason of each replicate that failed, empty where it did not; left out: none did."""
     pictures: Mapping[str, tuple[Path, ...]] = field(default_factory=dict)
-    """By condition: photographs that came with the data."""
+    """By condition: pictures that came with the data."""
     notes: tuple[str, ...] = ()
-    """What a reader must know about the data: too few replicates, values that contradict one another, ..."""
+    """Remarks that a reader must know: too few replicates, values that contradict one another, ..."""
 
     def __post_init__(self) -> None:
         for what, names in (("conditions", self.conditions), ("observables", self.observables)):
@@ -51,13 +48,13 @@ class Measured:
         if np.isinf(rows).any():
             raise RuleError("is finite, or NaN where nothing was measured", "an infinite value", place)
         if len(self.reasons[name]) != len(rows):
-            rule = "has one entry a replicate, empty where a heap formed"
+            rule = "has one entry a replicate, empty where it did not fail"
             raise RuleError(rule, self.reasons[name], f"Measured.reasons[{name!r}]")
         if np.isfinite(rows[[bool(reason) for reason in self.reasons[name]]]).any():
-            raise RuleError("is NaN in the row of a replicate that left no heap", "a number", place)
+            raise RuleError("is NaN in the row of a replicate that failed", "a number", place)
 
-    def heap_count(self, condition: str) -> int:
-        """Replicates of a condition that left a heap."""
+    def finished_count(self, condition: str) -> int:
+        """Replicates of a condition that did not fail."""
         return sum(not reason for reason in self.reasons[condition])
 
     def counts(self, condition: str) -> np.ndarray:

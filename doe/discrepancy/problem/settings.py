@@ -38,13 +38,13 @@ class Settings:
     tie_margin: float = 8.0
     """Mechanisms within so much of the best are a tie: in Q plus the logarithm of the determinant, less twice
     the held-out gain, which is minus twice a log-likelihood; a prediction's being uncertain counts for half
-    of it at most (`decision.lag`). Those that should look the same are one within somewhat more
-    (`decision.is_open`)."""
+    of it at most (`conclusion.lag`). Those that should look the same are one within somewhat more
+    (`conclusion.is_open`)."""
     power: float = 0.8
-    """Probability at which ``gamma80`` is stated."""
+    """Probability at which ``Power.detectable_size`` is stated."""
     systematic: float = 0.1
-    """Standard deviation, in units of that of one run, of what cameras and time steps add to every mean. In
-    the first blind trials it was 0.06, but for the drag on the tube, which has been mended since."""
+    """Standard deviation, in units of that of one run, of what instruments and numerics add to every
+    mean."""
     draws: int = 4000
     """Draws of every bootstrap."""
     shortlist_share: float = 0.3

@@ -1,7 +1,7 @@
-"""What the analysis asks of a simulator: points in, observables out.
+"""The simulator as an analysis sees it: points in, observables out.
 
-The engine, an emulator bank and a table of finished runs all answer alike, so that the statistics never know
-which of them they talk to.
+A solver, an emulator and a table of finished runs all answer alike, so that the statistics never know which
+of them they talk to.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ class Point:
     """One case: the parameters, the effects that are in the model, where it is tested, and the seed."""
 
     theta: tuple[float, ...]
-    """Values of the study's factors in natural units, in their order."""
+    """Values of the factors in natural units, in their order."""
     sizes: tuple[tuple[str, float], ...]
     """Mechanisms by name with their sizes in natural units, sorted by name; every other is at its null."""
     condition: str
@@ -29,17 +29,17 @@ class Point:
 
 @dataclass(frozen=True, eq=False)
 class Outcomes:
-    """What came out at a list of points, in their order."""
+    """Outcomes of a list of points, in their order."""
 
     values: np.ndarray
     """Observables in their natural units; rows of cases that failed are NaN, and no one may read them, (n,
     observables)."""
     reasons: tuple[str, ...]
-    """Why each case failed ("the tube is clogged ..."); empty where it did not."""
+    """Reason of each case that failed; empty where it did not."""
 
     @property
     def finished(self) -> np.ndarray:
-        """Whether each case has observables, (n,)."""
+        """True where a case has observables, (n,)."""
         return np.array([not reason for reason in self.reasons], dtype=bool)
 
 

@@ -26,7 +26,7 @@ class MechanismRange:
     name: str
     null: float
     maximum: float
-    """Where it is absent and the end of its range, in its natural units."""
+    """Size at which it is absent, and the end of its range, in its natural units."""
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.null) and math.isfinite(self.maximum)) or self.null == self.maximum:
@@ -44,7 +44,7 @@ class SearchSpace:
     """Their ranges in natural units."""
     conditions: tuple[str, ...]
     held_out: tuple[bool, ...]
-    """Whether each condition takes no part in any fit."""
+    """True where a condition takes no part in any fit."""
     mechanisms: tuple[MechanismRange, ...] = field(default=())
     """The library."""
 
@@ -80,7 +80,7 @@ class SearchSpace:
         return replace(self, mechanisms=kept)
 
     def is_held_out(self, condition: str) -> bool:
-        """Whether a condition takes no part in any fit."""
+        """True if a condition takes no part in any fit."""
         return self.held_out[self.conditions.index(condition)]
 
     def natural_theta(self, coded: np.ndarray) -> np.ndarray:

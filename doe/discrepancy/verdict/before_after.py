@@ -3,16 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from doe.discrepancy.fitting.evidence import Block
-from doe.discrepancy.fitting.fit import Fitted, whiten
+from doe.discrepancy.fitting.fit import Fitted, Interval, whiten
 from doe.discrepancy.fitting.model import Model, Stack
 from doe.discrepancy.fitting.refinement import Runs
-from doe.discrepancy.verdict.discovery import BeforeAfter, Interval
 
 COVERAGE = 0.9
+
+
+@dataclass(frozen=True)
+class BeforeAfter:
+    """The gap of fresh direct runs without and with the mechanism, on one set of conditions."""
+
+    held_out: bool
+    degrees_of_freedom: int
+    before: Interval
+    """Q of the base."""
+    after: Interval
+    """Q with the mechanism."""
+    removed: Interval
+    """Share of the base's excess that is gone."""
+    runs: int
+    """Fresh runs a model and condition."""
 
 
 def compare(

@@ -7,16 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from doe.discrepancy.contest.gap import GapTest
-from doe.discrepancy.fitting.fit import Fitted
+from doe.discrepancy.contest.gap import Answer, GapTest, Question
+from doe.discrepancy.fitting.fit import Fitted, Interval
 from doe.discrepancy.problem.settings import Settings
-from doe.discrepancy.verdict.discovery import Answer, Interval, Question, Verdict
+from doe.discrepancy.verdict.discovery import Verdict
 
 CHANCE = 1.645
 """Standard deviations that a normal number passes upwards in one case of twenty."""
 
 LIKELIHOOD = "minus twice the log-likelihood, held-out conditions included"
-"""What a score is, in reasons."""
+"""Name of a score, in reasons."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,9 +31,9 @@ class Assessment:
     explained: float
     """Share of the base's excess that it removes."""
     simulated: bool
-    """Whether fresh runs around its optimum stand behind it."""
+    """True if fresh runs around its optimum stand behind it."""
     declared: bool
-    """Whether all its mechanisms may be named by what was declared."""
+    """True if all its mechanisms may be named by what was declared."""
     alike: frozenset[str] = frozenset()
     """Mechanisms that these data cannot tell from it at its size."""
 
@@ -54,14 +54,14 @@ class Assessment:
 
 
 @dataclass(frozen=True)
-class Decision:
+class Conclusion:
     """A verdict with its reason."""
 
     verdict: Verdict
     named: tuple[str, ...]
     reason: str
     chosen: int | None
-    """Which of the assessments is the model to go on with."""
+    """Number of the assessment whose model to go on with."""
 
 
 def explained_share(base: GapTest, with_it: GapTest) -> float:
@@ -91,7 +91,7 @@ def objections(assessment: Assessment, settings: Settings) -> list[str]:
 
 
 def is_open(behind: float, are_alike: bool, margin: float) -> bool:
-    """Whether it stays open which of two models is right, one of which is so much behind.
+    """Say if it stays open which of two models is right, one of which is so much behind.
 
     Of models d standard deviations apart the wrong one is behind by d^2 +- 2 d. Two that should look the
     same, their d^2 being below the margin, are told apart where chance does so in one case of twenty at most.
@@ -117,7 +117,7 @@ def lag(one: Assessment, best: Assessment, margin: float) -> float:
     return min(one.score - best.score, plain)
 
 
-def decide(assessments: Sequence[Assessment], settings: Settings) -> Decision:
+def conclude(assessments: Sequence[Assessment], settings: Settings) -> Conclusion:
     """Choose among candidates of equally many mechanisms.
 
     The one of the best score is named if it passes every rule, may be named, and no other is so close behind
@@ -130,7 +130,7 @@ def decide(assessments: Sequence[Assessment], settings: Settings) -> Decision:
     settings : Settings
     """
     if not assessments:
-        return Decision(Verdict.UNKNOWN, (), "nothing in the library could explain the gap", None)
+        return Conclusion(Verdict.UNKNOWN, (), "nothing in the library could explain the gap", None)
     order = sorted(range(len(assessments)), key=lambda index: assessments[index].score)
     best = assessments[order[0]]
     margin = settings.tie_margin
@@ -141,21 +141,21 @@ def decide(assessments: Sequence[Assessment], settings: Settings) -> Decision:
     titles = ", ".join(_title(assessments[i]) for i in close)
     if passing and len(close) > 1:
         if len(best.mechanisms) > 1:
-            return Decision(Verdict.UNKNOWN, (), f"no one pair stands out: {titles}", None)
+            return Conclusion(Verdict.UNKNOWN, (), f"no one pair stands out: {titles}", None)
         names = tuple(assessments[i].mechanisms[0] for i in close)
         most = max(by[i] for i in close)
         reason = (
             f"{titles} explain the data alike: at most {most:.1f} apart as ties are judged, in {LIKELIHOOD}"
         )
-        return Decision(Verdict.TIE, names, reason, passing[0])
+        return Conclusion(Verdict.TIE, names, reason, passing[0])
     if passing and best.declared:
         return _named(assessments, order[0], order[1:])
     if passing:
         failed = ["it was declared that such data cannot tell it from others"]
-    return Decision(Verdict.UNKNOWN, (), f"{_title(best)} comes closest, but {failed[0]}", None)
+    return Conclusion(Verdict.UNKNOWN, (), f"{_title(best)} comes closest, but {failed[0]}", None)
 
 
-def _named(assessments: Sequence[Assessment], chosen: int, others: Sequence[int]) -> Decision:
+def _named(assessments: Sequence[Assessment], chosen: int, others: Sequence[int]) -> Conclusion:
     best = assessments[chosen]
     ratio = " and ".join(f"{value:.1f}" for value in best.ratios)
     reason = (
@@ -166,7 +166,7 @@ def _named(assessments: Sequence[Assessment], chosen: int, others: Sequence[int]
         second = assessments[others[0]]
         behind = second.score - best.score
         reason += f", and the next, {_title(second)}, is {behind:.0f} behind in {LIKELIHOOD}"
-    return Decision(Verdict.NAMED, best.mechanisms, reason, chosen)
+    return Conclusion(Verdict.NAMED, best.mechanisms, reason, chosen)
 
 
 def _answer(answer: Answer) -> str:

@@ -1,23 +1,25 @@
-"""What the analysis of a disagreement found: the verdict and every number that it rests on.
+"""The record of an analysis: the verdict and every number that it rests on.
 
 Arrays over the data have one row a condition and one column an observable, in the order of ``Data``; NaN
-stands where nothing was measured (or, for p values, tested). Parameters and sizes are in the natural units of
-the study and of the mechanism library.
+stands where nothing was measured (or, for p values, tested). Parameters and sizes are in natural units.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any
 
 import numpy as np
 
-from experiments.calibrate.export import jsonable
+from doe.discrepancy.contest.gap import Answer
+from doe.discrepancy.contest.power import Power
+from doe.discrepancy.fitting.fit import Interval
+from doe.discrepancy.verdict.before_after import BeforeAfter
+from doe.discrepancy.verdict.next_experiment import NextExperiment
 
 
 class Verdict(StrEnum):
-    """How an analysis ends."""
+    """Endings of an analysis."""
 
     NONE = "none"
     """The calibrated model agrees with the data: nothing is missing that they could show."""
@@ -31,15 +33,6 @@ class Verdict(StrEnum):
     """The data have fewer independent observables than the model has free parameters."""
 
 
-@dataclass(frozen=True)
-class Interval:
-    """An estimate with the ends of its 90 % interval."""
-
-    low: float
-    value: float
-    high: float
-
-
 @dataclass(frozen=True, eq=False)
 class Data:
     """The measured means that were compared with the model."""
@@ -48,7 +41,7 @@ class Data:
     observables: tuple[str, ...]
     """Rows and columns of every array of a discovery."""
     held_out: tuple[bool, ...]
-    """Whether a condition took no part in any fit."""
+    """True where a condition took no part in any fit."""
     means: np.ndarray
     standard_errors: np.ndarray
     """In natural units, (conditions, observables)."""
@@ -56,37 +49,12 @@ class Data:
     """Measurements that each mean is made of, (conditions, observables)."""
 
 
-class Question(StrEnum):
-    """What is asked of the residuals of a model."""
-
-    SIZE = "size"
-    """Whether they are too large: Q."""
-    FALL = "fall"
-    """Whether they point at one mechanism: the largest fall of Q that a positive size of one brings."""
-    SCORES = "scores"
-    """Whether they lie where mechanisms act at all, either way: the sum of all squared scores."""
-    COMMON = "common"
-    """Whether observables are off alike in all conditions: the sum of squares of what they have in common."""
-
-
-@dataclass(frozen=True)
-class Answer:
-    """What one question to the residuals gave."""
-
-    question: Question
-    value: float
-    limit: float
-    """The statistic, and the point that the bootstrap exceeds at the level of the rules."""
-    mechanism: str = ""
-    """Of the fall; empty with the other questions."""
-
-
 @dataclass(frozen=True, eq=False)
 class Fit:
     """A model as close to the training conditions as it comes."""
 
     mechanisms: tuple[str, ...]
-    """What was added to the base; empty for the base itself."""
+    """Additions to the base; empty for the base itself."""
     theta: tuple[float, ...]
     theta_se: tuple[float, ...]
     """The study's factors and their standard errors."""
@@ -105,7 +73,7 @@ class Fit:
     """Of the questions that the p value is made of, the one that noise alone answers so most seldom."""
     predicted: np.ndarray
     predicted_se: np.ndarray
-    """What the model says, held-out conditions included, and how well its means are known, (conditions,
+    """Means as the model has them, held-out conditions included, and how well its means are known, (conditions,
     observables)."""
     residuals: np.ndarray
     adjusted_p: np.ndarray
@@ -114,13 +82,13 @@ class Fit:
 
     @property
     def excess(self) -> float:
-        """What of Q the noise does not account for."""
+        """Part of Q that the noise does not account for."""
         return max(self.q - self.degrees_of_freedom, 0.0)
 
 
 @dataclass(frozen=True)
 class Gap:
-    """Whether the calibrated base disagrees with the data beyond the noise."""
+    """Disagreement of the calibrated base with the data beyond the noise."""
 
     found: bool
     """True if the base disagrees by its Q, by the largest drop, or by all its scores together."""
@@ -165,32 +133,18 @@ class Candidate:
     explained: float
     """Share of the base's excess that it removes."""
     held_out_gain: Interval | None
-    """What the log score of the held-out conditions gains over the base; None where none was measured."""
+    """Gain of the log score of the held-out conditions over the base; None where none was measured."""
     simulated: bool
     """True if these are figures of fresh runs around its optimum, False if the emulator's."""
     admitted: bool
-    """Whether it passes every rule."""
+    """True if it passes every rule."""
     objection: str
     """The first rule that it fails, as a sentence; empty if admitted."""
 
 
-@dataclass(frozen=True)
-class Power:
-    """The smallest size of a mechanism that these data could show and tell from every other."""
-
-    mechanism: str
-    gamma80: float
-    """Size found and told apart with 80 % probability at a false-alarm rate of 2.5 %; infinite if none."""
-    maximum: float
-    """End of its range."""
-    visible_share: float
-    resolvable: bool
-    """Whether its range has such a size, as the emulator has it; or what was declared."""
-
-
 @dataclass(frozen=True, eq=False)
 class Confounding:
-    """How much alike mechanisms look after calibration: correlations of their visible signatures."""
+    """Likeness of mechanisms after calibration: correlations of their visible signatures."""
 
     mechanisms: tuple[str, ...]
     correlations: np.ndarray
@@ -198,40 +152,8 @@ class Confounding:
 
 
 @dataclass(frozen=True)
-class BeforeAfter:
-    """The gap of fresh direct runs without and with the mechanism, on one set of conditions."""
-
-    held_out: bool
-    degrees_of_freedom: int
-    before: Interval
-    """Q of the base."""
-    after: Interval
-    """Q with the mechanism."""
-    removed: Interval
-    """Share of the base's excess that is gone."""
-    runs: int
-    """Fresh runs a model and condition."""
-
-
-@dataclass(frozen=True)
-class NextExperiment:
-    """The condition that would settle the verdict best."""
-
-    condition: str
-    changes: tuple[tuple[str, str], ...]
-    """What it changes in the study: place and value."""
-    separates: tuple[str, str]
-    """Two models, each a mechanism's name or "base"."""
-    expected_q: float
-    """Q between the two, each refitted, with ``replicates`` measurements."""
-    replicates: int
-    observable: str
-    """The observable that differs most."""
-
-
-@dataclass(frozen=True)
 class Effort:
-    """What the analysis cost, and what fixed it before the data were opened."""
+    """Cost of the analysis, and what fixed it before the data were opened."""
 
     seed: int
     settings_sha256: str
@@ -266,7 +188,7 @@ class Discovery:
     """Training conditions, then held-out ones if measured; empty where no model was chosen."""
     next_experiment: NextExperiment | None
     notes: tuple[str, ...]
-    """What was wrong with the data or the runs, and what was done about it."""
+    """Faults of the data or the runs, and what was done about them."""
     effort: Effort
 
     def __post_init__(self) -> None:
@@ -275,11 +197,6 @@ class Discovery:
         for name, fit in (("base", self.base), ("chosen", self.chosen)):
             if fit is not None:
                 _check(name, fit, shape, ("predicted", "predicted_se", "residuals", "adjusted_p"))
-
-    def to_dict(self) -> dict[str, Any]:
-        """The whole as plain JSON values; what is not finite becomes null."""
-        document: dict[str, Any] = jsonable(self)
-        return document
 
 
 def _check(name: str, tables: Data | Fit, shape: tuple[int, int], fields: tuple[str, ...]) -> None:

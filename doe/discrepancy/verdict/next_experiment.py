@@ -2,13 +2,30 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from doe.discrepancy.contest.signatures import projector
 from doe.discrepancy.fitting.evidence import Block
 from doe.discrepancy.fitting.fit import Fitted, whiten
 from doe.discrepancy.fitting.model import Stack
-from doe.discrepancy.verdict.discovery import NextExperiment
+
+
+@dataclass(frozen=True)
+class NextExperiment:
+    """The condition that would settle the verdict best."""
+
+    condition: str
+    changes: tuple[tuple[str, str], ...]
+    """Its settings that differ from the first: place and value."""
+    separates: tuple[str, str]
+    """Two models, each a mechanism's name or "base"."""
+    expected_q: float
+    """Q between the two, each refitted, with ``replicates`` measurements."""
+    replicates: int
+    observable: str
+    """The observable that differs most."""
 
 
 def propose(first: Fitted, second: Fitted, replicates: int) -> NextExperiment:

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from scipy import stats
 
 from doe.discrepancy.contest.gap import GapTest, condition_fits, drift_p, holm
 from doe.discrepancy.contest.held_out import forecast
-from doe.discrepancy.contest.signatures import Signatures, Visibility, projector
+from doe.discrepancy.contest.signatures import Signatures, projector
 from doe.discrepancy.emulation.emulator import Emulator
 from doe.discrepancy.fitting.evidence import Block, Evidence
-from doe.discrepancy.fitting.fit import AT_BOUND, Fitted, size_interval
+from doe.discrepancy.fitting.fit import AT_BOUND, Fitted, Interval, size_interval
 from doe.discrepancy.problem.settings import Settings
 from doe.discrepancy.verdict.conclusion import Assessment, objections
-from doe.discrepancy.verdict.discovery import Candidate, Data, Drift, Fit, Interval, Power
+from doe.discrepancy.verdict.discovery import Candidate, Data, Drift, Fit
 
 
 def data_record(emulator: Emulator, evidence: Evidence) -> Data:
@@ -154,18 +152,4 @@ def candidate_record(
         simulated=assessment.simulated,
         admitted=not found,
         objection=found[0] if found else "",
-    )
-
-
-def power_records(emulator: Emulator, seen: Sequence[Visibility]) -> tuple[Power, ...]:
-    """The smallest visible size of each mechanism in its natural units."""
-    return tuple(
-        Power(
-            one.name,
-            emulator.space.natural_size(one.name, one.gamma80) if np.isfinite(one.gamma80) else float("inf"),
-            emulator.space.mechanism(one.name).maximum,
-            one.share,
-            one.resolvable,
-        )
-        for one in seen
     )

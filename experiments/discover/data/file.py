@@ -20,10 +20,10 @@ from pathlib import Path
 
 import numpy as np
 
-from doe.discrepancy.problem.measured import CLOGGED, Measured
+from doe.discrepancy import Measured
 from experiments.discover.data.notes import data_notes
 from experiments.discover.data.plausible import SizeOfTest, inversions, size_of_test
-from experiments.discover.data.readings import CLOGGED_ROW, Reading, readings_of
+from experiments.discover.data.readings import CLOGGED, CLOGGED_ROW, Reading, readings_of
 from experiments.discover.data.table import Row, read_rows
 from experiments.discover.observables import NAMES
 from experiments.errors import InputError, Problem

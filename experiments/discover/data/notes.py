@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from scipy import stats
 
-from doe.discrepancy.problem.measured import Measured
+from doe.discrepancy import Measured
 
 ENOUGH = 5
 """Heaps of a condition; fewer show large effects only."""
@@ -47,13 +47,13 @@ def _missing(measured: Measured, held_out: Mapping[str, bool]) -> Iterator[str]:
     for condition in measured.conditions:
         counts = measured.counts(condition)
         lacking = [name for name, count in zip(measured.observables, counts, strict=True) if count == 0]
-        if lacking and measured.heap_count(condition):
+        if lacking and measured.finished_count(condition):
             yield f"{condition}: without {', '.join(lacking)}, which another condition has"
 
 
 def _scarce(measured: Measured) -> Iterator[str]:
     for condition in measured.conditions:
-        total, formed = len(measured.values[condition]), measured.heap_count(condition)
+        total, formed = len(measured.values[condition]), measured.finished_count(condition)
         if formed < total:
             yield f"{condition}: {total - formed} of {total} replicates left no heap: an outcome of its own"
         if formed == 0:

@@ -15,6 +15,8 @@ from experiments.studyfile.schema import nearest_name
 from experiments.studyfile.units import Quantity
 from imaging import find_outline, measure, read_picture
 
+CLOGGED = "the tube clogged"
+"""Reason of a replicate that left no heap because the grains stayed in the tube."""
 CLOGGED_ROW = "clogged"
 """Stands for an observable where the tube held its grains."""
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
-from doe.discrepancy.verdict.discovery import Confounding, Discovery, Fit
+from doe.discrepancy import Confounding, Discovery, Fit
 from experiments.report.discovery.tables import shown_candidates
 from experiments.report.discovery.terms import Terms, condition_name, spaced
 from experiments.report.numbers import MISSING, capital, fixed

@@ -8,8 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from doe.discrepancy.problem.settings import Settings
-from doe.discrepancy.verdict.discovery import Discovery
+from doe.discrepancy import Discovery, Settings
 from experiments.calibrate.export import jsonable
 from experiments.files import write_text
 from experiments.report.discovery.page import render_discovery
@@ -80,4 +79,4 @@ def write_discovery(
 def results_of(found: Discovery, terms: Terms) -> dict[str, Any]:
     """Everything that was found as JSON-able data, with the verdict in words."""
     words = {"headline": headline(found, terms), "sentence": verdict_sentence(found, terms)}
-    return {**words, "discovery": found.to_dict()}
+    return {**words, "discovery": jsonable(found)}

@@ -9,8 +9,7 @@ from typing import Any
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
-from doe.discrepancy.problem.settings import Settings
-from doe.discrepancy.verdict.discovery import Discovery, Verdict
+from doe.discrepancy import Discovery, Settings, Verdict
 from experiments.report.discovery import charts, tables
 from experiments.report.discovery.terms import Terms, percent
 from experiments.report.discovery.verdict import (

@@ -26,7 +26,7 @@ BESIDE, ABOVE, BELOW = 0.2, 0.12, 0.06
 
 @dataclass(frozen=True)
 class _Window:
-    """What a picture shows: to either side of the heap's middle, above its plate and below, in any unit."""
+    """Reach of a picture: to either side of the heap's middle, above its plate and below, in any unit."""
 
     reach: float
     above: float

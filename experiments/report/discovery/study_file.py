@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from doe.discrepancy.verdict.discovery import Candidate, Data, Discovery, Fit, Interval, Verdict
+from doe.discrepancy import Candidate, Data, Discovery, Fit, Interval, Verdict
 from experiments.discover.library import Mechanism, with_mechanisms
 from experiments.files import replacing, write_text
 from experiments.report.discovery.terms import Terms

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from doe.discrepancy.verdict.discovery import BeforeAfter, Candidate, Discovery, Fit, Interval
+from doe.discrepancy import BeforeAfter, Candidate, Discovery, Fit, Interval
 from experiments.report.discovery.terms import GAP, Terms, condition_name
 from experiments.report.numbers import MISSING, fixed, interval, trimmed
 from experiments.report.tables import Column, Table, make_table
@@ -142,9 +142,9 @@ def power_table(found: Discovery, terms: Terms) -> Table:
             {
                 "mechanism": terms.title(power.mechanism),
                 "what": terms.mechanisms[power.mechanism].sentence,
-                "gamma80": terms.value(power.mechanism, power.gamma80),
+                "size": terms.value(power.mechanism, power.detectable_size),
                 "maximum": terms.value(power.mechanism, power.maximum),
-                "share": 100.0 * power.gamma80 / power.maximum,
+                "share": 100.0 * power.detectable_size / power.maximum,
                 "visible": 100.0 * power.visible_share,
                 "resolvable": "yes" if power.resolvable else "no",
             }
@@ -154,7 +154,7 @@ def power_table(found: Discovery, terms: Terms) -> Table:
     columns = [
         Column("mechanism", "mechanism"),
         Column("what", "what it does"),
-        Column("gamma80", "smallest size named"),
+        Column("size", "smallest size named"),
         Column("maximum", "end of its range"),
         Column("share", "of the range", "percent", "%"),
         Column("visible", "left after calibration", "percent", "%"),

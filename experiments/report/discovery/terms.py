@@ -1,4 +1,4 @@
-"""What the names in a discovery mean: titles, units, and numbers with both."""
+"""Meaning of the names in a discovery: titles, units, and numbers with both."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from doe.discrepancy.verdict.discovery import Interval
+from doe.discrepancy import Interval
 from experiments.discover.library import Mechanism
 from experiments.discover.observables import Observable
 from experiments.report.numbers import MISSING, enumeration, fixed, trimmed

@@ -6,8 +6,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from doe.discrepancy.problem.settings import Settings
-from doe.discrepancy.verdict.discovery import (
+from doe.discrepancy import (
     Answer,
     BeforeAfter,
     Candidate,
@@ -15,6 +14,7 @@ from doe.discrepancy.verdict.discovery import (
     Interval,
     Power,
     Question,
+    Settings,
     Verdict,
 )
 from experiments.report.discovery.terms import Terms, percent, spaced

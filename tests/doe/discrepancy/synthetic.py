@@ -8,12 +8,19 @@ from functools import cache
 
 import numpy as np
 
-from doe.discrepancy.emulation.bank import Bank, bank_points, make_bank
-from doe.discrepancy.emulation.emulator import Emulator, fit_emulator
-from doe.discrepancy.problem.measured import Measured
-from doe.discrepancy.problem.settings import Settings
-from doe.discrepancy.problem.simulator import Outcomes, Point
-from doe.discrepancy.problem.space import MechanismRange, SearchSpace
+from doe.discrepancy import (
+    Bank,
+    Emulator,
+    Measured,
+    MechanismRange,
+    Outcomes,
+    Point,
+    SearchSpace,
+    Settings,
+    bank_points,
+    fit_emulator,
+    make_bank,
+)
 
 OBSERVABLES = (
     "flank_angle", "concavity", "height", "r50", "r90", "asymmetry",
@@ -102,7 +109,7 @@ def _signature(name: str, condition: str) -> tuple[np.ndarray, np.ndarray]:
     number = (*MECHANISMS, "stranger").index(name)
     common = np.random.default_rng([13, number])
     own = np.random.default_rng([14, number, CONDITIONS.index(condition)])
-    # Mechanisms act through a few ways to change a heap, so their signatures are alike.
+    # Mechanisms act through a few ways to change the observables, so their signatures are alike.
     ways = _ways(condition)
     size = len(OBSERVABLES)
     direct = 2.0 * common.standard_normal(len(ways)) @ ways + 0.8 * own.standard_normal(size)

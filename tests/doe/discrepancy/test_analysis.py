@@ -10,11 +10,7 @@ import numpy as np
 import pytest
 from synthetic import CONDITIONS, OBSERVABLES, SETTINGS, SyntheticSimulator, emulator, measure, space
 
-from doe.discrepancy.analysis import analyse
-from doe.discrepancy.emulation.emulator import Emulator
-from doe.discrepancy.problem.measured import CLOGGED, Measured
-from doe.discrepancy.problem.simulator import Outcomes, Point
-from doe.discrepancy.verdict.discovery import Discovery, Verdict
+from doe.discrepancy import Discovery, Emulator, Measured, Outcomes, Point, Verdict, analyse
 from doe.errors import RuleError
 
 ALONE = emulator().without("twin")
@@ -24,7 +20,7 @@ ALONE = emulator().without("twin")
 def _run(
     measured: Measured, known: Emulator = ALONE, is_lost: Callable[[int, Point], bool] = lambda *_: False
 ) -> tuple[Discovery, list[list[Point]]]:
-    """Drive an analysis; lost cases, told by their number in the wave and their point, leave no heap."""
+    """Drive an analysis; lost cases, told by their number in the wave and their point, have no values."""
     waves, simulator = [], SyntheticSimulator(space())
     analysis = analyse(measured, known, SETTINGS, seed=5)
     try:
@@ -34,7 +30,7 @@ def _run(
             values = simulator(points).values
             lost = [is_lost(i, point) for i, point in enumerate(points)]
             values[lost] = np.nan
-            points = analysis.send(Outcomes(values, tuple("clogged" if one else "" for one in lost)))
+            points = analysis.send(Outcomes(values, tuple("lost" if one else "" for one in lost)))
     except StopIteration as end:
         return end.value, waves
 
@@ -153,7 +149,7 @@ def test_one_angle_a_condition_cannot_tell_a_mechanism_from_friction() -> None:
     assert "4 measured means, 3 factors" in found.reason
 
 
-def test_photographs_alone_are_analysed_too() -> None:
+def test_some_observables_alone_are_analysed_too() -> None:
     found, _ = _run(measure({"delta": 1.2}, 3).only(OBSERVABLES[:6]))
     assert found.verdict == Verdict.NAMED
     assert found.named == ("delta",)
@@ -172,26 +168,26 @@ def test_one_replicate_a_condition_is_enough_for_a_verdict() -> None:
     assert found.verdict == Verdict.NONE
 
 
-def test_an_observable_without_variance_and_a_clogged_tube_are_no_crash() -> None:
+def test_an_observable_without_variance_and_lost_replicates_are_no_crash() -> None:
     whole = measure({}, 9)
     values = {name: rows.copy() for name, rows in whole.values.items()}
     values["base"][:, 2] = values["base"][:, 2].mean()
     values["wide"][0] = np.nan
     values["fast"][:] = np.nan
-    reasons = {"wide": (CLOGGED, "", "", "", ""), "fast": (CLOGGED,) * 5}
+    reasons = {"wide": ("lost", "", "", "", ""), "fast": ("lost",) * 5}
     found, _ = _run(Measured(CONDITIONS, OBSERVABLES, values, reasons))
     assert found.verdict == Verdict.NONE
-    assert "condition fast left no heap to compare: left out" in found.notes
+    assert "condition fast has no value to compare: left out" in found.notes
     assert found.data.replicates[CONDITIONS.index("wide")].max() == 4
 
 
-def test_nothing_but_clogged_tubes_is_a_verdict_with_its_reason() -> None:
+def test_nothing_but_lost_replicates_is_a_verdict_with_its_reason() -> None:
     whole = measure({}, 9)
     values = {name: np.full_like(rows, np.nan) for name, rows in whole.values.items()}
-    reasons = {name: (CLOGGED,) * len(rows) for name, rows in whole.values.items()}
+    reasons = {name: ("lost",) * len(rows) for name, rows in whole.values.items()}
     found, _ = _run(Measured(CONDITIONS, OBSERVABLES, values, reasons))
     assert found.verdict == Verdict.NOT_IDENTIFIABLE
-    assert found.reason == "no training condition left a heap to compare"
+    assert found.reason == "no training condition has a value to compare"
 
 
 def test_replicates_that_scatter_too_much_widen_the_error_instead_of_an_alarm() -> None:
@@ -211,7 +207,7 @@ def test_an_observable_that_nobody_simulates_is_left_out_with_a_note() -> None:
 def test_fresh_runs_that_fail_are_counted_and_left_out() -> None:
     found, _ = _run(measure({"delta": 0.6}, 3), is_lost=lambda i, _: i < 7)
     assert found.named == ("delta",)
-    assert any("fresh runs left no heap" in note for note in found.notes)
+    assert any("fresh runs failed" in note for note in found.notes)
 
 
 def test_what_is_declared_unresolvable_is_never_named() -> None:

@@ -10,8 +10,7 @@ import pytest
 from scipy import stats
 from synthetic import CONDITIONS, OBSERVABLES, SETTINGS, SyntheticSimulator, bank, emulator, measure, space
 
-from doe.discrepancy.emulation.bank import Bank, bank_points, load_bank, make_bank
-from doe.discrepancy.emulation.emulator import fit_emulator
+from doe.discrepancy import Bank, Outcomes, bank_points, fit_emulator, load_bank, make_bank
 from doe.discrepancy.emulation.kriging import fit_kriging, krige
 from doe.discrepancy.emulation.noise import ALIKE, fit_noise, repeat_deviations, shared_correlations
 from doe.discrepancy.emulation.surface_fits import (
@@ -25,7 +24,6 @@ from doe.discrepancy.emulation.surfaces import added
 from doe.discrepancy.fitting.evidence import gather
 from doe.discrepancy.fitting.fit import fit, whiten
 from doe.discrepancy.fitting.model import Model, Stack
-from doe.discrepancy.problem.simulator import Outcomes
 from doe.errors import RuleError
 from experiments.trials.emulated_simulator import EmulatedSimulator
 
@@ -177,24 +175,24 @@ def test_fitted_lengths_tell_a_flat_direction_from_a_steep_one() -> None:
 
 def _with_failures(failed: np.ndarray) -> Bank:
     values, reasons = bank().values.copy(), bank().reasons.astype("<U20")
-    values[failed], reasons[failed] = np.nan, "the tube is clogged"
+    values[failed], reasons[failed] = np.nan, "the run failed"
     return replace(bank(), values=values, reasons=reasons)
 
 
-def test_clogged_cases_are_left_out_and_counted() -> None:
+def test_failed_cases_are_left_out_and_counted() -> None:
     failed = np.zeros(len(bank().reasons), dtype=bool)
     failed[::50] = True
     known = fit_emulator(_with_failures(failed))
     assert any(f"{failed.sum()} of {len(failed)} cases" in note for note in known.notes)
 
 
-def test_a_mechanism_that_always_clogs_leaves_the_library() -> None:
+def test_a_mechanism_that_always_fails_leaves_the_library() -> None:
     known = fit_emulator(_with_failures((bank().mechanism == 1) & (bank().condition == 2)))
     assert "beta" not in known.space.names
     assert any(note.startswith("beta has too few") for note in known.notes)
 
 
-def test_a_condition_that_always_clogs_is_an_error_with_its_name() -> None:
+def test_a_condition_that_always_fails_is_an_error_with_its_name() -> None:
     with pytest.raises(RuleError, match="condition wide of the bank"):
         fit_emulator(_with_failures(bank().condition == 2))
 

@@ -9,22 +9,14 @@ import pytest
 from scipy import stats
 from synthetic import SETTINGS, emulator, measure, space
 
+from doe.discrepancy import Answer, Measured, Question
 from doe.discrepancy.contest.gap import OF_A_CANDIDATE, OF_THE_BASE, drift_p, find_gap, holm
 from doe.discrepancy.contest.held_out import forecast
-from doe.discrepancy.contest.signatures import (
-    SIZES,
-    Effects,
-    Visibility,
-    projector,
-    secants,
-    signatures,
-    visibilities,
-)
+from doe.discrepancy.contest.power import SIZES, Effects, visibilities
+from doe.discrepancy.contest.signatures import Visibility, projector, secants, signatures
 from doe.discrepancy.fitting.evidence import gather
 from doe.discrepancy.fitting.fit import Fitted, fit, size_interval, weigh
 from doe.discrepancy.fitting.model import Model, Stack
-from doe.discrepancy.problem.measured import Measured
-from doe.discrepancy.verdict.discovery import Answer, Question
 
 NULLS = 100
 

@@ -1,11 +1,11 @@
-"""Measured heaps as arrays: means and covariances over what was measured, and what is refused."""
+"""Measured data as arrays: means and covariances over what was measured, and what is refused."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from doe.discrepancy.problem.measured import CLOGGED, Measured
+from doe.discrepancy import Measured
 from doe.errors import RuleError
 
 NAN = np.nan
@@ -29,7 +29,7 @@ def test_what_was_not_measured_counts_nowhere() -> None:
     data = measured([[20.0, 1.0], [22.0, NAN], [24.0, 3.0]])
     np.testing.assert_array_equal(data.counts("base"), [3, 2])
     np.testing.assert_array_equal(data.mean("base"), [22.0, 2.0])
-    # Angle over three heaps, (4 + 0 + 4) / 2; both over the two that have both, (2 * 1 + 2 * 1) / 1.
+    # Angle over three replicates, (4 + 0 + 4) / 2; both over the two that have both, (2 * 1 + 2 * 1) / 1.
     np.testing.assert_array_equal(data.covariance("base"), [[4.0, 4.0], [4.0, 2.0]])
 
 
@@ -39,9 +39,9 @@ def test_one_replicate_has_a_mean_and_no_scatter() -> None:
     assert np.isnan(data.covariance("base")).all()
 
 
-def test_a_clogged_tube_is_a_replicate_without_a_heap() -> None:
-    data = measured([[20.0, 1.0], [NAN, NAN]], reasons={"base": ("", CLOGGED)})
-    assert data.heap_count("base") == 1
+def test_a_lost_replicate_has_no_values() -> None:
+    data = measured([[20.0, 1.0], [NAN, NAN]], reasons={"base": ("", "lost")})
+    assert data.finished_count("base") == 1
     np.testing.assert_array_equal(data.mean("base"), [20.0, 1.0])
 
 
@@ -58,7 +58,7 @@ def test_fewer_observables_leave_the_rest_as_it_is() -> None:
         ([[20.0]], {}, "a column for each of 2 observables"),
         ([[20.0, np.inf]], {}, "infinite"),
         ([[20.0, 1.0]], {"reasons": {"base": ("", "")}}, "one entry a replicate"),
-        ([[20.0, 1.0]], {"reasons": {"base": (CLOGGED,)}}, "left no heap"),
+        ([[20.0, 1.0]], {"reasons": {"base": ("lost",)}}, "failed"),
     ],
 )
 def test_tables_that_contradict_themselves_are_refused(rows, more, message) -> None:

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from doe.discrepancy.problem.settings import Settings, read_settings
+from doe.discrepancy import Settings
+from doe.discrepancy.problem.settings import read_settings
 from doe.errors import RuleError
 
 

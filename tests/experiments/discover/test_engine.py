@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dem_warp import Case, CaseResult, Progress, simulate
-from doe.discrepancy.problem.simulator import Point
+from doe.discrepancy import Point
 from experiments.discover import wave
 from experiments.discover.engine import EngineSimulator
 from experiments.discover.library import library_for

@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from doe.discrepancy.problem.measured import CLOGGED, Measured
+from doe.discrepancy import Measured
 from experiments.cli import app
 from experiments.discover.data.file import read_measured
 from experiments.discover.data.notes import SUSPICION
+from experiments.discover.data.readings import CLOGGED
 from experiments.discover.observables import NAMES
 from experiments.errors import InputError
 from experiments.studyfile import Study, load_study

@@ -9,8 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from doe.discrepancy.problem.settings import Settings
-from doe.discrepancy.verdict.discovery import Discovery, Verdict
+from doe.discrepancy import Discovery, Settings, Verdict
 from experiments.benchmarks.paper_disagreement import PAGE, disagreement_page
 from experiments.benchmarks.paper_record import FOLDER
 from experiments.discover.paper_tables import (
@@ -60,8 +59,8 @@ def replay(
 def test_the_tables_are_31_runs_at_27_settings_with_table_6_held_out() -> None:
     heaps = published_heaps()
     assert len(heaps.conditions) == 12 + 6 + 9
-    assert sum(heaps.heap_count(condition) for condition in heaps.conditions) == 31
-    assert heaps.heap_count(CENTRE) == 5
+    assert sum(heaps.finished_count(condition) for condition in heaps.conditions) == 31
+    assert heaps.finished_count(CENTRE) == 5
     space = tables_emulator(replay(smooth, 2, NOISE), None).space
     held_out = [name for name, out in zip(space.conditions, space.held_out, strict=True) if out]
     assert held_out == [name for name in heaps.conditions if name.startswith("composite")]
@@ -123,7 +122,7 @@ def test_the_physical_test_is_one_number_with_the_published_moments() -> None:
     heaps, target = physical_heaps(), paper.measured()
     np.testing.assert_allclose(heaps.mean(CENTRE), [target.mean], rtol=1e-12)
     np.testing.assert_allclose(np.sqrt(heaps.covariance(CENTRE)), [[target.sd]], rtol=1e-12)
-    assert heaps.heap_count(CENTRE) == target.n
+    assert heaps.finished_count(CENTRE) == target.n
 
 
 def test_the_model_of_the_physical_test_is_the_surface_of_table_6() -> None:

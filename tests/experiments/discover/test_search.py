@@ -9,10 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from doe.discrepancy.analysis import drive
-from doe.discrepancy.problem.measured import Measured
-from doe.discrepancy.problem.simulator import Outcomes, Point
-from doe.discrepancy.verdict.discovery import Verdict
+from doe.discrepancy import Measured, Outcomes, Point, Verdict, drive
 from experiments.discover.maker import maker_of_today
 from experiments.discover.observables import NAMES, OBSERVABLES
 from experiments.discover.search import Search

@@ -60,7 +60,7 @@ def test_sizes_drawn_are_strong_and_inside_their_range() -> None:
     effects = {effect.name: effect for effect in declared_effects(KNOWN, SETTINGS, REPLICATES)}
     for truth in draw_truths(KNOWN, tuple(effects.values()), 3, seed=1):
         for name, size in truth.sizes:
-            assert STRONG * effects[name].gamma80 * (1.0 - 1e-9) <= size <= effects[name].maximum
+            assert STRONG * effects[name].detectable * (1.0 - 1e-9) <= size <= effects[name].maximum
 
 
 def test_emulated_heaps_scatter_about_the_emulator_as_its_noise_says() -> None:

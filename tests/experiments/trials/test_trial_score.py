@@ -7,11 +7,10 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from doe.discrepancy.problem.settings import Settings
-from doe.discrepancy.verdict.discovery import Verdict
+from doe.discrepancy import Settings, Verdict
 from experiments.errors import InputError
 from experiments.trials.declaration import Declaration
-from experiments.trials.drawing import Effect, Plan
+from experiments.trials.drawing import Declared, Plan
 from experiments.trials.findings import (
     EVERYTHING,
     PHOTOGRAPHS,
@@ -35,9 +34,9 @@ from experiments.trials.score import (
 from experiments.trials.truth import Kind, Label, Sealed, write_labels, write_sealed
 
 
-def label_of(kind: Kind, *names: str, strength: float = 2.0) -> Label:
+def label_of(kind: Kind, *names: str, multiple: float = 2.0) -> Label:
     sizes = tuple((name, 1.0) for name in names)
-    return Label("", kind, (0.3, 0.3), sizes, (strength,) * len(names), seed=1, salt="")
+    return Label("", kind, (0.3, 0.3), sizes, (multiple,) * len(names), seed=1, salt="")
 
 
 @pytest.mark.parametrize(
@@ -78,7 +77,7 @@ def ideal_trials() -> tuple[pd.DataFrame, dict[str, Label]]:
     """Findings of an analysis that is right wherever it can be."""
     labels: dict[str, Label] = {f"null-{i}": label_of(Kind.NULL) for i in range(100)}
     labels |= {
-        f"{name}-{i}": label_of(Kind.SINGLE, name, strength=1.6 + i / 10)
+        f"{name}-{i}": label_of(Kind.SINGLE, name, multiple=1.6 + i / 10)
         for name in "abcdefgh"
         for i in range(15)
     }
@@ -147,7 +146,7 @@ def test_without_trials_nothing_passes() -> None:
 def test_the_page_is_written_from_the_record_alone(tmp_path: Path) -> None:
     findings, labels = ideal_trials()
     labels = {name: Label(**{**vars(label), "trial": name}) for name, label in labels.items()}
-    library = tuple(Effect(name, 0.0, 10.0, 1.0) for name in "abcdefgh")
+    library = tuple(Declared(name, 0.0, 10.0, 1.0) for name in "abcdefgh")
     declaration = Declaration("Grain", "", "2026-01-01", Plan(), Settings(), library, ())
     declaration.write(tmp_path / "declared.json")
     write_sealed(

@@ -11,12 +11,18 @@ import numpy as np
 import pytest
 import synthetic
 
-from doe.discrepancy.analysis import Analysis
-from doe.discrepancy.contest.signatures import SIZES
-from doe.discrepancy.problem.settings import Settings
-from doe.discrepancy.problem.simulator import Outcomes, Point
-from doe.discrepancy.problem.space import MechanismRange
-from doe.discrepancy.verdict.discovery import Data, Discovery, Effort, Verdict
+from doe.discrepancy import (
+    Analysis,
+    Data,
+    Discovery,
+    Effort,
+    MechanismRange,
+    Outcomes,
+    Point,
+    Settings,
+    Verdict,
+)
+from doe.discrepancy.contest.power import SIZES
 from doe.factors import Factor
 from experiments.discover.observables import OBSERVABLES, PHOTOGRAPHED
 from experiments.errors import InputError
@@ -29,7 +35,7 @@ from experiments.trials.declaration import (
     with_names,
 )
 from experiments.trials.desk import Desk, OutOfTime, TimedSimulator, job_name, keep
-from experiments.trials.drawing import STRONG, Effect, Plan, draw
+from experiments.trials.drawing import STRONG, Declared, Plan, draw
 from experiments.trials.findings import EVERYTHING, PHOTOGRAPHS, read_findings
 from experiments.trials.folder import Folder
 from experiments.trials.heaps import cases_of
@@ -48,13 +54,13 @@ from experiments.trials.truth import (
 
 FACTORS = (Factor("mu", 0.2, 0.6), Factor("e", 0.1, 0.5))
 LIBRARY = (
-    Effect("cohesion", null=0.0, maximum=10.0, gamma80=2.0, kin=("bridges",)),
-    Effect("bridges", null=0.0, maximum=4.0, gamma80=1.0, kin=("cohesion",)),
-    Effect("spread", null=0.05, maximum=0.3, gamma80=0.05),
-    Effect("drag", null=0.0, maximum=1.0, gamma80=0.9),
-    Effect("twist", null=0.0, maximum=1.0),
+    Declared("cohesion", null=0.0, maximum=10.0, detectable=2.0, kin=("bridges",)),
+    Declared("bridges", null=0.0, maximum=4.0, detectable=1.0, kin=("cohesion",)),
+    Declared("spread", null=0.05, maximum=0.3, detectable=0.05),
+    Declared("drag", null=0.0, maximum=1.0, detectable=0.9),
+    Declared("twist", null=0.0, maximum=1.0),
 )
-STRANGERS = (Effect("swollen", null=1.0, maximum=1.3),)
+STRANGERS = (Declared("swollen", null=1.0, maximum=1.3),)
 PLAN = Plan(nulls=3, strong=2, weak=2, unresolved=2, withheld=2, strangers=2, pairs=6)
 
 
@@ -96,8 +102,8 @@ def test_truths_lie_in_their_ranges() -> None:
 def test_strength_is_the_distance_from_the_null() -> None:
     strengths = [label for label, _ in draw_trials() if label.mechanisms == ("spread",)]
     for label in strengths:
-        assert label.strengths[0] == pytest.approx((label.sizes[0][1] - 0.05) / 0.05)
-    assert sum(label.strengths[0] > STRONG for label in strengths) == 2 + 2
+        assert label.multiples[0] == pytest.approx((label.sizes[0][1] - 0.05) / 0.05)
+    assert sum(label.multiples[0] > STRONG for label in strengths) == 2 + 2
 
 
 def test_a_withheld_mechanism_goes_with_its_like_and_pairs_are_never_alike() -> None:
@@ -337,11 +343,11 @@ def test_a_mechanism_that_shows_in_a_part_of_the_ranges_only_may_not_be_named() 
     settings, span = Settings(), MechanismRange("glue", 1.0, 3.0)
     shown = np.tile(SIZES >= 0.25, (20, 1)).astype(float)
     everywhere = declared_effect(span, shown, settings)
-    assert everywhere.gamma80 == pytest.approx(0.5)
+    assert everywhere.detectable == pytest.approx(0.5)
     assert everywhere.resolvable
     shown[:3] = 0.0
     mostly = declared_effect(span, shown, settings)
-    assert mostly.gamma80 == pytest.approx(0.5)
+    assert mostly.detectable == pytest.approx(0.5)
     assert not mostly.resolvable
 
 

@@ -5,10 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from doe.discrepancy.emulation.emulator import fit_emulator
-from doe.discrepancy.problem.measured import Measured
-from doe.discrepancy.problem.settings import Settings
-from doe.discrepancy.verdict.discovery import Discovery, Verdict
+from doe.discrepancy import Discovery, Measured, Settings, Verdict, fit_emulator
 from experiments.discover.engine import EngineSimulator
 from experiments.discover.library import library_for
 from experiments.discover.observables import NAMES

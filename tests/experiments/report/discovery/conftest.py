@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from doe.discrepancy.verdict.discovery import (
+from doe.discrepancy import (
     Answer,
     BeforeAfter,
     Candidate,

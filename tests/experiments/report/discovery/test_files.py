@@ -11,8 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from doe.discrepancy.problem.settings import Settings
-from doe.discrepancy.verdict.discovery import Discovery, Interval, Verdict
+from doe.discrepancy import Discovery, Interval, Settings, Verdict
 from experiments.commands.run import check_runs
 from experiments.discover.library import library_for
 from experiments.discover.observables import OBSERVABLES

@@ -10,8 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from doe.discrepancy.problem.settings import Settings
-from doe.discrepancy.verdict.discovery import Answer, Discovery, Question, Verdict
+from doe.discrepancy import Answer, Discovery, Question, Settings, Verdict
 from experiments.report import HeapPicture
 from experiments.report.discovery import Terms, render_discovery, verdict_sentence
 from experiments.report.discovery.tables import SHOWN_PAIRS, data_table, shown_candidates
