@@ -4,82 +4,40 @@
 
 They tune and guard the rules without a simulation. From the emulator of the shipped bank, bent by what no
 polynomial follows, new banks are drawn, and an analysis knows no more than one of these: so their noise, and
-what their emulators miss, show. The heaps are shifted as the rules say that cameras and time steps do.
-Whether the bent emulator is like the engine, only the blind trials show.
+what their emulators miss, show. Truths are drawn and judged as the sealed ones are; the heaps are shifted as
+the rules say that cameras and time steps do. Only the blind trials show if the bent emulator is like the
+engine.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
-from itertools import combinations
 from typing import Annotated
 
 import numpy as np
 import pandas as pd
 import typer
 
-from doe.discrepancy import Discovery, Emulator, Settings, Verdict, analyse, drive, fit_emulator
+from doe.discrepancy import Emulator, Settings, analyse, drive, fit_emulator
+from doe.factors import Factor
 from experiments.discover.observables import NAMES, PHOTOGRAPHED
 from experiments.discover.search import Search
 from experiments.studyfile import load_study
 from experiments.trials.declaration import declared_effects, with_names
-from experiments.trials.drawing import STRONG, Effect
+from experiments.trials.drawing import Declared, Plan, draw
 from experiments.trials.emulated_simulator import EmulatedSimulator, emulated_heaps, redrawn_bank
+from experiments.trials.findings import EVERYTHING, Finding, findings_table
 from experiments.trials.generate import STUDY, bank_beside
+from experiments.trials.score import aims, confusion, scored
+from experiments.trials.truth import Label, Sealed
 
 REPLICATES = 8
 """Heaps a condition, as in the sealed trials."""
-STRONGEST = 6.0
-"""Largest size drawn, in gamma80, where the range has so much."""
 
-
-@dataclass(frozen=True)
-class Truth:
-    """What a trial hides."""
-
-    kind: str
-    """``none``, ``one``, ``two`` or ``withheld`` (one that the library lacks)."""
-    sizes: tuple[tuple[str, float], ...]
-    theta: tuple[float, ...]
-    seed: int
-    library_lacks: tuple[str, ...] = ()
-    """What is withheld: the mechanism, and those that look like it."""
-
-
-def draw_truths(emulator: Emulator, effects: tuple[Effect, ...], count: int, seed: int) -> Iterator[Truth]:
-    """Draw so many trials of each resolvable mechanism, known and withheld; of none and of two as well.
-
-    Parameters
-    ----------
-    emulator : Emulator
-    effects : tuple of Effect
-        The library with its gamma80.
-    count, seed : int
-    """
-    rng = np.random.default_rng(seed)
-    visible = [effect for effect in effects if effect.resolvable]
-    pairs = list(combinations(visible, 2))
-    chosen = rng.permutation(len(pairs))[: count * len(visible) // 4]
-    hidden: list[tuple[str, tuple[Effect, ...]]] = [("none", ())] * (4 * count)
-    for kind in ("one", "withheld"):
-        hidden += [(kind, (effect,)) for effect in visible for _ in range(count)]
-    hidden += [("two", pairs[index]) for index in chosen]
-    for number, (kind, members) in enumerate(hidden):
-        coded = rng.uniform(-0.9, 0.9, len(emulator.space.factors))
-        sizes = tuple((effect.name, _size(effect, rng)) for effect in members)
-        theta = tuple(float(value) for value in emulator.space.natural_theta(coded))
-        lacks = [{effect.name, *effect.kin} for effect in members if kind == "withheld"]
-        yield Truth(kind, sizes, theta, seed + number, tuple(sorted(set().union(*lacks))))
-
-
-def _size(effect: Effect, rng: np.random.Generator) -> float:
-    span = abs(effect.maximum - effect.null)
-    least = min(STRONG * effect.gamma80, span)
-    drawn = np.exp(rng.uniform(np.log(least), np.log(min(STRONGEST * effect.gamma80, span))))
-    return float(effect.null + drawn * np.sign(effect.maximum - effect.null))
+Trial = tuple[Label, Sealed]
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,62 +48,51 @@ class World:
     """Makes the heaps and the fresh runs."""
     known: Emulator
     """Fitted to a bank that was drawn from the truth; the analysis has no other."""
-    effects: tuple[Effect, ...]
-    """Of the library, as that emulator declares them."""
+    library: tuple[Declared, ...]
+    """Mechanisms as that emulator declares them."""
     settings: Settings
-    """Which let the resolvable ones be named."""
+    """Rules that let the resolvable ones be named."""
 
     @classmethod
     def of(cls, truth: EmulatedSimulator, settings: Settings, seed: int) -> World:
         """Draw a bank and declare what it shows."""
         known = fit_emulator(redrawn_bank(truth, settings, seed))
-        effects = declared_effects(known, settings, REPLICATES)
-        return cls(truth, known, effects, with_names(settings, effects))
+        library = declared_effects(known, settings, REPLICATES)
+        return cls(truth, known, library, with_names(settings, library))
 
 
-def run_trial(world: World, observables: tuple[str, ...], truth: Truth) -> dict[str, object]:
-    """Analyse one trial, of which some observables are measured; a row of the table of `emulated_trials`."""
-    settings = world.settings
+def draw_trials(world: World, count: int, seed: int) -> tuple[Trial, ...]:
+    """Draw so many trials of each resolvable mechanism, known and withheld; of none and of two as well."""
+    space, resolvable = world.known.space, sum(one.resolvable for one in world.library)
+    plan = Plan(
+        nulls=4 * count,
+        strong=count,
+        weak=0,
+        unresolved=0,
+        withheld=count,
+        strangers=0,
+        pairs=count * resolvable // 4 if resolvable > 1 else 0,
+        replicates=REPLICATES,
+    )
+    factors = [Factor(*each) for each in zip(space.factors, space.lower, space.upper, strict=True)]
+    return draw(plan, factors, world.library, (), np.random.default_rng(seed), str)
+
+
+def run_trial(world: World, observables: Sequence[str], trial: Trial) -> Finding:
+    """Analyse one trial, of which some observables are measured."""
+    (label, sealed), settings = trial, world.settings
     measured = emulated_heaps(
-        world.truth, truth.theta, dict(truth.sizes), REPLICATES, truth.seed, settings.systematic
+        world.truth, label.theta, dict(label.sizes), REPLICATES, label.seed, settings.systematic
     ).only(observables)
-    known = world.known.without(*truth.library_lacks)
-    found = drive(analyse(measured, known, settings, truth.seed), world.truth)
-    hidden = tuple(sorted(name for name, _ in truth.sizes))
-    covered, z = None, None
-    if truth.kind == "one":
-        covered, z = _size_found(found, world.known, *truth.sizes[0])
-    return {
-        "kind": truth.kind,
-        "hidden": " + ".join(hidden),
-        "verdict": found.verdict.value,
-        "named": " + ".join(sorted(found.named)),
-        "right": _is_right(truth, found, hidden),
-        "wrong": found.verdict == Verdict.NAMED
-        and not set(found.named) <= set(hidden) - set(truth.library_lacks),
-        "covered": covered,
-        "z": z,
-        "cases": found.effort.fresh_cases,
-    }
+    known = world.known.without(*sealed.withheld)
+    found = drive(analyse(measured, known, settings, label.seed), world.truth)
+    return Finding.of(label.trial, EVERYTHING, found)
 
 
-def _size_found(
-    found: Discovery, known: Emulator, hidden: str, size: float
-) -> tuple[bool | None, float | None]:
-    """Whether the interval of a named mechanism covers its size, and the error over its standard error."""
-    if found.verdict != Verdict.NAMED or found.named != (hidden,):
-        return None, None
-    (one,) = (candidate for candidate in found.candidates if candidate.mechanisms == (hidden,))
-    got, effect = one.sizes[0], one.sizes[0].value - known.space.mechanism(hidden).null
-    return got.low <= size <= got.high, (got.value - size) / abs(effect) * one.size_over_se[0]
-
-
-def _is_right(truth: Truth, found: Discovery, hidden: tuple[str, ...]) -> bool:
-    if truth.kind == "withheld":
-        return found.verdict == Verdict.UNKNOWN
-    if truth.kind == "none":
-        return found.verdict == Verdict.NONE
-    return found.verdict == Verdict.NAMED and tuple(sorted(found.named)) == hidden
+def judged(findings: Iterable[Finding], trials: Iterable[Trial]) -> pd.DataFrame:
+    """Set findings of one world against its truths, as `scored` does."""
+    labels, sealed = zip(*trials, strict=True)
+    return scored(findings_table(findings), {label.trial: label for label in labels}, sealed)
 
 
 def emulated_trials(
@@ -153,7 +100,7 @@ def emulated_trials(
     settings: Settings,
     count: int,
     banks: int = 1,
-    observables: tuple[str, ...] = NAMES,
+    observables: Sequence[str] = NAMES,
     seed: int = 0,
     workers: int | None = None,
 ) -> pd.DataFrame:
@@ -167,8 +114,8 @@ def emulated_trials(
     count : int
         Trials of each mechanism with every bank.
     banks : int
-    observables : tuple of str
-        What is measured.
+    observables : sequence of str
+        Those that are measured.
     seed : int
         Of the banks and of the trials.
     workers : int, optional
@@ -177,26 +124,21 @@ def emulated_trials(
     Returns
     -------
     pandas.DataFrame
-        A row a trial: what was hidden, the verdict, what was named, whether that is right, or names something
-        that was not there; of a single effect that was named whether the interval of its size covers the
-        truth, and by how many standard errors the size is off; fresh cases.
+        A row a trial, as `scored` has it.
     """
-    rows: list[dict[str, object]] = []
+    tables = []
     with ProcessPoolExecutor(workers) as pool:
         for number in range(banks):
             world = World.of(truth, settings, seed + number)
-            truths = draw_truths(world.known, world.effects, count, 1000 * (seed + number))
-            rows += pool.map(partial(run_trial, world, observables), truths)
-    return pd.DataFrame(rows)
+            trials = draw_trials(world, count, 1000 * (seed + number))
+            tables.append(judged(pool.map(partial(run_trial, world, observables), trials), trials))
+    return pd.concat(tables, ignore_index=True)
 
 
-def summary(table: pd.DataFrame) -> pd.DataFrame:
-    """Verdicts by what was hidden, with the shares that were right, wrong and covered."""
-    grouped = table.groupby(["kind", "hidden"], sort=False)
-    verdicts = pd.crosstab([table["kind"], table["hidden"]], table["verdict"])
-    shares = grouped[["right", "wrong", "cases"]].mean()
-    covered = grouped["covered"].apply(lambda column: column.dropna().astype(float).mean())
-    return shares.join(covered).join(verdicts)
+def size_errors(table: pd.DataFrame) -> pd.Series:
+    """Errors of the sizes of mechanisms that were rightly named alone, in their standard errors."""
+    named = table[table["right"] & (table["kind"] == "single")]
+    return 2.0 * 1.645 * (named["size"] - named["true_size"]) / (named["size_high"] - named["size_low"])
 
 
 def main(
@@ -213,10 +155,12 @@ def main(
     truth = EmulatedSimulator(fit_emulator(search.read_bank(bank_beside(scale))), bend)
     seen = PHOTOGRAPHED if photographs else NAMES
     table = emulated_trials(truth, search.settings, count, banks, seen, seed, workers)
-    print(summary(table).round(2).to_string())
-    print(table.groupby("kind")[["right", "wrong"]].mean().round(3).to_string())
-    z, covered = table["z"].dropna().astype(float), table["covered"].dropna().astype(float)
-    print(f"sizes: {covered.mean():.0%} of {len(covered)} covered; z {z.mean():.2f} +- {z.std():.2f}")
+    print(confusion(table).to_string())
+    print(pd.DataFrame(aims(table, ())).to_string(index=False))
+    z = size_errors(table)
+    print(
+        f"sizes: z {z.mean():.2f} +- {z.std():.2f}; {table['fresh_cases'].mean():.0f} fresh cases an analysis"
+    )
 
 
 if __name__ == "__main__":

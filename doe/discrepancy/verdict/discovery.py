@@ -73,7 +73,7 @@ class Fit:
     """Of the questions that the p value is made of, the one that noise alone answers so most seldom."""
     predicted: np.ndarray
     predicted_se: np.ndarray
-    """Means as the model has them, held-out conditions included, and how well its means are known, (conditions,
+    """Means as the model has them, held-out conditions included, and how well they are known, (conditions,
     observables)."""
     residuals: np.ndarray
     adjusted_p: np.ndarray

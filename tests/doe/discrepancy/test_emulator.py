@@ -25,7 +25,6 @@ from doe.discrepancy.fitting.evidence import gather
 from doe.discrepancy.fitting.fit import fit, whiten
 from doe.discrepancy.fitting.model import Model, Stack
 from doe.errors import RuleError
-from experiments.trials.emulated_simulator import EmulatedSimulator
 
 
 def test_points_are_the_same_whenever_asked_and_every_case_has_its_own_seed() -> None:
@@ -195,14 +194,6 @@ def test_a_mechanism_that_always_fails_leaves_the_library() -> None:
 def test_a_condition_that_always_fails_is_an_error_with_its_name() -> None:
     with pytest.raises(RuleError, match="condition wide of the bank"):
         fit_emulator(_with_failures(bank().condition == 2))
-
-
-def test_the_emulated_simulator_answers_in_the_columns_of_the_bank() -> None:
-    simulator = EmulatedSimulator(emulator())
-    point = space().point(np.zeros(3), (), "base", 7)
-    first, second = simulator([point, point]).values
-    assert len(first) == len(simulator.observables)
-    np.testing.assert_array_equal(first, second)
 
 
 def test_a_correlation_is_drawn_towards_that_of_all_conditions_the_more_the_fewer_its_repeats() -> None:

@@ -9,11 +9,11 @@ import pytest
 from scipy import stats
 from synthetic import SETTINGS, emulator, measure, space
 
-from doe.discrepancy import Answer, Measured, Question
+from doe.discrepancy import Answer, Measured, Power, Question
 from doe.discrepancy.contest.gap import OF_A_CANDIDATE, OF_THE_BASE, drift_p, find_gap, holm
 from doe.discrepancy.contest.held_out import forecast
-from doe.discrepancy.contest.power import SIZES, Effects, visibilities
-from doe.discrepancy.contest.signatures import Visibility, projector, secants, signatures
+from doe.discrepancy.contest.power import SIZES, Effects, powers
+from doe.discrepancy.contest.signatures import projector, secants, signatures
 from doe.discrepancy.fitting.evidence import gather
 from doe.discrepancy.fitting.fit import Fitted, fit, size_interval, weigh
 from doe.discrepancy.fitting.model import Model, Stack
@@ -27,9 +27,9 @@ def _calibrated(measured: Measured, *mechanisms: str) -> Fitted:
     return fit(Stack(Model(known, mechanisms, 0.0), evidence.training))
 
 
-def _visibilities(fitted: Fitted) -> dict[str, Visibility]:
-    seen = signatures(fitted)
-    return {one.name: one for one in visibilities(Effects.of(fitted, seen), seen.shares, SETTINGS)}
+def _powers(fitted: Fitted) -> dict[str, Power]:
+    seen, known = signatures(fitted), fitted.model.emulator.space
+    return {one.mechanism: one for one in powers(Effects.of(fitted, seen), seen.shares, known, SETTINGS)}
 
 
 @pytest.fixture(scope="module", params=[OF_THE_BASE, OF_A_CANDIDATE])
@@ -199,12 +199,14 @@ def test_of_a_large_effect_that_calibration_takes_up_a_small_rest_is_not_believe
         assert effects.power(SETTINGS)[0, -1] == pytest.approx(power, abs=1e-5)
 
 
-# Nothing is like delta, so its gamma80 is where it is found; that of beta is where it is told from epsilon.
+# Nothing is like delta, so its detectable size is where it is found; beta's is where it is told from epsilon.
 @pytest.mark.parametrize(("name", "rivals"), [("delta", ()), ("beta", ("epsilon",))])
-def test_gamma80_is_found_and_told_from_the_rest_with_80_percent_probability(name, rivals) -> None:
+def test_the_detectable_size_is_found_and_told_from_the_rest_with_80_percent_probability(
+    name, rivals
+) -> None:
     middle = tuple(space().natural_theta(np.zeros(3)))
-    visible = _visibilities(_calibrated(measure({}, 1, theta=middle)))[name]
-    size = space().natural_size(name, visible.gamma80)
+    visible = _powers(_calibrated(measure({}, 1, theta=middle)))[name]
+    size = visible.detectable_size
     found, count = 0, 40
     for seed in range(count):
         data = measure({name: size}, seed, theta=middle)
@@ -221,7 +223,7 @@ def test_twins_are_confounded_and_not_resolvable() -> None:
     seen = signatures(fitted)
     alpha, twin = seen.names.index("alpha"), seen.names.index("twin")
     assert seen.correlations[alpha, twin] > 0.98
-    visible = _visibilities(fitted)
+    visible = _powers(fitted)
     assert not visible["alpha"].resolvable
     assert not visible["twin"].resolvable
     assert visible["delta"].resolvable

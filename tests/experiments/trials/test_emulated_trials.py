@@ -8,10 +8,11 @@ import pytest
 from scipy import stats
 from synthetic import OBSERVABLES, SETTINGS, emulator, space
 
-from experiments.trials.declaration import declared_effects
 from experiments.trials.drawing import STRONG
-from experiments.trials.emulated import REPLICATES, World, draw_truths, run_trial, summary
+from experiments.trials.emulated import World, draw_trials, judged, run_trial, size_errors
 from experiments.trials.emulated_simulator import EmulatedSimulator, emulated_heaps
+from experiments.trials.score import covered
+from experiments.trials.truth import Kind
 
 KNOWN = emulator().without("twin")
 
@@ -19,48 +20,43 @@ KNOWN = emulator().without("twin")
 @pytest.fixture(scope="module")
 def table() -> pd.DataFrame:
     # Every emulator of the analyses is that of a bank with its own noise.
-    worlds = [World.of(EmulatedSimulator(KNOWN), SETTINGS, seed) for seed in (2, 3)]
-    rows = []
-    for number, world in enumerate(worlds):
-        for truth in draw_truths(world.known, world.effects, 1, seed=100 * number):
-            if truth.kind == "one" or (truth.kind == "none" and number == 0):
-                rows.append(run_trial(world, OBSERVABLES, truth))
-    return pd.DataFrame(rows)
+    tables = []
+    for number in (0, 1):
+        world = World.of(EmulatedSimulator(KNOWN), SETTINGS, number + 2)
+        wanted = (Kind.SINGLE,) if number else (Kind.SINGLE, Kind.NULL)
+        trials = [trial for trial in draw_trials(world, 1, 100 * number) if trial[0].kind in wanted]
+        tables.append(judged([run_trial(world, OBSERVABLES, trial) for trial in trials], trials))
+    return pd.concat(tables, ignore_index=True)
 
 
 def test_a_complete_model_is_not_accused(table: pd.DataFrame) -> None:
-    nulls = table[table["kind"] == "none"]
-    assert nulls["right"].sum() >= len(nulls) - stats.binom.isf(1e-3, len(nulls), 0.025)
+    nulls = table[table["kind"] == Kind.NULL]
+    assert len(nulls) == 4
+    assert nulls["alarm"].sum() <= stats.binom.isf(1e-3, len(nulls), 0.025)
 
 
-def test_what_is_above_one_and_a_half_gamma80_is_named(table: pd.DataFrame) -> None:
-    singles = table[table["kind"] == "one"]
+def test_what_is_above_one_and_a_half_detectable_sizes_is_named(table: pd.DataFrame) -> None:
+    singles = table[table["kind"] == Kind.SINGLE]
     assert len(singles) == 12
+    assert (singles["multiple"] > STRONG).all()
     # The aim is 80 %.
     assert singles["right"].sum() >= stats.binom.ppf(1e-3, len(singles), 0.8)
     assert not singles["wrong"].any()
 
 
 def test_intervals_of_sizes_cover_though_the_bank_has_noise(table: pd.DataFrame) -> None:
-    named = table[table["z"].notna()]
-    z = named["z"].astype(float)
-    assert len(named) >= 6
-    assert named["covered"].sum() >= stats.binom.ppf(1e-3, len(named), 0.9)
+    z, inside = size_errors(table), covered(table)
+    assert len(z) == inside.trials >= 6
+    assert inside.count >= stats.binom.ppf(1e-3, inside.trials, 0.9)
     assert np.sum(z**2) < stats.chi2.isf(1e-3, len(z))
 
 
-def test_the_summary_counts_every_trial(table: pd.DataFrame) -> None:
-    counted = summary(table)
-    assert counted[
-        [name for name in counted.columns if name in set(table["verdict"])]
-    ].to_numpy().sum() == len(table)
-
-
-def test_sizes_drawn_are_strong_and_inside_their_range() -> None:
-    effects = {effect.name: effect for effect in declared_effects(KNOWN, SETTINGS, REPLICATES)}
-    for truth in draw_truths(KNOWN, tuple(effects.values()), 3, seed=1):
-        for name, size in truth.sizes:
-            assert STRONG * effects[name].detectable * (1.0 - 1e-9) <= size <= effects[name].maximum
+def test_the_emulated_simulator_answers_in_the_columns_of_the_bank() -> None:
+    simulator = EmulatedSimulator(KNOWN)
+    point = space().point(np.zeros(3), (), "base", 7)
+    first, second = simulator([point, point]).values  # noqa: PD011
+    assert len(first) == len(simulator.observables)
+    np.testing.assert_array_equal(first, second)
 
 
 def test_emulated_heaps_scatter_about_the_emulator_as_its_noise_says() -> None:

@@ -12,6 +12,7 @@ import pandas as pd
 import pytest
 
 from doe.discrepancy import Discovery, Interval, Settings, Verdict
+from experiments.calibrate.export import jsonable
 from experiments.commands.run import check_runs
 from experiments.discover.library import library_for
 from experiments.discover.observables import OBSERVABLES
@@ -47,7 +48,7 @@ def test_the_files_hold_the_same_numbers(
     page = write_discovery(found, trial, trial_terms, Settings(), tmp_path, provenance={"device": "cpu"})
     assert page.read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
     results = json.loads((tmp_path / "results.json").read_text(encoding="utf-8"))
-    assert results["discovery"] == json.loads(json.dumps(found.to_dict()))
+    assert results["discovery"] == json.loads(json.dumps(jsonable(found)))
     assert results["sentence"].startswith("Adding contact adhesion at 0.052 J/m²")
     compared = pd.read_csv(tmp_path / "tables" / "compared.csv")
     measured = np.isfinite(found.data.means)
