@@ -22,7 +22,7 @@ LIBRARIES = {
     "doe": {"contourpy", "matplotlib", "numpy", "pandas", "scipy", "statsmodels"},
     "imaging": {"cv2", "numpy", "scipy"},
 }
-LATE_LIBRARIES = {"dem_warp": {"trimesh"}, "doe": set(), "imaging": {"pyvista"}}
+LATE_LIBRARIES = {"dem_warp": {"trimesh"}, "doe": {"sklearn", "threadpoolctl"}, "imaging": {"pyvista"}}
 
 # Device code: a law sees numbers only, a kernel sees laws and the structures that it works on.
 LAYERS = {
@@ -191,6 +191,7 @@ def test_every_library_is_declared() -> None:
     [
         ("dem_warp", {"pandas", "scipy", "pyvista", "cv2", "trimesh", "pydantic", "typer"}),
         ("doe", {"warp", "pyvista", "cv2", "plotly", "matplotlib.pyplot"}),
+        ("doe.discrepancy", {"warp", "pyvista", "cv2", "plotly", "matplotlib.pyplot", "sklearn"}),
         ("imaging", {"warp", "pyvista", "vtkmodules", "pandas"}),
         ("experiments.cli", {"warp", "pyvista", "pandas", "cv2", "statsmodels", "plotly"}),
     ],

@@ -16,6 +16,9 @@ ROOMS = (
     "benchmarks", "trials",
 )  # fmt: skip
 
+# Of `doe.discrepancy`, the folders in the order of use.
+STEPS = ("threads", "problem", "emulation", "fitting", "contest", "verdict", "analysis")
+
 
 def modules(package: str) -> dict[str, Path]:
     paths = sorted((ROOT / package).rglob("*.py"))
@@ -34,10 +37,10 @@ def imported(path: Path, known: dict[str, Path]) -> Iterator[str]:
             yield from (name if name in known else node.module for name in inner)
 
 
-def room(module: str) -> str:
+def room(module: str, package: str, rooms: tuple[str, ...]) -> str:
     """Room of a module: the longest name of a room that its own begins with."""
-    inside = module.partition(".")[2] + "."
-    return max((name for name in ROOMS if inside.startswith(name + ".")), key=len, default=inside)
+    inside = module.removeprefix(package + ".") + "."
+    return max((name for name in rooms if inside.startswith(name + ".")), key=len, default=inside)
 
 
 def circle(graph: dict[str, set[str]]) -> list[str]:
@@ -58,14 +61,15 @@ def test_no_module_imports_itself_around_others(package: str) -> None:
     assert circle({name: set(imported(path, known)) for name, path in known.items()}) == []
 
 
-def test_the_rooms_of_experiments_stand_on_one_another() -> None:
-    known = modules("experiments")
-    rooms = {name: room(name) for name in known if "." in name}
-    assert set(rooms.values()) == set(ROOMS)
+@pytest.mark.parametrize(("package", "order"), [("experiments", ROOMS), ("doe.discrepancy", STEPS)])
+def test_the_rooms_of_a_package_stand_on_one_another(package: str, order: tuple[str, ...]) -> None:
+    known = modules(package.partition(".")[0])
+    rooms = {name: room(name, package, order) for name in known if name.startswith(package + ".")}
+    assert set(rooms.values()) == set(order)
     upward = [
         f"{name} -> {other}"
         for name in rooms
         for other in imported(known[name], known)
-        if ROOMS.index(rooms[other]) > ROOMS.index(rooms[name])
+        if other in rooms and order.index(rooms[other]) > order.index(rooms[name])
     ]
     assert upward == []

@@ -12,13 +12,6 @@ S = TypeVar("S")
 R = TypeVar("R")
 
 
-def use_one_thread() -> None:
-    """Let this process have one thread of linear algebra from now on."""
-    from threadpoolctl import threadpool_limits
-
-    threadpool_limits(1, "blas")
-
-
 def in_one_thread(function: Callable[P, R]) -> Callable[P, R]:
     """Run a function with one thread of linear algebra."""
 

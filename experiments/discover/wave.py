@@ -15,7 +15,6 @@ from dem_warp import Case, CaseResult, Progress, simulate
 from dem_warp.device import resolve_device
 from dem_warp.processes import end_with_parent
 from dem_warp.simulation import batches
-from doe.discrepancy.threads import use_one_thread
 from experiments.discover.devices import resolve_devices
 from experiments.discover.observables import measure
 from experiments.discover.outcome_table import Outcome, OutcomeTable
@@ -181,8 +180,10 @@ class WaveRunner:
 
 def _begin_measuring() -> None:
     """Measure on one thread: there is a process for every core."""
+    from threadpoolctl import threadpool_limits
+
     end_with_parent()
-    use_one_thread()
+    threadpool_limits(1, "blas")
 
 
 def _begin_driving(devices: Queue[str]) -> None:

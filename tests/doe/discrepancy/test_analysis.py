@@ -58,6 +58,23 @@ def test_a_hidden_mechanism_is_named_with_its_size() -> None:
     assert size.value == pytest.approx(0.6, abs=5.0 / 3.3 * (size.high - size.low))
 
 
+def test_the_numbers_of_an_analysis_stay() -> None:
+    # As they were when the statistics stood among the simulator's; rounding differs from host to host.
+    found, _ = _named()
+    assert found.base is not None
+    assert found.chosen is not None
+    assert found.gap is not None
+    [size] = found.chosen.sizes
+    numbers = [found.base.q, found.gap.largest_drop, found.chosen.q, size.low, size.value, size.high]
+    kept = [730.3634449, 677.0098736, 61.24957629, 0.5969043551, 0.6427359270, 0.6885103953]
+    np.testing.assert_allclose(numbers, kept, rtol=1e-6)
+    gaps = [q for both in found.before_after for q in (both.before.value, both.after.value)]
+    np.testing.assert_allclose(gaps, [484.6496541, 39.55356983, 31.62015152, 7.565687453], rtol=1e-6)
+    detectable = [power.detectable_size for power in found.power]
+    np.testing.assert_allclose(detectable, [0.05, 0.18, 0.19, 0.1, 0.17, 0.16], rtol=1e-12)
+    assert found.effort.fresh_cases == 140
+
+
 def test_the_gap_shrinks_on_conditions_that_took_no_part() -> None:
     found, waves = _named()
     training, held_out = found.before_after
