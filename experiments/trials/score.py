@@ -12,6 +12,7 @@ import pandas as pd
 from scipy.stats import binomtest
 
 from doe.discrepancy import Verdict
+from experiments.discover.library import FORMER_NAMES
 from experiments.trials.drawing import STRONG, Declared
 from experiments.trials.findings import CRASH
 from experiments.trials.truth import Kind, Label, Sealed
@@ -230,7 +231,7 @@ def aims(table: pd.DataFrame, unresolvable: Sequence[str]) -> tuple[Aim, ...]:
 
 
 MUST_RESOLVE = (
-    "contact_cohesion",
+    "contact_adhesion",
     "liquid_bridges",
     "size_spread",
     "plate_tilt",
@@ -242,10 +243,13 @@ MUST_RESOLVE = (
 
 def declared_aim(library: Sequence[Declared]) -> Aim:
     """Hold what was declared beforehand against the mechanisms that must be resolvable."""
+    # Sealed records keep the names that they were sealed with.
+    sealed = {FORMER_NAMES.get(effect.name, effect.name): effect.name for effect in library}
+    wanted = [sealed.get(name, name) for name in MUST_RESOLVE]
     seen = {effect.name for effect in library if effect.resolvable and effect.strongest >= 2.0}
-    missing = [name for name in MUST_RESOLVE if name not in seen]
+    missing = [name for name in wanted if name not in seen]
     found = f"not {', '.join(missing)}" if missing else "every one"
-    question = f"resolvable at half of their range: {', '.join(MUST_RESOLVE)}"
+    question = f"resolvable at half of their range: {', '.join(wanted)}"
     return Aim(question, "every one", found, not missing)
 
 

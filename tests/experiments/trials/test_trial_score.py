@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import pandas as pd
@@ -32,6 +33,8 @@ from experiments.trials.score import (
     scored,
 )
 from experiments.trials.truth import Kind, Label, Sealed, write_labels, write_sealed
+
+KEPT = Path(__file__).parents[3] / "experiments" / "trials" / "record" / "sixth"
 
 
 def label_of(kind: Kind, *names: str, multiple: float = 2.0) -> Label:
@@ -190,6 +193,13 @@ def test_a_strong_trial_ends_in_one_way() -> None:
         ends = by_mechanism(scored(changed, labels, [])).drop(columns="trials")
         assert (ends.sum(axis=1) == 15).all()
         assert ends.loc["a", column] == 1
+
+
+def test_the_kept_record_scores_as_its_page_says(tmp_path: Path) -> None:
+    # The sixth; the fifth was declared before the rules had `finish_points`, so its settings have another hash.
+    shutil.copytree(KEPT, tmp_path / "sixth")
+    page = write_page(tmp_path / "sixth")
+    assert page.read_text(encoding="utf-8") == (KEPT / "README.md").read_text(encoding="utf-8")
 
 
 def test_trials_that_have_not_run_leave_a_record_as_it_is(tmp_path: Path) -> None:
