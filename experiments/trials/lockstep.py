@@ -12,17 +12,16 @@ import os
 import sys
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from concurrent.futures import Future, ProcessPoolExecutor
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
-from multiprocessing.connection import Connection
 from typing import Protocol
 
+from dem_warp.processes import end_with_parent
 from doe.discrepancy import Analysis, Discovery, Outcomes, Point, Simulator
 
 POLITE = 10
 """Niceness of the processes of the analyses."""
-
-_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 @dataclass(frozen=True)
@@ -88,30 +87,28 @@ class ProcessCrew:
 
     Parameters
     ----------
-    pipes
-        One to each process.
+    homes
+        Pools of one process each, with a crew in it.
     """
 
-    def __init__(self, pipes: Sequence[Connection]) -> None:
-        self._pipes = pipes
-        self._homes: dict[str, int] = {}
+    def __init__(self, homes: Sequence[ProcessPoolExecutor]) -> None:
+        self._homes = homes
+        self._dealt: dict[str, int] = {}
         self._asked: list[str] = []
+        self._waiting: list[Future[dict[str, Step]]] = []
 
     def send(self, answers: Mapping[str, Outcomes | None]) -> None:
         """Send each process what its analyses wait for; new analyses are dealt in turn."""
-        self._asked = list(answers)
         shares: dict[int, dict[str, Outcomes | None]] = {}
         for name, answer in answers.items():
-            home = self._homes.setdefault(name, len(self._homes) % len(self._pipes))
+            home = self._dealt.setdefault(name, len(self._dealt) % len(self._homes))
             shares.setdefault(home, {})[name] = answer
-        for home, share in shares.items():
-            self._pipes[home].send(share)
+        self._asked = list(answers)
+        self._waiting = [self._homes[home].submit(_take, share) for home, share in shares.items()]
 
     def collect(self) -> dict[str, Step]:
         """Wait for every process that was sent something."""
-        steps: dict[str, Step] = {}
-        for home in dict.fromkeys(self._homes[name] for name in self._asked):
-            steps |= self._pipes[home].recv()
+        steps = {name: step for ended in self._waiting for name, step in ended.result().items()}
         return {name: steps[name] for name in self._asked}
 
 
@@ -132,57 +129,30 @@ def process_crew(begin: Callable[[str], Analysis], workers: int) -> Iterator[Pro
     """
     # Not forked: the parent may hold a CUDA context and threads, which do not survive a fork.
     context = multiprocessing.get_context("spawn")
-    pipes, processes = [], []
-    try:
-        with _one_thread_each():
-            for _ in range(workers):
-                mine, theirs = context.Pipe()
-                process = context.Process(target=_serve, args=(theirs,), daemon=True)
-                process.start()
-                theirs.close()
-                pipes.append(mine)
-                processes.append(process)
-        # Not with the start, which waits until the process before has loaded its libraries and reads.
-        for pipe in pipes:
-            pipe.send(begin)
-        yield ProcessCrew(pipes)
-    finally:
-        for pipe in pipes:
-            pipe.close()
-        for process in processes:
-            process.join()
+    with ExitStack() as stack:
+        homes = [
+            stack.enter_context(ProcessPoolExecutor(1, context, _settle, (begin,))) for _ in range(workers)
+        ]
+        yield ProcessCrew(homes)
 
 
-@contextmanager
-def _one_thread_each() -> Iterator[None]:
-    """Let processes that are started meanwhile use one thread of linear algebra: there is one a core."""
-    before = {name: os.environ.get(name) for name in _THREADS}
-    os.environ |= dict.fromkeys(_THREADS, "1")
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
+_here: list[LocalCrew] = []
+"""The crew of this process, where it is one of a `ProcessCrew`."""
 
 
-def _serve(pipe: Connection) -> None:
-    """Be told how analyses begin, and run them until the other end of the pipe closes."""
+def _settle(begin: Callable[[str], Analysis]) -> None:
+    """Be told how analyses begin."""
     # Whoever simulates meanwhile goes first: a GPU must not wait for a core.
     if sys.platform != "win32":
         os.nice(POLITE)
-    try:
-        crew = LocalCrew(pipe.recv())
-    except EOFError:
-        return
-    while True:
-        try:
-            crew.send(pipe.recv())
-            pipe.send(crew.collect())
-        except (EOFError, BrokenPipeError):
-            return
+    end_with_parent()
+    _here.append(LocalCrew(begin))
+
+
+def _take(answers: Mapping[str, Outcomes | None]) -> dict[str, Step]:
+    """Take every named analysis to its next wave."""
+    _here[0].send(answers)
+    return _here[0].collect()
 
 
 @dataclass(frozen=True)

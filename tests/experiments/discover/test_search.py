@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from doe.discrepancy import Measured, Outcomes, Point, Verdict, drive
+from doe.errors import RuleError
 from experiments.discover.maker import maker_of_today
 from experiments.discover.observables import NAMES, OBSERVABLES
 from experiments.discover.search import Search
@@ -77,7 +78,7 @@ def test_the_study_says_what_is_looked_for_and_how_hard() -> None:
     ],
 )
 def test_what_cannot_be_looked_for_is_an_error_with_its_place(discover: dict, said: str) -> None:
-    with pytest.raises(InputError, match=said) as error:
+    with pytest.raises((InputError, RuleError), match=said) as error:
         Search.of(trial(discover=discover))
     assert "discover" in str(error.value) or "Settings" in str(error.value)
 
@@ -152,7 +153,7 @@ def test_the_shipped_banks_know_what_made_them(scale: str | None) -> None:
 def test_no_bank_at_all_is_said_so(tmp_path: Path) -> None:
     path = tmp_path / "bank.npz"
     path.write_bytes(b"no archive")
-    with pytest.raises(InputError, match="bank"):
+    with pytest.raises(RuleError, match="bank"):
         Search.of(trial()).read_bank(path)
 
 
