@@ -105,6 +105,11 @@ class Case(Generic[SceneT]):
             self.grains.smallest_sphere, self.grain_material
         )
 
+    @property
+    def kinds(self) -> tuple[type, ...]:
+        """Classes of its scene and its mechanisms, whose code takes part in the result."""
+        return (type(self.scene), *(type(mechanism) for mechanism in self.mechanisms))
+
     def contacts(self, wall_material: Material) -> tuple[ContactCoefficients, ContactCoefficients]:
         """Contacts of grains with grains, and with walls of a material."""
         grain, numerics = self.grain_material, self.numerics

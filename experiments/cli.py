@@ -22,12 +22,31 @@ if TYPE_CHECKING:
 
 app = typer.Typer(
     name="dem-warp",
-    help="Calibrate discrete element models of grain: simulated heaps, designed experiments, repose angles.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
+    context_settings={"help_option_names": ["-h", "--help"]},
 )
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        from dem_warp.version import __version__, source_commit
+
+        commit = source_commit()
+        typer.echo(f"dem-warp {__version__}" + (f" ({commit})" if commit else ""))
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version.")
+    ] = False,
+) -> None:
+    """Calibrate discrete element models of grain: simulated heaps, designed experiments, repose angles."""
+
 
 StudyFile = Annotated[
     Path | None, typer.Argument(metavar="[STUDY.toml]", help="Study file; left out: the paper's buckwheat.")

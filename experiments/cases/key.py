@@ -28,7 +28,7 @@ def case_key(case: Case, **more: object) -> str:
     more
         What else determines what is kept under the key, as JSON-able data.
     """
-    determined_by = {"case": _described(case), "engine": engine_fingerprint(), **more}
+    determined_by = {"case": _described(case), "engine": engine_fingerprint(*case.kinds), **more}
     text = json.dumps(determined_by, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()
 

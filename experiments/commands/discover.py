@@ -12,6 +12,7 @@ from typing import Any
 
 from dem_warp import Progress
 from dem_warp.provenance import engine_fingerprint
+from dem_warp.version import source_commit
 from experiments.cases import open_folder, require_unused
 from experiments.discover.bank import Bank, Maker
 from experiments.discover.data.file import read_measured
@@ -25,7 +26,6 @@ from experiments.discover.simulator import Outcomes, Point
 from experiments.report import HeapPicture
 from experiments.report.discovery import Terms, write_discovery
 from experiments.report.discovery.pictures import photograph, simulated_heaps
-from experiments.report.writer import source_commit
 from experiments.studyfile import Study
 
 Watch = Callable[[str], AbstractContextManager[Callable[[Progress], None] | None]]
@@ -155,7 +155,7 @@ def run_search(job: Job, resume: bool = False, watch: Watch = lambda title: null
     search.settings.write(job.folder / SETTINGS)
     with _Watched(search, job, watch) as simulator:
         if bank is None:
-            bank = search.make_bank(simulator, Maker.of_today(source_commit() or ""))
+            bank = search.make_bank(simulator, Maker.of_today(source_commit()))
             bank.save(job.folder / BANK)
         if measured is None:
             return Ended(None, terms, job.folder / BANK)

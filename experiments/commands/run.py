@@ -14,6 +14,7 @@ from typing import Any
 import pandas as pd
 
 from dem_warp import Progress
+from dem_warp.version import source_commit
 from experiments.calibrate import Campaign, calibrate
 from experiments.calibrate.campaign import StageHook
 from experiments.calibrate.checks import check_study
@@ -23,7 +24,7 @@ from experiments.errors import StudyError
 from experiments.files import write_text
 from experiments.report import heap_pictures, write_report
 from experiments.report.record import draw_heaps, write_record
-from experiments.report.writer import library_versions, source_commit
+from experiments.report.writer import library_versions
 from experiments.studies.buckwheat.replay import Replay
 from experiments.studies.buckwheat.runs import STAGES, planned_cases
 from experiments.studyfile import Study
