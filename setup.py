@@ -1,4 +1,4 @@
-"""Writes the commit that a build comes from into wheels and source archives; all else is in pyproject.toml."""
+"""Writes the commit of a build into wheels and source archives; all else is in pyproject.toml."""
 
 import runpy
 from pathlib import Path

@@ -6,7 +6,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 COMMIT_FILE = "commit.txt"
-"""File in the package's folder that `setup.py` writes into whatever is built from a checkout."""
+"""File beside this one in whatever is built from a checkout; `setup.py` writes it."""
 
 try:
     __version__ = version("dem-warp")
@@ -16,21 +16,14 @@ except PackageNotFoundError:  # a source tree that nobody has installed
 
 @functools.cache
 def source_commit() -> str:
-    """Commit of the checkout that this file lies in, "-dirty" with changes, or that was built; "" if unknown."""
+    """Commit of the checkout or of the build, "-dirty" with changes; empty where it is not known."""
     here = Path(__file__).parent
     if (here.parent / ".git").exists():
-        command = [
-            "git",
-            "-C",
-            str(here.parent),
-            "describe",
-            "--always",
-            "--dirty",
-            "--abbrev=12",
-            "--exclude=*",
-        ]
+        command = ["git", "describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"]
         try:
-            return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
+            return subprocess.run(
+                command, cwd=here, capture_output=True, text=True, check=True
+            ).stdout.strip()
         except (OSError, subprocess.CalledProcessError):
             return ""
     built = here / COMMIT_FILE
