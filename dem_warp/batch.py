@@ -79,7 +79,7 @@ class Batch:
 
     @cached_property
     def maker(self) -> dict[str, Any]:
-        """What must be the same where a checkpoint goes on: versions of libraries, device, engine."""
+        """All that must be the same where a checkpoint goes on: libraries, device, engine."""
         engine = engine_fingerprint(*(kind for case in self.cases for kind in case.kinds))
         same = {name: value for name, value in self.provenance.items() if name not in ("dem-warp", "commit")}
         return same | {"engine": engine}

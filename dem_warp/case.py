@@ -15,7 +15,7 @@ SceneT = TypeVar("SceneT", bound=Scene)
 
 @dataclass(frozen=True)
 class Numerics:
-    """How a case is computed.
+    """Settings of how a case is computed.
 
     Attributes
     ----------

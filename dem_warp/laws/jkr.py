@@ -43,7 +43,7 @@ def relative_contact_radius(depth: Any):
 
 @wp.func
 def relative_attraction(depth: Any):
-    """What JKR's force lacks to Hertz's at the same overlap, over pi W R*, from 5/6 to 3/2."""
+    """Shortfall of JKR's force against Hertz's at the same overlap, over pi W R*, from 5/6 to 3/2."""
     p = relative_contact_radius(depth)
     shape = p * (p * p - type(depth)(3.0) * depth)
     if depth > type(depth)(0.0):

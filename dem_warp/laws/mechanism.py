@@ -1,4 +1,4 @@
-"""What a mechanism is: a physical effect that contacts have beside, or in place of, a part of the base law.
+"""Base class of a mechanism: a physical effect of contacts beside a part of the base law, or in its place.
 
 A mechanism is a frozen dataclass of its parameters, each a field of `ContactParams` under the same name, and
 of device functions (`@wp.func`), each at one of the places where the law can be changed; `None` leaves one as
@@ -57,7 +57,7 @@ class Mechanism:
     excludes: ClassVar[tuple[str, ...]] = ()
     """Names of mechanisms that the same contact may not have, since this one builds on Hertz's force."""
     acts_apart: ClassVar[bool] = False
-    """Whether it acts on surfaces that no longer touch; then `reach` says how far."""
+    """True of one that acts on surfaces that no longer touch; then `reach` says how far."""
 
     spring: ClassVar[Any] = None
     attraction: ClassVar[Any] = None
@@ -88,7 +88,7 @@ class Mechanism:
         return {name: float(getattr(self, name)) for name in self.parameter_names()}
 
     def acts_between(self, kind: str) -> bool:
-        """Whether contacts of a kind, "grains" or "walls", have it."""
+        """Tell whether contacts of a kind, "grains" or "walls", have it."""
         return self.between in ("all", kind)
 
     def reach(self, largest_radius: float, modulus: float) -> float:

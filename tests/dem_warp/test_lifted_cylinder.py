@@ -227,7 +227,7 @@ def test_sizes_stay_within_their_limits_and_follow_their_distribution():
 
 
 def end_of_lift(riding: int) -> tuple[Decision, Decision, float]:
-    """What a controller decides for a bed of 100 that stays where it is, but for some that ride on the tube.
+    """Decision of a controller on a bed of 100 that stays where it is, but for some that ride on the tube.
 
     Returns the first decision after the lift began that asks for anything, the last one, and how far the tube
     had then risen, in its heights.

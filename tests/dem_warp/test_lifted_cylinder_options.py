@@ -1,4 +1,4 @@
-"""What a lifted cylinder may have beside: a tilt, a plate of its own friction, a vibration, air."""
+"""Options of a lifted cylinder: a tilt, a plate of its own friction, a vibration, air."""
 
 import math
 from dataclasses import replace

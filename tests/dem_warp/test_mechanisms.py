@@ -1,4 +1,4 @@
-"""What holds for every mechanism: its null, its checks, how several stand together."""
+"""Rules that hold for every mechanism: its null, its checks, how several stand together."""
 
 import math
 
