@@ -14,7 +14,7 @@ from typing import Any
 import warp as wp
 
 from dem_warp.laws.contact_law import Mechanisms
-from dem_warp.laws.library import PARAMETERS
+from dem_warp.laws.library import parameters
 
 SPHERE_BITS = 23
 """Bits of a neighbour entry that hold the partner (a sphere or a wall); above is the own sphere's number."""
@@ -107,7 +107,7 @@ def device_structs(precision: Precision) -> SimpleNamespace:
     real, vec3, vec4, sphere = precision.real, precision.vec3, precision.vec4, precision.sphere
 
     @wp.struct
-    @_with_fields(dict.fromkeys(PARAMETERS, real))
+    @_with_fields(dict.fromkeys(parameters(), real))
     class ContactParams:
         modulus: real  # effective Young's modulus E* [Pa]
         shear_modulus: real  # effective shear modulus G* [Pa]

@@ -1,5 +1,6 @@
 """Every scene, by its name in study files; a new one is its file and a line here."""
 
+from dem_warp.registry import Registry, require_kind
 from dem_warp.scenes.draw_down import DrawDown
 from dem_warp.scenes.drum import Drum
 from dem_warp.scenes.hopper import Hopper
@@ -8,4 +9,8 @@ from dem_warp.scenes.poured_scene import PouredScene
 
 _ALL: tuple[type[PouredScene], ...] = (LiftedCylinder, Hopper, Drum, DrawDown)
 
-SCENES: dict[str, type[PouredScene]] = {scene.name: scene for scene in _ALL}
+SCENES = Registry(
+    "dem_warp.scenes",
+    {scene.name: scene for scene in _ALL},
+    lambda name, kind, known: require_kind(PouredScene, name, kind),
+)

@@ -1,8 +1,8 @@
 """The library of mechanisms: physical effects that a study may lack.
 
 A mechanism is one more parameter of a study, which the study leaves where it has no effect. Each is one file
-in ``mechanisms/``, named after it; to add one is to add a file. A range may be given in a scale of the grain,
-so that it fits any; `library_for` turns it into the units of a study.
+in ``mechanisms/``, named after it; to add one is to add a file. A package from outside adds the path of one.
+A range may be given in a scale of the grain, so that it fits any; `library_for` turns it into a study's units.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from pydantic import Field
 
 from dem_warp.case import Case
 from dem_warp.materials import effective_moduli
+from dem_warp.registry import Registry
 from dem_warp.scenes.poured_scene import GRAVITY
 from experiments.studyfile import Study, StudyError
 from experiments.studyfile.factor_section import Parameters, dimension_at, merge
@@ -25,9 +26,6 @@ from experiments.studyfile.schema import Section, field_at, validated
 from experiments.studyfile.sections import Physics
 from experiments.studyfile.toml_files import read_toml
 from experiments.studyfile.units import Quantity
-
-FOLDER = Path(__file__).parent / "mechanisms"
-"""The files of the library."""
 
 ScaleName = Literal["grain weight / radius", "grain volume", "grain stiffness"]
 
@@ -68,6 +66,21 @@ class MechanismFile(Section):
     """The further experiment that would show it."""
     companions: dict[str, Scaled | float | str] = Field(default_factory=dict)
     """What else it needs in a study, by place; without effect while it is at its null."""
+
+
+def _check(name: str, path: object, known: Mapping[str, Path]) -> None:
+    """Check the file of a mechanism from outside."""
+    if not isinstance(path, Path):
+        raise TypeError(f"must be the Path of a TOML file, got {path!r}")
+    _read(path)
+
+
+FILES: Mapping[str, Path] = Registry(
+    "dem_warp.mechanisms",
+    {path.stem: path for path in Path(__file__).parent.glob("mechanisms/*.toml")},
+    _check,
+)
+"""The files of the library, by the names of the mechanisms."""
 
 
 @dataclass(frozen=True)
@@ -120,7 +133,7 @@ class Mechanism:
         }
 
 
-def library_for(study: Study, folder: Path = FOLDER) -> tuple[Mechanism, ...]:
+def library_for(study: Study, files: Mapping[str, Path] = FILES) -> tuple[Mechanism, ...]:
     """Read the mechanisms that a study may lack, in alphabetical order.
 
     One that the study cannot have is left out: its test has no such setting, a factor varies it already, it
@@ -130,8 +143,8 @@ def library_for(study: Study, folder: Path = FOLDER) -> tuple[Mechanism, ...]:
     ----------
     study
         The study; it says where each mechanism starts from, and how large its grains are.
-    folder
-        The library.
+    files
+        The library: files by the names of the mechanisms.
 
     Raises
     ------
@@ -139,7 +152,7 @@ def library_for(study: Study, folder: Path = FOLDER) -> tuple[Mechanism, ...]:
         When a file breaks a rule.
     """
     scales = grain_scales(study.case({}, seed=0))
-    found = (_mechanism(path, study, scales) for path in sorted(folder.glob("*.toml")))
+    found = (_mechanism(name, path, study, scales) for name, path in sorted(files.items()))
     return tuple(mechanism for mechanism in found if mechanism is not None and _can_have(study, mechanism))
 
 
@@ -188,17 +201,21 @@ def with_mechanisms(
     return study.with_document(document)
 
 
-def _mechanism(path: Path, study: Study, scales: Mapping[str, float]) -> Mechanism | None:
+def _mechanism(name: str, path: Path, study: Study, scales: Mapping[str, float]) -> Mechanism | None:
     """Read a file for a study; None where the study cannot have the mechanism."""
-    text, document = read_toml(path, "a mechanism of the library")
-    file = validated(MechanismFile, document, Places.read(path, text))
+    file = _read(path)
     null, *others = (_start(study, tuple(place.split(".")), file) for place in file.parameters)
     maximum = _number(file.maximum, scales)
     if null is None or any(other != null for other in others) or null >= maximum:
         return None
     companions = tuple((place, _number(value, scales)) for place, value in file.companions.items())
     shared = file.model_dump(include={"title", "sentence", "kind", "parameters", "unit", "source", "confirm"})
-    return Mechanism(path.stem, **shared, null=null, maximum=maximum, companions=companions)
+    return Mechanism(name, **shared, null=null, maximum=maximum, companions=companions)
+
+
+def _read(path: Path) -> MechanismFile:
+    text, document = read_toml(path, "a mechanism of the library")
+    return validated(MechanismFile, document, Places.read(path, text))
 
 
 def _can_have(study: Study, mechanism: Mechanism) -> bool:

@@ -50,8 +50,10 @@ class NoiseFloorSettings(_Settings):
 
 
 class ScreeningSettings(_Settings):
-    """Stage (b): the Plackett-Burman design."""
+    """Stage (b): the screening design."""
 
+    design: str = "plackett-burman"
+    """Name of the design; packages from outside add further ones."""
     runs: int | None = Field(default=None, ge=4, multiple_of=4)
     """Runs of the design; None: the fewest that leave ``dummies`` columns free."""
     dummies: int = Field(default=3, ge=0)

@@ -51,7 +51,7 @@ from experiments.trials.truth import (
 STUDY = Path(__file__).parents[1] / "studies" / "trial" / "study.toml"
 """The study that the trials are about."""
 
-STRANGERS = Path(__file__).parent / "strangers"
+STRANGERS = {path.stem: path for path in Path(__file__).parent.glob("strangers/*.toml")}
 """Effects that the library never has, written as its mechanisms are."""
 
 STEP_SHARE = 0.8
