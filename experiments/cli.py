@@ -18,7 +18,7 @@ from experiments.commands.console import FAILED_RUN, CaseProgress, clear_errors,
 if TYPE_CHECKING:
     from experiments.calibrate.results import StageResult
     from experiments.cases import Heap
-    from experiments.commands.discover import Job
+    from experiments.runs.search import Job
 
 app = typer.Typer(
     name="dem-warp",
@@ -89,8 +89,7 @@ def calibrate(
 ) -> None:
     """Run a whole calibration: noise floor, screening, climb, surface, optimum, verification, report."""
     with clear_errors():
-        from experiments.commands.choices import chosen_device, chosen_study, default_folder
-        from experiments.commands.run import (
+        from experiments.runs.campaign import (
             Desk,
             check_runs,
             found_by,
@@ -98,6 +97,7 @@ def calibrate(
             replay_paper,
             run_campaign,
         )
+        from experiments.runs.choices import chosen_device, chosen_study, default_folder
 
         device = chosen_device(device)
         chosen = chosen_study(study, scale, device)
@@ -146,9 +146,9 @@ def discover(
 ) -> None:
     """Find the effect that a model lacks: calibrate, test the gap, name what explains it, show it closed."""
     with clear_errors():
-        from experiments.commands.choices import chosen_devices, chosen_study, default_folder
-        from experiments.commands.discover import Job, run_search
         from experiments.report.discovery import results_of, verdict_line
+        from experiments.runs.choices import chosen_devices, chosen_study, default_folder
+        from experiments.runs.search import Job, run_search
 
         device = chosen_devices(device)
         chosen = chosen_study(study, scale, device)
@@ -189,7 +189,7 @@ def heap(
     """
     with clear_errors():
         from experiments.cases import require_unused, simulate_heap, write_heap
-        from experiments.commands.choices import chosen_device, chosen_study, default_folder
+        from experiments.runs.choices import chosen_device, chosen_study, default_folder
         from experiments.studyfile.campaign import TARGET_SCENE
 
         device = chosen_device(device)

@@ -18,7 +18,6 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from experiments.commands.choices import chosen_devices
 from experiments.commands.console import clear_errors
 from experiments.discover.bank import Bank
 from experiments.discover.emulator import fit_emulator
@@ -28,6 +27,7 @@ from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.search import Search
 from experiments.discover.simulator import Outcomes, Simulator
 from experiments.errors import InputError
+from experiments.runs.choices import chosen_devices
 from experiments.studyfile import Study, load_study
 from experiments.studyfile.toml_files import read_toml
 from experiments.trials.declaration import (

@@ -14,8 +14,8 @@ import pyvista
 from typer.testing import CliRunner
 
 from experiments.cli import app
-from experiments.commands import run
 from experiments.commands.console import CaseProgress, describe_progress, duration
+from experiments.runs import campaign as run
 from imaging import save_picture
 
 WriteStudy = Callable[..., Path]
@@ -66,7 +66,7 @@ def test_help_imports_nothing_heavy() -> None:
 
 
 def test_a_calibration_does_not_need_pyvista() -> None:
-    program = "import sys; import experiments.commands.run; print('pyvista' in sys.modules)"
+    program = "import sys; import experiments.runs.campaign; print('pyvista' in sys.modules)"
     assert last_line_of(program) == "False"
 
 

@@ -10,14 +10,14 @@ import pytest
 from typer.testing import CliRunner
 
 from experiments.cli import app
-from experiments.commands import discover as commands
-from experiments.commands.discover import OUTCOMES, Ended, Job, run_search
-from experiments.commands.run import check_runs
 from experiments.discover import devices
 from experiments.discover.observables import PHOTOGRAPHED
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.wave import WaveRunner
 from experiments.report.discovery import Terms
+from experiments.runs import search as commands
+from experiments.runs.campaign import check_runs
+from experiments.runs.search import OUTCOMES, Ended, Job, run_search
 from experiments.studyfile import load_study
 
 TRIAL = Path(__file__).parents[3] / "experiments" / "studies" / "trial"

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from experiments.discover import library
 from experiments.discover.library import FILES, library_for, with_mechanisms
 from experiments.errors import StudyError
 from experiments.studyfile import Study, load_study

@@ -11,12 +11,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from experiments.commands.run import check_runs
 from experiments.discover.discovery import Discovery, Interval, Verdict
 from experiments.discover.library import library_for
 from experiments.discover.observables import OBSERVABLES
 from experiments.discover.settings import Settings
 from experiments.report.discovery import Terms, write_discovery
+from experiments.runs.campaign import check_runs
 from experiments.studyfile import Study, load_study
 
 Discovered = Callable[[Verdict], Discovery]
