@@ -17,20 +17,20 @@ from dem_warp.version import __version__, source_commit
 PACKAGE = "dem_warp"
 
 
-def engine_fingerprint(*kinds: type) -> str:
+def engine_fingerprint(*parts: Any) -> str:
     """Hash of what the engine's code means, and of the version of Warp that compiles it.
 
     Parameters
     ----------
-    kinds : type
-        Laws and scenes that take part. The packages of those from outside are hashed too.
+    parts : types or functions
+        Laws, scenes and whatever else takes part. The packages of those from outside are hashed too.
 
     Notes
     -----
     Comments, docstrings and the form of the text do not count, so that a corrected comment leaves stored
     cases valid; names of files do.
     """
-    outside = {kind.__module__ for kind in kinds if _top(kind.__module__) != PACKAGE}
+    outside = {part.__module__ for part in parts if _top(part.__module__) != PACKAGE}
     return _fingerprint(tuple(sorted(outside)))
 
 

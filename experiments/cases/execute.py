@@ -177,7 +177,8 @@ def _simulate_missing(
         outcomes[key] = pool.submit(measure, key, result)
 
     if missing:
-        simulate(
+        run = store.engine or simulate
+        run(
             [cases[key] for key in missing],
             device=device,
             workers=workers,

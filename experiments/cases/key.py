@@ -10,6 +10,7 @@ import numpy as np
 
 from dem_warp import Case
 from dem_warp.provenance import engine_fingerprint
+from experiments.cases.engines import Engine
 
 SHAPE_DIGITS = 12
 """Digits of the spheres of a shape, relative to its size, that make another case.
@@ -18,17 +19,21 @@ A clump's centre of mass is a sum whose last bits differ between processors, by 
 """
 
 
-def case_key(case: Case, **more: object) -> str:
+def case_key(case: Case, engine: Engine | None = None, **more: object) -> str:
     """Key of a case: a hash of all that determines its result, the engine's own code included.
 
     Parameters
     ----------
     case
         The case. Spheres of its shapes that agree to `SHAPE_DIGITS` count as the same.
+    engine
+        What simulates it; None: `dem_warp.simulate`.
     more
         What else determines what is kept under the key, as JSON-able data.
     """
-    determined_by = {"case": _described(case), "engine": engine_fingerprint(*case.kinds), **more}
+    outside = [] if engine is None else [engine]
+    more |= {"simulated by": getattr(one, "__qualname__", type(one).__qualname__) for one in outside}
+    determined_by = {"case": _described(case), "engine": engine_fingerprint(*case.kinds, *outside), **more}
     text = json.dumps(determined_by, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()
 

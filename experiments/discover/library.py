@@ -2,7 +2,8 @@
 
 A mechanism is one more parameter of a study, which the study leaves where it has no effect. Each is one file
 in ``mechanisms/``, named after it; to add one is to add a file. A package from outside adds the path of one.
-A range may be given in a scale of the grain, so that it fits any; `library_for` turns it into a study's units.
+A range may be given in a scale of the grain, so that it fits any; `library_for` turns it into the study's
+units.
 """
 
 from __future__ import annotations

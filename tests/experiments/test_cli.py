@@ -13,6 +13,7 @@ import pytest
 import pyvista
 from typer.testing import CliRunner
 
+from experiments import api
 from experiments.cli import app
 from experiments.commands.console import CaseProgress, describe_progress, duration
 from experiments.runs import campaign as run
@@ -179,7 +180,7 @@ def test_an_interruption_says_how_to_go_on(write_study: WriteStudy, monkeypatch:
     def interrupt(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(run, "run_campaign", interrupt)
+    monkeypatch.setattr(api, "run_campaign", interrupt)
     path = write_study()
     code, _, err = dem_warp("calibrate", path, "--scale", "stiff", "--device", "cpu", "--out", "results")
     assert code == 130

@@ -95,4 +95,4 @@ def test_a_wrong_file_is_named_with_its_line(trial: Study, tmp_path: Path) -> No
     path = tmp_path / "twisting.toml"
     path.write_text(text.replace("twisting.twisting_radius", "twisting.radius"), encoding="utf-8")
     with pytest.raises(StudyError, match=r"twisting.toml:4: parameters: must lead to a quantity"):
-        library_for(trial, tmp_path)
+        library_for(trial, {"twisting": path})
