@@ -28,12 +28,13 @@ def case_key(case: Case, **more: object) -> str:
     more
         What else determines what is kept under the key, as JSON-able data.
     """
-    determined_by = {"case": _described(case), "engine": engine_fingerprint(), **more}
+    determined_by = {"case": described(case), "engine": engine_fingerprint(), **more}
     text = json.dumps(determined_by, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def _described(case: Case) -> dict[str, Any]:
+def described(case: Case) -> dict[str, Any]:
+    """All of a case that determines its result, as JSON-able data."""
     described = case.to_dict()
     shape = described["grains"]["shape"]
     for spheres in shape.get("shapes", [shape]):
