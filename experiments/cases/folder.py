@@ -36,9 +36,9 @@ def open_folder(folder: Path, study: Study, resume: bool = False) -> tuple[Store
     Returns
     -------
     store
-        Where the cases are kept.
+        Store of the cases.
     changes
-        What differs from the study that the folder was made with, one line a key. Cases that a change does
+        Differences from the study that the folder was made with, one line a key. Cases that a change does
         not touch are used again: each is stored under all that determines it.
 
     Raises
@@ -58,7 +58,7 @@ def open_folder(folder: Path, study: Study, resume: bool = False) -> tuple[Store
 
 
 def is_used(folder: Path) -> bool:
-    """Whether a folder, or a file of that name, holds something."""
+    """Tell that a folder, or a file of that name, holds something."""
     return folder.exists() and (not folder.is_dir() or any(folder.iterdir()))
 
 

@@ -1,4 +1,4 @@
-"""What a case is known by on every machine: a hash of all that determines its result."""
+"""Key of a case, the same on every machine: a hash of all that determines its result."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def case_key(case: Case, **more: object) -> str:
     case
         The case. Spheres of its shapes that agree to `SHAPE_DIGITS` count as the same.
     more
-        What else determines what is kept under the key, as JSON-able data.
+        Whatever else determines what is kept under the key, as JSON-able data.
     """
     determined_by = {"case": described(case), "engine": engine_fingerprint(), **more}
     text = json.dumps(determined_by, sort_keys=True, separators=(",", ":"), allow_nan=False)

@@ -23,7 +23,7 @@ from experiments.studyfile.factor_section import Parameters, merge
 from experiments.studyfile.places import Places, drop, nested, value_at
 from experiments.studyfile.schema import Section, field_at, validated
 from experiments.studyfile.sections import Physics
-from experiments.studyfile.setters import Setter
+from experiments.studyfile.setters import setter_at
 from experiments.studyfile.toml_files import read_toml
 from experiments.studyfile.units import Quantity
 
@@ -220,7 +220,7 @@ def _start(study: Study, path: tuple[str, ...], file: MechanismFile) -> float | 
         field = field_at(Physics, path)
         default = field.default if field else None
         return float(default) if isinstance(default, float) else file.null
-    return Setter.at(".".join(path)).dimension.to_unit(written, "" if file.unit == "1" else file.unit)
+    return setter_at(".".join(path)).dimension.to_unit(written, "" if file.unit == "1" else file.unit)
 
 
 def _number(value: Any, scales: Mapping[str, float]) -> Any:

@@ -1,4 +1,4 @@
-"""What a person can decide about a calibration campaign, and what a campaign needs to know of a study.
+"""Decisions of a calibration campaign, and the part of a study that a campaign knows.
 
 Every number that a stage decides with is a field here, so that the study file can fix it. Factor values
 (``start``, ``step``, ``center``, ``half_range``, ``point``, ``truth``) are in each factor's natural unit;
@@ -44,7 +44,7 @@ FactorValues = Annotated[dict[str, float], BeforeValidator(_in_natural_units)]
 
 
 class SeedSettings(Section):
-    """Where the seeds of all cases come from; each case has its own."""
+    """Roots of the seeds of all cases; each case has its own."""
 
     campaign: int = Field(default=1, ge=0)
     """Root of the seeds of every stage's cases."""
@@ -113,7 +113,7 @@ class ClimbSettings(Section):
     extensions: int = Field(default=1, ge=0)
     """Further batches of up to ``steps`` points when the target was not crossed."""
     reach: float = Field(default=2.0, ge=1.0)
-    """How far from the middle the climb may go, in half-ranges (hard limits hold in any case)."""
+    """Farthest that the climb may go from the middle, in half-ranges (hard limits hold in any case)."""
     alpha: float = Field(default=0.05, gt=0.0, lt=1.0)
     """A fall from the best step, or any change along the path, counts when significant at this level."""
 
@@ -205,7 +205,7 @@ class Response(Section):
     """A number beside the angle that the cases must match."""
 
     name: str
-    """What it is called; other than the angle, and than every other response."""
+    """Name, other than the angle, and than every other response."""
     observable: str
     """Column of the cases that holds it."""
     unit: str = "1"
@@ -226,7 +226,7 @@ class MeasuredResponse(Response):
 
 
 class MeasuredTarget(Section):
-    """What the physical tests gave."""
+    """Result of the physical tests."""
 
     mean: float = Field(gt=0.0, lt=90.0)
     """Mean repose angle [deg]."""
@@ -250,7 +250,7 @@ class TwinTarget(Section):
 
 
 class CampaignStudy(Protocol):
-    """What ``calibrate`` reads of a study."""
+    """Part of a study that ``calibrate`` reads."""
 
     @property
     def factors(self) -> Sequence[Factor]:
@@ -262,7 +262,7 @@ class CampaignStudy(Protocol):
 
     @property
     def target(self) -> MeasuredTarget | TwinTarget:
-        """What the heaps, and the cases of further scenes, must match."""
+        """Target of the heaps, and of the cases of further scenes."""
 
     @property
     def limits(self) -> Mapping[str, tuple[float, float]]:

@@ -12,7 +12,7 @@ from doe.factors import Factor
 from experiments.errors import StudyError
 from experiments.studyfile.places import Places, nested, value_at
 from experiments.studyfile.schema import Dimension, RawQuantity, Section, nearest_name
-from experiments.studyfile.setters import Setter
+from experiments.studyfile.setters import Setter, setter_at
 from experiments.studyfile.units import Quantity
 
 
@@ -22,7 +22,7 @@ def _read_parameters(value: object) -> tuple[str, ...]:
     if not places or not all(isinstance(place, str) for place in places):
         raise ValueError("must be the place of a parameter, or a list of places")
     for place in places:
-        Setter.at(place)
+        setter_at(place)
     return places
 
 
@@ -36,7 +36,7 @@ class FactorSection(Section):
     name: str = Field(pattern=r"^[A-Za-z_]\w*$")
     """Short name: a column of every table, and what ``--set`` takes."""
     label: str
-    """What it is, in words."""
+    """Its meaning, in words."""
     parameter: Parameters
     """The parameter's place in the study, as ``contact.grain-grain.static_friction``; or several places of
     one value."""
@@ -49,7 +49,7 @@ class FactorSection(Section):
     @classmethod
     def _has_the_dimension(cls, level: Quantity, info: ValidationInfo) -> Quantity:
         for parameter in info.data.get("parameter", ()):
-            Setter.at(parameter).dimension.to_base(level)
+            setter_at(parameter).dimension.to_base(level)
         return level
 
     @model_validator(mode="after")
@@ -65,7 +65,7 @@ class FactorSection(Section):
     @cached_property
     def setters(self) -> tuple[Setter, ...]:
         """Setter of each of its places."""
-        return tuple(Setter.at(parameter) for parameter in self.parameter)
+        return tuple(setter_at(parameter) for parameter in self.parameter)
 
     @property
     def paths(self) -> tuple[tuple[str, ...], ...]:

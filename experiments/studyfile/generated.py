@@ -10,7 +10,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import MISSING, fields, is_dataclass
 from functools import cache
-from typing import Annotated, Any, ClassVar, Self, TypeVar, get_args, get_type_hints
+from typing import Annotated, Any, ClassVar, Self, get_args, get_type_hints
 
 from annotated_types import Ge, Gt, Le, Lt
 from pydantic import AfterValidator, Field, create_model, model_validator
@@ -18,8 +18,6 @@ from pydantic import AfterValidator, Field, create_model, model_validator
 from dem_warp.parameters import Parameter, parameters_of
 from experiments.studyfile.schema import Dimension, Section
 from experiments.studyfile.units import dimension_of_unit
-
-LibraryT = TypeVar("LibraryT", bound="LibrarySection")
 
 
 class EngineSection(Section):
@@ -75,17 +73,9 @@ def section_for(engine: type, base: type[EngineSection] = EngineSection) -> type
     return section
 
 
-def library_section(
-    section: type[LibraryT], library: Mapping[str, type], base: type[EngineSection]
-) -> type[LibraryT]:
-    """Generate the section of a library, as it is now."""
-    return _library_section(section, tuple(library.items()), base)  # type: ignore[return-value]
-
-
 @cache
-def _library_section(
-    section: type[LibrarySection], library: tuple[tuple[str, type], ...], base: type[EngineSection]
-) -> type[LibrarySection]:
+def library_section(section: type[Section], base: type[EngineSection], *library: tuple[str, type]) -> Any:
+    """Generate the section of a library from the name and the class of each thing."""
     keys: dict[str, Any] = {
         name.replace("-", "_"): (section_for(engine, base) | None, Field(default=None, alias=name))
         for name, engine in library

@@ -33,5 +33,5 @@ class MechanismsSection(LibrarySection):
 
 
 def mechanisms_section() -> type[MechanismsSection]:
-    """Generate the section of the mechanisms of the library."""
-    return library_section(MechanismsSection, MECHANISMS, MechanismSection)
+    """Generate the section of the mechanisms of the library, as it is now."""
+    return library_section(MechanismsSection, MechanismSection, *MECHANISMS.items())

@@ -20,9 +20,7 @@ class TestSection(EngineSection):
     """``[scene.NAME]``: parameters of a test."""
 
     # None of a scene's rules is about the material of its walls.
-    beside: ClassVar[Mapping[str, Any]] = {
-        "wall_material": Material(density=7800.0, shear_modulus=70e9, poisson_ratio=0.3)
-    }
+    beside: ClassVar[Mapping[str, Any]] = {"wall_material": Material(7800.0, 70e9, 0.3)}
 
 
 class SceneSection(LibrarySection):
@@ -63,5 +61,5 @@ class SceneSection(LibrarySection):
 
 
 def scene_section() -> type[SceneSection]:
-    """Generate the section of the scenes of the library."""
-    return library_section(SceneSection, SCENES, TestSection)
+    """Generate the section of the scenes of the library, as it is now."""
+    return library_section(SceneSection, TestSection, *SCENES.items())

@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, NamedTuple, TypeVar, get_args, get_origin
+from typing import Annotated, Any, TypeVar, get_args, get_origin
 
 from annotated_types import Ge, Gt, Le, Lt
 from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, PlainValidator, ValidationError
@@ -95,28 +95,19 @@ class Generated:
         return core_schema.no_info_plain_validator_function(self.read)
 
 
-class Step(NamedTuple):
-    """A key of a path through sections."""
-
-    attribute: str
-    """Name of the field, or the key itself where it names one of several sections."""
-    field: FieldInfo
-    """Field that the path has come to."""
-
-
-def steps(model: type[BaseModel], path: KeyPath) -> list[Step]:
-    """Follow a key path through sections; empty where there is no such field."""
-    found: list[Step] = []
+def steps(model: type[BaseModel], path: KeyPath) -> list[tuple[str, FieldInfo]]:
+    """Follow a key path through sections: attribute and field of each key; empty where there is no field."""
+    found: list[tuple[str, FieldInfo]] = []
     section: type[BaseModel] | None = model
     named = False  # whether the next key is the name of one section among several
     for key in path:
         if named or isinstance(key, int):
-            found.append(found[-1]._replace(attribute=str(key)))
+            found.append((str(key), found[-1][1]))
             named = False
         elif section is None or key not in (known := fields_of(section)):
             return []
         else:
-            found.append(Step(*known[key]))
+            found.append(known[key])
             section, named = section_of(known[key][1]), get_origin(known[key][1].annotation) is dict
     return found
 
@@ -124,17 +115,12 @@ def steps(model: type[BaseModel], path: KeyPath) -> list[Step]:
 def field_at(model: type[BaseModel], path: KeyPath) -> FieldInfo | None:
     """Find the field that a key path leads to; None when there is none."""
     found = steps(model, path)
-    return found[-1].field if found else None
+    return found[-1][1] if found else None
 
 
 def dimension_of(field: FieldInfo) -> Dimension | None:
     """Find the dimension of a quantity's field, be it optional or not; None for any other field."""
     return next((mark for mark in _marks(field) if isinstance(mark, Dimension)), None)
-
-
-def annotation(field: FieldInfo) -> Any:
-    """Whole type of a field, its marks included."""
-    return Annotated[(field.annotation, *field.metadata)] if field.metadata else field.annotation
 
 
 def bounds(field: FieldInfo) -> tuple[float, float]:

@@ -22,7 +22,7 @@ from experiments.studyfile.schema import Density, Generated, Length, Number, Pre
 
 
 class MaterialSection(Section):
-    """What a grain or a wall is made of."""
+    """Material of a grain or a wall."""
 
     density: Density = Field(gt=0.0)
     """Mass of the solid per volume."""
@@ -39,7 +39,7 @@ class MaterialSection(Section):
 
 
 class ShapeSection(Section):
-    """Where a shape comes from: a file of spheres, or the radius of one."""
+    """Source of a shape: a file of spheres, or the radius of one."""
 
     clump: Path | None = None
     """File with the clump's spheres (x y z r in mm), relative to the study file."""
@@ -87,8 +87,8 @@ class GrainSection(MaterialSection, ShapeSection):
     size_mean: Number = Field(default=1.0, gt=0.0)
     """Mean size, as a multiple of the shape."""
     size_mean_of: Literal["sizes", "masses"] = "sizes"
-    """Whether that is the mean of the sizes, as a ruler gives it, or the size of a grain of mean mass, as a
-    balance does: then a wider spread leaves the mass of a number of grains as it is."""
+    """Mean of the sizes, as a ruler gives it, or size of a grain of mean mass, as a balance does: then a wider
+    spread leaves the mass of a number of grains as it is."""
     size_sd: Number = Field(default=0.05, ge=0.0)
     """Standard deviation of the size."""
     elongation: Number = Field(default=0.0, ge=0.0)

@@ -2,25 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import BaseModel, TypeAdapter, ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 from experiments.studyfile.mechanisms import mechanisms_section
 from experiments.studyfile.scene_sections import scene_section
-from experiments.studyfile.schema import (
-    Dimension,
-    Section,
-    SectionT,
-    annotation,
-    bounds,
-    dimension_of,
-    message,
-    steps,
-)
+from experiments.studyfile.schema import Dimension, Section, bounds, dimension_of, message, steps
 from experiments.studyfile.sections import Physics
 from experiments.studyfile.units import Quantity
 
@@ -40,18 +30,6 @@ class Setter:
     number: TypeAdapter[Any]
     """Reads a quantity as the field does: in SI, within its bounds."""
 
-    @classmethod
-    def at(cls, parameter: str) -> Setter:
-        """Compile the setter of a place, as ``contact.grain-grain.static_friction``.
-
-        Raises
-        ------
-        ValueError
-            When there is no quantity.
-        """
-        # A place may lead elsewhere once a library has grown.
-        return _compiled(parameter, scene_section(), mechanisms_section())
-
     def write(self, changes: dict[str, Any], quantity: Quantity) -> None:
         """Add a quantity at this place to the changes of a study's physics.
 
@@ -70,29 +48,34 @@ class Setter:
         changes[last] = value
 
 
-def changed(section: SectionT, changes: Mapping[str, Any]) -> SectionT:
-    """Copy a section, each section inside that changes copied once; `changes` are nested as it is."""
-    return section.model_copy(update=_changed_values(vars(section), changes))
+def setter_at(parameter: str) -> Setter:
+    """Compile the setter of a place, as ``contact.grain-grain.static_friction``.
 
-
-def _changed_values(values: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    def new(value: Any, change: Any) -> Any:
-        if not isinstance(change, dict):
-            return change
-        return (
-            changed(value, change) if isinstance(value, BaseModel) else value | _changed_values(value, change)
-        )
-
-    return {name: new(values[name], change) for name, change in changes.items()}
+    Raises
+    ------
+    ValueError
+        When there is no quantity.
+    """
+    # A place may lead elsewhere once a library has grown.
+    return _compiled(parameter, scene_section(), mechanisms_section())
 
 
 @cache
 def _compiled(parameter: str, *libraries: type[Section]) -> Setter:
     path = tuple(parameter.split("."))
     trail = steps(Physics, path)
-    dimension = dimension_of(trail[-1].field) if trail else None
-    if dimension is None:
+    field = trail[-1][1] if trail else None
+    dimension = dimension_of(field) if field else None
+    if field is None or dimension is None:
         raise ValueError('must lead to a quantity of the study, as "contact.grain-grain.static_friction"')
-    attributes = tuple(step.attribute for step in trail)
-    field = trail[-1].field
-    return Setter(path, attributes, dimension, bounds(field), TypeAdapter(annotation(field)))
+    kind: Any = Annotated[(field.annotation, *field.metadata)] if field.metadata else field.annotation
+    return Setter(path, tuple(name for name, _ in trail), dimension, bounds(field), TypeAdapter(kind))
+
+
+def changed(value: Any, change: Any) -> Any:
+    """Copy a section, or sections by name, with changes nested as it is."""
+    if not isinstance(change, dict):
+        return change
+    old = value if isinstance(value, dict) else vars(value)
+    new = {name: changed(old[name], each) for name, each in change.items()}
+    return value | new if isinstance(value, dict) else value.model_copy(update=new)

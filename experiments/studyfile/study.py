@@ -50,7 +50,7 @@ BUCKWHEAT = Path(__file__).parents[1] / "studies" / "buckwheat" / "study.toml"
 
 
 class MeasurementSection(Section):
-    """``[measurement]``: how an angle is read from a heap; only angles read the same way compare."""
+    """``[measurement]``: the reading of an angle from a heap; only angles read the same way compare."""
 
     fit: str = "flank"
     """Part of the flank that the line is fitted to, one of ``imaging.FITS``."""
@@ -71,17 +71,17 @@ class Study(Physics):
     """Everything that a person configures; built by `load_study`."""
 
     name: str
-    """What is calibrated, in words."""
+    """Name of what is calibrated, in words."""
     note: str = ""
-    """What a reader must know about the study at this scale."""
+    """Note that a reader needs of the study at this scale."""
     paper: bool = False
     """The study is the paper's buckwheat: the report shows the published numbers beside."""
     measurement: MeasurementSection = MeasurementSection()
-    """How the angle is read."""
+    """The reading of the angle."""
     target_section: TargetSection | None = Field(default=None, alias="target")
     """The angle to be matched."""
     response_sections: tuple[ResponseSection, ...] = Field(default=(), alias="response")
-    """What else is to be matched."""
+    """Further numbers to be matched."""
     response_scenes: dict[str, Scene] = Field(default_factory=dict, alias="response-scene")
     """Further scenes, by the names that responses call them by."""
     factor_sections: tuple[FactorSection, ...] = Field(default=(), alias="factor")
@@ -91,7 +91,7 @@ class Study(Physics):
     campaign: CampaignSettings = CampaignSettings()
     """Every decision of the campaign."""
     discover: DiscoverSection = DiscoverSection()
-    """What a search for a missing effect looks for."""
+    """The search for a missing effect."""
 
     _document: dict[str, Any] = PrivateAttr(default_factory=dict)
     _places: Places = PrivateAttr(default_factory=lambda: Places(BUCKWHEAT, {}))
@@ -115,7 +115,7 @@ class Study(Physics):
 
     @property
     def target(self) -> MeasuredTarget | TwinTarget:
-        """What the heaps must match.
+        """Target that the heaps must match.
 
         Raises
         ------
@@ -133,7 +133,7 @@ class Study(Physics):
 
     @cached_property
     def responses(self) -> tuple[Response, ...]:
-        """What is to be matched beside the angle.
+        """Responses to be matched beside the angle.
 
         Raises
         ------
@@ -155,7 +155,7 @@ class Study(Physics):
 
     @cached_property
     def conditions(self) -> tuple[Condition, ...]:
-        """What the grain is tested under, in the order of the file; none written: the test as it is."""
+        """Conditions of the tests, in the order of the file; none written: the test as it is."""
         return tuple(section.condition(name) for name, section in self.condition_sections.items()) or (BASE,)
 
     def under(self, condition: str) -> Study:
@@ -267,7 +267,7 @@ def load_study(
     scale
         Name of a ``[scale.NAME]`` table to merge over the rest; None: the study as written.
     changes
-        What a caller merges over that, table by table, as written in a study file.
+        Sections that a caller merges over that, table by table, as written in a study file.
 
     Raises
     ------
