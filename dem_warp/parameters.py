@@ -22,24 +22,24 @@ class Parameter:
     at_most: float | None = None
 
     def breach(self, value: float) -> str:
-        """Say which rule a value breaks; empty where it breaks none."""
-        low = -math.inf if self.at_least is None else self.at_least
-        if not (math.isfinite(value) and value >= low and (self.above is None or value > self.above)):
-            return self._lower_rule
+        """Rule that a value breaks, with the unit; empty where it breaks none."""
         unit = "" if self.unit == "1" else f" [{self.unit}]"
-        if self.below is not None and not value < self.below:
-            return f"must be below {self.below:g}{unit}"
-        if self.at_most is not None and not value <= self.at_most:
-            return f"must be at most {self.at_most:g}{unit}"
-        return ""
+        return f"must be {rule}{unit}" if (rule := self._broken(value)) else ""
 
-    @property
-    def _lower_rule(self) -> str:
-        if self.at_least is not None:
-            return f"must be finite and {self.at_least:g} or more"
-        if self.above is not None:
-            return f"must be {f'above {self.above:g}' if self.above else 'positive'} and finite"
-        return "must be finite"
+    def _broken(self, value: float) -> str:
+        if self.above is not None and not self.above < value < math.inf:
+            return f"{f'above {self.above:g}' if self.above else 'positive'} and finite"
+        if self.at_least == 0.0 and not 0.0 <= value < math.inf:
+            return "finite and 0 or more"
+        if not math.isfinite(value):
+            return "finite"
+        if self.at_least is not None and value < self.at_least:
+            return f"at least {self.at_least:g}"
+        if self.below is not None and value >= self.below:
+            return f"below {self.below:g}"
+        if self.at_most is not None and value > self.at_most:
+            return f"at most {self.at_most:g}"
+        return ""
 
 
 @cache
@@ -67,7 +67,7 @@ def check_parameters(instance: object) -> None:
     ValueError
         With class and field, the rule and the value received.
     """
-    for name, parameter in parameters_of(type(instance)).items():
+    for name, parameter in parameters_of(type(instance)).items():  # type: ignore[arg-type]
         value = getattr(instance, name)
         if value is not None and (rule := parameter.breach(value)):
             raise ValueError(f"{type(instance).__name__}.{name}: {rule}, got {value!r}")

@@ -139,15 +139,10 @@ class SurfaceAngles(NamedTuple):
 
 @dataclass
 class Turning(Course):
-    """Course of a drum.
-
-    Attributes
-    ----------
-    angles : list of list of float
-        `SurfaceAngles` of every look at which all of them could be seen.
-    """
+    """Course of a drum."""
 
     angles: list[list[float]] = field(default_factory=list)
+    """`SurfaceAngles` of every look at which all of them could be seen."""
 
 
 class DrumController(PouredController[Turning]):

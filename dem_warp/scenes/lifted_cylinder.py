@@ -187,24 +187,16 @@ class LiftedCylinder(PouredScene):
 
 @dataclass
 class Lift(Course):
-    """Course of a lifted cylinder.
-
-    Attributes
-    ----------
-    mass : float
-        Of the grains that filled the tube [kg].
-    surface : list of float
-        Time since the start of the lift [s], and level of the surface [m], when last looked at.
-    pushed : float
-        What the grains had given to the tube, along its axis, when the lift began [N s].
-    drawn : list of float
-        Time since the start of the lift [s], and what they had given to it when last looked at.
-    """
+    """Course of a lifted cylinder."""
 
     mass: float = 0.0
+    """Of the grains that filled the tube [kg]."""
     surface: list[float] = field(default_factory=list)
+    """Time since the start of the lift [s], and level of the surface [m], when last looked at."""
     pushed: float = 0.0
+    """Impulse of the grains on the tube, along its axis, when the lift began [N s]."""
     drawn: list[float] = field(default_factory=list)
+    """Time since the start of the lift [s], and that impulse, when last looked at."""
 
 
 class LiftController(PouredController[Lift]):
@@ -300,7 +292,7 @@ class LiftController(PouredController[Lift]):
         course.enter("rest", view)
 
     def _weigh_heap(self, view: WorldView) -> None:
-        """Where the mass came to lie."""
+        """Measure where the mass came to lie."""
         masses, positions = view.masses[view.alive].astype(float), view.positions[view.alive]
         near = np.hypot(positions[:, 0], positions[:, 1]) <= ROLLED * self.scene.diameter / 2
         self.course.observables["rolled_fraction"] = 1.0 - float(masses[near].sum()) / self.course.mass

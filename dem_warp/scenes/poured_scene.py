@@ -23,7 +23,7 @@ FILL_OBSERVABLES = {
     "solid_fraction": Observable("1", "volume of the grains over that of the container up to the surface"),
     "simulated_time": Observable("s", "from the first grain of the rain to the end"),
 }
-"""What every poured scene measures."""
+"""Observables of every poured scene."""
 
 
 @dataclass(frozen=True, kw_only=True)

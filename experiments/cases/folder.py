@@ -41,9 +41,9 @@ def open_folder(
     Returns
     -------
     store
-        Where the cases are kept.
+        Store of the cases.
     changes
-        What differs from the study that the folder was made with, one line a key. Cases that a change does
+        Differences from the study that the folder was made with, one line a key. Cases that a change does
         not touch are used again: each is stored under all that determines it.
 
     Raises
@@ -63,7 +63,7 @@ def open_folder(
 
 
 def is_used(folder: Path) -> bool:
-    """Whether a folder, or a file of that name, holds something."""
+    """Tell that a folder, or a file of that name, holds something."""
     return folder.exists() and (not folder.is_dir() or any(folder.iterdir()))
 
 

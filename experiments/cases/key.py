@@ -1,4 +1,4 @@
-"""What a case is known by on every machine: a hash of all that determines its result."""
+"""Key of a case, the same on every machine: a hash of all that determines its result."""
 
 from __future__ import annotations
 
@@ -29,16 +29,17 @@ def case_key(case: Case, engine: Engine | None = None, **more: object) -> str:
     engine
         What simulates it; None: `dem_warp.simulate`.
     more
-        What else determines what is kept under the key, as JSON-able data.
+        Whatever else determines what is kept under the key, as JSON-able data.
     """
     outside = [] if engine is None else [engine]
     more |= {"simulated by": getattr(one, "__qualname__", type(one).__qualname__) for one in outside}
-    determined_by = {"case": _described(case), "engine": engine_fingerprint(*case.kinds, *outside), **more}
+    determined_by = {"case": described(case), "engine": engine_fingerprint(*case.kinds, *outside), **more}
     text = json.dumps(determined_by, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def _described(case: Case) -> dict[str, Any]:
+def described(case: Case) -> dict[str, Any]:
+    """All of a case that determines its result, as JSON-able data."""
     described = case.to_dict()
     shape = described["grains"]["shape"]
     for spheres in shape.get("shapes", [shape]):

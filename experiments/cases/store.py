@@ -56,11 +56,11 @@ class Store:
         return len(list(self.folder.glob("*.npz")))
 
     def has(self, key: str) -> bool:
-        """Whether the case is stored and whole."""
+        """Tell that the case is stored and whole."""
         return self.path(key).is_file() and self.damage(key) is None
 
     def damage(self, key: str) -> str | None:
-        """What is wrong with a stored case; None when it is whole or absent."""
+        """Fault of a stored case; None when it is whole or absent."""
         if not self.path(key).exists():
             return None
         try:

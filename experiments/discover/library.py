@@ -21,10 +21,11 @@ from dem_warp.materials import effective_moduli
 from dem_warp.registry import Registry
 from dem_warp.scenes.poured_scene import GRAVITY
 from experiments.studyfile import Study, StudyError
-from experiments.studyfile.factor_section import Parameters, dimension_at, merge
+from experiments.studyfile.factor_section import Parameters, merge
 from experiments.studyfile.places import Places, drop, nested, value_at
 from experiments.studyfile.schema import Section, field_at, validated
 from experiments.studyfile.sections import Physics
+from experiments.studyfile.setters import setter_at
 from experiments.studyfile.toml_files import read_toml
 from experiments.studyfile.units import Quantity
 
@@ -123,8 +124,7 @@ class Mechanism:
     def factor(self, low: float | None = None, high: float | None = None) -> dict[str, Any]:
         """Write it as a ``[[factor]]`` of a study, its range this one or the whole."""
         ends = (self.null if low is None else low, self.maximum if high is None else high)
-        dimension = dimension_at(self.parameters[0])
-        written = [str(Quantity(end, self.unit)) if dimension else end for end in ends]
+        written = [end if self.unit == "1" else str(Quantity(end, self.unit)) for end in ends]
         return {
             "name": self.name,
             "label": self.title,
@@ -238,9 +238,7 @@ def _start(study: Study, path: tuple[str, ...], file: MechanismFile) -> float | 
         field = field_at(Physics, path)
         default = field.default if field else None
         return float(default) if isinstance(default, float) else file.null
-    dimension = dimension_at(".".join(path))
-    quantity = Quantity.parse(written)
-    return quantity.to_unit(file.unit, dimension) if dimension else quantity.to_base("")
+    return setter_at(".".join(path)).dimension.to_unit(written, "" if file.unit == "1" else file.unit)
 
 
 def _number(value: Any, scales: Mapping[str, float]) -> Any:

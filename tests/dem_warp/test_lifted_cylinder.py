@@ -93,7 +93,7 @@ def test_grains_fall_over_the_rim_of_a_small_plate():
 
 def test_a_plate_is_wider_than_the_tube():
     with pytest.raises(
-        ValueError, match=r"LiftedCylinder.plate_diameter: must be finite and above .* got 0.01"
+        ValueError, match=r"LiftedCylinder.plate_diameter: must be above the tube's .* got 0.01"
     ):
         replace(SMALL_TUBE, plate_diameter=0.01)
 

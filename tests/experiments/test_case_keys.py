@@ -1,4 +1,4 @@
-"""Cases of the shipped studies: each still has the very bits that it had when their keys were written down."""
+"""Cases of the shipped studies: each has the bits that it had when the keys were written down."""
 
 from __future__ import annotations
 
