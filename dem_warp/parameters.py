@@ -9,10 +9,22 @@ from dataclasses import dataclass
 from functools import cache
 from typing import get_type_hints
 
+UNITS = (
+    "1", "m", "m^3", "s", "1/s", "Hz", "m/s", "kg", "kg/s", "kg/m^3", "N", "N/m", "Pa", "J/m^2", "J/m^3",
+    "rad",
+)  # fmt: skip
+"""Units that a parameter may have; a study file knows a dimension for each."""
+
 
 @dataclass(frozen=True)
 class Parameter:
-    """Unit and bounds of a number, which is finite in any case."""
+    """Unit and bounds of a number, which is finite in any case.
+
+    Raises
+    ------
+    ValueError
+        When the unit is not one of `UNITS`.
+    """
 
     unit: str
     """Its SI unit, as ``"kg/m^3"``; ``"1"``: none."""
@@ -20,6 +32,10 @@ class Parameter:
     at_least: float | None = None
     below: float | None = None
     at_most: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.unit not in UNITS:
+            raise ValueError(f"Parameter.unit: must be one of {', '.join(UNITS)}, got {self.unit!r}")
 
     def breach(self, value: float) -> str:
         """Rule that a value breaks, with the unit; empty where it breaks none."""

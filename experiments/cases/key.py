@@ -32,7 +32,8 @@ def case_key(case: Case, engine: Engine | None = None, **more: object) -> str:
         Whatever else determines what is kept under the key, as JSON-able data.
     """
     outside = [] if engine is None else [engine]
-    more |= {"simulated by": getattr(one, "__qualname__", type(one).__qualname__) for one in outside}
+    if engine is not None:
+        more["simulated by"] = getattr(engine, "__qualname__", type(engine).__qualname__)
     determined_by = {"case": described(case), "engine": engine_fingerprint(*case.kinds, *outside), **more}
     text = json.dumps(determined_by, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()

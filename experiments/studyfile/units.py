@@ -20,6 +20,7 @@ UNITS: dict[str, dict[str, float]] = {
     "mass": {"kg": 1.0, "g": 1e-3, "mg": 1e-6},
     "mass flow": {"kg/s": 1.0, "g/s": 1e-3},
     "volume": {"m^3": 1.0, "cm^3": 1e-6, "mm^3": 1e-9, "l": 1e-3, "ml": 1e-6, "ul": 1e-9},
+    "force": {"N": 1.0, "mN": 1e-3},
     "surface energy": {"J/m^2": 1.0, "mJ/m^2": 1e-3, "N/m": 1.0, "mN/m": 1e-3},
     "energy density": {"J/m^3": 1.0, "kJ/m^3": 1e3, "Pa": 1.0, "kPa": 1e3},
     "angle": {"deg": 1.0, "rad": math.degrees(1.0)},

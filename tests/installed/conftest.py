@@ -26,4 +26,4 @@ def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Installe
     folder = tmp_path_factory.mktemp("installed")
     pip("install", wheel, "--target", folder / "site")
     (folder / "work").mkdir()
-    return Installed(folder / "site", folder / "work")
+    return Installed((folder / "site",), folder / "work")

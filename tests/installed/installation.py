@@ -16,16 +16,15 @@ COMMIT = "0123456789ab"
 
 @dataclass(frozen=True)
 class Installed:
-    """Folder that packages are installed in, and that in which programs run."""
+    """Folders that packages are installed in, and the one that programs run in."""
 
-    site: Path
+    sites: tuple[Path, ...]
     work: Path
 
     def python(self, *arguments: object) -> str:
         """Run Python with what is installed here, before what the environment has; return its output."""
-        return _output(
-            [sys.executable, *arguments], cwd=self.work, env=os.environ | {"PYTHONPATH": str(self.site)}
-        )
+        paths = os.pathsep.join(map(str, self.sites))
+        return _output([sys.executable, *arguments], cwd=self.work, env=os.environ | {"PYTHONPATH": paths})
 
     def dem_warp(self, *arguments: object) -> str:
         """Run the command line; return its output."""

@@ -24,8 +24,8 @@ def test_the_wheel_holds_the_product_and_no_evidence(wheel: Path) -> None:
 
 
 def test_the_wheel_is_typed_and_names_what_it_runs_on(installed: Installed) -> None:
-    assert all((installed.site / package / "py.typed").is_file() for package in PACKAGES)
-    (metadata,) = installed.site.glob("dem_warp-*.dist-info/METADATA")
+    assert all((installed.sites[0] / package / "py.typed").is_file() for package in PACKAGES)
+    (metadata,) = installed.sites[0].glob("dem_warp-*.dist-info/METADATA")
     text = metadata.read_text(encoding="utf-8")
     assert f"Version: {PROJECT['version']}\n" in text
     assert f"Requires-Python: {PROJECT['requires-python']}\n" in text
@@ -37,7 +37,7 @@ def test_an_installed_package_knows_its_version_and_its_commit(installed: Instal
     program = "import dem_warp.version as here; print(here.__version__, here.source_commit(), here.__file__)"
     version, commit, file = installed.python("-c", program).split()
     assert (version, commit) == (PROJECT["version"], COMMIT)
-    assert Path(file).is_relative_to(installed.site)
+    assert Path(file).is_relative_to(installed.sites[0])
 
 
 def test_the_citation_names_the_version() -> None:
