@@ -10,6 +10,7 @@ from dem_warp.scenes.drum import Drum
 from dem_warp.scenes.hopper import Hopper
 from dem_warp.scenes.lifted_cylinder import LiftedCylinder
 from dem_warp.simulation import simulate
+from dem_warp.version import __version__
 
 __all__ = [
     "Case",
@@ -25,6 +26,7 @@ __all__ = [
     "Numerics",
     "Progress",
     "ShapeMixture",
+    "__version__",
     "effective_moduli",
     "rayleigh_time",
     "simulate",

@@ -3,6 +3,8 @@
 import logging
 import time
 from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
 
 from dem_warp.case import Case
 from dem_warp.checkpoint import Checkpoints
@@ -50,7 +52,6 @@ class Batch:
         self.steps = [0] * len(cases)
         self.provenance = provenance(self.solver.device, self.solver.precision.name)
         self._checkpoints, self._saved = checkpoints, time.monotonic()
-        self.maker = self.provenance | {"engine": engine_fingerprint()}
         self._resume()
 
     def advance(self) -> list[tuple[int, CaseResult]]:
@@ -75,6 +76,13 @@ class Batch:
     def phase(self, world: int) -> str:
         """Phase that a world is in."""
         return self.controllers[world].course.phase
+
+    @cached_property
+    def maker(self) -> dict[str, Any]:
+        """All that must be the same where a checkpoint goes on: libraries, device, engine."""
+        engine = engine_fingerprint(*(kind for case in self.cases for kind in case.kinds))
+        same = {name: value for name, value in self.provenance.items() if name not in ("dem-warp", "commit")}
+        return same | {"engine": engine}
 
     # ---- checkpoints ---------------------------------------------------------------------------------------
 

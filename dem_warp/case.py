@@ -1,11 +1,12 @@
 """One simulation: what is simulated (scene, grains, contacts, seed) and how (numerics)."""
 
 from dataclasses import dataclass, field, fields, is_dataclass
-from typing import Any, Generic, TypeVar
+from typing import Annotated, Any, Generic, Literal, TypeVar
 
 from dem_warp.laws.mechanism import Mechanism
 from dem_warp.materials import Interaction, Material, rayleigh_time
 from dem_warp.model import ContactCoefficients
+from dem_warp.parameters import Parameter, check_parameters
 from dem_warp.population import GrainPopulation
 from dem_warp.scenes.scene import Scene
 from dem_warp.types import PRECISIONS
@@ -15,50 +16,28 @@ SceneT = TypeVar("SceneT", bound=Scene)
 
 @dataclass(frozen=True)
 class Numerics:
-    """How a case is computed.
+    """Settings of the computation of a case."""
 
-    Attributes
-    ----------
-    time_step_fraction : float
-        Time step over the Rayleigh time of the smallest sphere; the paper uses 0.25.
-    skin : float, optional
-        Reach of the neighbour lists beyond contact [m]; affects the speed only. By default from the time
-        step.
-    precision : "mixed" or "double"
-    modulus_scale : float
-        The grains' shear modulus is divided by it, for larger time steps; 1 leaves it.
-    clamp_attraction : bool
-        Keep the damping from attracting at the end of an impact.
-    tangential_damping : bool
-        Damp the tangential spring of a contact; not every code does.
-    rolling_holds : bool
-        Let rolling resistance stop a spin at most. Codes that apply its torque for a whole step, whatever the
-        spin, reverse slow ones each step, and grains that ought to stick creep.
-    """
-
-    time_step_fraction: float = 0.25
-    skin: float | None = None
-    precision: str = "mixed"
-    modulus_scale: float = 1.0
+    time_step_fraction: Annotated[float, Parameter("1", above=0.0, at_most=1.0)] = 0.25
+    """Time step, as a fraction of the Rayleigh time of the smallest sphere; the paper uses 0.25."""
+    skin: Annotated[float | None, Parameter("m", above=0.0)] = None
+    """Reach of the neighbour lists beyond contact, which affects the speed only; left out: from the step."""
+    precision: Literal["mixed", "double"] = "mixed"
+    """Floating point precision of the forces."""
+    modulus_scale: Annotated[float, Parameter("1", at_least=1.0)] = 1.0
+    """The grains' shear modulus is divided by this (softer grains take larger steps)."""
     clamp_attraction: bool = False
+    """Keep the damping from attracting at the end of an impact."""
     tangential_damping: bool = True
+    """Damp the tangential spring of a contact; not every code does."""
     rolling_holds: bool = True
+    """Let rolling resistance stop a spin at most. Codes that apply its torque for a whole step, whatever the
+    spin, reverse slow ones each step, and grains that ought to stick creep."""
 
     def __post_init__(self) -> None:
-        _require(
-            0 < self.time_step_fraction <= 1,
-            "Numerics.time_step_fraction",
-            "must be above 0 and at most 1",
-            self.time_step_fraction,
-        )
-        _require(self.skin is None or self.skin > 0, "Numerics.skin", "must be positive [m]", self.skin)
-        _require(self.modulus_scale >= 1, "Numerics.modulus_scale", "must be at least 1", self.modulus_scale)
-        _require(
-            self.precision in PRECISIONS,
-            "Numerics.precision",
-            f"must be one of {sorted(PRECISIONS)}",
-            self.precision,
-        )
+        check_parameters(self)
+        known = sorted(PRECISIONS)
+        _require(self.precision in known, "Numerics.precision", f"must be one of {known}", self.precision)
 
 
 @dataclass(frozen=True)
@@ -104,6 +83,11 @@ class Case(Generic[SceneT]):
         return self.numerics.time_step_fraction * rayleigh_time(
             self.grains.smallest_sphere, self.grain_material
         )
+
+    @property
+    def kinds(self) -> tuple[type, ...]:
+        """Classes of its scene and its mechanisms, whose code takes part in the result."""
+        return (type(self.scene), *(type(mechanism) for mechanism in self.mechanisms))
 
     def contacts(self, wall_material: Material) -> tuple[ContactCoefficients, ContactCoefficients]:
         """Contacts of grains with grains, and with walls of a material."""

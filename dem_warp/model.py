@@ -1,4 +1,4 @@
-"""What one world is made of, described on the host, and the stacking of many worlds into arrays."""
+"""Parts of one world, described on the host, and the stacking of many worlds into arrays."""
 
 import functools
 import math

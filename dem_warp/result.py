@@ -1,4 +1,4 @@
-"""What a simulation gives back."""
+"""Result of a simulation, and its progress."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -10,7 +10,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a simulation is.
+    """Progress of a simulation.
 
     Attributes
     ----------
@@ -90,7 +90,7 @@ class CaseResult:
 
     @property
     def _exist(self) -> np.ndarray:
-        """Whether a grain has the sphere of a number, (n, S)."""
+        """True where a grain has the sphere of a number, (n, S)."""
         return self.clumps[self.shapes, :, 3] > 0.0
 
 

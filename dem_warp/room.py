@@ -1,4 +1,4 @@
-"""How many neighbours a world's grains may have: room that no packing of them should pass."""
+"""Most neighbours of a world's grains: room that no packing of them should pass."""
 
 from itertools import product
 

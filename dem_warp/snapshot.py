@@ -18,7 +18,7 @@ from dem_warp.state import arrays_of
 from dem_warp.types import SPHERE_MASK
 
 Snapshot = dict[str, np.ndarray]
-"""What a world has in each array of the state, by the array's name."""
+"""Part of a world in each array of the state, by the array's name."""
 
 STEP, COUNT, ENTRY = "grains.step", "neighbours.count", "neighbours.entry"
 LISTS = 2
@@ -60,12 +60,12 @@ def put_snapshot(solver: Solver, world: int, snapshot: Snapshot) -> None:
 
 @dataclass(frozen=True, eq=False)
 class _Field:
-    """What one world has in an array; the same in every copy that there is of it."""
+    """Part of one world in an array; the same in every copy that there is of it."""
 
     name: str
     parts: tuple[Any, ...]
     axes: tuple[int, ...]
-    """What it is counted by; a last axis beside them holds the values of each."""
+    """Axes that it is counted by; a last axis beside them holds the values of each."""
     used: Any
     """Index into the axes of what is in use; the rest is room."""
 
@@ -90,7 +90,7 @@ class _Field:
 
 def _fields(solver: Solver, world: int, counts: np.ndarray) -> Iterator[_Field]:
     """Every array that has something of a world, whose grains have `counts` neighbours."""
-    layout, capacity = solver.layout, solver.hood.capacity
+    layout, capacity = solver.layout, solver.neighbours.capacity
     slots, grains, held = layout.grain_count, solver.worlds[world].grains.count, _held(solver, world)
     if counts.shape != (grains,) or counts.max() > capacity:
         raise ValueError(f"{COUNT}: must be at most {capacity} for each of {grains} grains, got {counts}")
@@ -117,7 +117,7 @@ def _state(solver: Solver) -> dict[str, tuple[Any, ...]]:
     state: dict[str, tuple[Any, ...]] = {
         f"grains.{name}": (array, second[name]) for name, array in first.items()
     }
-    state |= {f"neighbours.{name}": (array,) for name, array in arrays_of(solver.hood).items()}
+    state |= {f"neighbours.{name}": (array,) for name, array in arrays_of(solver.neighbours).items()}
     state |= {f"world.{name}": (getattr(solver, name),) for name in ("alive", "flags", "rebuilds")}
     # which list holds: the snapshot's entries go into the one that holds in the batch
     del state["neighbours.list"]
@@ -125,13 +125,13 @@ def _state(solver: Solver) -> dict[str, tuple[Any, ...]]:
 
 
 def _held(solver: Solver, world: int) -> int:
-    return int(solver.hood.list.numpy()[world])
+    return int(solver.neighbours.list.numpy()[world])
 
 
 def _counts(solver: Solver, world: int) -> np.ndarray:
     """Neighbours of each of a world's grains; those of a grain that was taken out are never looked at."""
     shape, grains = (solver.layout.world_count, -1), solver.worlds[world].grains.count
-    counts = solver.hood.count.reshape((LISTS, *shape))[_held(solver, world), world].numpy()[:grains]
+    counts = solver.neighbours.count.reshape((LISTS, *shape))[_held(solver, world), world].numpy()[:grains]
     alive = solver.alive.reshape(shape)[world].numpy()[:grains] > 0
     return np.where(alive, counts, 0)
 

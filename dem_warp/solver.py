@@ -51,7 +51,7 @@ MOST_LANES = 16
 
 @dataclass(frozen=True)
 class WorldView:
-    """What a scene sees of one world between two chunks; arrays are by grain slot.
+    """View of one world that a scene has between two chunks; arrays are by grain slot.
 
     Attributes
     ----------
@@ -165,7 +165,9 @@ class Solver:
         self._trees = place_triangles(self.model, self.worlds, self.precision, device)
         first = build_grains(self.worlds, layout, self.precision, device)
         self.grains = (first, copy_grains(first, self.precision))
-        self.hood = build_neighbours(layout, capacity, memory_size(layout.mechanisms), self.precision, device)
+        self.neighbours = build_neighbours(
+            layout, capacity, memory_size(layout.mechanisms), self.precision, device
+        )
         self.alive = living_grains(self.worlds, layout, device)
         self.flags, self.stale, self.idle, self.rebuilds, self.running = (
             wp.zeros(layout.world_count, dtype=int) for _ in range(5)
@@ -224,8 +226,8 @@ class Solver:
         slots = len(self._running) * self.layout.grain_count
         threads = self._whole_warps(slots * self.lanes)
         inputs = [
-            self.lanes, slots, self.model, self.running, self.grains[read], self.hood, self.alive, self.flags,
-            self.grains[1 - read],
+            self.lanes, slots, self.model, self.running, self.grains[read], self.neighbours, self.alive,
+            self.flags, self.grains[1 - read],
         ]  # fmt: skip
         self._launch(self._step_kernels.step, threads, inputs)
 
@@ -241,12 +243,14 @@ class Solver:
         self._launch(cells.fill_buckets, spheres, [self.model, grains, self.stale, self.cells])
         self._launch(cells.search, spheres, [self.model, grains, self.stale, self.cells])
         threads = spheres * list_lanes(self.build)
-        self._launch(lists.write_lists, threads, [self.model, self.stale, self.cells, self.hood, self.flags])
-        finish = [grains, self.cells, self.hood, self.stale, self.any_stale, self.rebuilds]
+        self._launch(
+            lists.write_lists, threads, [self.model, self.stale, self.cells, self.neighbours, self.flags]
+        )
+        finish = [grains, self.cells, self.neighbours, self.stale, self.any_stale, self.rebuilds]
         self._launch(lists.finish, self.layout.world_count, finish)
 
     def _rebuild_together(self, steps: int, read: int) -> None:
-        inputs = [steps, self.model, self.grains[read], self.alive, self.idle, self.hood, self.stale]
+        inputs = [steps, self.model, self.grains[read], self.alive, self.idle, self.neighbours, self.stale]
         self._launch(self._watch_kernels.join, self.layout.grain_total, inputs)
         self._rebuild(read)
 
@@ -255,19 +259,20 @@ class Solver:
         watch, grains, total = self._watch_kernels, self.grains[read], self.layout.grain_total
         self._place_walls(steps, read)
         seen = [self.model, grains, self.alive, self.idle]
-        inputs = [steps, *seen, self.fastest, self.hood, self.stale, self.any_stale]
+        inputs = [steps, *seen, self.fastest, self.neighbours, self.stale, self.any_stale]
         self._launch(watch.mark_stale, total, inputs)
         wp.capture_if(self.any_stale, self._rebuild_together, steps=steps, read=read)
         threads = total * WARP if self.device.is_cuda else total
-        striking = [steps, self.model, self.alive, self.idle, self.fastest, self.hood]
+        striking = [steps, self.model, self.alive, self.idle, self.fastest, self.neighbours]
         self._launch(watch.heed_neighbours, threads, striking)
-        self._launch(watch.select_near, threads, [steps, *seen, self.hood, self.fastest])
+        self._launch(watch.select_near, threads, [steps, *seen, self.neighbours, self.fastest])
 
     def _look_back(self, read: int) -> None:
         """Find out how fast the grains have become, and whether all contacts were met."""
         row = self._whole_warps(self.layout.grain_count)
         inputs = [
-            row, self.model, self.grains[read], self.alive, self.idle, self.hood, self.fastest, self.flags,
+            row, self.model, self.grains[read], self.alive, self.idle, self.neighbours, self.fastest,
+            self.flags,
         ]  # fmt: skip
         self._launch(self._watch_kernels.find_fastest, row * self.layout.world_count, inputs)
 
@@ -365,30 +370,30 @@ class Solver:
         self._look_back(0)
 
     def wall_pose(self, world: int, wall: int) -> tuple[np.ndarray, np.ndarray]:
-        """Where the wall's own point is [m], and how far the wall has turned (quaternion x y z w)."""
+        """Place of the wall's own point [m], and how far the wall has turned (quaternion x y z w)."""
         self._place_walls(0)
         frame = self._frame(world, wall).numpy()[0]
         return np.array(frame["origin"]), np.array(frame["rotation"])
 
     def _frame(self, world: int, wall: int) -> Any:
-        """Where a wall stands in the present step, as an array of one on the device."""
+        """Place of a wall in the present step, as an array of one on the device."""
         step = int(self.grains[0].step[world : world + 1].numpy()[0])
         place = (world * self.layout.wall_count + wall) * FRAMES + step % FRAMES
         return self.model.frame[place : place + 1]
 
     def impulses(self) -> np.ndarray:
-        """What the grains have given to the wall that is weighed, along z, since the first step [N s].
+        """Impulse of the grains on the wall that is weighed, along z, since the first step [N s].
 
         Returns
         -------
         (worlds,) array
             The sum over all steps of force times time step; 0 where no wall is weighed.
         """
-        counts = self.hood.pushed.numpy().reshape(self.layout.world_count, -1).sum(axis=1)
+        counts = self.neighbours.pushed.numpy().reshape(self.layout.world_count, -1).sum(axis=1)
         return np.asarray(counts * self._impulse_of_count)
 
     def view(self, worlds: Sequence[int]) -> list[WorldView]:
-        """What scenes need of some worlds, copied from the device."""
+        """State of some worlds for their scenes, copied from the device."""
         n, grains, chosen = self.layout.grain_count, self.grains[0], list(worlds)
         steps = grains.step.numpy()[chosen]
         alive = self.alive.numpy().reshape(-1, n)[chosen] > 0

@@ -220,18 +220,18 @@ def build_neighbours(
     layout: Layout, capacity: int, remembered: int, precision: Precision, device: Any
 ) -> Any:
     """Empty `Neighbours` of a batch, of which the mechanisms remember some values a contact."""
-    hood = device_structs(precision).Neighbours()
+    neighbours = device_structs(precision).Neighbours()
     slots = 2 * layout.grain_total * capacity
-    hood.capacity = capacity
-    hood.list = wp.zeros(layout.world_count, dtype=int, device=device)
-    hood.count = wp.zeros(2 * layout.grain_total, dtype=int, device=device)
-    hood.entry = wp.zeros(slots, dtype=int, device=device)
+    neighbours.capacity = capacity
+    neighbours.list = wp.zeros(layout.world_count, dtype=int, device=device)
+    neighbours.count = wp.zeros(2 * layout.grain_total, dtype=int, device=device)
+    neighbours.entry = wp.zeros(slots, dtype=int, device=device)
     # all zero is a displacement of zero, remembered at step 0: no history
-    hood.history = wp.zeros(slots, dtype=precision.vec4, device=device)
-    hood.memory = wp.zeros(slots * remembered, dtype=precision.real, device=device)
-    hood.rebuilt = wp.zeros(layout.world_count, dtype=int, device=device)
-    hood.travel = wp.zeros(layout.grain_total, dtype=precision.real, device=device)
-    hood.pushed = wp.zeros(layout.grain_total, dtype=wp.int64, device=device)
+    neighbours.history = wp.zeros(slots, dtype=precision.vec4, device=device)
+    neighbours.memory = wp.zeros(slots * remembered, dtype=precision.real, device=device)
+    neighbours.rebuilt = wp.zeros(layout.world_count, dtype=int, device=device)
+    neighbours.travel = wp.zeros(layout.grain_total, dtype=precision.real, device=device)
+    neighbours.pushed = wp.zeros(layout.grain_total, dtype=wp.int64, device=device)
     near = device_structs(precision).Near()
     near.count = wp.zeros(layout.grain_total, dtype=int, device=device)
     near.item = wp.zeros(layout.grain_total * capacity, dtype=wp.vec2i, device=device)
@@ -241,12 +241,12 @@ def build_neighbours(
     near.path = wp.zeros(layout.grain_total, dtype=precision.real, device=device)
     near.wall_path = wp.zeros(layout.world_count, dtype=precision.real, device=device)
     near.travel = wp.zeros(layout.grain_total, dtype=precision.real, device=device)
-    hood.near = near
-    hood.reactions = device_structs(precision).Reactions()
+    neighbours.near = near
+    neighbours.reactions = device_structs(precision).Reactions()
     for name in ("force", "torque"):
         reacting = 0 if wp.get_device(device).is_cuda else layout.grain_total
-        setattr(hood.reactions, name, wp.zeros(reacting, dtype=precision.vec4, device=device))
-    return hood
+        setattr(neighbours.reactions, name, wp.zeros(reacting, dtype=precision.vec4, device=device))
+    return neighbours
 
 
 def _unit(quaternions: np.ndarray) -> np.ndarray:

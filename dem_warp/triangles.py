@@ -71,7 +71,7 @@ def _neighbours(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def most_within(mesh: Mesh, reach: float) -> int:
-    """How many triangles lie about as near as `reach` [m] to a point of the mesh, at the most."""
+    """Most triangles that lie about as near as `reach` [m] to a point of the mesh."""
     corners = mesh.vertices[mesh.faces]
     lower, upper = corners.min(axis=1) - reach, corners.max(axis=1) + reach
     middles = corners.mean(axis=1)[:: -(-len(corners) // SAMPLE)]

@@ -14,7 +14,7 @@ from typing import Any
 import warp as wp
 
 from dem_warp.laws.contact_law import Mechanisms
-from dem_warp.laws.library import PARAMETERS
+from dem_warp.laws.library import parameters
 
 SPHERE_BITS = 23
 """Bits of a neighbour entry that hold the partner (a sphere or a wall); above is the own sphere's number."""
@@ -28,7 +28,7 @@ FRAMES = 128
 
 
 class WorldFlag(IntFlag):
-    """What happened to a world while it ran; 0 is a healthy one."""
+    """Marks of what happened to a world while it ran; 0 is a healthy one."""
 
     DIVERGED = 1
     """A grain passed the speed limit of the scene (or is not finite)."""
@@ -55,7 +55,7 @@ class Precision:
 
     @property
     def is_fixed_point(self) -> bool:
-        """Whether sphere positions are integers of the length unit."""
+        """True where sphere positions are integers of the length unit."""
         return self.sphere is wp.vec4i
 
 
@@ -65,7 +65,7 @@ DOUBLE = Precision("double", wp.float64, wp.vec3d, wp.vec4d, wp.quatd, wp.vec4d)
 
 @dataclass(frozen=True)
 class Build:
-    """What kernels are compiled for; worlds of one build run in one batch, none changing another's bits."""
+    """Key of compiled kernels; worlds of one build run in one batch, none changing another's bits."""
 
     precision: Precision
     sphere_count: int
@@ -84,7 +84,7 @@ class Build:
 
     @property
     def without_mechanisms(self) -> "Build":
-        """What kernels are compiled for that have nothing to do with forces."""
+        """The build of kernels that have nothing to do with forces."""
         return replace(self, mechanisms=())
 
 
@@ -107,7 +107,7 @@ def device_structs(precision: Precision) -> SimpleNamespace:
     real, vec3, vec4, sphere = precision.real, precision.vec3, precision.vec4, precision.sphere
 
     @wp.struct
-    @_with_fields(dict.fromkeys(PARAMETERS, real))
+    @_with_fields(dict.fromkeys(parameters(), real))
     class ContactParams:
         modulus: real  # effective Young's modulus E* [Pa]
         shear_modulus: real  # effective shear modulus G* [Pa]
@@ -177,9 +177,8 @@ def device_structs(precision: Precision) -> SimpleNamespace:
 
     @wp.struct
     class Triangle:
-        a: (
-            wp.vec3d
-        )  # corners, from the wall's point and before any motion, in the order of the mesh's vertices [m]
+        # corners, from the wall's point and before any motion, in the order of the mesh's vertices [m]
+        a: wp.vec3d
         b: wp.vec3d
         c: wp.vec3d
         normal: wp.vec3d  # unit vector, to either side
@@ -198,14 +197,12 @@ def device_structs(precision: Precision) -> SimpleNamespace:
         world: wp.array(dtype=World)  # (worlds,)
         contact: wp.array(dtype=ContactParams)  # (worlds * pairs,)
         wall: wp.array(dtype=Wall)  # (worlds * walls,)
-        frame: wp.array(
-            dtype=Frame
-        )  # where it stands in the steps about the present, (worlds * walls * FRAMES,)
+        # where it stands in the steps about the present, (worlds * walls * FRAMES,)
+        frame: wp.array(dtype=Frame)
         facets: wp.array(dtype=Facets)  # (worlds * walls,)
         triangle: wp.array(dtype=Triangle)  # of every different mesh
-        beside: wp.array(
-            dtype=int
-        )  # its neighbours: number in the mesh, and bits of the corners that they share
+        # its neighbours: number in the mesh, and bits of the corners that they share
+        beside: wp.array(dtype=int)
         shape_spheres: wp.array(dtype=vec4)  # local centre and radius, (shapes * spheres,) [m]
         shape_sphere_count: wp.array(dtype=int)  # (shapes,)
         shape: wp.array(dtype=int)  # (grains,)

@@ -125,7 +125,7 @@ class Disc:
 
     @property
     def upper_radius(self) -> float:
-        """Where the profile ends [m]."""
+        """End of the profile [m]."""
         return self.inner_radius
 
     @property
@@ -167,7 +167,7 @@ class Cylinder:
 
     @property
     def upper_radius(self) -> float:
-        """Where the profile ends [m]."""
+        """End of the profile [m]."""
         return self.radius
 
     @property

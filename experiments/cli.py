@@ -18,16 +18,34 @@ from experiments.commands.console import FAILED_RUN, CaseProgress, clear_errors,
 if TYPE_CHECKING:
     from experiments.calibrate.results import StageResult
     from experiments.cases import Heap
-    from experiments.commands.discover import Job
 
 app = typer.Typer(
     name="dem-warp",
-    help="Calibrate discrete element models of grain: simulated heaps, designed experiments, repose angles.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
+    context_settings={"help_option_names": ["-h", "--help"]},
 )
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        from dem_warp.version import __version__, source_commit
+
+        commit = source_commit()
+        typer.echo(f"dem-warp {__version__}" + (f" ({commit})" if commit else ""))
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version.")
+    ] = False,
+) -> None:
+    """Calibrate discrete element models of grain: simulated heaps, designed experiments, repose angles."""
+
 
 StudyFile = Annotated[
     Path | None, typer.Argument(metavar="[STUDY.toml]", help="Study file; left out: the paper's buckwheat.")
@@ -58,6 +76,10 @@ def calibrate(
     scale: Scale = None,
     device: Device = None,
     workers: Workers = None,
+    engine: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="Engine of an installed package. Left out: dem-warp's own."),
+    ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on in the folder of an earlier run.")] = False,
     follow_paper: Annotated[
         bool, typer.Option("--follow-paper", help="Simulate the paper's own runs too, and set them beside.")
@@ -70,34 +92,39 @@ def calibrate(
 ) -> None:
     """Run a whole calibration: noise floor, screening, climb, surface, optimum, verification, report."""
     with clear_errors():
-        from experiments.commands.choices import chosen_device, chosen_study, default_folder
-        from experiments.commands.run import (
-            Desk,
-            check_runs,
-            found_by,
-            record_paper,
-            replay_paper,
-            run_campaign,
-        )
+        from experiments import api
+        from experiments.runs.choices import chosen_device, chosen_study, default_folder
 
         device = chosen_device(device)
         chosen = chosen_study(study, scale, device)
         folder = out or default_folder(chosen)
-        check_runs(chosen, campaign=not only_paper, paper=follow_paper or only_paper)
-    again = {"--follow-paper": follow_paper, "--only-paper": only_paper}
-    with clear_errors(resume=_resume_command(study, folder, chosen.scale, device, again, paper_replicates)):
+    go_on = _go_on(
+        "calibrate", study, out=folder, scale=chosen.scale, device=device, engine=engine,
+        follow_paper=follow_paper, only_paper=only_paper,
+        paper_replicates=paper_replicates if follow_paper or only_paper else None,
+    )  # fmt: skip
+    with clear_errors(resume=go_on):
         messages.print(f"{chosen.name}, on {device}", chosen.note, sep="\n", markup=False)
-        desk = Desk.open(chosen, folder, device, workers, resume, CaseProgress)
-        replay = replay_paper(desk, paper_replicates) if follow_paper or only_paper else None
-        campaign = None if only_paper else run_campaign(desk, _show_stage, replay)
-        if replay is not None:
-            messages.print(f"The paper's runs: {record_paper(desk, replay, campaign)}")
+        ended = api.calibrate(
+            chosen,
+            folder,
+            device=device,
+            workers=workers,
+            engine=engine,
+            resume=resume,
+            paper_replicates=paper_replicates if follow_paper or only_paper else 0,
+            campaign=not only_paper,
+            watch=CaseProgress,
+            on_stage=_show_stage,
+        )
+    if ended.record is not None:
+        messages.print(f"The paper's runs: {ended.record}")
     if as_json:
-        typer.echo(json.dumps(found_by(campaign, replay), allow_nan=False))
-    if campaign is None:
+        typer.echo(json.dumps(ended.to_dict(), allow_nan=False))
+    if (campaign := ended.campaign) is None:
         return
     messages.print(f"{campaign.outcome}: {campaign.reason}")
-    messages.print(f"Report: {folder / 'report.html'}")
+    messages.print(f"Report: {ended.report}")
     if campaign.outcome == "too-many-failed-runs":
         raise typer.Exit(FAILED_RUN)
 
@@ -127,17 +154,31 @@ def discover(
 ) -> None:
     """Find the effect that a model lacks: calibrate, test the gap, name what explains it, show it closed."""
     with clear_errors():
-        from experiments.commands.choices import chosen_devices, chosen_study, default_folder
-        from experiments.commands.discover import Job, run_search
+        from experiments import api
         from experiments.report.discovery import results_of, verdict_line
+        from experiments.runs.choices import chosen_devices, chosen_study, default_folder
 
         device = chosen_devices(device)
         chosen = chosen_study(study, scale, device)
         folder = out or default_folder(chosen, "discover")
-        job = Job(chosen, measured, folder, bank, photographs_only, device, workers, seed)
-    with clear_errors(resume=_resume_search(job, scale)):
+    go_on = _go_on(
+        "discover", study, measured, out=folder, bank=bank, photographs_only=photographs_only, scale=scale,
+        device=device, seed=seed,
+    )  # fmt: skip
+    with clear_errors(resume=go_on):
         messages.print(f"{chosen.name}, on {device}", chosen.note, sep="\n", markup=False)
-        ended = run_search(job, resume, CaseProgress)
+        ended = api.discover(
+            chosen,
+            measured,
+            folder,
+            bank=bank,
+            photographs_only=photographs_only,
+            seed=seed,
+            device=device,
+            workers=workers,
+            resume=resume,
+            watch=CaseProgress,
+        )
     if ended.discovery is None:
         messages.print(f"Library waves: {ended.page}")
         return
@@ -170,7 +211,7 @@ def heap(
     """
     with clear_errors():
         from experiments.cases import require_unused, simulate_heap, write_heap
-        from experiments.commands.choices import chosen_device, chosen_study, default_folder
+        from experiments.runs.choices import chosen_device, chosen_study, default_folder
         from experiments.studyfile.campaign import TARGET_SCENE
 
         device = chosen_device(device)
@@ -318,21 +359,12 @@ def _print_clump(facts: dict[str, Any]) -> None:
         typer.echo(f"covers {facts['coverage']:.1%} of the solid, passes it by {facts['overshoot']:.1%}")
 
 
-def _resume_command(
-    study: Path | None, folder: Path, scale: str | None, device: str, flags: dict[str, bool], replicates: int
-) -> str:
-    words = ["dem-warp calibrate", *([str(study)] if study else []), f"--out {folder}"]
-    words += [*([f"--scale {scale}"] if scale else []), f"--device {device}"]
-    if given := [flag for flag, wanted in flags.items() if wanted]:
-        words += [*given, f"--paper-replicates {replicates}"]
-    return " ".join([*words, "--resume"])
-
-
-def _resume_search(job: Job, scale: str | None) -> str:
-    words = ["dem-warp discover", str(job.study.file), *([str(job.measured)] if job.measured else [])]
-    words += [f"--out {job.folder}", *([f"--bank {job.bank}"] if job.bank else [])]
-    words += ["--photographs-only"] if job.photographs_only else []
-    words += [*([f"--scale {scale}"] if scale else []), f"--device {job.device} --seed {job.seed}"]
+def _go_on(command: str, *files: Path | None, **options: object) -> str:
+    """Command that goes on where this one was interrupted; options that were not given are left out."""
+    words = ["dem-warp", command, *(str(file) for file in files if file)]
+    for name, value in options.items():
+        if value is not None and value is not False:
+            words += [f"--{name.replace('_', '-')}", *([] if value is True else [str(value)])]
     return " ".join([*words, "--resume"])
 
 

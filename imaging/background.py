@@ -1,4 +1,4 @@
-"""How much every pixel differs from its background: evens out light, colour and polarity."""
+"""Difference of every pixel from its background: evens out light, colour and polarity."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ TOE_ROUNDS = 10
 
 @dataclass(frozen=True)
 class FitSettings:
-    """Which part of a flank the line is fitted to: angles with different settings are not comparable.
+    """Part of a flank that the line is fitted to: angles with different settings are not comparable.
 
     Attributes
     ----------

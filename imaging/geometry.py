@@ -1,4 +1,4 @@
-"""What heaps and pictures of them share: checked spheres, the camera's directions, the picture's frame."""
+"""Geometry of heaps and their pictures: checked spheres, the camera's directions, the picture's frame."""
 
 from __future__ import annotations
 

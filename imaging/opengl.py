@@ -25,7 +25,7 @@ SUPERSAMPLING = 3
 SECTORS, RINGS = 24, 5
 """Facets of a sphere: round the line of sight, and from its rim to its middle."""
 LIGHT_POSITION = (-0.45, 0.61, 0.65)
-"""Where the light comes from, as VTK counts for a headlight: right, up, towards the camera."""
+"""Direction of the light, as VTK counts for a headlight: right, up, towards the camera."""
 QUIET_ENVIRONMENT = {"VTK_DEFAULT_OPENGL_WINDOW": "vtkEGLRenderWindow", "EGL_LOG_LEVEL": "fatal"}
 """On Linux VTK otherwise asks an X server first, and complains on stderr where there is none."""
 PROBE = """
@@ -41,7 +41,7 @@ raise SystemExit(0 if window.SupportsOpenGL() else 1)
 
 @functools.cache
 def opengl_works() -> bool:
-    """Whether VTK can draw on this machine.
+    """Tell whether VTK can draw on this machine.
 
     Tried once, in a child process: without a driver VTK does not raise an error, it ends the process.
     """

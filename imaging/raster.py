@@ -13,13 +13,13 @@ SUPERSAMPLING = 4
 SHADING_SUPERSAMPLING = 2
 """The same for shaded pictures, whose edges need only look smooth."""
 LIGHT = np.array([-0.45, -0.65, 0.61])
-"""Where the light comes from, in the camera's frame (right, away, up)."""
+"""Direction of the light in the camera's frame (right, away, up)."""
 AMBIENT = 0.45
 """Light on a surface that is turned away from the lamp."""
 BRIGHTNESS = 1.25
 """Overall exposure."""
 CAVITY_SHADING = 0.6
-"""How much what lies behind its neighbours is darkened, at the most."""
+"""Largest darkening of what lies behind its neighbours."""
 CAVITY_REACH = 0.02
 """Neighbours shade over three radii, but at most over this share of the picture's width."""
 FRAGMENT_LIMIT = 4_000_000

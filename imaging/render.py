@@ -100,7 +100,7 @@ def snapshot(
 
 
 class Renderer(Protocol):
-    """What draws spheres; both pictures are seen by a horizontal orthographic camera."""
+    """Drawer of spheres; both pictures are seen by a horizontal orthographic camera."""
 
     def coverage(self, spheres: Spheres, frame: Frame, azimuth: float) -> Picture:
         """Share of each pixel that the spheres cover, 0 to 255."""

@@ -76,7 +76,7 @@ class ReposeAngle:
 
 
 class Angle(Protocol):
-    """What every measured angle has: a mean with its standard error [degrees], and how it was measured."""
+    """Part that all measured angles share: mean and standard error [degrees], and how it was measured."""
 
     @property
     def mean(self) -> float: ...

@@ -20,11 +20,11 @@ from imaging.plate import PlateLine, find_plate
 MINIMUM_HEAP_WIDTH = 16
 """A narrower heap [pixels] is not measured."""
 RIVAL_SHARE = 0.5
-"""Where a second piece is larger than this share of the heap, the picture does not show one heap."""
+"""Largest second piece, as a share of the heap, of a picture that shows one heap."""
 THIN = 4.0
 """Columns up to this high [pixels] are measured by their area."""
 PLATE_CLEARANCE = 0.25
-"""What rises less than this over the plate line [pixels] belongs to the plate."""
+"""Height over the plate line [pixels] below which all belongs to the plate."""
 
 
 @dataclass(frozen=True)

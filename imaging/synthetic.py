@@ -58,7 +58,7 @@ class DrawnHeap:
 
     @property
     def apex(self) -> FloatArray:
-        """Where the two flanks meet."""
+        """Point in which the two flanks meet."""
         left, right = np.tan(np.radians([self.left, self.right]))
         x = self.width * right / (left + right)
         return np.array([x, left * x])
@@ -75,7 +75,7 @@ class DrawnHeap:
 
     @property
     def overhang(self) -> float:
-        """How far grains may lie beside the smooth heap: on its flanks' lines, sunk into the plate."""
+        """Largest distance of grains from the smooth heap: on its flanks' lines, sunk into the plate."""
         return self.grain / float(np.tan(np.radians(min(self.left, self.right))))
 
     def grains(self) -> FloatArray:
@@ -98,7 +98,7 @@ class DrawnHeap:
 
 @dataclass(frozen=True)
 class Camera:
-    """What a drawn photograph adds to a heap.
+    """Faults that a drawn photograph adds to a heap.
 
     Attributes
     ----------

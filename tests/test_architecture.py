@@ -26,7 +26,10 @@ LATE_LIBRARIES = {"dem_warp": {"trimesh"}, "doe": {"sklearn", "threadpoolctl"}, 
 
 # Device code: a law sees numbers only, a kernel sees laws and the structures that it works on.
 LAYERS = {
-    "dem_warp.laws": {"dem_warp.laws", "dataclasses", "functools", "math", "typing", "warp"},
+    "dem_warp.laws": {
+        "collections.abc", "dem_warp.laws", "dem_warp.parameters", "dem_warp.registry", "dataclasses",
+        "functools", "math", "typing", "warp",
+    },
     "dem_warp.kernels": {
         "dem_warp.kernels", "dem_warp.laws", "dem_warp.types", "dem_warp.walls",
         "functools", "types", "typing", "warp",

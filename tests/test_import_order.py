@@ -12,8 +12,8 @@ ROOT = Path(__file__).resolve().parents[1]
 # Of `experiments`, from the bottom up: a room imports itself and what is named before it. Trials are run by a
 # person, as benchmarks are, though they lie beside what they try.
 ROOMS = (
-    "errors", "files", "studyfile", "cases", "calibrate", "studies", "discover", "report", "commands", "cli",
-    "benchmarks", "trials",
+    "errors", "files", "studyfile", "cases", "calibrate", "studies", "discover", "report", "runs", "api",
+    "commands", "cli", "benchmarks", "trials",
 )  # fmt: skip
 
 # Of `doe.discrepancy`, the folders in the order of use.

@@ -1,4 +1,4 @@
-"""Which spheres are near each other: a hash grid of cells, each occupied one a run of spheres in memory.
+"""Spheres near each other, found in a hash grid of cells: each occupied one is a run of spheres in memory.
 
 The grid wraps around in each direction; two cells of one bucket are told apart by the distance of their
 spheres. Only worlds whose `stale` flag is set are searched. Places in memory are given out in a race, and the
@@ -77,7 +77,7 @@ def cell_kernels(build: Build) -> SimpleNamespace:
 
     @wp.func
     def room_for(cells: Cells, thread: int, w: int, size: int) -> int:
-        """Where `size` places of a world begin; the lanes of a warp, if all of that world, ask at once."""
+        """First of `size` places of a world; the lanes of a warp, if all of that world, ask at once."""
         through = running_sum(size)
         of_warp = from_lane(through, WARP - 1)
         begin = int(0)

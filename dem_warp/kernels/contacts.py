@@ -39,7 +39,7 @@ def contact_functions(build: Build) -> SimpleNamespace:
     def nears(
         model: Model, world: World, grains: Grains, w: int, g: int, entry: int, margin: real, step: int
     ) -> bool:
-        """Whether the two partners of an entry are nearer to each other than a margin [m]."""
+        """Tell whether the two partners of an entry are nearer to each other than a margin [m]."""
         partner = entry & SPHERE_MASK
         wall_base = model.grain_count * spheres_each
         a = pack.load_sphere(grains.spheres, g * spheres_each + (entry >> SPHERE_BITS))
@@ -52,9 +52,9 @@ def contact_functions(build: Build) -> SimpleNamespace:
         return wp.dot(d, d) < reach * reach
 
     @wp.func
-    def is_free(model: Model, hood: Neighbours, w: int, item: int, step: int) -> bool:
-        """Whether the partner in an item of `near` is a grain that moves freely."""
-        partner = load_pair(hood.near.item, item)[0] & SPHERE_MASK
+    def is_free(model: Model, neighbours: Neighbours, w: int, item: int, step: int) -> bool:
+        """Tell whether the partner in an item of `near` is a grain that moves freely."""
+        partner = load_pair(neighbours.near.item, item)[0] & SPHERE_MASK
         j = partner // spheres_each
         return j < model.grain_count and step >= model.release_step[w * model.grain_count + j]
 
@@ -96,7 +96,7 @@ def contact_functions(build: Build) -> SimpleNamespace:
 
     @wp.func
     def joined(model: Model, w: int, entry: int, other: int) -> bool:
-        """Whether the partners of two entries are triangles that share a corner, the first being one."""
+        """Tell whether the partners of two entries are triangles that share a corner, the first being one."""
         wall_base = model.grain_count * spheres_each
         return walls.joined(model, w, (entry & SPHERE_MASK) - wall_base, (other & SPHERE_MASK) - wall_base)
 
@@ -104,7 +104,7 @@ def contact_functions(build: Build) -> SimpleNamespace:
     def touches_triangle(
         model: Model, world: World, grains: Grains, w: int, g: int, entry: int, step: int
     ) -> bool:
-        """Whether the triangle of an entry has a contact with the entry's sphere."""
+        """Tell whether the triangle of an entry has a contact with the entry's sphere."""
         a = pack.load_sphere(grains.spheres, g * spheres_each + (entry >> SPHERE_BITS))
         reach = pack.last(a)
         if wp.static(is_apart):
@@ -114,37 +114,40 @@ def contact_functions(build: Build) -> SimpleNamespace:
 
     @wp.func
     def take_over(
-        model: Model, world: World, grains: Grains, hood: Neighbours, w: int, g: int, slot: int, step: int
-    ):
+        model: Model, world: World, grains: Grains, neighbours: Neighbours,
+        w: int, g: int, slot: int, step: int,
+    ):  # fmt: skip
         """Lets a contact that has passed from one triangle of a mesh to the next go on with its history.
 
         The sphere touched the other one in the step before and has left it now. Nobody writes to an entry
         that does not touch, so it may be read.
         """
-        entry = hood.entry[slot]
-        row = hood.list[w] * model.shape.shape[0] + g
-        first = row * hood.capacity
-        for k in range(first, first + hood.count[row]):
-            other = hood.entry[k]
+        entry = neighbours.entry[slot]
+        row = neighbours.list[w] * model.shape.shape[0] + g
+        first = row * neighbours.capacity
+        for k in range(first, first + neighbours.count[row]):
+            other = neighbours.entry[k]
             if other >> SPHERE_BITS == entry >> SPHERE_BITS and joined(model, w, entry, other):
                 if not touches_triangle(model, world, grains, w, g, other, step):
-                    history = pack.load_vec4(hood.history, k)
+                    history = pack.load_vec4(neighbours.history, k)
                     if pack.stamped_step(history) == step:
-                        pack.store_vec4(hood.history, slot, history)
+                        pack.store_vec4(neighbours.history, slot, history)
                         for m in range(memory_each):
-                            hood.memory[slot * memory_each + m] = hood.memory[k * memory_each + m]
+                            neighbours.memory[slot * memory_each + m] = neighbours.memory[k * memory_each + m]
                         return
 
     @wp.func
     def recall(
-        model: Model, world: World, grains: Grains, hood: Neighbours, w: int, g: int, slot: int, step: int
-    ):
+        model: Model, world: World, grains: Grains, neighbours: Neighbours,
+        w: int, g: int, slot: int, step: int,
+    ):  # fmt: skip
         """Tangential displacement [m] of a contact in the step before, and whether there was no contact."""
         if wp.static(build.has_mesh):
-            is_triangle = hood.entry[slot] & SPHERE_MASK >= model.grain_count * spheres_each + walls_each
-            if is_triangle and pack.stamped_step(pack.load_vec4(hood.history, slot)) != step:
-                take_over(model, world, grains, hood, w, g, slot, step)
-        history = pack.load_vec4(hood.history, slot)
+            first_triangle = model.grain_count * spheres_each + walls_each
+            is_triangle = neighbours.entry[slot] & SPHERE_MASK >= first_triangle
+            if is_triangle and pack.stamped_step(pack.load_vec4(neighbours.history, slot)) != step:
+                take_over(model, world, grains, neighbours, w, g, slot, step)
+        history = pack.load_vec4(neighbours.history, slot)
         displacement = vec3(history[0], history[1], history[2])
         is_new = pack.stamped_step(history) != step
         if is_new:
@@ -152,32 +155,33 @@ def contact_functions(build: Build) -> SimpleNamespace:
         return displacement, is_new
 
     @wp.func
-    def react(hood: Neighbours, g: int, force: vec3, torque: vec3, rolling: real):
+    def react(neighbours: Neighbours, g: int, force: vec3, torque: vec3, rolling: real):
         """Sets the opposite of a force and torque, and a rolling torque, on a grain whose turn is to come."""
-        f = pack.load_vec4(hood.reactions.force, g)
-        t = pack.load_vec4(hood.reactions.torque, g)
-        pack.store_vec4(hood.reactions.force, g, f + vec4(-force[0], -force[1], -force[2], rolling))
-        pack.store_vec4(hood.reactions.torque, g, t - vec4(torque[0], torque[1], torque[2], real(0.0)))
+        f = pack.load_vec4(neighbours.reactions.force, g)
+        t = pack.load_vec4(neighbours.reactions.torque, g)
+        pack.store_vec4(neighbours.reactions.force, g, f + vec4(-force[0], -force[1], -force[2], rolling))
+        pack.store_vec4(neighbours.reactions.torque, g, t - vec4(torque[0], torque[1], torque[2], real(0.0)))
 
     @wp.func
-    def weigh(model: Model, world: World, hood: Neighbours, wall: int, g: int, force: vec3):
+    def weigh(model: Model, world: World, neighbours: Neighbours, wall: int, g: int, force: vec3):
         """Adds the opposite of a force to what a grain has given to the weighed wall.
 
         Counts have the same sum in any order; a sum for each grain, as one for all would have to wait.
         """
         if model.wall[wall].weighed != 0:
-            wp.atomic_add(hood.pushed, g, -wp.int64(wp.rint(force[2] * world.force_rate)))
+            wp.atomic_add(neighbours.pushed, g, -wp.int64(wp.rint(force[2] * world.force_rate)))
 
     @wp.func
     def contact(
-        model: Model, world: World, grains: Grains, hood: Neighbours, w: int, g: int, item: int, step: int
-    ):
+        model: Model, world: World, grains: Grains, neighbours: Neighbours,
+        w: int, g: int, item: int, step: int,
+    ):  # fmt: skip
         """Force [N], torque and rolling torque [N m] of an item of `near`, none if the two do not meet.
 
         Updates the history of the contact, what the weighed wall has borne and, on a CPU, the reactions of
         the partner.
         """
-        near = load_pair(hood.near.item, item)
+        near = load_pair(neighbours.near.item, item)
         entry = near[0]
         slot = near[1]
         force = vec3()
@@ -217,20 +221,20 @@ def contact_functions(build: Build) -> SimpleNamespace:
             c.mobility += real(1.0) / (mass * wp.dot(c.lever, c.lever))
             c.velocity += surface_velocity(grains, g, c.lever)
             c.spin += spin_of(grains, g)
-            displacement, is_new = recall(model, world, grains, hood, w, g, slot, step)
+            displacement, is_new = recall(model, world, grains, neighbours, w, g, slot, step)
             c.is_new = is_new
             force, displacement, torque, rolling, partner_rolling = law(
-                model.contact[pair], c, displacement, hood.memory, slot * memory_each
+                model.contact[pair], c, displacement, neighbours.memory, slot * memory_each
             )
             if wp.static(not build.cooperative):
                 if partner < wall_base:
                     j = w * model.grain_count + partner // spheres_each
-                    react(hood, j, force, torque + wp.cross(c.partner_lever, force), partner_rolling)
+                    react(neighbours, j, force, torque + wp.cross(c.partner_lever, force), partner_rolling)
             torque += wp.cross(c.lever, force)
             if meets:
-                pack.store_vec4(hood.history, slot, pack.stamp(displacement, step + 1))
+                pack.store_vec4(neighbours.history, slot, pack.stamp(displacement, step + 1))
                 if partner >= wall_base:
-                    weigh(model, world, hood, walls.wall_of(model, w, partner - wall_base), g, force)
+                    weigh(model, world, neighbours, walls.wall_of(model, w, partner - wall_base), g, force)
         if wp.static(is_speculative) and not meets:
             force = vec3()
             torque = vec3()

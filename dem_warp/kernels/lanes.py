@@ -1,4 +1,4 @@
-"""What the lanes of a GPU warp tell one another; on a CPU each is a warp of its own lane."""
+"""Exchange between the lanes of a GPU warp; on a CPU each lane is a warp of its own."""
 
 import functools
 from typing import Any
@@ -9,7 +9,7 @@ WARP = 32
 """Lanes of a warp."""
 
 ALL_LANES = wp.constant(-1)
-"""What `lanes_with` gives when all lanes of a GPU warp have it."""
+"""Answer of `lanes_with` when all lanes of a GPU warp have it."""
 
 BLOCK = 128
 """Threads of a block, that share memory."""

@@ -56,7 +56,7 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
 
     @wp.func
     def rank_of(array: wp.array(dtype=int), first: int, count: int, value: int) -> int:
-        """How many of `count` numbers are less than a value."""
+        """Count of those among `count` numbers that are less than a value."""
         rank = int(0)
         for k in range(count):
             rank += wp.where(array[first + k] < value, 1, 0)
@@ -64,8 +64,9 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
 
     @wp.kernel(module=module, grid_stride=False)
     def write_lists(
-        model: Model, stale: wp.array(dtype=int), cells: Cells, hood: Neighbours, flags: wp.array(dtype=int)
-    ):
+        model: Model, stale: wp.array(dtype=int), cells: Cells, neighbours: Neighbours,
+        flags: wp.array(dtype=int),
+    ):  # fmt: skip
         """A sphere's part of its grain's new list, shared out to some lanes on a GPU.
 
         A partner's place is found by counting, as they are few. Histories come over from the old list.
@@ -84,44 +85,44 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
             before += wp.min(cells.found_count[g * spheres_each + k], world.most_found)
         own = wp.min(cells.found_count[i], world.most_found)
         grain_total = model.shape.shape[0]
-        old_row = hood.list[w] * grain_total + g
-        new_row = (1 - hood.list[w]) * grain_total + g
-        old_count = hood.count[old_row]
-        old_first = old_row * hood.capacity
+        old_row = neighbours.list[w] * grain_total + g
+        new_row = (1 - neighbours.list[w]) * grain_total + g
+        old_count = neighbours.count[old_row]
+        old_first = old_row * neighbours.capacity
         found = i * cells.found_capacity
         for k in range(lane, own, lanes):
             partner = cells.found[found + k]
             place = before + rank_of(cells.found, found, own, partner)
             if place < world.most_listed:
                 entry = (s << SPHERE_BITS) | partner
-                slot = new_row * hood.capacity + place
+                slot = new_row * neighbours.capacity + place
                 history = vec4(real(0.0), real(0.0), real(0.0), real(-1.0))
-                old = place_of(hood.entry, old_first, old_count, entry, place)
-                if old < old_count and hood.entry[old_first + old] == entry:
-                    history = pack.load_vec4(hood.history, old_first + old)
+                old = place_of(neighbours.entry, old_first, old_count, entry, place)
+                if old < old_count and neighbours.entry[old_first + old] == entry:
+                    history = pack.load_vec4(neighbours.history, old_first + old)
                     for m in range(memory_each):
-                        remembered = hood.memory[(old_first + old) * memory_each + m]
-                        hood.memory[slot * memory_each + m] = remembered
-                hood.entry[slot] = entry
-                pack.store_vec4(hood.history, slot, history)
+                        remembered = neighbours.memory[(old_first + old) * memory_each + m]
+                        neighbours.memory[slot * memory_each + m] = remembered
+                neighbours.entry[slot] = entry
+                pack.store_vec4(neighbours.history, slot, history)
         if lane == 0:
             # empty for the next time; every sphere of the bucket writes the same
             cells.bucket_size[cells.bucket[i]] = 0
             if cells.found_count[i] > world.most_found or before + own > world.most_listed:
                 wp.atomic_or(flags, w, NEIGHBOUR_OVERFLOW)
             if s == model.shape_sphere_count[model.shape[g]] - 1:
-                hood.count[new_row] = wp.min(before + own, world.most_listed)
-                hood.travel[g] = real(0.0)
+                neighbours.count[new_row] = wp.min(before + own, world.most_listed)
+                neighbours.travel[g] = real(0.0)
 
     @wp.kernel(module=module)
     def finish(
-        grains: Grains, cells: Cells, hood: Neighbours,
+        grains: Grains, cells: Cells, neighbours: Neighbours,
         stale: wp.array(dtype=int), any_stale: wp.array(dtype=int), rebuilds: wp.array(dtype=int),
     ):  # fmt: skip
         w = wp.tid()
         if stale[w] != 0:
-            hood.list[w] = 1 - hood.list[w]
-            hood.rebuilt[w] = grains.step[w]
+            neighbours.list[w] = 1 - neighbours.list[w]
+            neighbours.rebuilt[w] = grains.step[w]
             stale[w] = 0
             cells.cursor[w] = 0
             rebuilds[w] = rebuilds[w] + 1

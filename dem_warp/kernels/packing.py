@@ -1,4 +1,4 @@
-"""How a sphere's position, and the step number of a contact, are packed into four components.
+"""Packing of a sphere's position, and of a contact's step number, into four components.
 
 In the `mixed` precision a sphere is four 32-bit integers, three counts of the world's length unit and the
 bits of its float32 radius, so that the difference of two positions is exact wherever the heap stands. In

@@ -26,7 +26,7 @@ def place_in(section: wp.vec3, u: float, v: float) -> wp.vec2:
 
 @wp.func
 def is_outside(section: wp.vec3, x: float, y: float, radius: float) -> bool:
-    """Whether a sphere passes the edge of a cross-section."""
+    """Tell whether a sphere passes the edge of a cross-section."""
     if section[2] > 0.0:
         return wp.sqrt(x * x + y * y) + radius > section[2]
     return wp.abs(x) + radius > section[0] or wp.abs(y) + radius > section[1]
@@ -62,7 +62,7 @@ def spread_spheres(
 def meet(
     g: int, count: int, h: int, others: int, sphere_count: int, spheres: wp.array(dtype=wp.vec4)
 ) -> bool:
-    """Whether two grains are less than the clearance apart."""
+    """Tell whether two grains are less than the clearance apart."""
     for a in range(count):
         for b in range(others):
             sa = spheres[g * sphere_count + a]

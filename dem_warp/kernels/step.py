@@ -70,7 +70,7 @@ def step_kernels(build: Build) -> SimpleNamespace:
 
     @wp.func
     def move(
-        model: Model, grains: Grains, out: Grains, hood: Neighbours, alive: wp.array(dtype=int),
+        model: Model, grains: Grains, out: Grains, neighbours: Neighbours, alive: wp.array(dtype=int),
         flags: wp.array(dtype=int), w: int, g: int, step: int, force: vec3, torque: vec3, rolling: real,
         lane: int, lanes: int,
     ):  # fmt: skip
@@ -106,7 +106,7 @@ def step_kernels(build: Build) -> SimpleNamespace:
             pack.store_vec4(out.velocity, g, vec4(velocity[0], velocity[1], velocity[2], v4[3]))
             pack.store_vec4(out.spin, g, vec4(spin[0], spin[1], spin[2], real(0.0)))
             pack.store_sphere(out.center, g, center)
-            hood.travel[g] = hood.travel[g] + speed * dt
+            neighbours.travel[g] = neighbours.travel[g] + speed * dt
             if not (speed < world.speed_limit):
                 wp.atomic_or(flags, w, DIVERGED)
             if left_domain(world, position):
@@ -123,7 +123,7 @@ def step_kernels(build: Build) -> SimpleNamespace:
         running: wp.array(dtype=int),
         grains_in: Grains,
         # state in and out
-        hood: Neighbours,
+        neighbours: Neighbours,
         alive: wp.array(dtype=int),
         flags: wp.array(dtype=int),
         # state out
@@ -148,13 +148,13 @@ def step_kernels(build: Build) -> SimpleNamespace:
             if slot_count < alive.shape[0]:
                 w = running[w]
             g = w * model.grain_count + place
-            first = g * hood.capacity
+            first = g * neighbours.capacity
             if lane == 0:
-                prefetch_item(hood.near.item, first)
+                prefetch_item(neighbours.near.item, first)
                 prefetch_turn(grains_in.orientation, g)
                 prefetch_place(grains_in.position, g)
                 prefetch_four(model.inertia, g)
-            count = hood.near.count[g]
+            count = neighbours.near.count[g]
             moving = alive[g] > 0
             step = grains_in.step[w]
             if wp.static(build.cooperative):
@@ -163,11 +163,11 @@ def step_kernels(build: Build) -> SimpleNamespace:
             if lane == 0 and place == 0:
                 grains_out.step[w] = step + 1
         force, torque, rolling = sum_contacts(
-            model, grains_in, hood, w, g, count, first, step, thread & (WARP - 1), lane, lanes
+            model, grains_in, neighbours, w, g, count, first, step, thread & (WARP - 1), lane, lanes
         )
         if moving:
             move(
-                model, grains_in, grains_out, hood, alive,
+                model, grains_in, grains_out, neighbours, alive,
                 flags, w, g, step, force, torque, rolling,
                 lane, lanes,
             )  # fmt: skip

@@ -37,22 +37,22 @@ def serial_sum(build: Build):
 
     @wp.func
     def sum_contacts(
-        model: Model, grains: Grains, hood: Neighbours, w: int, g: int, count: int, first: int,
+        model: Model, grains: Grains, neighbours: Neighbours, w: int, g: int, count: int, first: int,
         step: int, thread: int, lane: int, lanes: int,
     ):  # fmt: skip
         """A grain that waits to be released feels nothing, but it may be in the way of another."""
-        f4 = pack.load_vec4(hood.reactions.force, g)
-        t4 = pack.load_vec4(hood.reactions.torque, g)
-        pack.store_vec4(hood.reactions.force, g, vec4())
-        pack.store_vec4(hood.reactions.torque, g, vec4())
+        f4 = pack.load_vec4(neighbours.reactions.force, g)
+        t4 = pack.load_vec4(neighbours.reactions.torque, g)
+        pack.store_vec4(neighbours.reactions.force, g, vec4())
+        pack.store_vec4(neighbours.reactions.torque, g, vec4())
         force = vec3(f4[0], f4[1], f4[2])
         torque = vec3(t4[0], t4[1], t4[2])
         rolling = f4[3]
         world = model.world[w]
         is_free = step >= model.release_step[g]
         for item in range(first, first + count):
-            if is_free or contacts.is_free(model, hood, w, item, step):
-                f, t, r = contacts.contact(model, world, grains, hood, w, g, item, step)
+            if is_free or contacts.is_free(model, neighbours, w, item, step):
+                f, t, r = contacts.contact(model, world, grains, neighbours, w, g, item, step)
                 force += f
                 torque += t
                 rolling += r
@@ -136,7 +136,7 @@ def cooperative_sum(build: Build):
 
     @wp.func
     def sum_contacts(
-        model: Model, grains: Grains, hood: Neighbours, w: int, g: int, count: int, first: int,
+        model: Model, grains: Grains, neighbours: Neighbours, w: int, g: int, count: int, first: int,
         step: int, thread: int, lane: int, lanes: int,
     ):  # fmt: skip
         """`count` is 0 for a lane whose grain takes no part; `thread` is the lane's number in the warp."""
@@ -156,7 +156,7 @@ def cooperative_sum(build: Build):
             first_i = from_lane(first, source)
             if batch + thread < items:
                 f, t, r = contacts.contact(
-                    model, model.world[wi], grains, hood, wi, gi, first_i + place, step_i
+                    model, model.world[wi], grains, neighbours, wi, gi, first_i + place, step_i
                 )
                 totals.write(thread, f, t, r)
             sync_warp()

@@ -1,4 +1,4 @@
-"""How a sphere meets a mesh of triangles: in every place where the surface comes nearest to its centre.
+"""Contacts of a sphere with a mesh of triangles: one wherever the surface comes nearest to its centre.
 
 Each triangle is a partner of its own, so a sphere in a corner touches several. Where its nearest point lies
 on an edge or in a corner, other triangles have that point too. The contact then belongs to the one of them
@@ -74,7 +74,7 @@ def triangle_functions(precision: Precision) -> SimpleNamespace:
 
     @wp.func
     def touches(model: Model, first: int, index: int, q: wp.vec3d, radius: wp.float64) -> bool:
-        """Whether a sphere has a contact with triangle `index` of a mesh whose triangles begin at `first`."""
+        """Tell whether a sphere has a contact with triangle `index` of a mesh that begins at `first`."""
         t = model.triangle[first + index]
         d = from_triangle(t, q)
         distance2 = wp.dot(d, d)
@@ -94,7 +94,7 @@ def triangle_functions(precision: Precision) -> SimpleNamespace:
 
     @wp.func
     def joined(model: Model, index: int, other: int) -> bool:
-        """Whether triangle `index` of the table shares a corner with number `other` of its mesh."""
+        """Tell whether triangle `index` of the table shares a corner with number `other` of its mesh."""
         t = model.triangle[index]
         found = bool(False)
         for k in range(t.first, t.first + t.count):

@@ -1,4 +1,4 @@
-"""Where walls stand, step by step, and how a sphere meets one: overlap, normal and the wall's velocity."""
+"""Places of the walls, step by step, and a sphere's contact with one: overlap, normal, wall velocity."""
 
 import functools
 from types import SimpleNamespace
@@ -43,7 +43,7 @@ def wall_functions(build: Build) -> SimpleNamespace:
 
     @wp.func
     def frame_of(model: Model, wall: int, step: int) -> Frame:
-        """Where a wall stands in a step, one of those that `place_walls` was last asked for."""
+        """Place of a wall in a step, one of those that `place_walls` was last asked for."""
         return model.frame[wall * FRAMES + step % FRAMES]
 
     @wp.func
@@ -67,7 +67,7 @@ def wall_functions(build: Build) -> SimpleNamespace:
 
     @wp.func
     def overlaps(wall: Wall, frame: Frame, position: wp.vec3d, radius: real) -> bool:
-        """Whether a sphere touches the wall; away from a cylinder's rims without a root."""
+        """Tell whether a sphere touches the wall; away from a cylinder's rims without a root."""
         r = position - frame.origin
         reach = wp.float64(radius)
         along = wp.dot(r, frame.axis)
@@ -95,7 +95,7 @@ def wall_functions(build: Build) -> SimpleNamespace:
 
     @wp.func
     def joined(model: Model, w: int, number: int, other: int) -> bool:
-        """Whether a triangle shares a corner with another partner."""
+        """Tell whether a triangle shares a corner with another partner."""
         facets = model.facets[wall_of(model, w, number)]
         return triangles.joined(model, facets.first + number - facets.number, other - facets.number)
 
@@ -106,7 +106,7 @@ def wall_functions(build: Build) -> SimpleNamespace:
 
     @wp.func
     def touches(model: Model, w: int, number: int, position: wp.vec3d, radius: real, step: int) -> bool:
-        """Whether a sphere touches a wall or a triangle."""
+        """Tell whether a sphere touches a wall or a triangle."""
         wall = wall_of(model, w, number)
         frame = frame_of(model, wall, step)
         if wp.static(has_mesh):
@@ -120,7 +120,7 @@ def wall_functions(build: Build) -> SimpleNamespace:
 
     @wp.func
     def nears(model: Model, w: int, number: int, position: wp.vec3d, reach: real, step: int) -> bool:
-        """Whether a wall or a triangle has a point nearer to a position than `reach` [m]."""
+        """Tell whether a wall or a triangle has a point nearer to a position than `reach` [m]."""
         if wp.static(has_mesh):
             if number >= walls_each:
                 wall = wall_of(model, w, number)
@@ -178,7 +178,7 @@ def wall_functions(build: Build) -> SimpleNamespace:
 
     @wp.func
     def path(wall: Wall, frame: Frame, world: World, time: wp.float64) -> wp.float64:
-        """How far the wall's motion takes any point of it that grains may touch, at the most, in a time [m].
+        """Farthest that the wall's motion takes any point of it that grains may touch, in a time [m].
 
         A spin about its own axis leaves a surface of revolution where it is.
         """

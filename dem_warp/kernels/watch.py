@@ -40,7 +40,7 @@ LATE_REBUILD = wp.constant(int(WorldFlag.LATE_REBUILD))
 
 @functools.cache
 def watch_kernels(build: Build) -> SimpleNamespace:
-    """What is launched before some steps, in this order, and `find_fastest` after them."""
+    """Kernels to launch before some steps, in this order, and `find_fastest` for after them."""
     precision = build.precision
     real = precision.real
     types = device_structs(precision)
@@ -66,14 +66,14 @@ def watch_kernels(build: Build) -> SimpleNamespace:
 
     @wp.func
     def farthest(world: World, pace: float, ahead: int) -> real:
-        """How far a grain that may be struck to reach a speed, and falls besides, comes in some steps [m]."""
+        """Farthest that a grain comes in some steps, struck to reach a speed and falling besides [m]."""
         time = real(ahead) * world.time_step
         falling = real(HEADROOM) * wp.length(world.gravity) * time
         return wp.clamp((real(pace) + falling) * time, real(LEAST_PATH) * world.skin, real(0.5) * world.skin)
 
     @wp.func
     def wall_path(model: Model, world: World, grains: Grains, w: int, i: int, steps: int) -> real:
-        """How far a wall may come in some steps [m]."""
+        """Farthest that a wall may come in some steps [m]."""
         index = w * walls_each + i
         time = wp.float64(steps) * wp.float64(world.time_step)
         frame = walls.frame_of(model, index, grains.step[w])
@@ -81,11 +81,11 @@ def watch_kernels(build: Build) -> SimpleNamespace:
 
     @wp.func
     def uses_up(
-        model: Model, world: World, grains: Grains, hood: Neighbours, g: int, ahead: int, part: real
+        model: Model, world: World, grains: Grains, neighbours: Neighbours, g: int, ahead: int, part: real
     ) -> bool:
-        """Whether a grain may come farther than a part of the skin within some steps."""
+        """Tell whether a grain may come farther than a part of the skin within some steps."""
         speed = real(EXPECTED * speed_of(model, grains, g))
-        return hood.travel[g] + speed * real(ahead) * world.time_step > part * world.skin
+        return neighbours.travel[g] + speed * real(ahead) * world.time_step > part * world.skin
 
     @wp.kernel(module=module)
     def mark_stale(
@@ -97,7 +97,7 @@ def watch_kernels(build: Build) -> SimpleNamespace:
         alive: wp.array(dtype=int),
         idle: wp.array(dtype=int),
         fastest: wp.array(dtype=float),
-        hood: Neighbours,
+        neighbours: Neighbours,
         # state out
         stale: wp.array(dtype=int),
         any_stale: wp.array(dtype=int),
@@ -109,20 +109,21 @@ def watch_kernels(build: Build) -> SimpleNamespace:
             return
         world = model.world[w]
         if g % model.grain_count == 0:
-            hood.near.wall_path[w] = real(0.0)
-            hood.near.wall_speed[w] = 0.0
+            neighbours.near.wall_path[w] = real(0.0)
+            neighbours.near.wall_speed[w] = 0.0
             for i in range(walls_each):
                 path = wall_path(model, world, grains, w, i, ahead)
-                hood.near.wall_path[w] = wp.max(hood.near.wall_path[w], path)
+                neighbours.near.wall_path[w] = wp.max(neighbours.near.wall_path[w], path)
                 speed = float(wall_path(model, world, grains, w, i, 1) / world.time_step)
-                hood.near.wall_speed[w] = wp.max(hood.near.wall_speed[w], speed)
-                whole = wall_path(model, world, grains, w, i, grains.step[w] + ahead - hood.rebuilt[w])
+                neighbours.near.wall_speed[w] = wp.max(neighbours.near.wall_speed[w], speed)
+                whole = wall_path(model, world, grains, w, i, grains.step[w] + ahead - neighbours.rebuilt[w])
                 if real(2.0) * whole > world.skin:
                     stale[w] = 1
                     any_stale[0] = 1
-        hood.near.speed[g] = speed_of(model, grains, g)
-        hood.near.pace[g] = wp.max(float(HEADROOM) * hood.near.speed[g], float(SHAKEN) * fastest[w])
-        if alive[g] > 0 and uses_up(model, world, grains, hood, g, ahead, real(0.5)):
+        neighbours.near.speed[g] = speed_of(model, grains, g)
+        own = float(HEADROOM) * neighbours.near.speed[g]
+        neighbours.near.pace[g] = wp.max(own, float(SHAKEN) * fastest[w])
+        if alive[g] > 0 and uses_up(model, world, grains, neighbours, g, ahead, real(0.5)):
             stale[w] = 1
             any_stale[0] = 1
 
@@ -135,7 +136,7 @@ def watch_kernels(build: Build) -> SimpleNamespace:
         grains: Grains,
         alive: wp.array(dtype=int),
         idle: wp.array(dtype=int),
-        hood: Neighbours,
+        neighbours: Neighbours,
         # state out
         stale: wp.array(dtype=int),
     ):
@@ -143,7 +144,7 @@ def watch_kernels(build: Build) -> SimpleNamespace:
         g = wp.tid()
         w = g // model.grain_count
         if idle[w] == 0 and alive[g] > 0 and stale[w] == 0:
-            if uses_up(model, model.world[w], grains, hood, g, ahead, real(JOINED)):
+            if uses_up(model, model.world[w], grains, neighbours, g, ahead, real(JOINED)):
                 stale[w] = 1
 
     @wp.kernel(module=module, grid_stride=False)
@@ -156,7 +157,7 @@ def watch_kernels(build: Build) -> SimpleNamespace:
         idle: wp.array(dtype=int),
         fastest: wp.array(dtype=float),
         # state in and out
-        hood: Neighbours,
+        neighbours: Neighbours,
     ):
         """Raises the pace of a grain for the neighbours that may strike it; a warp a grain on a GPU."""
         thread = wp.tid()
@@ -170,23 +171,24 @@ def watch_kernels(build: Build) -> SimpleNamespace:
         if real(pace) * real(ahead) * world.time_step <= real(LEAST_PATH) * world.skin:
             # so slow a world that it hardly matters who strikes
             if lane == 0:
-                hood.near.pace[g] = wp.max(hood.near.pace[g], pace)
+                neighbours.near.pace[g] = wp.max(neighbours.near.pace[g], pace)
             return
-        row = hood.list[w] * model.shape.shape[0] + g
+        row = neighbours.list[w] * model.shape.shape[0] + g
         striker = float(0.0)
-        for k in range(lane, hood.count[row], lanes):
-            partner = hood.entry[row * hood.capacity + k] & SPHERE_MASK
-            speed = hood.near.wall_speed[w]
+        for k in range(lane, neighbours.count[row], lanes):
+            partner = neighbours.entry[row * neighbours.capacity + k] & SPHERE_MASK
+            speed = neighbours.near.wall_speed[w]
             if partner < model.grain_count * spheres_each:
                 j = w * model.grain_count + partner // spheres_each
-                speed = hood.near.speed[j]
+                speed = neighbours.near.speed[j]
                 if wp.static(not build.cooperative):
                     # this list alone has the two of them
-                    hood.near.pace[j] = wp.max(hood.near.pace[j], float(STRUCK) * hood.near.speed[g])
+                    struck = float(STRUCK) * neighbours.near.speed[g]
+                    neighbours.near.pace[j] = wp.max(neighbours.near.pace[j], struck)
             striker = wp.max(striker, speed)
         striker = largest_of_warp(striker)
         if lane == 0:
-            hood.near.pace[g] = wp.max(hood.near.pace[g], float(STRUCK) * striker)
+            neighbours.near.pace[g] = wp.max(neighbours.near.pace[g], float(STRUCK) * striker)
 
     @wp.kernel(module=module, grid_stride=False)
     def select_near(
@@ -198,7 +200,7 @@ def watch_kernels(build: Build) -> SimpleNamespace:
         alive: wp.array(dtype=int),
         idle: wp.array(dtype=int),
         # state in and out
-        hood: Neighbours,
+        neighbours: Neighbours,
         fastest: wp.array(dtype=float),
     ):
         """Lists, in order, the entries that may touch in the next steps; a warp a grain on a GPU."""
@@ -209,34 +211,34 @@ def watch_kernels(build: Build) -> SimpleNamespace:
         if idle[w] != 0:
             return
         world = model.world[w]
-        own = farthest(world, hood.near.pace[g], ahead)
+        own = farthest(world, neighbours.near.pace[g], ahead)
         step = grains.step[w]
-        row = hood.list[w] * model.shape.shape[0] + g
-        count = hood.count[row]
+        row = neighbours.list[w] * model.shape.shape[0] + g
+        count = neighbours.count[row]
         if alive[g] <= 0:
             count = 0
-        found = g * hood.capacity
+        found = g * neighbours.capacity
         for k in range(lane, count + lane, lanes):
-            slot = row * hood.capacity + k
+            slot = row * neighbours.capacity + k
             entry = int(0)
             is_near = bool(False)
             if k < count:
-                entry = hood.entry[slot]
+                entry = neighbours.entry[slot]
                 partner = entry & SPHERE_MASK
-                path = hood.near.wall_path[w]
+                path = neighbours.near.wall_path[w]
                 if partner < model.grain_count * spheres_each:
                     path = farthest(
-                        world, hood.near.pace[w * model.grain_count + partner // spheres_each], ahead
+                        world, neighbours.near.pace[w * model.grain_count + partner // spheres_each], ahead
                     )
                 is_near = contacts.nears(model, world, grains, w, g, entry, world.reach + own + path, step)
             bits = lanes_with(is_near)
             if is_near:
-                hood.near.item[found + bit_count(bits & ((1 << lane) - 1))] = wp.vec2i(entry, slot)
+                neighbours.near.item[found + bit_count(bits & ((1 << lane) - 1))] = wp.vec2i(entry, slot)
             found += bit_count(bits)
         if lane == 0:
-            hood.near.count[g] = found - g * hood.capacity
-            hood.near.path[g] = own
-            hood.near.travel[g] = hood.travel[g]
+            neighbours.near.count[g] = found - g * neighbours.capacity
+            neighbours.near.path[g] = own
+            neighbours.near.travel[g] = neighbours.travel[g]
             if g % model.grain_count == 0:
                 fastest[w] = 0.0
 
@@ -249,7 +251,7 @@ def watch_kernels(build: Build) -> SimpleNamespace:
         grains: Grains,
         alive: wp.array(dtype=int),
         idle: wp.array(dtype=int),
-        hood: Neighbours,
+        neighbours: Neighbours,
         # state out
         fastest: wp.array(dtype=float),
         flags: wp.array(dtype=int),
@@ -267,12 +269,13 @@ def watch_kernels(build: Build) -> SimpleNamespace:
             g = w * model.grain_count + place
             if alive[g] > 0:
                 speed = speed_of(model, grains, g)
-                travel = hood.travel[g]
-                if travel - hood.near.travel[g] > hood.near.path[g] or real(2.0) * travel > world.skin:
+                travel = neighbours.travel[g]
+                since = travel - neighbours.near.travel[g]
+                if since > neighbours.near.path[g] or real(2.0) * travel > world.skin:
                     wp.atomic_or(flags, w, LATE_REBUILD)
             if place == 0:
                 for i in range(walls_each):
-                    whole = wall_path(model, world, grains, w, i, grains.step[w] - hood.rebuilt[w])
+                    whole = wall_path(model, world, grains, w, i, grains.step[w] - neighbours.rebuilt[w])
                     if real(2.0) * whole > world.skin:
                         wp.atomic_or(flags, w, LATE_REBUILD)
                     speed = wp.max(speed, float(wall_path(model, world, grains, w, i, 1) / world.time_step))

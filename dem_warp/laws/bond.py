@@ -7,7 +7,7 @@ import warp as wp
 
 @wp.func
 def bonded(contact: Any, longest: Any, memory: Any, at: int) -> bool:
-    """Whether two surfaces touched once and were since never more than `longest` [m] apart.
+    """Tell whether two surfaces touched once and were since never more than `longest` [m] apart.
 
     `memory[at]` is 1 while they are bonded and 0 else.
     """

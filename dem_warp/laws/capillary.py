@@ -2,12 +2,13 @@
 
 import math
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import warp as wp
 
 from dem_warp.laws.bond import bonded
 from dem_warp.laws.mechanism import Mechanism
+from dem_warp.parameters import Parameter
 
 
 @wp.func
@@ -38,15 +39,6 @@ def bridge_attraction(params: Any, contact: Any, memory: Any, at: int):
 class CapillaryBridge(Mechanism):
     """Touching spheres share a drop of liquid, which pulls them together until it breaks.
 
-    Attributes
-    ----------
-    surface_tension : float
-        g [N/m]; of water 0.072.
-    bridge_volume : float
-        V of each bridge [m3]; above 0 where there is surface tension.
-    contact_angle : float
-        theta, of the liquid on the surfaces [rad], below pi / 2.
-
     Raises
     ------
     ValueError
@@ -71,9 +63,12 @@ class CapillaryBridge(Mechanism):
     Interface Sci. 161 (1993) 138-147.
     """
 
-    surface_tension: float = 0.0
-    bridge_volume: float = 0.0
-    contact_angle: float = 0.0
+    surface_tension: Annotated[float, Parameter("N/m", at_least=0.0)] = 0.0
+    """Surface tension g; of water 0.072 N/m."""
+    bridge_volume: Annotated[float, Parameter("m^3", at_least=0.0)] = 0.0
+    """Volume V of each bridge; above 0 where there is surface tension."""
+    contact_angle: Annotated[float, Parameter("rad", at_least=0.0, below=math.pi / 2)] = 0.0
+    """Angle theta of the liquid on the surfaces."""
 
     name: ClassVar[str] = "capillary_bridge"
     strength: ClassVar[str] = "surface_tension"
@@ -87,10 +82,6 @@ class CapillaryBridge(Mechanism):
             raise ValueError(
                 "CapillaryBridge.bridge_volume: must be above 0 where there is surface tension [m3], "
                 f"got {self.bridge_volume!r}"
-            )
-        if self.contact_angle >= math.pi / 2.0:
-            raise ValueError(
-                f"CapillaryBridge.contact_angle: must be below pi / 2 [rad], got {self.contact_angle!r}"
             )
 
     def reach(self, largest_radius: float, modulus: float) -> float:

@@ -19,7 +19,7 @@ def memory_size(mechanisms: Mechanisms) -> int:
 
 
 def acts_apart(mechanisms: Mechanisms) -> bool:
-    """Whether some mechanism acts on surfaces that do not touch."""
+    """Tell whether some mechanism acts on surfaces that do not touch."""
     return any(mechanism.acts_apart for mechanism in mechanisms)
 
 

@@ -1,13 +1,14 @@
 """Rolling resistance that stores: a rotational spring, a slider and a dashpot."""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import warp as wp
 
 from dem_warp.laws.mechanism import Mechanism
 from dem_warp.laws.normal import hertz_stiffness
 from dem_warp.laws.tangential import advance_displacement, coulomb_spring
+from dem_warp.parameters import Parameter
 
 
 @wp.func
@@ -44,14 +45,6 @@ class ElasticPlasticRolling(Mechanism):
 
     A grain on a slope below atan(mu_r) stands still in it, and two grains feel opposite torques of one size.
 
-    Attributes
-    ----------
-    rolling_stiffness : float
-        c in k_r = c S_n (mu_r R*)^2 [1], S_n = 2 E* sqrt(R* d) being the normal stiffness and mu_r the
-        rolling friction of the pair; the source recommends 2.25.
-    rolling_damping : float
-        Damping ratio eta_r of the rolling vibration [1].
-
     Notes
     -----
     With the relative roll theta [rad], the part of the relative rotation in the contact's tangent plane since
@@ -68,8 +61,11 @@ class ElasticPlasticRolling(Mechanism):
     a fast grain is braked as a slow one.
     """
 
-    rolling_stiffness: float = 0.0
-    rolling_damping: float = 0.0
+    rolling_stiffness: Annotated[float, Parameter("1", at_least=0.0)] = 0.0
+    """c in k_r = c S_n (mu_r R*)^2, S_n = 2 E* sqrt(R* d) being the normal stiffness and mu_r the rolling
+    friction of the pair; the source recommends 2.25."""
+    rolling_damping: Annotated[float, Parameter("1", at_least=0.0)] = 0.0
+    """Damping ratio eta_r of the rolling vibration."""
 
     name: ClassVar[str] = "elastic_plastic_rolling"
     strength: ClassVar[str] = "rolling_stiffness"

@@ -1,11 +1,12 @@
 """Plastic dents: a normal spring that gives less back than it took, at any speed."""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import warp as wp
 
 from dem_warp.laws.mechanism import Mechanism
+from dem_warp.parameters import Parameter
 
 
 @wp.func
@@ -28,11 +29,6 @@ def dented(params: Any, contact: Any, elastic: Any, memory: Any, at: int):
 class HystereticSpring(Mechanism):
     """Normal spring that loads along Hertz's curve and unloads along a steeper one.
 
-    Attributes
-    ----------
-    plasticity : float
-        Depth of the dent that is left over the largest overlap, d_p / d_max [1], from 0 to below 1.
-
     Notes
     -----
     With Hertz's F = K d^(3/2) on first loading, below the largest overlap d_max of the contact
@@ -49,13 +45,10 @@ class HystereticSpring(Mechanism):
     plasticity 0 is the base law.
     """
 
-    plasticity: float = 0.0
+    plasticity: Annotated[float, Parameter("1", at_least=0.0, below=1.0)] = 0.0
+    """Depth of the dent that is left over the largest overlap, d_p / d_max."""
 
     name: ClassVar[str] = "hysteretic_spring"
     strength: ClassVar[str] = "plasticity"
     memory_size: ClassVar[int] = 1
     spring: ClassVar[Any] = dented
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self._require_below_one("plasticity")

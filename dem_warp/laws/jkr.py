@@ -2,12 +2,13 @@
 
 import math
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import warp as wp
 
 from dem_warp.laws.bond import bonded
 from dem_warp.laws.mechanism import Mechanism
+from dem_warp.parameters import Parameter
 
 PULL_OFF = 0.75 * 4.0 ** (-1.0 / 3.0)
 """Largest distance of two surfaces in contact, over s^2 / R*: that of p = 4^(-2/3)."""
@@ -43,7 +44,7 @@ def relative_contact_radius(depth: Any):
 
 @wp.func
 def relative_attraction(depth: Any):
-    """What JKR's force lacks to Hertz's at the same overlap, over pi W R*, from 5/6 to 3/2."""
+    """Shortfall of JKR's force against Hertz's at the same overlap, over pi W R*, from 5/6 to 3/2."""
     p = relative_contact_radius(depth)
     shape = p * (p * p - type(depth)(3.0) * depth)
     if depth > type(depth)(0.0):
@@ -71,11 +72,6 @@ def jkr_attraction(params: Any, contact: Any, memory: Any, at: int):
 class JKR(Mechanism):
     """Elastic spheres that adhere, on a contact area that adhesion makes larger.
 
-    Attributes
-    ----------
-    work_of_adhesion : float
-        W [J/m2], that parts two surfaces: twice the surface energy of two like ones, W = 2 gamma.
-
     Notes
     -----
     With the contact radius a, the force and the overlap are ::
@@ -100,7 +96,8 @@ class JKR(Mechanism):
     impact: C. Thornton and Z. Ning, Powder Technology 99 (1998) 154-162.
     """
 
-    work_of_adhesion: float = 0.0
+    work_of_adhesion: Annotated[float, Parameter("J/m^2", at_least=0.0)] = 0.0
+    """Work W that parts two surfaces: twice the surface energy of two like ones, W = 2 gamma."""
 
     name: ClassVar[str] = "jkr"
     strength: ClassVar[str] = "work_of_adhesion"

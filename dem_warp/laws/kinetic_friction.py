@@ -1,11 +1,12 @@
 """Static and kinetic friction: a contact that slips is held by less than one that sticks."""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import warp as wp
 
 from dem_warp.laws.mechanism import Mechanism
+from dem_warp.parameters import Parameter
 
 
 @wp.func
@@ -30,11 +31,6 @@ def stick_or_slip(
 class KineticFriction(Mechanism):
     """Kinetic friction mu_k below the static mu_s, which is the pair's coefficient of friction.
 
-    Attributes
-    ----------
-    friction_drop : float
-        1 - mu_k / mu_s [1], from 0 to below 1.
-
     Notes
     -----
     A contact starts to slip when its tangential spring passes mu_s F_n. From then on the spring is held to
@@ -45,13 +41,10 @@ class KineticFriction(Mechanism):
     (2008) 235-246.
     """
 
-    friction_drop: float = 0.0
+    friction_drop: Annotated[float, Parameter("1", at_least=0.0, below=1.0)] = 0.0
+    """Part of the static friction that a slipping contact lacks, 1 - mu_k / mu_s."""
 
     name: ClassVar[str] = "kinetic_friction"
     strength: ClassVar[str] = "friction_drop"
     memory_size: ClassVar[int] = 1
     friction: ClassVar[Any] = stick_or_slip
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self._require_below_one("friction_drop")

@@ -2,11 +2,12 @@
 
 import math
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import warp as wp
 
 from dem_warp.laws.mechanism import Mechanism
+from dem_warp.parameters import Parameter
 
 
 @wp.func
@@ -26,11 +27,6 @@ def area_attraction(params: Any, contact: Any, memory: Any, at: int):
 class LinearCohesion(Mechanism):
     """Surfaces attract each other with a constant pressure over their contact area ("simplified JKR", SJKR).
 
-    Attributes
-    ----------
-    cohesion_energy_density : float
-        k in F = k 2 pi R* d [J/m3 = Pa].
-
     Notes
     -----
     The area is that in which the two undeformed surfaces cut each other, twice that of the Hertz contact
@@ -45,7 +41,8 @@ class LinearCohesion(Mechanism):
     Source: LIGGGHTS documentation, "gran cohesion sjkr"; its "sjkr2" takes twice this area.
     """
 
-    cohesion_energy_density: float = 0.0
+    cohesion_energy_density: Annotated[float, Parameter("J/m^3", at_least=0.0)] = 0.0
+    """k in F = k 2 pi R* d."""
 
     name: ClassVar[str] = "linear_cohesion"
     strength: ClassVar[str] = "cohesion_energy_density"

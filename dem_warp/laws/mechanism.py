@@ -1,25 +1,23 @@
-"""What a mechanism is: a physical effect that contacts have beside, or in place of, a part of the base law.
+"""Base of mechanisms: physical effects that contacts have beside, or in place of, a part of the base law.
 
-A mechanism is a frozen dataclass of its parameters, each a field of `ContactParams` under the same name, and
-of device functions (`@wp.func`), each at one of the places where the law can be changed; `None` leaves one as
-it is. A mechanism of strength 0, the default, is at its null: it leaves the base law as it is.
+A mechanism is a frozen dataclass of its parameters, each with unit and bounds and a field of `ContactParams`
+under the same name, and of device functions (`@wp.func`), each at one of the places where the law can be
+changed; `None` leaves one as it is. A mechanism of strength 0, the default, is at its null: it leaves the
+base law as it is.
 """
 
-import math
-from dataclasses import dataclass, fields
-from typing import Any, ClassVar
+from dataclasses import dataclass
+from typing import Any, ClassVar, Literal, get_args
 
-BETWEEN = ("all", "grains", "walls")
+from dem_warp.parameters import check_parameters, parameters_of
+
+Between = Literal["all", "grains", "walls"]
+"""Contacts that have a mechanism: every one, those of grains with grains, or those of grains with walls."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Mechanism:
     """A physical effect of contacts.
-
-    Attributes
-    ----------
-    between : "all", "grains" or "walls"
-        The contacts that have it: every one, those of grains with grains, or those of grains with walls.
 
     Notes
     -----
@@ -48,7 +46,8 @@ class Mechanism:
         stands in its place. One mechanism of a build at the most has it.
     """
 
-    between: str = "all"
+    between: Between = "all"
+    """Contacts that have it: all, those between grains, or those with walls."""
 
     name: ClassVar[str]
     strength: ClassVar[str]
@@ -57,7 +56,7 @@ class Mechanism:
     excludes: ClassVar[tuple[str, ...]] = ()
     """Names of mechanisms that the same contact may not have, since this one builds on Hertz's force."""
     acts_apart: ClassVar[bool] = False
-    """Whether it acts on surfaces that no longer touch; then `reach` says how far."""
+    """True of one that acts on surfaces that no longer touch; then `reach` says how far."""
 
     spring: ClassVar[Any] = None
     attraction: ClassVar[Any] = None
@@ -67,20 +66,15 @@ class Mechanism:
     rolling: ClassVar[Any] = None
 
     def __post_init__(self) -> None:
-        if self.between not in BETWEEN:
-            raise ValueError(f"{type(self).__name__}.between: must be one of {BETWEEN}, got {self.between!r}")
-        for name, value in self.parameters.items():
-            if not (math.isfinite(value) and value >= 0.0):
-                raise ValueError(f"{type(self).__name__}.{name}: must be finite and 0 or more, got {value!r}")
-
-    def _require_below_one(self, name: str) -> None:
-        if not getattr(self, name) < 1.0:
-            raise ValueError(f"{type(self).__name__}.{name}: must be below 1, got {getattr(self, name)!r}")
+        if self.between not in get_args(Between):
+            rule = f"must be one of {get_args(Between)}"
+            raise ValueError(f"{type(self).__name__}.between: {rule}, got {self.between!r}")
+        check_parameters(self)
 
     @classmethod
     def parameter_names(cls) -> tuple[str, ...]:
         """Names of the parameters, which are fields of `ContactParams` too."""
-        return tuple(f.name for f in fields(cls) if f.name != "between")
+        return tuple(parameters_of(cls))
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -88,7 +82,7 @@ class Mechanism:
         return {name: float(getattr(self, name)) for name in self.parameter_names()}
 
     def acts_between(self, kind: str) -> bool:
-        """Whether contacts of a kind, "grains" or "walls", have it."""
+        """Tell whether contacts of a kind, "grains" or "walls", have it."""
         return self.between in ("all", kind)
 
     def reach(self, largest_radius: float, modulus: float) -> float:

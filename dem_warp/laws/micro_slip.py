@@ -1,12 +1,13 @@
 """Micro-slip: the rim of a contact slips while its middle sticks, as in theory and unlike one spring."""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import warp as wp
 
 from dem_warp.laws.mechanism import Mechanism
 from dem_warp.laws.tangential import coulomb_spring, limited
+from dem_warp.parameters import Parameter
 
 SPRINGS = 8
 """Springs of the row, an even number."""
@@ -105,11 +106,6 @@ def row_or_spring(
 class MicroSlip(Mechanism):
     """A contact slips from its rim inwards, in place of sticking or sliding as a whole.
 
-    Attributes
-    ----------
-    micro_slip : float
-        1 with it, 0 without [1].
-
     Notes
     -----
     The contact is a row of springs along a line through its middle, each of which sticks or slips by itself
@@ -131,7 +127,8 @@ class MicroSlip(Mechanism):
     Springer (2015); R. D. Mindlin and H. Deresiewicz, Journal of Applied Mechanics 20 (1953) 327-344.
     """
 
-    micro_slip: float = 0.0
+    micro_slip: Annotated[float, Parameter("1", at_least=0.0, at_most=1.0)] = 0.0
+    """1 with it, 0 without."""
 
     name: ClassVar[str] = "micro_slip"
     strength: ClassVar[str] = "micro_slip"

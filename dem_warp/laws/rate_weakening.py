@@ -1,11 +1,12 @@
 """Friction that weakens with the speed of sliding."""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import warp as wp
 
 from dem_warp.laws.mechanism import Mechanism
+from dem_warp.parameters import Parameter
 
 
 @wp.func
@@ -23,13 +24,6 @@ def weakened(params: Any, contact: Any, coefficient: Any, spring: Any, support: 
 class RateWeakening(Mechanism):
     """Friction that falls from the pair's coefficient mu at rest to mu (1 - weakening) at speed.
 
-    Attributes
-    ----------
-    weakening : float
-        Part of the friction that is lost at high speed [1], from 0 to below 1.
-    weakening_speed : float
-        v_0, the speed at which 63 % of that is lost [m/s]; above 0 where something is lost.
-
     Notes
     -----
     mu(v) = mu (1 - weakening (1 - exp(-v / v_0))), where v is the speed of the one surface along the other.
@@ -39,8 +33,10 @@ class RateWeakening(Mechanism):
     (1990) 455-474, for a friction that grows with speed.
     """
 
-    weakening: float = 0.0
-    weakening_speed: float = 0.0
+    weakening: Annotated[float, Parameter("1", at_least=0.0, below=1.0)] = 0.0
+    """Part of the friction that is lost at high speed."""
+    weakening_speed: Annotated[float, Parameter("m/s", at_least=0.0)] = 0.0
+    """Speed v_0 at which 63 % of that is lost; above 0 where something is lost."""
 
     name: ClassVar[str] = "rate_weakening"
     strength: ClassVar[str] = "weakening"
@@ -48,7 +44,6 @@ class RateWeakening(Mechanism):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self._require_below_one("weakening")
         if self.weakening > 0.0 and self.weakening_speed == 0.0:
             raise ValueError(
                 f"{type(self).__name__}.weakening_speed: must be above 0 where weakening is, "

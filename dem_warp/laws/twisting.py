@@ -1,12 +1,13 @@
 """Twisting resistance: a spring and a slider against the spin about the contact's normal."""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import warp as wp
 
 from dem_warp.laws.mechanism import Mechanism
 from dem_warp.laws.tangential import coulomb_spring, mindlin_stiffness
+from dem_warp.parameters import Parameter
 
 
 @wp.func
@@ -32,12 +33,6 @@ def twist_torque(params: Any, contact: Any, support: Any, memory: Any, at: int):
 class Twisting(Mechanism):
     """A contact resists to being twisted, by the friction of its area.
 
-    Attributes
-    ----------
-    twisting_radius : float
-        Radius of the area that resists over that of the Hertz contact, a = sqrt(R* d) [1]: 1 for smooth
-        spheres, more where a sphere stands for a flatter surface.
-
     Notes
     -----
     With b = twisting_radius a and the twist psi [rad], the relative rotation about the normal since the
@@ -54,7 +49,9 @@ class Twisting(Mechanism):
     and slider also S. Luding, Granular Matter 10 (2008) 235-246.
     """
 
-    twisting_radius: float = 0.0
+    twisting_radius: Annotated[float, Parameter("1", at_least=0.0)] = 0.0
+    """Radius of the area that resists over that of the Hertz contact, a = sqrt(R* d): 1 for smooth spheres,
+    more where a sphere stands for a flatter surface."""
 
     name: ClassVar[str] = "twisting"
     strength: ClassVar[str] = "twisting_radius"

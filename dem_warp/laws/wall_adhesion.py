@@ -1,12 +1,13 @@
 """Adhesion to walls alone, in proportion to the contact area."""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import warp as wp
 
 from dem_warp.laws.linear_cohesion import contact_area
-from dem_warp.laws.mechanism import Mechanism
+from dem_warp.laws.mechanism import Between, Mechanism
+from dem_warp.parameters import Parameter
 
 
 @wp.func
@@ -22,11 +23,6 @@ class WallAdhesion(Mechanism):
     It is a mechanism beside the cohesion of the grains, so that a case may have either, or both, and a study
     may vary them apart.
 
-    Attributes
-    ----------
-    wall_adhesion_energy_density : float
-        k_w in F = k_w 2 pi R* d [J/m3 = Pa]; R* is the radius of the sphere on the wall.
-
     Raises
     ------
     ValueError
@@ -37,8 +33,9 @@ class WallAdhesion(Mechanism):
     Source: LIGGGHTS documentation, "gran cohesion sjkr", for pairs of a grain and a wall.
     """
 
-    between: str = "walls"
-    wall_adhesion_energy_density: float = 0.0
+    between: Between = "walls"
+    wall_adhesion_energy_density: Annotated[float, Parameter("J/m^3", at_least=0.0)] = 0.0
+    """k_w in F = k_w 2 pi R* d; R* is the radius of the sphere on the wall."""
 
     name: ClassVar[str] = "wall_adhesion"
     strength: ClassVar[str] = "wall_adhesion_energy_density"

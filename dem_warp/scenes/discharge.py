@@ -1,4 +1,4 @@
-"""What scenes share in which a gate falls away and grains run out: the course and the rate."""
+"""Base of scenes in which a gate falls away and grains run out: the course and the rate."""
 
 from abc import abstractmethod
 from collections.abc import Mapping
@@ -37,15 +37,10 @@ DISCHARGE_OBSERVABLES = {
 
 @dataclass
 class Discharge(Course):
-    """Course of a scene whose grains run out of a container.
-
-    Attributes
-    ----------
-    fallen : list of [float, float]
-        Time since the opening [s] and mass that has come out [kg], at the opening and every look after it.
-    """
+    """Course of a scene whose grains run out of a container."""
 
     fallen: list[list[float]] = field(default_factory=list)
+    """Time since the opening [s] and mass that has come out [kg], at the opening and every look after it."""
 
     @property
     def last_fall(self) -> float:
@@ -78,7 +73,7 @@ class DischargeController(PouredController[Discharge]):
     @property
     @abstractmethod
     def gate_path(self) -> float:
-        """How far the gate falls, to where no grain is [m]."""
+        """Height that the gate falls, to where no grain is [m]."""
 
     @property
     @abstractmethod

@@ -3,13 +3,14 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
 from dem_warp.case import Case
 from dem_warp.materials import Material
 from dem_warp.model import GRAVITY, WorldSetup
+from dem_warp.parameters import Parameter
 from dem_warp.scenes.discharge import DISCHARGE_OBSERVABLES, DischargeController
 from dem_warp.scenes.poured_scene import FILL_OBSERVABLES, PouredScene
 from dem_warp.scenes.rain import CrossSection
@@ -31,27 +32,22 @@ class DrawDown(PouredScene):
 
     What stays in the box forms two slopes down to the slot. What falls forms a heap in the box below, which
     has the same width and depth. The slot is along y, so that the test may be cut to a thin slice.
-
-    Attributes
-    ----------
-    width, depth : float
-        Inner sides of both boxes along x and y [m].
-    fill_depth : float
-        Depth of the grains in the upper box [m].
-    slot : float
-        Width of the slot [m].
-    drop : float
-        From the floor of the upper box down to that of the lower box [m].
-    wall_material : Material
     """
 
-    width: float
-    depth: float
-    fill_depth: float
-    slot: float
-    drop: float
+    width: Annotated[float, Parameter("m", above=0.0)]
+    """Inner width of both boxes, across the slot, along x."""
+    depth: Annotated[float, Parameter("m", above=0.0)]
+    """Inner depth of both boxes, along the slot, along y."""
+    fill_depth: Annotated[float, Parameter("m", above=0.0)]
+    """Depth of the grains in the upper box."""
+    slot: Annotated[float, Parameter("m", above=0.0)]
+    """Width of the slot."""
+    drop: Annotated[float, Parameter("m", above=0.0)]
+    """Height of the floor of the upper box above that of the lower."""
     wall_material: Material
+    """Material of both boxes."""
 
+    name = "draw-down"
     observables: ClassVar[Mapping[str, Observable]] = (
         FILL_OBSERVABLES
         | DISCHARGE_OBSERVABLES
@@ -70,7 +66,6 @@ class DrawDown(PouredScene):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self._require_positive("width", "depth", "fill_depth", "slot", "drop")
         if self.slot >= self.width:
             raise ValueError(f"DrawDown.slot: must be below the width {self.width!r} [m], got {self.slot!r}")
 

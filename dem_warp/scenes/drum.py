@@ -3,13 +3,14 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from dem_warp.case import Case
 from dem_warp.materials import Material
 from dem_warp.model import GRAVITY, WorldSetup
+from dem_warp.parameters import Parameter
 from dem_warp.scenes.poured_controller import Phase, PouredController
 from dem_warp.scenes.poured_scene import FILL_OBSERVABLES, PouredScene
 from dem_warp.scenes.rain import CrossSection
@@ -28,30 +29,24 @@ SURFACE = 0.8
 
 @dataclass(frozen=True)
 class Drum(PouredScene):
-    """A horizontal drum, part filled by a rain of grains, turns about its axis, which is along y.
+    """A horizontal drum, part filled by a rain of grains, turns about its axis, which is along y."""
 
-    Attributes
-    ----------
-    diameter, length : float
-        Inside the drum [m].
-    wall_material : Material
-        Of the shell and the two ends, which turn along.
-    rotation_rate : float
-        Revolutions a second [1/s].
-    filling : float
-        Part of the drum's volume that the bed takes, at most one half.
-    start_up, revolutions : float
-        Revolutions before measuring, and while measuring.
-    """
-
-    diameter: float
-    length: float
+    diameter: Annotated[float, Parameter("m", above=0.0)]
+    """Inner diameter of the drum."""
+    length: Annotated[float, Parameter("m", above=0.0)]
+    """Inner length of the drum."""
     wall_material: Material
-    rotation_rate: float
-    filling: float = 0.35
-    start_up: float = 1.0
-    revolutions: float = 2.0
+    """Material of the shell and the two ends, which turn along."""
+    rotation_rate: Annotated[float, Parameter("1/s", above=0.0)]
+    """Revolutions per second."""
+    filling: Annotated[float, Parameter("1", above=0.0, at_most=MOST_FILLED)] = 0.35
+    """Part of the drum's volume that the bed takes."""
+    start_up: Annotated[float, Parameter("1", at_least=0.0)] = 1.0
+    """Revolutions before measuring."""
+    revolutions: Annotated[float, Parameter("1", above=0.0)] = 2.0
+    """Revolutions while measuring."""
 
+    name = "drum"
     observables: ClassVar[Mapping[str, Observable]] = FILL_OBSERVABLES | {
         "dynamic_angle": Observable(
             "deg",
@@ -70,11 +65,6 @@ class Drum(PouredScene):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self._require_positive("diameter", "length", "rotation_rate", "filling", "revolutions")
-        if self.filling > MOST_FILLED:
-            raise ValueError(f"Drum.filling: must be at most {MOST_FILLED:g}, got {self.filling!r}")
-        if not (math.isfinite(self.start_up) and self.start_up >= 0):
-            raise ValueError(f"Drum.start_up: must be finite and not negative, got {self.start_up!r}")
         if self.froude_number >= 1:
             fastest = self.rotation_rate / math.sqrt(self.froude_number)
             raise ValueError(
@@ -149,15 +139,10 @@ class SurfaceAngles(NamedTuple):
 
 @dataclass
 class Turning(Course):
-    """Course of a drum.
-
-    Attributes
-    ----------
-    angles : list of list of float
-        `SurfaceAngles` of every look at which all of them could be seen.
-    """
+    """Course of a drum."""
 
     angles: list[list[float]] = field(default_factory=list)
+    """`SurfaceAngles` of every look at which all of them could be seen."""
 
 
 class DrumController(PouredController[Turning]):

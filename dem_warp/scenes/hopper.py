@@ -2,13 +2,14 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
 from dem_warp.case import Case
 from dem_warp.materials import Material
 from dem_warp.model import GRAVITY, WorldSetup
+from dem_warp.parameters import Parameter
 from dem_warp.scenes.discharge import DISCHARGE_OBSERVABLES, DischargeController
 from dem_warp.scenes.poured_scene import FILL_OBSERVABLES, PouredScene
 from dem_warp.scenes.rain import CrossSection
@@ -26,31 +27,23 @@ OVER_OUTLET = 0.25
 
 @dataclass(frozen=True)
 class Hopper(PouredScene):
-    """A round bin with a flat bottom is filled by a rain of grains; a round hole in its floor opens at once.
+    """A flat-bottomed round bin is filled by a rain of grains; a round hole in its floor opens at once."""
 
-    Attributes
-    ----------
-    diameter : float
-        Inner diameter of the bin [m].
-    fill_depth : float
-        Height that it is filled to [m].
-    outlet : float
-        Diameter of the hole [m].
-    wall_material : Material
-        Of the bin, its floor and its plug.
-    """
-
-    diameter: float
-    fill_depth: float
-    outlet: float
+    diameter: Annotated[float, Parameter("m", above=0.0)]
+    """Inner diameter of the bin."""
+    fill_depth: Annotated[float, Parameter("m", above=0.0)]
+    """Height that it is filled to."""
+    outlet: Annotated[float, Parameter("m", above=0.0)]
+    """Diameter of the hole."""
     wall_material: Material
+    """Material of the bin, its floor and its plug."""
 
+    name = "hopper"
     observables: ClassVar[Mapping[str, Observable]] = FILL_OBSERVABLES | DISCHARGE_OBSERVABLES
     floor = 0.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self._require_positive("diameter", "fill_depth", "outlet")
         if self.outlet >= self.diameter:
             raise ValueError(
                 f"Hopper.outlet: must be below the diameter {self.diameter!r} [m], got {self.outlet!r}"

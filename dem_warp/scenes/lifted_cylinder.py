@@ -3,13 +3,14 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
 from dem_warp.case import Case
 from dem_warp.materials import Material
 from dem_warp.model import GRAVITY, ContactCoefficients, WorldSetup
+from dem_warp.parameters import Parameter
 from dem_warp.scenes.poured_controller import UNREST, Phase, PouredController
 from dem_warp.scenes.poured_scene import FILL_OBSERVABLES, PouredScene
 from dem_warp.scenes.rain import CrossSection
@@ -65,45 +66,36 @@ class LiftedCylinder(PouredScene):
     """An open tube is filled by a rain of grains and lifted at constant speed along its axis.
 
     Plate and tube are tilted together, if they are: z is the axis of the tube, and gravity is turned about y.
-
-    Attributes
-    ----------
-    diameter, height : float
-        Inner diameter and height of the tube [m]; it is filled to the rim.
-    wall_material : Material
-        Of the tube and the plate.
-    lift_speed : float
-        [m/s]
-    duration : float, optional
-        Ends the case at a fixed simulated time [s] instead of at rest.
-    plate_diameter : float, optional
-        Of a round plate, over whose rim grains fall and are lost [m]; by default the plate has no end.
-    tilt : float
-        Of plate and tube, from the beginning on: the plate falls towards +x [rad].
-    plate_friction : float, optional
-        Static friction on a plate of known roughness; by default the plate is as the tube.
-    plate_friction_excess : float
-        Static friction that the plate has beyond the tube's; nothing on a plate of known friction.
-    vibration_amplitude, vibration_frequency : float
-        Of the plate, along the axis of the tube, while the drive of the tube runs [m], [Hz].
-    vibration_hold : float
-        The drive runs from the start of the lift until this long after the tube has risen by its height [s],
-        and on to the end of a vibration.
     """
 
-    diameter: float
-    height: float
+    diameter: Annotated[float, Parameter("m", above=0.0)]
+    """Inner diameter of the tube."""
+    height: Annotated[float, Parameter("m", above=0.0)]
+    """Height of the tube, which is filled to the rim."""
     wall_material: Material
-    lift_speed: float = 0.05
-    duration: float | None = None
-    plate_diameter: float | None = None
-    tilt: float = 0.0
-    plate_friction: float | None = None
-    plate_friction_excess: float = 0.0
-    vibration_amplitude: float = 0.0
-    vibration_frequency: float = 50.0
-    vibration_hold: float = 0.5
+    """Material of the tube and the plate."""
+    lift_speed: Annotated[float, Parameter("m/s", above=0.0)] = 0.05
+    """Speed of the tube."""
+    duration: Annotated[float | None, Parameter("s", above=0.0)] = None
+    """Simulated time at which the test ends; left out: at rest."""
+    plate_diameter: Annotated[float | None, Parameter("m", above=0.0)] = None
+    """Diameter of a round plate, over whose rim grains fall and are lost; left out: the plate has no end."""
+    tilt: Annotated[float, Parameter("rad", at_least=0.0, below=math.pi / 2)] = 0.0
+    """Tilt of plate and tube together, from the beginning on: the plate falls towards +x."""
+    plate_friction: Annotated[float | None, Parameter("1", at_least=0.0)] = None
+    """Static friction on a plate of known roughness; left out: the plate is as the tube."""
+    plate_friction_excess: Annotated[float, Parameter("1", at_least=0.0)] = 0.0
+    """Static friction that the plate has beyond the tube's; nothing on a plate of known friction."""
+    vibration_amplitude: Annotated[float, Parameter("m", at_least=0.0)] = 0.0
+    """Amplitude of the plate along the axis of the tube, while the drive of the tube runs."""
+    vibration_frequency: Annotated[float, Parameter("Hz", above=0.0)] = 50.0
+    """Frequency of the plate."""
+    vibration_hold: Annotated[float, Parameter("s", at_least=0.0)] = 0.5
+    """The drive runs from the start of the lift until this long after the tube has risen by its height, and
+    on to the end of a vibration."""
 
+    name = "lifted-cylinder"
+    leaves_a_heap = True
     observables: ClassVar[Mapping[str, Observable]] = FILL_OBSERVABLES | LIFT_OBSERVABLES
     densest_fill = 0.58
     floor = 0.0
@@ -111,17 +103,9 @@ class LiftedCylinder(PouredScene):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self._require_positive("diameter", "height", "lift_speed", "vibration_frequency")
-        self._require_not_negative("tilt", "plate_friction_excess", "vibration_amplitude", "vibration_hold")
-        if self.plate_friction is not None:
-            self._require_not_negative("plate_friction")
-        if self.tilt >= math.pi / 2:
-            raise ValueError(f"LiftedCylinder.tilt: must be below pi / 2 [rad], got {self.tilt!r}")
-        if self.duration is not None and self.duration <= 0:
-            raise ValueError(f"LiftedCylinder.duration: must be positive [s], got {self.duration!r}")
-        if self.plate_diameter is not None and not self.diameter < self.plate_diameter < np.inf:
+        if self.plate_diameter is not None and not self.diameter < self.plate_diameter:
             raise ValueError(
-                f"LiftedCylinder.plate_diameter: must be finite and above the tube's {self.diameter!r} [m], "
+                f"LiftedCylinder.plate_diameter: must be above the tube's {self.diameter!r} [m], "
                 f"got {self.plate_diameter!r}"
             )
 
@@ -157,7 +141,7 @@ class LiftedCylinder(PouredScene):
 
     @property
     def plate(self) -> Plane | Disc:
-        """What the tube stands on, at z = 0."""
+        """Plate that the tube stands on, at z = 0."""
         if self.plate_diameter is None:
             return Plane()
         return Disc((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), self.plate_diameter / 2)
@@ -203,24 +187,16 @@ class LiftedCylinder(PouredScene):
 
 @dataclass
 class Lift(Course):
-    """Course of a lifted cylinder.
-
-    Attributes
-    ----------
-    mass : float
-        Of the grains that filled the tube [kg].
-    surface : list of float
-        Time since the start of the lift [s], and level of the surface [m], when last looked at.
-    pushed : float
-        What the grains had given to the tube, along its axis, when the lift began [N s].
-    drawn : list of float
-        Time since the start of the lift [s], and what they had given to it when last looked at.
-    """
+    """Course of a lifted cylinder."""
 
     mass: float = 0.0
+    """Of the grains that filled the tube [kg]."""
     surface: list[float] = field(default_factory=list)
+    """Time since the start of the lift [s], and level of the surface [m], when last looked at."""
     pushed: float = 0.0
+    """Impulse of the grains on the tube, along its axis, when the lift began [N s]."""
     drawn: list[float] = field(default_factory=list)
+    """Time since the start of the lift [s], and that impulse, when last looked at."""
 
 
 class LiftController(PouredController[Lift]):
@@ -249,7 +225,7 @@ class LiftController(PouredController[Lift]):
         return replace(decision, move={PLATE: Motion()}) if self._vibration_ends(view) else decision
 
     def _vibration_ends(self, view: WorldView) -> bool:
-        """Whether the plate, which vibrated when the world was last looked at, has come to a stop."""
+        """Tell that the plate, which vibrated when the world was last looked at, has come to a stop."""
         before = (view.step - self.period) * self.setup.time_step
         end = self.course.phase_start + self.scene.vibration_time
         return self.course.phase_start <= before < end <= view.time
@@ -316,7 +292,7 @@ class LiftController(PouredController[Lift]):
         course.enter("rest", view)
 
     def _weigh_heap(self, view: WorldView) -> None:
-        """Where the mass came to lie."""
+        """Measure where the mass came to lie."""
         masses, positions = view.masses[view.alive].astype(float), view.positions[view.alive]
         near = np.hypot(positions[:, 0], positions[:, 1]) <= ROLLED * self.scene.diameter / 2
         self.course.observables["rolled_fraction"] = 1.0 - float(masses[near].sum()) / self.course.mass

@@ -29,7 +29,7 @@ class Phase(NamedTuple):
 
     look: Callable[[WorldView], Decision]
     expected: float
-    """How long it takes, roughly [s]."""
+    """Duration, roughly [s]."""
 
 
 class PouredController(ABC, Generic[CourseT]):
@@ -73,7 +73,7 @@ class PouredController(ABC, Generic[CourseT]):
         return self.phases[self.course.phase].look(view)
 
     def rests(self, view: WorldView) -> bool:
-        """Whether the grains have been slow for `rest_time`."""
+        """Tell that the grains have been slow for `rest_time`."""
         limit = self.poured.rest_speed
         if not (view.rms_speed < limit and view.fastest < CALM * limit):
             self.course.slow_since = None
@@ -96,7 +96,7 @@ class PouredController(ABC, Generic[CourseT]):
         return Decision(remove=np.flatnonzero(above | awaited))
 
     def _is_full(self, view: WorldView) -> bool:
-        """Whether slow grains are heaped above the brim; a counted fill never is."""
+        """Tell that slow grains are heaped above the brim; a counted fill is never full."""
         if self.poured.grain_count is not None or view.highest <= self.poured.brim:
             return False
         above = view.alive & view.released & (view.positions[:, 2] > self.poured.brim)

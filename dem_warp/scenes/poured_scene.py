@@ -1,14 +1,15 @@
-"""What scenes share that begin with a rain into a container: its settings and the world before it."""
+"""Base of scenes that begin with a rain into a container: its settings and the world before it."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
 from dem_warp.case import Case
 from dem_warp.model import GRAVITY, ContactCoefficients, Grains, WorldSetup
+from dem_warp.parameters import Parameter, check_parameters
 from dem_warp.scenes.rain import CrossSection, Rain, place_rain
 from dem_warp.scenes.scene import Controller, Observable
 from dem_warp.walls import Wall
@@ -22,33 +23,30 @@ FILL_OBSERVABLES = {
     "solid_fraction": Observable("1", "volume of the grains over that of the container up to the surface"),
     "simulated_time": Observable("s", "from the first grain of the rain to the end"),
 }
-"""What every poured scene measures."""
+"""Observables of every poured scene."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class PouredScene(ABC):
-    """A container that a rain of grains fills; every kind has a `wall_material` beside.
+    """A container that a rain of grains fills; every kind has a `wall_material` beside."""
 
-    Attributes
-    ----------
-    rain_rate, rain_speed : float
-        Grains a second, and the speed at which they enter [m/s].
-    grain_count : int, optional
-        Grains to pour; by default until four lie above the brim, and what stands above it is removed.
-    rest_speed, rest_time : float
-        Grains rest when their root mean square speed has been below `rest_speed` [m/s], and none has passed
-        ten times that, for `rest_time` [s].
-    air_drag : float
-        Of still air: a free grain slows down by this part of its velocity a second, whatever its size [1/s].
-    """
+    rain_rate: Annotated[float, Parameter("1/s", above=0.0)] = 3000.0
+    """Grains per second while filling."""
+    rain_speed: Annotated[float, Parameter("m/s", above=0.0)] = 0.5
+    """Speed of the raining grains."""
+    grain_count: Annotated[int | None, Parameter("1", at_least=1)] = None
+    """Grains to pour; left out: until four lie above the brim, and what stands above it is removed."""
+    rest_speed: Annotated[float, Parameter("m/s", above=0.0)] = 1.0e-3
+    """The grains rest when their root mean square speed is below this, and none passes ten times it ..."""
+    rest_time: Annotated[float, Parameter("s", above=0.0)] = 0.05
+    """... for this long."""
+    air_drag: Annotated[float, Parameter("1/s", at_least=0.0)] = 0.0
+    """Part of its velocity that still air takes from a free grain in a second, whatever its size."""
 
-    rain_rate: float = 3000.0
-    rain_speed: float = 0.5
-    grain_count: int | None = None
-    rest_speed: float = 1.0e-3
-    rest_time: float = 0.05
-    air_drag: float = 0.0
-
+    name: ClassVar[str]
+    """Name in study files."""
+    leaves_a_heap: ClassVar[bool] = False
+    """The test ends in a heap, whose repose angle can be measured."""
     observables: ClassVar[Mapping[str, Observable]] = FILL_OBSERVABLES
     densest_fill: ClassVar[float] = 0.64
     """Solid fraction that no poured bed is expected to pass: how many grains are kept ready."""
@@ -56,24 +54,7 @@ class PouredScene(ABC):
     """Number of the wall whose impulse is summed up."""
 
     def __post_init__(self) -> None:
-        self._require_positive("rain_rate", "rain_speed", "rest_speed", "rest_time")
-        self._require_not_negative("air_drag")
-        if self.grain_count is not None and self.grain_count < 1:
-            raise ValueError(
-                f"{type(self).__name__}.grain_count: must be at least 1, got {self.grain_count!r}"
-            )
-
-    def _require_positive(self, *names: str) -> None:
-        for name in names:
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0):
-                raise ValueError(f"{type(self).__name__}.{name}: must be positive and finite, got {value!r}")
-
-    def _require_not_negative(self, *names: str) -> None:
-        for name in names:
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value >= 0):
-                raise ValueError(f"{type(self).__name__}.{name}: must be finite and 0 or more, got {value!r}")
+        check_parameters(self)
 
     # ---- what a scene says of its container ----------------------------------------------------------------
 
@@ -93,7 +74,7 @@ class PouredScene(ABC):
 
     @abstractmethod
     def cross_section(self, reach: float) -> CrossSection:
-        """What grains of a bounding radius [m] may rain through."""
+        """Opening that grains of a bounding radius [m] may rain through."""
 
     @abstractmethod
     def walls(self, reach: float) -> tuple[Wall, ...]:

@@ -21,18 +21,12 @@ from dem_warp.population import DrawnGrains
 
 @dataclass(frozen=True)
 class CrossSection:
-    """What a rain falls through, about the z axis.
-
-    Attributes
-    ----------
-    half_sides : 2 floats
-        Along x and y [m].
-    is_round : bool
-        A circle, with `half_sides` both its radius; otherwise a rectangle.
-    """
+    """Opening that a rain falls through, about the z axis."""
 
     half_sides: tuple[float, float]
+    """Along x and y [m]."""
     is_round: bool = False
+    """A circle, with `half_sides` both its radius; otherwise a rectangle."""
 
     @classmethod
     def circle(cls, radius: float) -> "CrossSection":
@@ -42,21 +36,14 @@ class CrossSection:
 
 @dataclass(frozen=True, eq=False)
 class Rain:
-    """A rain in its own frame.
-
-    Attributes
-    ----------
-    grains : DrawnGrains
-        In order of arrival.
-    positions : (n, 3) array
-        [m], the lowest grain near z = 0.
-    orientations : (n, 4) array
-        Quaternions x y z w.
-    """
+    """A rain in its own frame."""
 
     grains: DrawnGrains
+    """In order of arrival."""
     positions: np.ndarray
+    """[m], shape (n, 3), the lowest grain near z = 0."""
     orientations: np.ndarray
+    """Quaternions x y z w, shape (n, 4)."""
 
 
 def place_rain(

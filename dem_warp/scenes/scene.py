@@ -1,4 +1,4 @@
-"""What every scene offers: worlds to start from, and a controller that leads each through its phases."""
+"""Base of every scene: worlds to start from, and a controller that leads each through its phases."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -13,28 +13,20 @@ from dem_warp.walls import Motion
 
 @dataclass(frozen=True)
 class Decision:
-    """What a scene wants done with its world.
-
-    Attributes
-    ----------
-    remove : (k,) int array, optional
-        Grain slots to take out.
-    move : mapping of int to Motion
-        Walls to set in motion, by number, and how.
-    done : bool
-        The world has ended.
-    failure : str
-        Why it ended without a result; empty otherwise.
-    """
+    """Order of a scene to its world."""
 
     remove: np.ndarray | None = None
+    """Grain slots to take out, (k,) int."""
     move: Mapping[int, Motion] = field(default_factory=dict)
+    """Walls to set in motion, by number, and their motions."""
     done: bool = False
+    """The world has ended."""
     failure: str = ""
+    """Reason of an end without a result; empty otherwise."""
 
 
 class Observable(NamedTuple):
-    """What a number that a scene measures is in, and how it is defined."""
+    """Unit and definition of a number that a scene measures."""
 
     unit: str
     meaning: str
@@ -42,28 +34,20 @@ class Observable(NamedTuple):
 
 @dataclass
 class Course:
-    """How far a world has come: all that its controller remembers from one look to the next.
+    """Progress of a world: all that its controller remembers from one look to the next.
 
     A checkpoint keeps it as JSON, so its fields, and those that a scene adds in a subclass, are plain values.
-
-    Attributes
-    ----------
-    phase : str
-    phase_start : float
-        When the phase began [s].
-    slow_since : float, optional
-        Since when the grains have been slow in this phase [s].
-    phases : list of dict
-        Name, time [s] and steps of each phase that has ended.
-    observables : dict of float
-        In the units that the scene says.
     """
 
     phase: str
     phase_start: float = 0.0
+    """Time at which the phase began [s]."""
     slow_since: float | None = None
+    """Time since which the grains have been slow in this phase [s]."""
     phases: list[dict[str, Any]] = field(default_factory=list)
+    """Name, time [s] and steps of each phase that has ended."""
     observables: dict[str, float] = field(default_factory=dict)
+    """In the units that the scene says."""
 
     def enter(self, phase: str, view: WorldView) -> None:
         """Record the end of the present phase and begin another."""

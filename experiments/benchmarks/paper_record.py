@@ -19,11 +19,11 @@ from typing import Annotated
 
 import typer
 
-from experiments.commands.run import RECORD
 from experiments.errors import InputError
 from experiments.files import replacing, write_text
 from experiments.report.material_card import CARD
 from experiments.report.record import CAMPAIGN, HEAPS, PROVENANCE, RUNS, SENSITIVITIES, write_page
+from experiments.runs.campaign import RECORD
 from experiments.studies.buckwheat import paper
 from experiments.studies.buckwheat.sensitivities import SETTINGS
 from experiments.studies.buckwheat.variants import variants

@@ -20,13 +20,13 @@ import typer
 
 from doe.joint_plots import joint_plot
 from experiments.calibrate import Campaign, calibrate
-from experiments.commands.run import WALLS
 from experiments.errors import InputError
 from experiments.files import replacing, write_text
 from experiments.report.markdown import markdown_table
 from experiments.report.numbers import fixed, plain, prose
 from experiments.report.response_tables import response_tables
 from experiments.report.tables import Column, Table, make_table
+from experiments.runs.campaign import WALLS
 from experiments.studies.buckwheat import paper
 from experiments.studyfile import Study, load_study
 

@@ -66,7 +66,8 @@ class Traffic:
 def step_traffic(solver: Solver) -> Traffic:
     """Count what a step moves, from the arrays of a solver and its present contacts."""
     length, touching = _list_length(solver), _touching(solver)
-    grains, hood = solver.layout.grain_total, solver.hood
+    grains, neighbours = solver.layout.grain_total, solver.neighbours
+    each, reactions = neighbours.memory.size / neighbours.history.size, _arrays(neighbours.reactions)
     rows = [
         *(
             (name, array, array.size / grains, 2)
@@ -75,12 +76,12 @@ def step_traffic(solver: Solver) -> Traffic:
         ),
         *((name, getattr(solver.model, name), 1.0, 1) for name in ("shape", "inertia", "release_step")),
         ("alive", solver.alive, 1.0, 1),
-        ("numbers of near entries", hood.near.count, 1.0, 1),
-        ("near entries", hood.near.item, length, 1),
-        ("histories", hood.history, touching, 2),
-        ("memories of mechanisms", hood.memory, touching * hood.memory.size / hood.history.size, 2),
-        ("path since the rebuild", hood.travel, 1.0, 2),
-        *((f"reactions: {name}", array, array.size / grains, 2) for name, array in _arrays(hood.reactions)),
+        ("numbers of near entries", neighbours.near.count, 1.0, 1),
+        ("near entries", neighbours.near.item, length, 1),
+        ("histories", neighbours.history, touching, 2),
+        ("memories of mechanisms", neighbours.memory, touching * each, 2),
+        ("path since the rebuild", neighbours.travel, 1.0, 2),
+        *((f"reactions: {name}", array, array.size / grains, 2) for name, array in reactions),
     ]
     table = pd.DataFrame(
         [(name, _element_bytes(array), elements, moves) for name, array, elements, moves in rows],
@@ -91,8 +92,9 @@ def step_traffic(solver: Solver) -> Traffic:
 
 def memory_bytes(solver: Solver) -> int:
     """Bytes of all device arrays of a solver."""
-    hood = solver.hood
-    holders = (solver, solver.model, *solver.grains, hood, hood.near, hood.reactions, solver.cells)
+    neighbours = solver.neighbours
+    lists = (neighbours, neighbours.near, neighbours.reactions)
+    holders = (solver, solver.model, *solver.grains, *lists, solver.cells)
     return sum(array.size * _element_bytes(array) for holder in holders for _, array in _arrays(holder))
 
 
@@ -124,7 +126,7 @@ def _element_bytes(array: Any) -> int:
 
 def _list_length(solver: Solver) -> float:
     worlds = solver.layout.world_count
-    lengths = solver.hood.near.count.numpy().reshape(worlds, -1)
+    lengths = solver.neighbours.near.count.numpy().reshape(worlds, -1)
     views = solver.view(range(worlds))
     alive, released = (np.array([getattr(view, name) for view in views]) for name in ("alive", "released"))
     return float(lengths[alive & released].sum() / np.count_nonzero(alive))

@@ -127,10 +127,11 @@ def _open(study: CampaignStudy, record: _Record) -> tuple[TargetResult, NoiseFlo
             record.run, plan_target(factors, target, settings.seeds), *plans
         )
         aim = twin_target(study, target, heaps)
+    screened = analyse_screening(design, screening_cases, target.responses, settings.screening.design)
     return (
         record.keep("target", aim),
         record.keep("noise_floor", analyse_noise_floor(settings.noise_floor, noise_cases, target.responses)),
-        record.keep("screening", analyse_screening(design, screening_cases, target.responses)),
+        record.keep("screening", screened),
     )
 
 

@@ -1,11 +1,12 @@
-"""Stage (b): which factors move the angle, by a Plackett-Burman design."""
+"""Stage (b): the factors that move the angle, found by a screening design."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import pandas as pd
 
+from dem_warp.registry import Registry
 from doe import Design, DesignError, Factor, ScreenResult, plackett_burman, screen
 from experiments.calibrate.cases import (
     failure_summary,
@@ -22,16 +23,28 @@ from experiments.studyfile.campaign import ANGLE, Response, ScreeningSettings, S
 
 STAGE = "screening"
 
+DESIGNS: Registry[Callable[[Sequence[Factor], int], Design]] = Registry(
+    "dem_warp.designs", {"plackett-burman": plackett_burman}
+)
+"""Screening designs of two levels by name, each made for some factors in a number of runs."""
+
 LEAST_RUNS = 8
 """Runs of the smallest design that is chosen unasked: with 4, interactions fall wholly onto the factors."""
 
 
 def screening_design(factors: Sequence[Factor], settings: ScreeningSettings) -> Design:
-    """Return the design: as many runs as asked for, or the fewest with the wanted number of dummies."""
-    if settings.runs is not None:
-        return plackett_burman(factors, settings.runs)
-    runs = max(LEAST_RUNS, 4 * -(-(len(factors) + settings.dummies + 1) // 4))
-    return plackett_burman(factors, runs)
+    """Make the design: as many runs as asked for, or the fewest with the wanted number of dummies.
+
+    Raises
+    ------
+    ValueError
+        When no design has the name, or the design does not come in so many runs.
+    """
+    if settings.design not in DESIGNS:
+        rule = f"campaign.screening.design: must be one of {', '.join(DESIGNS)}"
+        raise ValueError(f"{rule} (received {settings.design!r})")
+    fewest = max(LEAST_RUNS, 4 * -(-(len(factors) + settings.dummies + 1) // 4))
+    return DESIGNS[settings.design](factors, settings.runs or fewest)
 
 
 def plan_screening(
@@ -47,9 +60,9 @@ def plan_screening(
 
 
 def analyse_screening(
-    design: Design, cases: pd.DataFrame, responses: Sequence[Response] = ()
+    design: Design, cases: pd.DataFrame, responses: Sequence[Response] = (), name: str = "plackett-burman"
 ) -> ScreeningResult:
-    """Estimate and test the effects on every response from the cases that gave it.
+    """Estimate and test the effects on every response from the cases that gave it, in a design of a name.
 
     Raises
     ------
@@ -60,7 +73,7 @@ def analyse_screening(
     result = _screen(design, heaps, ANGLE)
     others = each_response(responses, cases, lambda found, column: _screen(design, found, column))
     response = response_table(heaps, design.coded.index.tolist())
-    decisions = [_decision(design, heaps, result)]
+    decisions = [_decision(name, design, heaps, result)]
     if others:
         decisions.append(_responses(others))
     return ScreeningResult(heaps, design, response, result, tuple(decisions), others)
@@ -94,7 +107,7 @@ def _responses(screens: dict[str, ScreenResult]) -> Decision:
     )
 
 
-def _decision(design: Design, cases: pd.DataFrame, result: ScreenResult) -> Decision:
+def _decision(name: str, design: Design, cases: pd.DataFrame, result: ScreenResult) -> Decision:
     ranked = result.table.sort_values("rank")
     strongest = ranked.index[0]
     replicates = int(cases["replicate"].max())
@@ -104,7 +117,7 @@ def _decision(design: Design, cases: pd.DataFrame, result: ScreenResult) -> Deci
     }[result.error_rule]
     return Decision(
         STAGE,
-        f"A Plackett-Burman design of {len(design.coded)} runs, {replicates} "
+        f"A {name.title()} design of {len(design.coded)} runs, {replicates} "
         f"{'case' if replicates == 1 else 'cases'} each; effects are tested against {against}.",
         {
             "runs": len(design.coded),

@@ -38,13 +38,13 @@ def run_cases(
     Parameters
     ----------
     study
-        What the cases are made from, and how their angle is read.
+        Study that the cases are made from, and that says how their angle is read.
     table
         One row a case: factors by name in natural units (one that is missing is at its middle), ``seed``,
         the name of its ``scene`` (without that column, all are of the study's own), and any further columns,
         which are carried over.
     store
-        Where results are kept; each is saved as it ends, failed ones too: the same case fails again. A run
+        Store of the results; each is saved as it ends, failed ones too: the same case fails again. A run
         that the machine ends raises, and leaves no result of what was running. Checkpoints of the running
         cases are kept there too: what an interrupted run had begun goes on where it was.
     device
@@ -177,7 +177,8 @@ def _simulate_missing(
         outcomes[key] = pool.submit(measure, key, result)
 
     if missing:
-        simulate(
+        run = store.engine or simulate
+        run(
             [cases[key] for key in missing],
             device=device,
             workers=workers,

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from experiments.cases.engines import Engine
 from experiments.cases.store import Store
 from experiments.errors import StoreError
 from experiments.files import write_text
@@ -21,7 +22,9 @@ CASES = "cases"
 """Folder of the stored cases."""
 
 
-def open_folder(folder: Path, study: Study, resume: bool = False) -> tuple[Store, list[str]]:
+def open_folder(
+    folder: Path, study: Study, resume: bool = False, engine: Engine | None = None
+) -> tuple[Store, list[str]]:
     """Make a campaign's folder, or go on in an existing one.
 
     Parameters
@@ -32,13 +35,15 @@ def open_folder(folder: Path, study: Study, resume: bool = False) -> tuple[Store
         The study that will run.
     resume
         Go on in a folder that an earlier run left.
+    engine
+        What simulates; None: `dem_warp.simulate`.
 
     Returns
     -------
     store
-        Where the cases are kept.
+        Store of the cases.
     changes
-        What differs from the study that the folder was made with, one line a key. Cases that a change does
+        Differences from the study that the folder was made with, one line a key. Cases that a change does
         not touch are used again: each is stored under all that determines it.
 
     Raises
@@ -54,11 +59,11 @@ def open_folder(folder: Path, study: Study, resume: bool = False) -> tuple[Store
     elif is_used(folder):
         changes = list(differences(_read_manifest(manifest), described))
     write_text(manifest, json.dumps(described, indent=1, allow_nan=False))
-    return Store(folder / CASES), changes
+    return Store(folder / CASES, engine), changes
 
 
 def is_used(folder: Path) -> bool:
-    """Whether a folder, or a file of that name, holds something."""
+    """Tell that a folder, or a file of that name, holds something."""
     return folder.exists() and (not folder.is_dir() or any(folder.iterdir()))
 
 

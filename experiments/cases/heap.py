@@ -24,13 +24,13 @@ class Heap:
     """A simulated case and the repose angle of its heap, if the test leaves one."""
 
     study: Study
-    """What it was made from."""
+    """Study that it was made from."""
     settings: dict[str, float]
     """Value of every factor in its natural unit."""
     seed: int
     """Seed of everything random in it."""
     result: CaseResult
-    """How the case ended."""
+    """Result of the case."""
     angle: HeapAngle | None
     """Its angle; None when the case failed, there is no measurable heap, or the test leaves none."""
     reason: str
@@ -78,7 +78,7 @@ def simulate_heap(
     Parameters
     ----------
     study
-        What the case is made from.
+        Study that the case is made from.
     settings
         Values by factor name in natural units; a factor that is not named is at its middle.
     seed

@@ -1,4 +1,4 @@
-"""What a case is known by on every machine: a hash of all that determines its result."""
+"""Key of a case, the same on every machine: a hash of all that determines its result."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from dem_warp import Case
 from dem_warp.provenance import engine_fingerprint
+from experiments.cases.engines import Engine
 
 SHAPE_DIGITS = 12
 """Digits of the spheres of a shape, relative to its size, that make another case.
@@ -18,22 +19,28 @@ A clump's centre of mass is a sum whose last bits differ between processors, by 
 """
 
 
-def case_key(case: Case, **more: object) -> str:
+def case_key(case: Case, engine: Engine | None = None, **more: object) -> str:
     """Key of a case: a hash of all that determines its result, the engine's own code included.
 
     Parameters
     ----------
     case
         The case. Spheres of its shapes that agree to `SHAPE_DIGITS` count as the same.
+    engine
+        What simulates it; None: `dem_warp.simulate`.
     more
-        What else determines what is kept under the key, as JSON-able data.
+        Whatever else determines what is kept under the key, as JSON-able data.
     """
-    determined_by = {"case": _described(case), "engine": engine_fingerprint(), **more}
+    outside = [] if engine is None else [engine]
+    if engine is not None:
+        more["simulated by"] = getattr(engine, "__qualname__", type(engine).__qualname__)
+    determined_by = {"case": described(case), "engine": engine_fingerprint(*case.kinds, *outside), **more}
     text = json.dumps(determined_by, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def _described(case: Case) -> dict[str, Any]:
+def described(case: Case) -> dict[str, Any]:
+    """All of a case that determines its result, as JSON-able data."""
     described = case.to_dict()
     shape = described["grains"]["shape"]
     for spheres in shape.get("shapes", [shape]):

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from dem_warp import Case, CaseResult
+from experiments.cases.engines import Engine
 from experiments.cases.key import case_key
 from experiments.errors import StoreError
 from experiments.files import replacing
@@ -30,14 +31,16 @@ class Store:
     ----------
     folder
         The folder; it is made when the first case is saved.
+    engine
+        What makes the results; None: `dem_warp.simulate`.
     """
 
-    def __init__(self, folder: str | Path) -> None:
-        self.folder = Path(folder)
+    def __init__(self, folder: str | Path, engine: Engine | None = None) -> None:
+        self.folder, self.engine = Path(folder), engine
 
     def key(self, case: Case) -> str:
         """Key of a case: a hash of all that determines its result and how it is stored."""
-        return case_key(case, format=FORMAT)
+        return case_key(case, self.engine, format=FORMAT)
 
     @property
     def unfinished(self) -> Path:
@@ -53,11 +56,11 @@ class Store:
         return len(list(self.folder.glob("*.npz")))
 
     def has(self, key: str) -> bool:
-        """Whether the case is stored and whole."""
+        """Tell that the case is stored and whole."""
         return self.path(key).is_file() and self.damage(key) is None
 
     def damage(self, key: str) -> str | None:
-        """What is wrong with a stored case; None when it is whole or absent."""
+        """Fault of a stored case; None when it is whole or absent."""
         if not self.path(key).exists():
             return None
         try:

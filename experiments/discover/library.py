@@ -1,8 +1,9 @@
 """The library of mechanisms: physical effects that a study may lack.
 
 A mechanism is one more parameter of a study, which the study leaves where it has no effect. Each is one file
-in ``mechanisms/``, named after it; to add one is to add a file. A range may be given in a scale of the grain,
-so that it fits any; `library_for` turns it into the units of a study.
+in ``mechanisms/``, named after it; to add one is to add a file. A package from outside adds the path of one.
+A range may be given in a scale of the grain, so that it fits any; `library_for` turns it into the study's
+units.
 """
 
 from __future__ import annotations
@@ -17,17 +18,16 @@ from pydantic import Field
 
 from dem_warp.case import Case
 from dem_warp.materials import effective_moduli
+from dem_warp.registry import Registry
 from dem_warp.scenes.poured_scene import GRAVITY
 from experiments.studyfile import Study, StudyError
-from experiments.studyfile.factor_section import Parameters, dimension_at, merge
+from experiments.studyfile.factor_section import Parameters, merge
 from experiments.studyfile.places import Places, drop, nested, value_at
 from experiments.studyfile.schema import Section, field_at, validated
 from experiments.studyfile.sections import Physics
+from experiments.studyfile.setters import setter_at
 from experiments.studyfile.toml_files import read_toml
 from experiments.studyfile.units import Quantity
-
-FOLDER = Path(__file__).parent / "mechanisms"
-"""The files of the library."""
 
 FORMER_NAMES = {"contact_cohesion": "contact_adhesion"}
 """Names by which older studies and banks know mechanisms."""
@@ -73,6 +73,21 @@ class MechanismFile(Section):
     """Further settings that it needs in a study, by place; without effect while it is at its null."""
 
 
+def _check(name: str, path: object, known: Mapping[str, Path]) -> None:
+    """Check the file of a mechanism from outside."""
+    if not isinstance(path, Path):
+        raise TypeError(f"must be the Path of a TOML file, got {path!r}")
+    _read(path)
+
+
+FILES: Mapping[str, Path] = Registry(
+    "dem_warp.mechanisms",
+    {path.stem: path for path in Path(__file__).parent.glob("mechanisms/*.toml")},
+    _check,
+)
+"""The files of the library, by the names of the mechanisms."""
+
+
 @dataclass(frozen=True)
 class Mechanism:
     """A physical effect that a study may lack, in the units of that study."""
@@ -100,8 +115,7 @@ class Mechanism:
     def factor(self, low: float | None = None, high: float | None = None) -> dict[str, Any]:
         """Write it as a ``[[factor]]`` of a study, its range this one or the whole."""
         ends = (self.null if low is None else low, self.maximum if high is None else high)
-        dimension = dimension_at(self.parameters[0])
-        written = [str(Quantity(end, self.unit)) if dimension else end for end in ends]
+        written = [end if self.unit == "1" else str(Quantity(end, self.unit)) for end in ends]
         return {
             "name": self.name,
             "label": self.title,
@@ -111,7 +125,7 @@ class Mechanism:
         }
 
 
-def library_for(study: Study, folder: Path = FOLDER) -> tuple[Mechanism, ...]:
+def library_for(study: Study, files: Mapping[str, Path] = FILES) -> tuple[Mechanism, ...]:
     """Read the mechanisms that a study may lack, in alphabetical order.
 
     One that the study cannot have is left out: its test has no such setting, a factor varies it already, it
@@ -121,8 +135,8 @@ def library_for(study: Study, folder: Path = FOLDER) -> tuple[Mechanism, ...]:
     ----------
     study
         The study; it says where each mechanism starts from, and how large its grains are.
-    folder
-        The library.
+    files
+        The library: files by the names of the mechanisms.
 
     Raises
     ------
@@ -130,7 +144,7 @@ def library_for(study: Study, folder: Path = FOLDER) -> tuple[Mechanism, ...]:
         When a file breaks a rule.
     """
     scales = grain_scales(study.case({}, seed=0))
-    found = (_mechanism(path, study, scales) for path in sorted(folder.glob("*.toml")))
+    found = (_mechanism(name, path, study, scales) for name, path in sorted(files.items()))
     return tuple(mechanism for mechanism in found if mechanism is not None and _can_have(study, mechanism))
 
 
@@ -179,17 +193,21 @@ def with_mechanisms(
     return study.with_document(document)
 
 
-def _mechanism(path: Path, study: Study, scales: Mapping[str, float]) -> Mechanism | None:
+def _mechanism(name: str, path: Path, study: Study, scales: Mapping[str, float]) -> Mechanism | None:
     """Read a file for a study; None where the study cannot have the mechanism."""
-    text, document = read_toml(path, "a mechanism of the library")
-    file = validated(MechanismFile, document, Places.read(path, text))
+    file = _read(path)
     null, *others = (_start(study, tuple(place.split(".")), file) for place in file.parameters)
     maximum = _number(file.maximum, scales)
     if null is None or any(other != null for other in others) or null >= maximum:
         return None
     companions = tuple((place, _number(value, scales)) for place, value in file.companions.items())
     shared = file.model_dump(include={"title", "sentence", "kind", "parameters", "unit", "source", "confirm"})
-    return Mechanism(path.stem, **shared, null=null, maximum=maximum, companions=companions)
+    return Mechanism(name, **shared, null=null, maximum=maximum, companions=companions)
+
+
+def _read(path: Path) -> MechanismFile:
+    text, document = read_toml(path, "a mechanism of the library")
+    return validated(MechanismFile, document, Places.read(path, text))
 
 
 def _can_have(study: Study, mechanism: Mechanism) -> bool:
@@ -211,9 +229,7 @@ def _start(study: Study, path: tuple[str, ...], file: MechanismFile) -> float | 
         field = field_at(Physics, path)
         default = field.default if field else None
         return float(default) if isinstance(default, float) else file.null
-    dimension = dimension_at(".".join(path))
-    quantity = Quantity.parse(written)
-    return quantity.to_unit(file.unit, dimension) if dimension else quantity.to_base("")
+    return setter_at(".".join(path)).dimension.to_unit(written, "" if file.unit == "1" else file.unit)
 
 
 def _number(value: Any, scales: Mapping[str, float]) -> Any:

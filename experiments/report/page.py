@@ -87,7 +87,7 @@ def render_page(
 
 def study_facts(study: Study) -> dict[str, str]:
     """Say what was simulated and measured, in the terms in which scales differ."""
-    tube, numerics, measurement = study.scene.lifted_cylinder, study.numerics, study.measurement
+    tube, numerics, measurement = study.scene.given.get("lifted-cylinder"), study.numerics, study.measurement
     if tube is None:
         raise ValueError("a report is about heaps of a lifted cylinder, got a study of another test")
     grains = f"{tube.grain_count} grains" if tube.grain_count else "as many grains as fill it"

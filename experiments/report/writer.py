@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 import platform
-import subprocess
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from dem_warp.version import __version__
 from experiments.calibrate.export import jsonable
 from experiments.calibrate.results import Campaign
 from experiments.files import write_text
@@ -19,7 +19,15 @@ from experiments.report.pictures import HeapPicture
 from experiments.studies.buckwheat.replay import Replay
 from experiments.studyfile import Study
 
-LIBRARIES = ("warp-lang", "numpy", "scipy", "pandas", "statsmodels", "opencv-python-headless")
+LIBRARIES = (
+    "warp-lang",
+    "numpy",
+    "scipy",
+    "pandas",
+    "statsmodels",
+    "scikit-learn",
+    "opencv-python-headless",
+)
 """Packages whose version may change a number."""
 
 
@@ -75,18 +83,7 @@ def write_report(
     return folder / "report.html"
 
 
-def source_commit() -> str | None:
-    """Return the commit that this source is checked out at, "-dirty" with changes; None where it is not."""
-    root = Path(__file__).parents[2]
-    if not (root / ".git").exists():
-        return None
-    command = ["git", "-C", str(root), "describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"]
-    try:
-        return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
-    except (OSError, subprocess.CalledProcessError):
-        return None
-
-
 def library_versions() -> dict[str, str]:
     """Return the versions of Python and of the packages that the numbers depend on."""
-    return {"python": platform.python_version()} | {name: version(name) for name in LIBRARIES}
+    own = {"dem-warp": __version__, "python": platform.python_version()}
+    return own | {name: version(name) for name in LIBRARIES}

@@ -1,4 +1,4 @@
-"""What a study is: one TOML file, its sections and units, every rule checked with the place of a breach."""
+"""Studies: one TOML file each, its sections and units, every rule checked with the place of a breach."""
 
 from experiments.errors import StudyError
 from experiments.studyfile.conditions import Condition

@@ -1,4 +1,4 @@
-"""What a person can decide about a calibration campaign, and what a campaign needs to know of a study.
+"""Decisions of a calibration campaign, and the part of a study that a campaign knows.
 
 Every number that a stage decides with is a field here, so that the study file can fix it. Factor values
 (``start``, ``step``, ``center``, ``half_range``, ``point``, ``truth``) are in each factor's natural unit;
@@ -9,24 +9,42 @@ at its high level.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Literal, Protocol
+from typing import TYPE_CHECKING, Annotated, Literal, Protocol
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
+
+from experiments.studyfile.schema import Dimension, Section, nested_error
 
 if TYPE_CHECKING:
     from doe import Factor
 
-FactorValues = dict[str, float]
+
+def _in_natural_units(values: object, info: ValidationInfo) -> object:
+    """Turn quantities of a study file into natural units; plain numbers of a program are so already."""
+    if not (info.context and isinstance(values, Mapping)):
+        return values
+    natural, errors = {}, []
+    for name, value in values.items():
+        try:
+            natural[name] = info.context["natural_value"](name, value)
+        except ValueError as error:
+            errors.append({"type": "value_error", "loc": (name,), "msg": str(error)})
+    if errors:
+        raise nested_error(errors)
+    return natural
 
 
-class _Settings(BaseModel):
-    """Frozen settings: an unknown key is an error, so that a misspelt decision is never ignored."""
+def _in_degrees(value: object, info: ValidationInfo) -> object:
+    """Turn an angle of a study file into degrees; a plain number of a program is so already."""
+    return Dimension("angle").to_base(value) if info.context else value
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+FactorValues = Annotated[dict[str, float], BeforeValidator(_in_natural_units)]
+"""Values by factor name."""
 
 
-class SeedSettings(_Settings):
-    """Where the seeds of all cases come from; each case has its own."""
+class SeedSettings(Section):
+    """Roots of the seeds of all cases; each case has its own."""
 
     campaign: int = Field(default=1, ge=0)
     """Root of the seeds of every stage's cases."""
@@ -40,7 +58,7 @@ class SeedSettings(_Settings):
         return self
 
 
-class NoiseFloorSettings(_Settings):
+class NoiseFloorSettings(Section):
     """Stage (a): replicates with every factor at its middle."""
 
     replicates: int = Field(default=5, ge=2)
@@ -49,9 +67,11 @@ class NoiseFloorSettings(_Settings):
     """Level of the interval of the standard deviation."""
 
 
-class ScreeningSettings(_Settings):
-    """Stage (b): the Plackett-Burman design."""
+class ScreeningSettings(Section):
+    """Stage (b): the screening design."""
 
+    design: str = "plackett-burman"
+    """Name of the design; packages from outside add further ones."""
     runs: int | None = Field(default=None, ge=4, multiple_of=4)
     """Runs of the design; None: the fewest that leave ``dummies`` columns free."""
     dummies: int = Field(default=3, ge=0)
@@ -60,7 +80,7 @@ class ScreeningSettings(_Settings):
     """Cases of each run."""
 
 
-class SelectionSettings(_Settings):
+class SelectionSettings(Section):
     """Stage (c): which factors are kept."""
 
     keep: tuple[str, ...] | None = Field(default=None, min_length=1)
@@ -81,7 +101,7 @@ class SelectionSettings(_Settings):
         return self
 
 
-class ClimbSettings(_Settings):
+class ClimbSettings(Section):
     """Stage (d): the path of steepest ascent in the kept factors."""
 
     replicates: int = Field(default=2, ge=1)
@@ -95,7 +115,7 @@ class ClimbSettings(_Settings):
     extensions: int = Field(default=1, ge=0)
     """Further batches of up to ``steps`` points when the target was not crossed."""
     reach: float = Field(default=2.0, ge=1.0)
-    """How far from the middle the climb may go, in half-ranges (hard limits hold in any case)."""
+    """Farthest that the climb may go from the middle, in half-ranges (hard limits hold in any case)."""
     alpha: float = Field(default=0.05, gt=0.0, lt=1.0)
     """A fall from the best step, or any change along the path, counts when significant at this level."""
 
@@ -111,7 +131,7 @@ class ClimbSettings(_Settings):
         return self
 
 
-class SurfaceSettings(_Settings):
+class SurfaceSettings(Section):
     """Stages (e) and (f): the composite design and the fitted surface."""
 
     center_rule: Literal["crossing", "smallest-error"] = "crossing"
@@ -137,7 +157,7 @@ class SurfaceSettings(_Settings):
     """Lack of fit is called significant below this."""
 
 
-class OptimumSettings(_Settings):
+class OptimumSettings(Section):
     """Stage (g): the chosen point and the compatible region."""
 
     point: FactorValues | None = None
@@ -148,12 +168,12 @@ class OptimumSettings(_Settings):
     """A factor whose compatible values span more than this share of the design's range is unidentified."""
 
 
-class VerificationSettings(_Settings):
+class VerificationSettings(Section):
     """Stage (h): fresh cases at the optimum against the target."""
 
     replicates: int = Field(default=5, ge=2)
     """Fresh cases at the chosen point."""
-    margin: float | None = Field(default=None, gt=0.0)
+    margin: Annotated[float, BeforeValidator(_in_degrees)] | None = Field(default=None, gt=0.0)
     """Equivalence margin [deg]; None: ``margin_sds`` standard deviations of the target."""
     margin_sds: float = Field(default=2.0, gt=0.0)
     """Margin in standard deviations of the target when ``margin`` is None."""
@@ -163,7 +183,7 @@ class VerificationSettings(_Settings):
     """Call the campaign calibrated only when equivalence is shown, not merely no difference found."""
 
 
-class CampaignSettings(_Settings):
+class CampaignSettings(Section):
     """The ``[campaign]`` section of a study."""
 
     seeds: SeedSettings = SeedSettings()
@@ -183,11 +203,11 @@ TARGET_SCENE = "target"
 """Name of the scene whose heaps have the angle."""
 
 
-class Response(_Settings):
+class Response(Section):
     """A number beside the angle that the cases must match."""
 
     name: str
-    """What it is called; other than the angle, and than every other response."""
+    """Name, other than the angle, and than every other response."""
     observable: str
     """Column of the cases that holds it."""
     unit: str = "1"
@@ -207,8 +227,8 @@ class MeasuredResponse(Response):
     """Measurements."""
 
 
-class MeasuredTarget(_Settings):
-    """What the physical tests gave."""
+class MeasuredTarget(Section):
+    """Result of the physical tests."""
 
     mean: float = Field(gt=0.0, lt=90.0)
     """Mean repose angle [deg]."""
@@ -220,7 +240,7 @@ class MeasuredTarget(_Settings):
     """Further responses."""
 
 
-class TwinTarget(_Settings):
+class TwinTarget(Section):
     """A target that is simulated with settings that the campaign does not see."""
 
     truth: FactorValues = Field(min_length=1)
@@ -232,7 +252,7 @@ class TwinTarget(_Settings):
 
 
 class CampaignStudy(Protocol):
-    """What ``calibrate`` reads of a study."""
+    """Part of a study that ``calibrate`` reads."""
 
     @property
     def factors(self) -> Sequence[Factor]:
@@ -244,7 +264,7 @@ class CampaignStudy(Protocol):
 
     @property
     def target(self) -> MeasuredTarget | TwinTarget:
-        """What the heaps, and the cases of further scenes, must match."""
+        """Target of the heaps, and of the cases of further scenes."""
 
     @property
     def limits(self) -> Mapping[str, tuple[float, float]]:

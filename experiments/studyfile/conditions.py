@@ -27,7 +27,7 @@ class Condition:
     changes: Mapping[str, Any] = field(default_factory=dict)
     """Sections of the study that differ under it, as written; none: the study as it is."""
     held_out: bool = False
-    """Whether it takes no part in any fit, and only judges."""
+    """It takes no part in any fit, and only judges."""
 
 
 BASE = Condition("base")
@@ -38,7 +38,7 @@ class ConditionSection(Section):
     """``[condition.NAME]``: what is known to be different under a condition."""
 
     held_out: bool = False
-    """Whether it takes no part in any fit."""
+    """It takes no part in any fit, and only judges."""
     grain: dict[str, Any] | None = None
     """Of the grains, as their moisture."""
     wall: dict[str, Any] | None = None

@@ -2,40 +2,18 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Iterable, Mapping
+from functools import cached_property
 from typing import Annotated, Any
 
 from pydantic import Field, PlainValidator, ValidationInfo, field_validator, model_validator
 
 from doe.factors import Factor
 from experiments.errors import StudyError
-from experiments.studyfile.places import KeyPath, Places, nested, value_at
-from experiments.studyfile.schema import (
-    RawQuantity,
-    Section,
-    bounds,
-    dimension_of,
-    field_at,
-    nearest_name,
-)
-from experiments.studyfile.sections import Physics
-from experiments.studyfile.units import Quantity, unit_size
-
-
-def dimension_at(parameter: str) -> str:
-    """Dimension of the quantity at a place of a study.
-
-    Raises
-    ------
-    ValueError
-        When there is no quantity.
-    """
-    field = field_at(Physics, tuple(parameter.split(".")))
-    dimension = dimension_of(field) if field else None
-    if dimension is None:
-        raise ValueError('must lead to a quantity of the study, as "contact.grain-grain.static_friction"')
-    return dimension.name
+from experiments.studyfile.places import Places, nested, value_at
+from experiments.studyfile.schema import Dimension, RawQuantity, Section, nearest_name
+from experiments.studyfile.setters import Setter, setter_at
+from experiments.studyfile.units import Quantity
 
 
 def _read_parameters(value: object) -> tuple[str, ...]:
@@ -44,7 +22,7 @@ def _read_parameters(value: object) -> tuple[str, ...]:
     if not places or not all(isinstance(place, str) for place in places):
         raise ValueError("must be the place of a parameter, or a list of places")
     for place in places:
-        dimension_at(place)
+        setter_at(place)
     return places
 
 
@@ -58,7 +36,7 @@ class FactorSection(Section):
     name: str = Field(pattern=r"^[A-Za-z_]\w*$")
     """Short name: a column of every table, and what ``--set`` takes."""
     label: str
-    """What it is, in words."""
+    """Its meaning, in words."""
     parameter: Parameters
     """The parameter's place in the study, as ``contact.grain-grain.static_friction``; or several places of
     one value."""
@@ -71,7 +49,7 @@ class FactorSection(Section):
     @classmethod
     def _has_the_dimension(cls, level: Quantity, info: ValidationInfo) -> Quantity:
         for parameter in info.data.get("parameter", ()):
-            level.to_base(dimension_at(parameter))
+            setter_at(parameter).dimension.to_base(level)
         return level
 
     @model_validator(mode="after")
@@ -84,10 +62,15 @@ class FactorSection(Section):
             raise ValueError(f"low and high must stay within {least:g} and {most:g} {self.unit}".rstrip())
         return self
 
+    @cached_property
+    def setters(self) -> tuple[Setter, ...]:
+        """Setter of each of its places."""
+        return tuple(setter_at(parameter) for parameter in self.parameter)
+
     @property
     def paths(self) -> tuple[tuple[str, ...], ...]:
         """Key path of each of its places."""
-        return tuple(tuple(parameter.split(".")) for parameter in self.parameter)
+        return tuple(setter.path for setter in self.setters)
 
     @property
     def unit(self) -> str:
@@ -95,16 +78,15 @@ class FactorSection(Section):
         return self.low.unit
 
     @property
-    def dimension(self) -> str:
-        """Dimension of the parameter, a key of ``units.UNITS`` or ``""``."""
-        return dimension_at(self.parameter[0])
+    def dimension(self) -> Dimension:
+        """Dimension of the parameter."""
+        return self.setters[0].dimension
 
     @property
     def limits(self) -> tuple[float, float]:
         """Hard physical limits in the natural unit, infinite where there is none."""
-        fields = [field for path in self.paths if (field := field_at(Physics, path))]
-        least, most = zip(*map(bounds, fields), strict=True)
-        size = unit_size(self.unit, self.dimension)
+        least, most = zip(*(setter.limits for setter in self.setters), strict=True)
+        size = self.dimension.size(self.unit)
         return max(least) / size, min(most) / size
 
     def natural(self, value: object) -> float:
@@ -115,8 +97,21 @@ class FactorSection(Section):
         ValueError
             When it is no quantity of the factor's dimension.
         """
-        quantity = value if isinstance(value, Quantity) else Quantity.parse(value)
-        return quantity.to_unit(self.unit, self.dimension)
+        return self.dimension.to_unit(value, self.unit)
+
+    def write(self, changes: dict[str, Any], value: float, places: Places) -> None:
+        """Add a value in the natural unit, at each of its places, to the changes of a study's physics.
+
+        Raises
+        ------
+        StudyError
+            When the value leaves what is physical.
+        """
+        for setter in self.setters:
+            try:
+                setter.write(changes, Quantity(float(value), self.unit))
+            except ValueError as error:
+                raise StudyError(str(error), value, places.of(setter.path)) from None
 
     def factor(self) -> Factor:
         """Build the factor of the designs."""
@@ -139,36 +134,18 @@ class FactorTable(Section):
         return self
 
 
-def natural_settings(
-    sections: Iterable[FactorSection], settings: Mapping[str, object], places: Places, path: KeyPath = ()
-) -> dict[str, float]:
-    """Read factor values with their units as numbers in natural units.
-
-    Parameters
-    ----------
-    sections
-        Factors of the study.
-    settings
-        Quantities by factor name, as ``{"B": "34 MPa", "E": 0.46}``.
-    places, path
-        Where they stand.
+def natural_value(sections: Iterable[FactorSection], name: str, value: object) -> float:
+    """Read the value of a factor with its unit as a number in its natural unit.
 
     Raises
     ------
-    StudyError
-        When there is no such factor, or a value is no quantity of its dimension.
+    ValueError
+        When there is no such factor, or the value is no quantity of its dimension.
     """
     by_name = {section.name: section for section in sections}
-    natural = {}
-    for name, value in settings.items():
-        if name not in by_name:
-            rule = f"must name a factor, {nearest_name(name, list(by_name))}"
-            raise StudyError(rule, name, places.of((*path, name)))
-        try:
-            natural[name] = by_name[name].natural(value)
-        except ValueError as error:
-            raise StudyError(str(error), value, places.of((*path, name))) from None
-    return natural
+    if name not in by_name:
+        raise ValueError(f"must name a factor, {nearest_name(name, list(by_name))}")
+    return by_name[name].natural(value)
 
 
 def merge(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
@@ -179,7 +156,7 @@ def merge(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
         if isinstance(value, Mapping) and isinstance(below, Mapping):
             value = merge(below, value)
         merged[key] = value
-    return copy.deepcopy(merged)
+    return merged
 
 
 def with_factor_values(

@@ -2,28 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
-from typing import Any, Literal
-
-from pydantic import Field, create_model
-
 from dem_warp.laws.library import MECHANISMS
 from dem_warp.laws.mechanism import Mechanism, clashes
-from experiments.studyfile.schema import Number, Section
+from experiments.studyfile.generated import EngineSection, LibrarySection, library_section
 
 
-def _section(kind: type[Mechanism]) -> Any:
-    """Build the section of a mechanism: its parameters in SI, and which contacts have it."""
-    defaults = {field.name: field.default for field in fields(kind)}
-    parameters: dict[str, Any] = {
-        name: (Number, Field(default=defaults[name], ge=0.0)) for name in kind.parameter_names()
-    }
-    between: Any = (Literal["all", "grains", "walls"], defaults["between"])
-    return create_model(f"{kind.__name__}Section", __base__=Section, between=between, **parameters)
+class MechanismSection(EngineSection):
+    """``[mechanism.NAME]``: parameters of a mechanism, and the contacts that have it."""
+
+    plain_numbers = True
 
 
-class _Mechanisms(Section):
-    """The mechanisms of a study, in the order of the library."""
+class MechanismsSection(LibrarySection):
+    """``[mechanism]``: the mechanisms of a study, in the order of the library."""
 
     def mechanisms(self) -> tuple[Mechanism, ...]:
         """Build the engine's mechanisms: those that the study names.
@@ -33,8 +24,7 @@ class _Mechanisms(Section):
         ValueError
             When a parameter leaves what is physical, or two of them exclude each other.
         """
-        named = [(kind, getattr(self, name)) for name, kind in MECHANISMS.items()]
-        built = tuple(kind(**dict(section)) for kind, section in named if section is not None)
+        built = tuple(section.build() for section in self.given.values())
         for kind in ("grains", "walls"):
             for name, other in clashes(tuple(one for one in built if one.acts_between(kind))):
                 rule = f"mechanism.{name} must not stand beside mechanism.{other} in one contact"
@@ -42,7 +32,6 @@ class _Mechanisms(Section):
         return built
 
 
-_SECTIONS: dict[str, Any] = {name: (_section(kind) | None, None) for name, kind in MECHANISMS.items()}
-
-MechanismsSection: Any = create_model("MechanismsSection", __base__=_Mechanisms, **_SECTIONS)
-"""``[mechanism]``: a section for each one of the library."""
+def mechanisms_section() -> type[MechanismsSection]:
+    """Generate the section of the mechanisms of the library, as it is now."""
+    return library_section(MechanismsSection, MechanismSection, *MECHANISMS.items())

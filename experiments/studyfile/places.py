@@ -1,4 +1,4 @@
-"""Where in a TOML file a value stands: file, line and key, for error messages."""
+"""Places in a TOML file: file, line and key of a value, for error messages."""
 
 from __future__ import annotations
 

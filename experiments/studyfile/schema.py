@@ -3,32 +3,59 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, TypeVar, get_args, get_origin
 
 from annotated_types import Ge, Gt, Le, Lt
 from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, PlainValidator, ValidationError
 from pydantic.fields import FieldInfo
-from pydantic_core import CoreSchema, ErrorDetails, core_schema
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from experiments.errors import Problem, StudyError
 from experiments.studyfile.places import KeyPath, Places, value_at
-from experiments.studyfile.units import Quantity
+from experiments.studyfile.units import Quantity, unit_size
 
 SectionT = TypeVar("SectionT", bound=BaseModel)
+
+_NESTED = "nested"
+"""Type of an error that holds those inside a value."""
 
 
 @dataclass(frozen=True)
 class Dimension:
-    """Marks a float field as a quantity: it is read with its unit and held in SI (degrees for angles)."""
+    """Marks a float field as a quantity: it is read with its unit and held in the base unit."""
 
     name: str
     """A key of ``units.UNITS``, or ``""`` for a plain number."""
+    plain: str = ""
+    """Unit of a number that is written without one; ``""``: a number needs its unit."""
 
     def to_base(self, value: object) -> float:
-        """Read a quantity and convert it."""
-        return Quantity.parse(value).to_base(self.name)
+        """Read a quantity and convert it.
+
+        Raises
+        ------
+        ValueError
+            When it is no quantity of the dimension.
+        """
+        quantity = Quantity.parse(value)
+        return Quantity(quantity.number, quantity.unit or self.plain).to_base(self.name)
+
+    def to_unit(self, value: object, unit: str) -> float:
+        """Read a quantity and express it in a unit of the dimension.
+
+        Raises
+        ------
+        ValueError
+            When it is no quantity of the dimension.
+        """
+        quantity = Quantity.parse(value)
+        return quantity.number if quantity.unit == unit else self.to_base(quantity) / self.size(unit)
+
+    def size(self, unit: str) -> float:
+        """Size of a unit in the base unit of the dimension."""
+        return unit_size(unit or self.plain, self.name)
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.no_info_before_validator_function(self.to_base, handler(source))
@@ -38,11 +65,8 @@ Number = Annotated[float, Dimension("")]
 Length = Annotated[float, Dimension("length")]
 Pressure = Annotated[float, Dimension("pressure")]
 Density = Annotated[float, Dimension("density")]
-Speed = Annotated[float, Dimension("speed")]
-Rate = Annotated[float, Dimension("rate")]
-Frequency = Annotated[float, Dimension("frequency")]
-Time = Annotated[float, Dimension("time")]
 Angle = Annotated[float, Dimension("angle")]
+"""A measured angle, in degrees."""
 RawQuantity = Annotated[Quantity, PlainValidator(Quantity.parse)]
 """A quantity of any dimension, kept as written."""
 
@@ -53,36 +77,82 @@ class Section(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
-def field_at(model: type[BaseModel], path: KeyPath) -> FieldInfo | None:
-    """Find the field that a key path leads to; None when there is none."""
-    field = None
+@dataclass(frozen=True)
+class Generated:
+    """Marks a field as a section whose keys are known when a file is read, those of plug-ins included."""
+
+    section: Callable[[], type[Section]]
+    """Builds the section."""
+
+    def read(self, value: object) -> Section:
+        """Validate the section."""
+        try:
+            return self.section().model_validate(value)
+        except ValidationError as error:
+            raise nested_error(error.errors()) from None
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_plain_validator_function(self.read)
+
+
+def steps(model: type[BaseModel], path: KeyPath) -> list[tuple[str, FieldInfo]]:
+    """Follow a key path through sections: attribute and field of each key; empty where there is no field."""
+    found: list[tuple[str, FieldInfo]] = []
     section: type[BaseModel] | None = model
     named = False  # whether the next key is the name of one section among several
     for key in path:
-        if isinstance(key, int) or named:
+        if named or isinstance(key, int):
+            found.append((str(key), found[-1][1]))
             named = False
-            continue
-        if section is None or (field := _fields(section).get(key)) is None:
-            return None
-        section, named = _section_of(field), get_origin(field.annotation) is dict
-    return field
+        elif section is None or key not in (known := fields_of(section)):
+            return []
+        else:
+            found.append(known[key])
+            section, named = section_of(known[key][1]), get_origin(known[key][1].annotation) is dict
+    return found
+
+
+def field_at(model: type[BaseModel], path: KeyPath) -> FieldInfo | None:
+    """Find the field that a key path leads to; None when there is none."""
+    found = steps(model, path)
+    return found[-1][1] if found else None
 
 
 def dimension_of(field: FieldInfo) -> Dimension | None:
     """Find the dimension of a quantity's field, be it optional or not; None for any other field."""
-    inner = [mark for kind in get_args(field.annotation) for mark in getattr(kind, "__metadata__", ())]
-    return next((mark for mark in (*field.metadata, *inner) if isinstance(mark, Dimension)), None)
+    return next((mark for mark in _marks(field) if isinstance(mark, Dimension)), None)
 
 
 def bounds(field: FieldInfo) -> tuple[float, float]:
-    """Lower and upper bound of a number field in SI, infinite where there is none."""
+    """Lower and upper bound of a number field in the base unit, infinite where there is none."""
     lower, upper = float("-inf"), float("inf")
-    for mark in field.metadata:
+    for mark in _marks(field):
         if isinstance(mark, (Ge, Gt)):
             lower = float(mark.ge if isinstance(mark, Ge) else mark.gt)  # type: ignore[arg-type]
         elif isinstance(mark, (Le, Lt)):
             upper = float(mark.le if isinstance(mark, Le) else mark.lt)  # type: ignore[arg-type]
     return lower, upper
+
+
+def fields_of(section: type[BaseModel]) -> dict[str, tuple[str, FieldInfo]]:
+    """Attribute and field of each key of a section."""
+    return {field.alias or name: (name, field) for name, field in section.model_fields.items()}
+
+
+def section_of(field: FieldInfo) -> type[BaseModel] | None:
+    """Return the section that a field holds, also when it is optional or one of several."""
+    for mark in _marks(field):
+        if isinstance(mark, Generated):
+            return mark.section()
+    kinds = (field.annotation, *get_args(field.annotation))
+    return next((kind for kind in kinds if isinstance(kind, type) and issubclass(kind, BaseModel)), None)
+
+
+def _marks(field: FieldInfo) -> Iterator[Any]:
+    """Marks of a field's type, or of what it holds where it is optional or holds several."""
+    yield from field.metadata
+    for kind in get_args(field.annotation):
+        yield from getattr(kind, "__metadata__", ())
 
 
 def nearest_name(name: str, known: list[str]) -> str:
@@ -91,8 +161,21 @@ def nearest_name(name: str, known: list[str]) -> str:
     return f"did you mean {near[0]!r}?" if near else f"known: {', '.join(known) or 'none'}"
 
 
-def validated(model: type[SectionT], document: Mapping[str, Any], places: Places) -> SectionT:
+def validated(
+    model: type[SectionT], document: Mapping[str, Any], places: Places, **context: object
+) -> SectionT:
     """Validate a document.
+
+    Parameters
+    ----------
+    model
+        The section.
+    document
+        Its values by key.
+    places
+        Where they stand.
+    context
+        Further facts that validators want.
 
     Raises
     ------
@@ -100,40 +183,46 @@ def validated(model: type[SectionT], document: Mapping[str, Any], places: Places
         With every rule that is broken, the value received and its place.
     """
     try:
-        return model.model_validate(document, context={"folder": places.folder})
+        return model.model_validate(document, context={"folder": places.folder, **context})
     except ValidationError as error:
-        first, *more = (_problem(model, document, places, details) for details in error.errors())
+        first, *more = (_problem(model, document, places, *each) for each in _flat(error.errors()))
         raise StudyError(first.rule, first.value, first.place, tuple(more)) from None
 
 
+def nested_error(errors: Any) -> PydanticCustomError:
+    """Hand errors inside a value on to `validated`, each with its place ``loc`` from that value on."""
+    return PydanticCustomError(_NESTED, "is wrong", {"errors": errors})
+
+
+def message(details: Mapping[str, Any]) -> str:
+    """Rule that an error of pydantic tells of, in the words of a study's errors."""
+    return details["msg"].removeprefix("Value error, ").replace("Input should be", "must be")
+
+
+def _flat(errors: Any, outer: KeyPath = ()) -> Iterator[tuple[KeyPath, Mapping[str, Any]]]:
+    for each in errors:
+        path = (*outer, *each["loc"])
+        if each["type"] == _NESTED:
+            yield from _flat(each["ctx"]["errors"], path)
+        else:
+            yield path, each
+
+
 def _problem(
-    model: type[BaseModel], document: Mapping[str, Any], places: Places, details: ErrorDetails
+    model: type[BaseModel],
+    document: Mapping[str, Any],
+    places: Places,
+    path: KeyPath,
+    details: Mapping[str, Any],
 ) -> Problem:
-    path = details["loc"]
     value = value_at(document, path)
     match details["type"]:
         case "extra_forbidden":
-            owner = _section_at(model, path[:-1])
-            rule = f"unknown key, {nearest_name(str(path[-1]), list(_fields(owner)) if owner else [])}"
+            field = field_at(model, path[:-1])
+            owner = section_of(field) if field else model
+            rule = f"unknown key, {nearest_name(str(path[-1]), list(fields_of(owner)) if owner else [])}"
         case "missing":
             rule = "is required"
         case _:
-            rule = details["msg"].removeprefix("Value error, ").replace("Input should be", "must be")
+            rule = message(details)
     return Problem(rule, "nothing" if value is None else repr(value), places.of(path))
-
-
-def _fields(section: type[BaseModel]) -> dict[str, FieldInfo]:
-    return {field.alias or name: field for name, field in section.model_fields.items()}
-
-
-def _section_at(model: type[BaseModel], path: KeyPath) -> type[BaseModel] | None:
-    if not path:
-        return model
-    field = field_at(model, path)
-    return _section_of(field) if field else None
-
-
-def _section_of(field: FieldInfo) -> type[BaseModel] | None:
-    """Return the section that a field holds, also when it is optional or one of several."""
-    kinds = (field.annotation, *get_args(field.annotation))
-    return next((kind for kind in kinds if isinstance(kind, type) and issubclass(kind, BaseModel)), None)

@@ -5,9 +5,9 @@ A field's type names its dimension; its bounds are the hard physical limits, for
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
-from typing import Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
@@ -15,13 +15,14 @@ from dem_warp.case import Case, Numerics
 from dem_warp.clumps import ClumpShape
 from dem_warp.materials import Interaction, Material
 from dem_warp.population import FRACTION_TOLERANCE, GrainPopulation, ShapeMixture, size_of_mean_mass
-from experiments.studyfile.mechanisms import MechanismsSection
-from experiments.studyfile.scene_sections import SceneSection
-from experiments.studyfile.schema import Density, Length, Number, Pressure, Section
+from experiments.studyfile.generated import section_for
+from experiments.studyfile.mechanisms import MechanismsSection, mechanisms_section
+from experiments.studyfile.scene_sections import SceneSection, scene_section
+from experiments.studyfile.schema import Density, Generated, Length, Number, Pressure, Section
 
 
 class MaterialSection(Section):
-    """What a grain or a wall is made of."""
+    """Material of a grain or a wall."""
 
     density: Density = Field(gt=0.0)
     """Mass of the solid per volume."""
@@ -38,7 +39,7 @@ class MaterialSection(Section):
 
 
 class ShapeSection(Section):
-    """Where a shape comes from: a file of spheres, or the radius of one."""
+    """Source of a shape: a file of spheres, or the radius of one."""
 
     clump: Path | None = None
     """File with the clump's spheres (x y z r in mm), relative to the study file."""
@@ -86,8 +87,8 @@ class GrainSection(MaterialSection, ShapeSection):
     size_mean: Number = Field(default=1.0, gt=0.0)
     """Mean size, as a multiple of the shape."""
     size_mean_of: Literal["sizes", "masses"] = "sizes"
-    """Whether that is the mean of the sizes, as a ruler gives it, or the size of a grain of mean mass, as a
-    balance does: then a wider spread leaves the mass of a number of grains as it is."""
+    """Mean of the sizes, as a ruler gives it, or size of a grain of mean mass, as a balance does: a wider
+    spread leaves the mass of a number of grains as it is."""
     size_sd: Number = Field(default=0.05, ge=0.0)
     """Standard deviation of the size."""
     elongation: Number = Field(default=0.0, ge=0.0)
@@ -176,27 +177,8 @@ class ContactSection(Section):
     """Grain on every wall."""
 
 
-class NumericsSection(Section):
-    """``[numerics]``: how the equations are integrated."""
-
-    time_step_fraction: Number = Field(default=0.25, gt=0.0, le=1.0)
-    """Time step, as a fraction of the Rayleigh time of the smallest sphere."""
-    modulus_scale: Number = Field(default=1.0, ge=1.0)
-    """The grains' shear modulus is divided by this (softer grains take larger steps)."""
-    skin: Length | None = Field(default=None, gt=0.0)
-    """Reach of the neighbour search beyond contact; left out: chosen by the engine."""
-    precision: Literal["mixed", "double"] = "mixed"
-    """Floating point precision of the forces."""
-    clamp_attraction: bool = False
-    """Keep the damping from attracting at the end of an impact."""
-    tangential_damping: bool = True
-    """Damp the tangential spring of a contact."""
-    rolling_holds: bool = True
-    """Let rolling resistance stop a spin at most, and never reverse it."""
-
-    def numerics(self) -> Numerics:
-        """Build the engine's numerics."""
-        return Numerics(**dict(self))
+Scene = Annotated[SceneSection, Generated(scene_section)]
+"""``[scene]``: one of the tests of the library."""
 
 
 class Physics(Section):
@@ -208,11 +190,13 @@ class Physics(Section):
     """Tube and plate, or whatever holds the grains."""
     contact: ContactSection
     """Contact properties of each pair of surfaces."""
-    scene: SceneSection
+    scene: Scene
     """The physical test."""
-    numerics: NumericsSection = NumericsSection()
+    numerics: Annotated[Any, Generated(partial(section_for, Numerics))] = section_for(Numerics)()
     """Time step, softening, precision."""
-    mechanism: MechanismsSection = MechanismsSection()  # type: ignore[valid-type]
+    mechanism: Annotated[MechanismsSection, Generated(mechanisms_section)] = Field(
+        default_factory=lambda: mechanisms_section()()
+    )
     """Physical effects beside those of the base contact law."""
 
     @model_validator(mode="after")
@@ -228,6 +212,6 @@ class Physics(Section):
             grain_grain=self.contact.grain_grain.interaction(),
             grain_wall=self.contact.grain_wall.interaction(),
             seed=seed,
-            numerics=self.numerics.numerics(),
+            numerics=self.numerics.build(),
             mechanisms=self.mechanism.mechanisms(),
         )

@@ -9,7 +9,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -33,13 +33,14 @@ from experiments.studyfile.factor_section import (
     FactorTable,
     check_one_home,
     merge,
-    natural_settings,
+    natural_value,
     with_factor_values,
 )
-from experiments.studyfile.places import Places, value_at
+from experiments.studyfile.places import Places
 from experiments.studyfile.scene_sections import SceneSection
-from experiments.studyfile.schema import Dimension, Section, nearest_name, validated
-from experiments.studyfile.sections import Physics
+from experiments.studyfile.schema import Section, nearest_name, validated
+from experiments.studyfile.sections import Physics, Scene
+from experiments.studyfile.setters import changed
 from experiments.studyfile.target_section import ResponseSection, TargetSection, build_responses
 from experiments.studyfile.toml_files import read_toml
 from imaging import FITS
@@ -47,19 +48,9 @@ from imaging import FITS
 BUCKWHEAT = Path(__file__).parents[1] / "studies" / "buckwheat" / "study.toml"
 """The study that is meant when none is named: the paper's buckwheat."""
 
-_FACTOR_VALUE_TABLES = (
-    ("campaign", "climb", "start"),
-    ("campaign", "climb", "step"),
-    ("campaign", "surface", "center"),
-    ("campaign", "surface", "half_range"),
-    ("campaign", "optimum", "point"),
-    ("target", "twin", "truth"),
-)
-"""Tables of a study that hold quantities by factor name."""
-
 
 class MeasurementSection(Section):
-    """``[measurement]``: how an angle is read from a heap; only angles read the same way compare."""
+    """``[measurement]``: the reading of an angle from a heap; only angles read the same way compare."""
 
     fit: str = "flank"
     """Part of the flank that the line is fitted to, one of ``imaging.FITS``."""
@@ -80,18 +71,18 @@ class Study(Physics):
     """Everything that a person configures; built by `load_study`."""
 
     name: str
-    """What is calibrated, in words."""
+    """Name of what is calibrated, in words."""
     note: str = ""
-    """What a reader must know about the study at this scale."""
+    """Note that a reader needs of the study at this scale."""
     paper: bool = False
     """The study is the paper's buckwheat: the report shows the published numbers beside."""
     measurement: MeasurementSection = MeasurementSection()
-    """How the angle is read."""
+    """The reading of the angle."""
     target_section: TargetSection | None = Field(default=None, alias="target")
     """The angle to be matched."""
     response_sections: tuple[ResponseSection, ...] = Field(default=(), alias="response")
-    """What else is to be matched."""
-    response_scenes: dict[str, SceneSection] = Field(default_factory=dict, alias="response-scene")
+    """Further numbers to be matched."""
+    response_scenes: dict[str, Scene] = Field(default_factory=dict, alias="response-scene")
     """Further scenes, by the names that responses call them by."""
     factor_sections: tuple[FactorSection, ...] = Field(default=(), alias="factor")
     """The factors as written, in order."""
@@ -100,11 +91,12 @@ class Study(Physics):
     campaign: CampaignSettings = CampaignSettings()
     """Every decision of the campaign."""
     discover: DiscoverSection = DiscoverSection()
-    """What a search for a missing effect looks for."""
+    """The search for a missing effect."""
 
     _document: dict[str, Any] = PrivateAttr(default_factory=dict)
     _places: Places = PrivateAttr(default_factory=lambda: Places(BUCKWHEAT, {}))
     _fixed: frozenset[str] = PrivateAttr(default=frozenset())
+    _under: dict[str, Study] = PrivateAttr(default_factory=dict)
 
     @property
     def file(self) -> Path:
@@ -123,7 +115,7 @@ class Study(Physics):
 
     @property
     def target(self) -> MeasuredTarget | TwinTarget:
-        """What the heaps must match.
+        """Target that the heaps must match.
 
         Raises
         ------
@@ -141,7 +133,7 @@ class Study(Physics):
 
     @cached_property
     def responses(self) -> tuple[Response, ...]:
-        """What is to be matched beside the angle.
+        """Responses to be matched beside the angle.
 
         Raises
         ------
@@ -163,25 +155,27 @@ class Study(Physics):
 
     @cached_property
     def conditions(self) -> tuple[Condition, ...]:
-        """What the grain is tested under, in the order of the file; none written: the test as it is."""
+        """Conditions of the tests, in the order of the file; none written: the test as it is."""
         return tuple(section.condition(name) for name, section in self.condition_sections.items()) or (BASE,)
 
     def under(self, condition: str) -> Study:
-        """Build the study of the test under one condition; it takes settings of all factors of this one.
+        """Study of the test under one condition; it takes settings of all factors of this one.
 
         Raises
         ------
         StudyError
             When there is no such condition, or it breaks a rule.
         """
-        by_name = {each.name: each for each in self.conditions}
-        if condition not in by_name:
-            rule = f"must be a condition of the study, {nearest_name(condition, list(by_name))}"
+        known = {each.name: each for each in self.conditions}
+        if condition not in known:
+            rule = f"must be a condition of the study, {nearest_name(condition, list(known))}"
             raise StudyError(rule, condition, str(self.file))
-        document, fixed = under_condition(self._document, by_name[condition])
-        study = _build(document, replace(self._places, condition=condition))
-        study._fixed = self._fixed | fixed
-        return study
+        if condition not in self._under:
+            document, fixed = under_condition(self._document, known[condition])
+            study = _build(document, replace(self._places, condition=condition))
+            study._fixed = self._fixed | fixed
+            self._under[condition] = study
+        return self._under[condition]
 
     def with_document(self, document: Mapping[str, Any]) -> Study:
         """Build the study that another document describes, as if it stood in the same file.
@@ -208,7 +202,13 @@ class Study(Physics):
         StudyError
             When there is no such factor, or a value is no quantity of its dimension.
         """
-        return natural_settings(self.factor_sections, settings, Places(Path(source), {}))
+        natural = {}
+        for name, value in settings.items():
+            try:
+                natural[name] = natural_value(self.factor_sections, name, value)
+            except ValueError as error:
+                raise StudyError(str(error), value, f"{source}: {name}") from None
+        return natural
 
     def case(self, settings: Mapping[str, float], seed: int, scene: str = TARGET_SCENE) -> Case:
         """Build one case.
@@ -227,22 +227,32 @@ class Study(Physics):
         StudyError
             When there is no such factor or scene, or a value leaves what is physical.
         """
-        names = [section.name for section in self.factor_sections]
-        for name in settings:
-            if name not in names and name not in self._fixed:
-                raise StudyError(f"must name a factor, {nearest_name(name, names)}", name, str(self.file))
-        document = with_factor_values(self._document, self.factor_sections, settings)
-        sections = {key: document[key] for key in Physics.model_fields if key in document}
         if scene not in self.scenes:
             rule = f"must name a scene of the study, {nearest_name(scene, list(self.scenes))}"
             raise StudyError(rule, scene, str(self.file))
+        changes: dict[str, Any] = {}
+        for name, value in settings.items():
+            if name in self._factors:
+                self._factors[name].write(changes, value, self._places)
+            elif name not in self._fixed:
+                rule = f"must name a factor, {nearest_name(name, list(self._factors))}"
+                raise StudyError(rule, name, str(self.file))
         if scene != TARGET_SCENE:
-            sections["scene"] = document["response-scene"][scene]
-        physics = validated(Physics, sections, self._places)
+            changes["scene"] = self.response_scenes[scene]
         try:
-            return physics.build_case(seed)
+            return changed(self._physics, changes).build_case(seed)
         except ValueError as error:
             raise StudyError(str(error), dict(settings), str(self.file)) from error
+
+    @cached_property
+    def _physics(self) -> Physics:
+        """Physics alone, every factor at its middle."""
+        return Physics.model_construct(**{key: getattr(self, key) for key in Physics.model_fields})
+
+    @cached_property
+    def _factors(self) -> dict[str, FactorSection]:
+        """The factors by name."""
+        return {section.name: section for section in self.factor_sections}
 
 
 def load_study(
@@ -257,7 +267,7 @@ def load_study(
     scale
         Name of a ``[scale.NAME]`` table to merge over the rest; None: the study as written.
     changes
-        What a caller merges over that, table by table, as written in a study file.
+        Sections that a caller merges over that, table by table, as written in a study file.
 
     Raises
     ------
@@ -278,19 +288,18 @@ def load_study(
 
 
 def _build(document: dict[str, Any], places: Places) -> Study:
-    """Build a study, and each of its conditions once, so that a wrong one is named at once."""
+    """Build a study, and each of its conditions, so that a wrong one is named at once."""
     sections = validated(FactorTable, {"factor": document.get("factor", [])}, places).factor
     check_one_home(document, sections, places)
-    plain = with_factor_values(_without_units(document, sections, places), sections, {})
-    study = validated(Study, plain, places)
+    middle = with_factor_values(document, sections, {}) | {"factor": sections}
+    study = validated(Study, middle, places, natural_value=partial(natural_value, sections))
     study._document, study._places = document, places
     if TARGET_SCENE in study.response_scenes:
         rule = f"a further scene has a name of its own: {TARGET_SCENE!r} is the study's own"
         raise StudyError(rule, TARGET_SCENE, places.of(("response-scene", TARGET_SCENE)))
     study.responses  # noqa: B018  (a wrong response is an error now, not when a campaign begins)
-    if study.condition_sections:
-        for condition in study.conditions:
-            study.under(condition.name)
+    for name in study.condition_sections:
+        study.under(name)
     return study
 
 
@@ -311,20 +320,3 @@ def _scales(path: Path, document: Mapping[str, Any]) -> Mapping[str, Mapping[str
     if not isinstance(scales, Mapping) or not all(isinstance(table, Mapping) for table in scales.values()):
         raise StudyError("scales are tables, [scale.NAME]", scales, str(path))
     return scales
-
-
-def _without_units(
-    document: dict[str, Any], sections: tuple[FactorSection, ...], places: Places
-) -> dict[str, Any]:
-    """Copy a document with factor values and margin as plain numbers, as the campaign takes them."""
-    plain = copy.deepcopy(document)
-    for path in _FACTOR_VALUE_TABLES:
-        if isinstance(table := value_at(plain, path), dict):
-            value_at(plain, path[:-1])[path[-1]] = natural_settings(sections, table, places, path)  # type: ignore[index]
-    path = ("campaign", "verification", "margin")
-    if (margin := value_at(plain, path)) is not None:
-        try:
-            plain["campaign"]["verification"]["margin"] = Dimension("angle").to_base(margin)
-        except ValueError as error:
-            raise StudyError(str(error), margin, places.of(path)) from None
-    return plain

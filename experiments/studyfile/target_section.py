@@ -11,6 +11,7 @@ from experiments.errors import StudyError
 from experiments.studyfile.campaign import (
     ANGLE,
     TARGET_SCENE,
+    FactorValues,
     MeasuredResponse,
     MeasuredTarget,
     Response,
@@ -30,7 +31,7 @@ DIMENSIONS = {"1": "", "deg": "angle", "m": "length", "s": "time", "kg": "mass",
 class TwinSection(Section):
     """``[target.twin]``: the target is simulated with settings that the campaign does not see."""
 
-    truth: dict[str, float] = Field(min_length=1)
+    truth: FactorValues = Field(min_length=1)
     """Hidden factor values; the factors not named are at their middle."""
     replicates: int = Field(default=5, ge=2)
     """Cases of the target in every scene."""

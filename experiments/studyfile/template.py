@@ -18,7 +18,7 @@ def write_template(name: str, folder: Path | None = None) -> Path:
     name
         Name of the grain; the file is ``NAME.toml``.
     folder
-        Where it is written; None: the current folder.
+        Folder that it is written to; None: the current one.
 
     Returns
     -------

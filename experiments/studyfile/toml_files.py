@@ -20,7 +20,7 @@ def read_toml(path: Path, what: str = "the study") -> tuple[str, dict[str, Any]]
     path
         The file.
     what
-        What it is, for the error message.
+        Name of its kind, for the error message.
 
     Raises
     ------

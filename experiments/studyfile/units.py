@@ -19,6 +19,10 @@ UNITS: dict[str, dict[str, float]] = {
     "time": {"s": 1.0, "ms": 1e-3, "min": 60.0},
     "mass": {"kg": 1.0, "g": 1e-3, "mg": 1e-6},
     "mass flow": {"kg/s": 1.0, "g/s": 1e-3},
+    "volume": {"m^3": 1.0, "cm^3": 1e-6, "mm^3": 1e-9, "l": 1e-3, "ml": 1e-6, "ul": 1e-9},
+    "force": {"N": 1.0, "mN": 1e-3},
+    "surface energy": {"J/m^2": 1.0, "mJ/m^2": 1e-3, "N/m": 1.0, "mN/m": 1e-3},
+    "energy density": {"J/m^3": 1.0, "kJ/m^3": 1e3, "Pa": 1.0, "kPa": 1e3},
     "angle": {"deg": 1.0, "rad": math.degrees(1.0)},
 }
 """Size of each unit in the base unit of its dimension (SI; degrees for angles)."""
@@ -35,14 +39,16 @@ class Quantity:
 
     @classmethod
     def parse(cls, value: object) -> Quantity:
-        """Read a number, or text such as ``"110 mm"``.
+        """Read a number, text such as ``"110 mm"``, or a quantity.
 
         Raises
         ------
         ValueError
             When the value is neither, or the number is not finite.
         """
-        if isinstance(value, (int, float)) and not isinstance(value, bool):
+        if isinstance(value, cls):
+            quantity = value
+        elif isinstance(value, (int, float)) and not isinstance(value, bool):
             quantity = cls(float(value))
         elif isinstance(value, str) and (match := _TEXT.fullmatch(value)):
             quantity = cls(float(match[1]), match[2] or "")
@@ -76,6 +82,22 @@ class Quantity:
     def to_unit(self, unit: str, dimension: str) -> float:
         """Express in another unit of the same dimension."""
         return self.number if unit == self.unit else self.to_base(dimension) / unit_size(unit, dimension)
+
+
+def dimension_of_unit(unit: str) -> str:
+    """Name the dimension of an SI unit, as a parameter or an observable of the engine has it.
+
+    Raises
+    ------
+    ValueError
+        When it is none of a known dimension.
+    """
+    if unit == "1":
+        return ""
+    for dimension, sizes in UNITS.items():
+        if sizes.get(unit) == 1.0 or unit == "rad" in sizes:
+            return dimension
+    raise ValueError(f"must be an SI unit of a known dimension ({', '.join(UNITS)}), not {unit!r}")
 
 
 def unit_size(unit: str, dimension: str) -> float:

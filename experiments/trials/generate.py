@@ -19,13 +19,13 @@ import numpy as np
 import typer
 
 from doe.discrepancy import Bank, Outcomes, Simulator, fit_emulator
-from experiments.commands.choices import chosen_devices
 from experiments.commands.console import clear_errors
 from experiments.discover.engine import EngineSimulator
 from experiments.discover.library import library_for
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.search import Search
 from experiments.errors import InputError
+from experiments.runs.choices import chosen_devices
 from experiments.studyfile import Study, load_study
 from experiments.studyfile.toml_files import read_toml
 from experiments.trials.declaration import (
@@ -49,7 +49,7 @@ from experiments.trials.truth import (
 STUDY = Path(__file__).parents[1] / "studies" / "trial" / "study.toml"
 """The study that the trials are about."""
 
-STRANGERS = Path(__file__).parent / "strangers"
+STRANGERS = {path.stem: path for path in Path(__file__).parent.glob("strangers/*.toml")}
 """Effects that the library never has, written as its mechanisms are."""
 
 STEP_SHARE = 0.8

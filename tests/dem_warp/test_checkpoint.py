@@ -261,7 +261,7 @@ def test_a_damaged_checkpoint_is_named_and_only_its_case_starts_afresh(left, tmp
 @pytest.mark.parametrize(
     ("module", "name", "value", "reason"),
     [
-        (dem_warp.batch, "engine_fingerprint", lambda: "newer", "engine '.*' instead of 'newer'"),
+        (dem_warp.batch, "engine_fingerprint", lambda *_: "newer", "engine '.*' instead of 'newer'"),
         (dem_warp.batch, "provenance", lambda *_: {"device": "another"}, "device '.*' instead of 'another'"),
         (dem_warp.checkpoint, "FORMAT", 99, "format 1 instead of 99"),
     ],

@@ -1,4 +1,4 @@
-"""What pulls surfaces together: linear cohesion, adhesion to walls, JKR, capillary bridges.
+"""Pull between surfaces: linear cohesion, adhesion to walls, JKR, capillary bridges.
 
 All tests share the kernels of one set of mechanisms, those that a test does not name being at their nulls.
 """
@@ -70,7 +70,7 @@ def hertz(radius: float, overlap: np.ndarray) -> np.ndarray:
 # ---- force against overlap -----------------------------------------------------------------------------
 
 PARTNERS = (1.0, 0.5, None)
-"""What a ball meets: a ball by its relative size, or a plane."""
+"""Partner of a ball: a ball by its relative size, or a plane."""
 
 
 def effective_radius(partner: float | None) -> float:
@@ -361,7 +361,7 @@ def test_lists_reach_as_far_beyond_the_skin_as_surfaces_act():
     assert reach == pytest.approx(2e-4)
     sticky, dry = damp_pile(skin), pile(skin=skin + reach)
     a, b, c = (
-        solve(replace(setup, grains=cloud), precision="mixed").hood
+        solve(replace(setup, grains=cloud), precision="mixed").neighbours
         for setup in (sticky, dry, replace(dry, skin=skin))
     )
     assert a.capacity == b.capacity

@@ -53,11 +53,11 @@ def rebuild(solver: Solver) -> None:
 
 def springs(solver: Solver) -> dict[tuple[int, int], np.ndarray]:
     """Tangential displacement [m] and stamp of every contact that has touched, by grain and partner."""
-    hood = solver.hood
-    row = hood.list.numpy()[0] * 2
-    counts = hood.count.numpy()[row : row + 2]
-    entries = hood.entry.numpy().reshape(-1, hood.capacity)[row : row + 2]
-    histories = hood.history.numpy().reshape(-1, hood.capacity, 4)[row : row + 2]
+    neighbours = solver.neighbours
+    row = neighbours.list.numpy()[0] * 2
+    counts = neighbours.count.numpy()[row : row + 2]
+    entries = neighbours.entry.numpy().reshape(-1, neighbours.capacity)[row : row + 2]
+    histories = neighbours.history.numpy().reshape(-1, neighbours.capacity, 4)[row : row + 2]
     return {
         (g, int(entries[g, k]) & SPHERE_MASK): histories[g, k].copy()
         for g in range(2)
@@ -113,5 +113,5 @@ def test_a_belt_that_changes_its_speed_keeps_the_springs():
 def test_a_spring_that_were_lost_would_be_felt(undisturbed):
     solver = column()
     take_steps(solver, 64)
-    solver.hood.history.zero_()
+    solver.neighbours.history.zero_()
     assert not np.array_equal(take_steps(solver, 64), undisturbed[64:128])

@@ -84,7 +84,7 @@ def test_the_level_of_the_filling_encloses_its_part_of_the_drum():
     [
         ({"filling": 0.6}, "Drum.filling: must be at most 0.5, got 0.6"),
         ({"filling": 0.0}, "Drum.filling: must be positive and finite, got 0.0"),
-        ({"start_up": -1.0}, "Drum.start_up: must be finite and not negative, got -1.0"),
+        ({"start_up": -1.0}, "Drum.start_up: must be finite and 0 or more, got -1.0"),
         # w^2 r = g at 3.153 revolutions a second.
         ({"rotation_rate": 3.2}, "Drum.rotation_rate: must be below 3.153 1/s, .* got 3.2"),
     ],

@@ -12,7 +12,7 @@ from dem_warp.walls import Plane
 
 SPEED = 0.1
 PHASES = (0.0, 0.25, 0.5, 0.75)
-"""Where within a step the spheres meet: what is seen of an impact depends on it."""
+"""Part of a step at which the spheres meet: what is seen of an impact depends on it."""
 
 
 @dataclass(frozen=True)
@@ -227,9 +227,9 @@ def test_the_tangential_spring_turns_with_the_contact():
     assert touching[40:80].all()
     across = seen.positions[79, 0] - seen.positions[79, 1]
     normal = across / np.linalg.norm(across)
-    hood = solver.hood
-    first = hood.list.numpy()[0] * 2 * hood.capacity
-    spring = hood.history.numpy()[first, :3]
+    neighbours = solver.neighbours
+    first = neighbours.list.numpy()[0] * 2 * neighbours.capacity
+    spring = neighbours.history.numpy()[first, :3]
     assert np.linalg.norm(spring) > 1e-9
     # It lies in the plane in which the contact stood at its last step: rounding, while the normal has turned
     # by 1e-3.

@@ -100,7 +100,7 @@ def test_a_world_overflows_in_any_company_or_in_none():
     places = np.random.default_rng(0).normal(size=(40, 3)) * 1e-3
     crowd, roomy = replace(heap(0), grains=grains(places)), replace(heap(1), skin=2.0 * RADIUS)
     alone, together = solve(crowd, precision="mixed"), solve(roomy, crowd, precision="mixed")
-    assert together.hood.capacity > alone.hood.capacity
+    assert together.neighbours.capacity > alone.neighbours.capacity
     assert WorldFlag.NEIGHBOUR_OVERFLOW in WorldFlag(int(alone.flags.numpy()[0]))
     assert together.flags.numpy().tolist() == [0, *alone.flags.numpy()]
 

@@ -1,4 +1,4 @@
-"""What a lifted cylinder measures beside its heap: loads, the falling surface, where the mass lies."""
+"""Measurements of a lifted cylinder beside its heap: loads, the falling surface, where the mass lies."""
 
 import math
 from collections.abc import Callable

@@ -93,7 +93,7 @@ def test_grains_fall_over_the_rim_of_a_small_plate():
 
 def test_a_plate_is_wider_than_the_tube():
     with pytest.raises(
-        ValueError, match=r"LiftedCylinder.plate_diameter: must be finite and above .* got 0.01"
+        ValueError, match=r"LiftedCylinder.plate_diameter: must be above the tube's .* got 0.01"
     ):
         replace(SMALL_TUBE, plate_diameter=0.01)
 
@@ -227,7 +227,7 @@ def test_sizes_stay_within_their_limits_and_follow_their_distribution():
 
 
 def end_of_lift(riding: int) -> tuple[Decision, Decision, float]:
-    """What a controller decides for a bed of 100 that stays where it is, but for some that ride on the tube.
+    """Decision of a controller on a bed of 100 that stays where it is, but for some that ride on the tube.
 
     Returns the first decision after the lift began that asks for anything, the last one, and how far the tube
     had then risen, in its heights.

@@ -1,4 +1,4 @@
-"""What holds for every mechanism: its null, its checks, how several stand together."""
+"""Rules that hold for every mechanism: its null, its checks, how several stand together."""
 
 import math
 
@@ -23,7 +23,7 @@ from dem_warp.laws.capillary import CapillaryBridge
 from dem_warp.laws.contact_law import contact_law
 from dem_warp.laws.hysteretic_spring import HystereticSpring
 from dem_warp.laws.jkr import JKR
-from dem_warp.laws.library import MECHANISMS, PARAMETERS
+from dem_warp.laws.library import MECHANISMS, parameters
 from dem_warp.laws.linear_cohesion import LinearCohesion
 from dem_warp.laws.mechanism import Mechanism
 from dem_warp.model import WorldSetup
@@ -61,7 +61,7 @@ def test_a_null_mechanism_leaves_the_base_law(kind: type[Mechanism]):
 
 
 def test_parameters_of_mechanisms_have_names_of_their_own():
-    assert len(set(PARAMETERS)) == len(PARAMETERS)
+    assert len(set(parameters())) == len(parameters())
 
 
 def test_mechanisms_stand_in_the_order_of_the_library():

@@ -89,7 +89,7 @@ def test_what_a_contact_remembers_goes_along_to_another_batch(settled):
     first, second = solve(rich_pile(), precision=precision), solve(larger, rich_pile(), precision=precision)
     run_for(first, 0.5 * FALL)
     put_snapshot(second, 1, take_snapshot(first, 0))
-    assert np.abs(second.hood.memory.numpy()).max() > 0.0
+    assert np.abs(second.neighbours.memory.numpy()).max() > 0.0
     run_for(second, FALL - first.view([0])[0].time)
     assert second.view([1])[0].step == first.view([0])[0].step + second.view([0])[0].step
     assert_same_bits(state(second, 1), midst)

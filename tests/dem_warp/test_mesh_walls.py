@@ -57,7 +57,7 @@ def plate(cells: int, half: float = 0.06, shift: float = 0.0) -> Mesh:
 
 
 def settle(wall, place, down, time=0.06):
-    """Where a ball comes to rest on a wall that lies `down` from its place."""
+    """Resting place of a ball on a wall that lies `down` from it."""
     gravity = tuple(GRAVITY * np.asarray(down, dtype=float))
     solver = solve(world(grains(place), CONTACT, TIME_STEP, walls=(wall,), gravity=gravity))
     run_for(solver, time)
@@ -234,7 +234,7 @@ def test_worlds_of_a_batch_have_meshes_of_their_own():
             alone.move_wall(0, 0, Motion(spin=(0.0, 0.0, 4.0)))
         run_for(alone, 0.1)
         assert_same_bits(state(together, w), state(alone))
-        listed = alone.hood.entry.numpy() & SPHERE_MASK
+        listed = alone.neighbours.entry.numpy() & SPHERE_MASK
         assert (listed >= 12 + 2).any()
 
 

@@ -30,10 +30,10 @@ SPHERES = PYRAMID.sphere_count
 
 def listed(solver: Solver) -> list[tuple[int, int]]:
     """Pairs (own sphere, partner) of a world's present list, in its order."""
-    n, hood = solver.layout.grain_count, solver.hood
-    row = hood.list.numpy()[0] * n
-    counts = hood.count.numpy()[row : row + n]
-    entries = hood.entry.numpy().reshape(-1, hood.capacity)[row : row + n]
+    n, neighbours = solver.layout.grain_count, solver.neighbours
+    row = neighbours.list.numpy()[0] * n
+    counts = neighbours.count.numpy()[row : row + n]
+    entries = neighbours.entry.numpy().reshape(-1, neighbours.capacity)[row : row + n]
     return [
         (g * SPHERES + (entry >> SPHERE_BITS), entry & SPHERE_MASK)
         for g in range(n)

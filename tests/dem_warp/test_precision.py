@@ -43,7 +43,7 @@ def packing_kernel(precision):
 
 
 def probe(precision, a: np.ndarray, b: np.ndarray) -> dict[str, np.ndarray]:
-    """What the packing makes of positions `a` and `b` [m], (n, 3), in a world about (0.1, 0.2, 0.3)."""
+    """Positions `a` and `b` [m], (n, 3), after the packing of a world about (0.1, 0.2, 0.3)."""
     device = resolve_device("cpu")
     rows = [{"unit": UNIT if precision.is_fixed_point else 1.0, "origin": (0.1, 0.2, 0.3)}]
     worlds = struct_array(device_structs(precision).World, rows, device)

@@ -32,7 +32,7 @@ SLANT = math.sqrt(0.5)
 
 
 def settle(wall, place, down, time=0.06):
-    """Where a ball comes to rest on a wall that lies `down` from its place."""
+    """Resting place of a ball on a wall that lies `down` from it."""
     gravity = tuple(GRAVITY * np.asarray(down, dtype=float))
     solver = solve(world(grains(place), CONTACT, TIME_STEP, walls=(wall,), gravity=gravity))
     run_for(solver, time)

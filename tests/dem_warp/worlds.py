@@ -29,7 +29,7 @@ from dem_warp.solver import Solver
 from dem_warp.walls import Cylinder, Plane, Wall
 
 DEVICE = os.environ.get("DEM_WARP_TEST_DEVICE", "cpu")
-"""Where these worlds run; what is promised of a world's bits holds on every device."""
+"""Device that these worlds run on; what is promised of a world's bits holds on every device."""
 
 GRAVITY = 9.81
 RADIUS = 5e-3

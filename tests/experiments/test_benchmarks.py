@@ -118,7 +118,7 @@ def test_contacts_are_pairs_of_different_grains_and_walls() -> None:
 def test_near_is_what_may_touch_within_the_paths_of_both(small_columns: Columns) -> None:
     solver = start(small_columns.moments("settled", 1), DEVICE)
     solver._look_ahead(2, 0)
-    paths = solver.hood.near.path.numpy()
+    paths = solver.neighbours.near.path.numpy()
     # all at rest: every path is the least one
     assert paths.min() == paths.max()
     setup, margin = solver.worlds[0], 2.0 * float(paths[0])

@@ -13,9 +13,10 @@ import pytest
 import pyvista
 from typer.testing import CliRunner
 
+from experiments import api
 from experiments.cli import app
-from experiments.commands import run
 from experiments.commands.console import CaseProgress, describe_progress, duration
+from experiments.runs import campaign as run
 from imaging import save_picture
 
 WriteStudy = Callable[..., Path]
@@ -66,7 +67,7 @@ def test_help_imports_nothing_heavy() -> None:
 
 
 def test_a_calibration_does_not_need_pyvista() -> None:
-    program = "import sys; import experiments.commands.run; print('pyvista' in sys.modules)"
+    program = "import sys; import experiments.runs.campaign; print('pyvista' in sys.modules)"
     assert last_line_of(program) == "False"
 
 
@@ -179,7 +180,7 @@ def test_an_interruption_says_how_to_go_on(write_study: WriteStudy, monkeypatch:
     def interrupt(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(run, "run_campaign", interrupt)
+    monkeypatch.setattr(api, "run_campaign", interrupt)
     path = write_study()
     code, _, err = dem_warp("calibrate", path, "--scale", "stiff", "--device", "cpu", "--out", "results")
     assert code == 130

@@ -10,9 +10,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from experiments.commands import run
-from experiments.commands.run import Desk, check_runs, replay_paper
 from experiments.errors import StudyError
+from experiments.runs import campaign as run
+from experiments.runs.campaign import Desk, check_runs, replay_paper
 from experiments.studies.buckwheat import paper
 from experiments.studies.buckwheat.replay import ALL, Replay, published_noise
 from experiments.studies.buckwheat.runs import DESIGNS, OPTIMUM, STAGES, planned_cases, published_runs

@@ -17,8 +17,8 @@ from dem_warp import Case, CaseResult
 from experiments.calibrate import Campaign, Outcome
 from experiments.calibrate.campaign import StageHook
 from experiments.cases import execute
-from experiments.commands import run
-from experiments.commands.run import Desk
+from experiments.runs import campaign as run
+from experiments.runs.campaign import Desk
 from experiments.studyfile import Study, load_study
 
 SLOPE = 30.0

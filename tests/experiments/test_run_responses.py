@@ -17,8 +17,8 @@ from dem_warp import CaseResult, Hopper
 from experiments.calibrate import Outcome
 from experiments.cases import Store, execute, run_cases
 from experiments.cli import app
-from experiments.commands import run
-from experiments.commands.run import Desk
+from experiments.runs import campaign as run
+from experiments.runs.campaign import Desk
 from experiments.studyfile import Study, load_study
 
 BIN = """

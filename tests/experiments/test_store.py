@@ -54,7 +54,7 @@ def test_another_engine_makes_another_key(
 ) -> None:
     store, case = Store(tmp_path), small_study.case({}, seed=1)
     key = store.key(case)
-    monkeypatch.setattr(key_module, "engine_fingerprint", lambda: "another")
+    monkeypatch.setattr(key_module, "engine_fingerprint", lambda *_: "another")
     assert store.key(case) != key
 
 

@@ -9,10 +9,11 @@ from pathlib import Path
 
 import pytest
 
+from dem_warp.parameters import UNITS as ENGINE_UNITS
 from experiments.errors import StudyError
 from experiments.studyfile import BUCKWHEAT, load_study, study_scales, write_template
 from experiments.studyfile.campaign import MeasuredTarget, TwinTarget
-from experiments.studyfile.units import UNITS, Quantity
+from experiments.studyfile.units import UNITS, Quantity, dimension_of_unit
 
 WriteStudy = Callable[..., Path]
 
@@ -55,6 +56,10 @@ def test_every_unit_survives_a_round_trip() -> None:
                 there = Quantity(1.5, unit).to_unit(other, dimension)
                 # Two roundings each way.
                 assert Quantity(there, other).to_unit(unit, dimension) == pytest.approx(1.5, rel=1e-15)
+
+
+def test_every_unit_of_a_parameter_of_the_engine_can_be_written() -> None:
+    assert "" not in [dimension_of_unit(unit) for unit in ENGINE_UNITS if unit != "1"]
 
 
 def test_the_paper_study_is_the_papers() -> None:

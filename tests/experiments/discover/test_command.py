@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from experiments import api
 from experiments.cli import app
-from experiments.commands import discover as commands
-from experiments.commands.discover import OUTCOMES, Ended, Job, run_search
-from experiments.commands.run import check_runs
 from experiments.discover import devices
 from experiments.discover.observables import PHOTOGRAPHED
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.wave import WaveRunner
 from experiments.report.discovery import Terms
+from experiments.runs.campaign import check_runs
+from experiments.runs.search import OUTCOMES, Ended, Job, run_search
 from experiments.studyfile import load_study
 
 TRIAL = Path(__file__).parents[3] / "experiments" / "studies" / "trial"
@@ -115,7 +115,7 @@ def test_a_wave_is_spread_over_the_devices_that_are_named(
         asked.append(job.device)
         return Ended(None, Terms({}, {}, {}), job.folder)
 
-    monkeypatch.setattr(commands, "run_search", note)
+    monkeypatch.setattr(api, "run_search", note)
     code, _, err = discover(DATA / "nothing-missing.csv", "--out", tmp_path / "out", device="cuda, cuda:1")
     assert (code, asked) == (0, ["cuda:0,cuda:1"])
     assert "on cuda:0,cuda:1" in err

@@ -8,11 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from experiments.discover.library import FOLDER, library_for, with_mechanisms
+from experiments.discover import library
+from experiments.discover.library import FILES, library_for, with_mechanisms
 from experiments.errors import StudyError
 from experiments.studyfile import Study, load_study
 
-TRIAL = Path(FOLDER).parents[1] / "studies" / "trial" / "study.toml"
+TRIAL = Path(library.__file__).parents[1] / "studies" / "trial" / "study.toml"
 WriteStudy = Callable[..., Path]
 
 
@@ -22,10 +23,10 @@ def trial() -> Study:
 
 
 def test_the_trial_study_lacks_every_mechanism_of_the_library(trial: Study) -> None:
-    assert [m.name for m in library_for(trial)] == sorted(path.stem for path in FOLDER.glob("*.toml"))
+    assert [m.name for m in library_for(trial)] == sorted(FILES)
 
 
-@pytest.mark.parametrize("name", sorted(path.stem for path in FOLDER.glob("*.toml")))
+@pytest.mark.parametrize("name", sorted(FILES))
 def test_a_mechanism_at_its_null_is_the_study_and_at_its_maximum_is_not(trial: Study, name: str) -> None:
     mechanism = next(m for m in library_for(trial) if m.name == name)
     theta = {factor.name: factor.low for factor in trial.factors}
@@ -90,8 +91,8 @@ def test_two_mechanisms_of_one_parameter_exclude_each_other(trial: Study) -> Non
 
 
 def test_a_wrong_file_is_named_with_its_line(trial: Study, tmp_path: Path) -> None:
-    text = (FOLDER / "twisting.toml").read_text(encoding="utf-8")
+    text = FILES["twisting"].read_text(encoding="utf-8")
     path = tmp_path / "twisting.toml"
     path.write_text(text.replace("twisting.twisting_radius", "twisting.radius"), encoding="utf-8")
     with pytest.raises(StudyError, match=r"twisting.toml:4: parameters: must lead to a quantity"):
-        library_for(trial, tmp_path)
+        library_for(trial, {"twisting": path})

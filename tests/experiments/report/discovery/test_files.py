@@ -13,10 +13,10 @@ import pytest
 
 from doe.discrepancy import Discovery, Interval, Settings, Verdict
 from experiments.calibrate.export import jsonable
-from experiments.commands.run import check_runs
 from experiments.discover.library import library_for
 from experiments.discover.observables import OBSERVABLES
 from experiments.report.discovery import Terms, write_discovery
+from experiments.runs.campaign import check_runs
 from experiments.studyfile import Study, load_study
 
 Discovered = Callable[[Verdict], Discovery]

@@ -1,4 +1,4 @@
-"""What a command runs on when nothing is named: the device, the scale of the study, the folder of results."""
+"""Choices where nothing is named: the device, the scale of the study, the folder of results."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 from dem_warp.device import resolve_device
 from experiments.discover.devices import resolve_devices
 from experiments.errors import InputError
-from experiments.studyfile import Study, load_study, study_scales
+from experiments.studyfile import Study, StudyError, load_study, study_scales
 
 
 def chosen_device(device: str | None) -> str:
@@ -38,14 +38,21 @@ def chosen_devices(devices: str | None) -> str:
         raise InputError(str(error), devices, "--device") from None
 
 
-def chosen_study(path: Path | None, scale: str | None, device: str) -> Study:
+def chosen_study(study: Study | str | Path | None, scale: str | None, device: str) -> Study:
     """Load a study at the scale asked for, or at the one for the device: paper on a GPU, bench on a CPU.
+
+    A study that is loaded stays as it is.
 
     Raises
     ------
     StudyError
-        When the study breaks a rule, or has no such scale.
+        When the study breaks a rule, has no such scale, or is loaded at another.
     """
+    if isinstance(study, Study):
+        if scale not in (None, study.scale):
+            raise StudyError(f"is loaded at the scale {study.scale!r}", scale, f"{study.file}: scale")
+        return study
+    path = None if study is None else Path(study)
     if scale is None:
         suited = "paper" if device.startswith("cuda") else "bench"
         scale = suited if suited in study_scales(path) else None

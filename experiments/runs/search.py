@@ -12,6 +12,7 @@ from typing import Any
 
 from dem_warp import Progress
 from dem_warp.provenance import engine_fingerprint
+from dem_warp.version import source_commit
 from doe.discrepancy import Bank, Discovery, Fit, Measured, Outcomes, Point, drive
 from experiments.cases import open_folder, require_unused
 from experiments.discover.data.file import read_measured
@@ -23,7 +24,6 @@ from experiments.discover.search import Search
 from experiments.report import HeapPicture
 from experiments.report.discovery import Terms, write_discovery
 from experiments.report.discovery.pictures import photograph, simulated_heaps
-from experiments.report.writer import source_commit
 from experiments.studyfile import Study
 
 Watch = Callable[[str], AbstractContextManager[Callable[[Progress], None] | None]]
@@ -153,7 +153,7 @@ def run_search(job: Job, resume: bool = False, watch: Watch = lambda title: null
     search.settings.write(job.folder / SETTINGS)
     with _Watched(search, job, watch) as simulator:
         if bank is None:
-            bank = search.make_bank(simulator, maker_of_today(source_commit() or ""))
+            bank = search.make_bank(simulator, maker_of_today(source_commit()))
             bank.save(job.folder / BANK)
         if measured is None:
             return Ended(None, terms, job.folder / BANK)

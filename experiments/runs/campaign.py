@@ -14,16 +14,17 @@ from typing import Any
 import pandas as pd
 
 from dem_warp import Progress
+from dem_warp.version import source_commit
 from experiments.calibrate import Campaign, calibrate
 from experiments.calibrate.campaign import StageHook
 from experiments.calibrate.checks import check_study
 from experiments.calibrate.export import jsonable
-from experiments.cases import Store, open_folder, run_cases
+from experiments.cases import Engine, Store, open_folder, run_cases
 from experiments.errors import StudyError
 from experiments.files import write_text
 from experiments.report import heap_pictures, write_report
 from experiments.report.record import draw_heaps, write_record
-from experiments.report.writer import library_versions, source_commit
+from experiments.report.writer import library_versions
 from experiments.studies.buckwheat.replay import Replay
 from experiments.studies.buckwheat.runs import STAGES, planned_cases
 from experiments.studyfile import Study
@@ -60,6 +61,7 @@ class Desk:
         workers: int | None = None,
         resume: bool = False,
         watch: Watch = lambda title: nullcontext(),
+        engine: Engine | None = None,
     ) -> Desk:
         """Make the folder of a study, or go on in it.
 
@@ -77,13 +79,15 @@ class Desk:
             Go on in the folder of an earlier run: what it has simulated is not simulated again.
         watch
             Display of each batch of cases.
+        engine
+            What simulates; None: `dem_warp.simulate`.
 
         Raises
         ------
         StoreError
             When the folder is in use, or is not one to resume; nothing is written then.
         """
-        store, changes = open_folder(folder, study, resume)
+        store, changes = open_folder(folder, study, resume, engine)
         for change in changes:
             _log.warning("The study has changed since the earlier run: %s", change)
         return cls(study, folder, store, device, workers, watch)

@@ -1,0 +1,146 @@
+"""Calibration and search as functions: the command line calls them, and so may a script or a notebook."""
+
+from __future__ import annotations
+
+from contextlib import nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from experiments.calibrate import Campaign
+from experiments.calibrate.campaign import StageHook
+from experiments.cases.engines import engine_named
+from experiments.runs.campaign import (
+    Desk,
+    Watch,
+    check_runs,
+    found_by,
+    record_paper,
+    replay_paper,
+    run_campaign,
+)
+from experiments.runs.choices import chosen_device, chosen_devices, chosen_study, default_folder
+from experiments.runs.search import Ended, Job, run_search
+from experiments.studies.buckwheat.replay import Replay
+from experiments.studyfile import Study
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """A calibration that has ended."""
+
+    folder: Path
+    """Folder of everything that it wrote."""
+    campaign: Campaign | None
+    """Results of every stage; None where only the paper's runs were wanted."""
+    replay: Replay | None
+    """The paper's own runs, simulated again; None where they were not wanted."""
+    record: Path | None
+    """Page on the paper's runs."""
+
+    @property
+    def report(self) -> Path:
+        """Page of the campaign."""
+        return self.folder / "report.html"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything that was found as JSON-able data."""
+        return found_by(self.campaign, self.replay)
+
+
+def calibrate(
+    study: Study | str | Path | None = None,
+    out: str | Path | None = None,
+    *,
+    scale: str | None = None,
+    device: str | None = None,
+    workers: int | None = None,
+    engine: str | None = None,
+    resume: bool = False,
+    paper_replicates: int = 0,
+    campaign: bool = True,
+    watch: Watch = lambda title: nullcontext(),
+    on_stage: StageHook | None = None,
+) -> Calibration:
+    """Calibrate the contact parameters of a study, and write the report into a folder.
+
+    Parameters
+    ----------
+    study
+        A study, or its file; None: the paper's buckwheat.
+    out
+        Folder of the results, new or empty; None: ``out/NAME-SCALE``.
+    scale
+        A scale of the study's file; None: the one for the device, ``paper`` on a GPU and ``bench`` without.
+    device
+        ``"cpu"``, ``"cuda"`` or ``"cuda:1"``; None: the GPU if there is one.
+    workers
+        Processes on the CPU; None: one a core.
+    engine
+        Name of an engine from outside (`experiments.cases.ENGINES`); None: `dem_warp.simulate`.
+    resume
+        Go on in the folder of an earlier run: no finished case is simulated again.
+    paper_replicates
+        Heaps of each of the paper's own runs, to be set beside; 0: none of them.
+    campaign
+        Run the campaign; without it, the paper's own runs alone.
+    watch
+        Opens the display of a batch of cases, by its title, and hands out what its progress is reported to.
+    on_stage
+        Called with the name and the result of every finished stage.
+
+    Raises
+    ------
+    InputError
+        When study, device, engine or folder break a rule; nothing is written then.
+    """
+    chosen = chosen_study(study, scale, device := chosen_device(device))
+    folder = Path(out) if out is not None else default_folder(chosen)
+    check_runs(chosen, campaign=campaign, paper=paper_replicates > 0)
+    desk = Desk.open(chosen, folder, device, workers, resume, watch, engine_named(engine))
+    replay = replay_paper(desk, paper_replicates) if paper_replicates else None
+    found = run_campaign(desk, on_stage, replay) if campaign else None
+    record = record_paper(desk, replay, found) if replay is not None else None
+    return Calibration(folder, found, replay, record)
+
+
+def discover(
+    study: Study | str | Path,
+    data: str | Path | None = None,
+    out: str | Path | None = None,
+    *,
+    bank: str | Path | None = None,
+    photographs_only: bool = False,
+    seed: int = 1,
+    scale: str | None = None,
+    device: str | None = None,
+    workers: int | None = None,
+    resume: bool = False,
+    watch: Watch = lambda title: nullcontext(),
+) -> Ended:
+    """Find the effect that a study's model lacks, and write the report into a folder.
+
+    Parameters
+    ----------
+    study, out, scale, workers, resume, watch
+        As of `calibrate`.
+    data
+        File of measured heaps; None: only the bank of library waves is made.
+    bank
+        A bank made earlier for the study; None: that of the folder, that beside the study, or a new one.
+    photographs_only
+        Look only at what photographs show.
+    seed
+        Seed of the bootstraps and of the fresh runs.
+    device
+        As of `calibrate`; several GPUs stand between commas.
+
+    Raises
+    ------
+    InputError
+        When study, data, bank, device or folder break a rule; nothing is written then.
+    """
+    chosen = chosen_study(study, scale, device := chosen_devices(device))
+    folder = Path(out) if out is not None else default_folder(chosen, "discover")
+    data, bank = (Path(file) if file is not None else None for file in (data, bank))
+    return run_search(Job(chosen, data, folder, bank, photographs_only, device, workers, seed), resume, watch)

@@ -1,0 +1,29 @@
+"""The wheel of the tree; lets the tests import `installation`, which lies beside them."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from installation import Installed, build, pip
+
+ROOT = Path(__file__).resolve().parents[2]
+PACKAGES = ("dem_warp", "doe", "imaging", "experiments")
+BUILT_FROM = (*PACKAGES, "pyproject.toml", "setup.py", "README.md", "LICENSE")
+
+
+@pytest.fixture(scope="session")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Wheel of this tree."""
+    return build(ROOT, BUILT_FROM, tmp_path_factory.mktemp("build"))
+
+
+@pytest.fixture(scope="session")
+def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Installed:
+    """The wheel, installed."""
+    folder = tmp_path_factory.mktemp("installed")
+    pip("install", wheel, "--target", folder / "site")
+    (folder / "work").mkdir()
+    return Installed((folder / "site",), folder / "work")

@@ -1,0 +1,47 @@
+"""Program for a fresh interpreter: all that an installed package adds, and what it leaves as it is.
+
+It prints one JSON object. Its argument is the folder of the tests of `dem_warp`, for worlds of two grains.
+"""
+
+import json
+import logging
+import sys
+
+warnings: list[str] = []
+logging.basicConfig(level=logging.WARNING)
+logging.getLogger("dem_warp.registry").addFilter(lambda record: not warnings.append(record.getMessage()))
+sys.path.insert(0, sys.argv[1])
+
+from worlds import RADIUS, ball_mass, grains, pair, record, small_case, solve, world
+
+from dem_warp.laws.library import MECHANISMS
+from dem_warp.scenes.library import SCENES
+from experiments.calibrate.screening import DESIGNS
+from experiments.cases import ENGINES, Store
+from experiments.discover.library import library_for, with_mechanisms
+from experiments.studyfile import load_study
+
+
+def approach(*mechanisms: object) -> float:
+    """Speed [m/s] that a step of 1 microsecond gives to one of two grains that just touch."""
+    bodies = grains([[0.0, 0.0, 0.0], [0.0, 0.0, 1.999999 * RADIUS]])
+    return float(record(solve(world(bodies, pair(mechanisms=mechanisms), 1e-6)), 1).velocities[1, 0, 2])
+
+
+case = small_case()
+found = {
+    "laws": list(MECHANISMS),
+    "scenes": list(SCENES),
+    "designs": list(DESIGNS),
+    "engines": list(ENGINES),
+    "key": Store("cases").key(case),
+    "approach": approach(),
+}
+if "magnetism" in MECHANISMS:
+    study = load_study(scale="bench")
+    [mechanism] = (one for one in library_for(study) if one.name == "magnetic_grains")
+    [law] = with_mechanisms(study, [mechanism]).case({"magnetic_grains": 0.5}, seed=1).mechanisms
+    found["force"] = law.magnetic_force
+    found["accelerations"] = [(approach(law) - approach()) * ball_mass() / 1e-6]
+    found["keys by engine"] = [Store("cases", ENGINES["cones"]).key(case)]
+print(json.dumps(found | {"warnings": warnings}))
