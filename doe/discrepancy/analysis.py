@@ -211,7 +211,7 @@ class _Parts:
             share = explained_share(base.gap, gap)
             same = frozenset[str]()
             if len(names) == 1:
-                same = alike(base.effects, names[0], float(one.fitted.sizes[0]), settings.tie_margin)
+                same = alike(base.effects, names[0], float(one.fitted.coded_sizes[0]), settings.tie_margin)
             may = settings.resolvable is None or set(names) <= set(settings.resolvable)
             out.append(Assessment(one.fitted, gap, gain, share, one.simulated, may, same))
         return sorted(out, key=lambda one: one.score)
