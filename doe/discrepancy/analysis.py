@@ -104,7 +104,7 @@ def analyse(measured: Measured, emulator: Emulator, settings: Settings, seed: in
 
 
 def _search(parts: _Parts, base: _Base) -> Analysis:
-    """Go on where there is a gap: who could explain the gap, simulated again, decided, shown before and after."""
+    """Go on where there is a gap: who could explain it, simulated again, decided, shown before and after."""
     settings = parts.settings
     contenders: Contenders = {(): Contender(base.fitted), **parts.contenders([(n,) for n in base.seen.names])}
     error = settings.shortlist_share * base.gap.excess
