@@ -6,7 +6,7 @@ run with any simulator, and hundreds side by side with all their waves in one ba
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,7 +23,7 @@ from doe.discrepancy.fitting.fit import Fitted, fit, weigh
 from doe.discrepancy.fitting.model import Model, Stack
 from doe.discrepancy.problem.measured import Measured
 from doe.discrepancy.problem.settings import Settings
-from doe.discrepancy.problem.simulator import Outcomes, Point, Simulator
+from doe.discrepancy.problem.simulator import Outcomes, Point
 from doe.discrepancy.threads import steps_in_one_thread
 from doe.discrepancy.verdict.before_after import BeforeAfter, compare
 from doe.discrepancy.verdict.conclusion import Assessment, Conclusion, conclude, explained_share
@@ -104,7 +104,7 @@ def analyse(measured: Measured, emulator: Emulator, settings: Settings, seed: in
 
 
 def _search(parts: _Parts, base: _Base) -> Analysis:
-    """Steps 4 to 8: who could explain the gap, simulated again, decided, shown before and after."""
+    """Go on where there is a gap: who could explain it, simulated again, decided, shown before and after."""
     settings = parts.settings
     contenders: Contenders = {(): Contender(base.fitted), **parts.contenders([(n,) for n in base.seen.names])}
     error = settings.shortlist_share * base.gap.excess
@@ -135,8 +135,8 @@ def _search(parts: _Parts, base: _Base) -> Analysis:
     return parts.discovery(base, conclusion, assessments, [one for one in compared if one is not None])
 
 
-def drive(analysis: Analysis, simulator: Simulator) -> Discovery:
-    """Run an analysis to its end, its waves answered by a simulator."""
+def drive(analysis: Analysis, simulator: Callable[[Sequence[Point]], Outcomes]) -> Discovery:
+    """Run an analysis to its end, its waves answered by a simulator, or by any function of points."""
     try:
         points = next(analysis)
         while True:
@@ -211,7 +211,7 @@ class _Parts:
             share = explained_share(base.gap, gap)
             same = frozenset[str]()
             if len(names) == 1:
-                same = alike(base.effects, names[0], float(one.fitted.sizes[0]), settings.tie_margin)
+                same = alike(base.effects, names[0], float(one.fitted.coded_sizes[0]), settings.tie_margin)
             may = settings.resolvable is None or set(names) <= set(settings.resolvable)
             out.append(Assessment(one.fitted, gap, gain, share, one.simulated, may, same))
         return sorted(out, key=lambda one: one.score)

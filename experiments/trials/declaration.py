@@ -116,7 +116,7 @@ def declared_effect(
     ----------
     span : MechanismRange
     powers : (points, sizes) array
-        At the coded sizes of `ranking.SIZES`.
+        At `power.CODED_SIZES`.
     settings : Settings
     kin : tuple of str
         Mechanisms that look like it.

@@ -46,7 +46,7 @@ all, whichever way: there lies, most likely, what the library lacks, too."""
 
 OF_A_CANDIDATE = (Question.SIZE, Question.COMMON)
 """Asked of a model that is to be believed. What the library lacks moves an observable in all conditions, and
-an emulator errs here and there. In the fourth and fifth blind trials these refuse, at 10 %, 215 of the 228
+an emulator errs here and there. In blind trials on a simulator these refused, at 10 %, 215 of the 228
 best candidates, single or pair, for what the library lacked, and 15 of the 310 true models."""
 
 

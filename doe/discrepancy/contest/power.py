@@ -15,7 +15,7 @@ from doe.discrepancy.fitting.fit import Fitted, minimise
 from doe.discrepancy.problem.settings import Settings
 from doe.discrepancy.problem.space import SearchSpace
 
-SIZES = np.linspace(0.0, 1.0, 201)[1:]
+CODED_SIZES = np.linspace(0.0, 1.0, 201)[1:]
 """Coded sizes that the smallest visible one is searched on."""
 KNOTS = np.linspace(0.0, 1.0, 11)
 """Coded sizes at which calibration is asked what it takes up; straight in between."""
@@ -33,7 +33,7 @@ class Effects:
 
     names: tuple[str, ...]
     visible: np.ndarray
-    """Whitened, at the coded `SIZES`, (mechanisms, sizes, means)."""
+    """Whitened, at `CODED_SIZES`, (mechanisms, sizes, means)."""
     whole: np.ndarray
     """Squared lengths without the refit, (mechanisms, sizes)."""
     chance: np.ndarray
@@ -59,8 +59,9 @@ class Effects:
         bounds = fitted.model.lower, fitted.model.upper
         x, _ = minimise(stack, fitted.whitening, targets, starts, *bounds)
         left = (targets - stack.predict(x)).reshape(shape)
-        visible, whole = (interp1d(KNOTS, each @ fitted.whitening.T, axis=1)(SIZES) for each in (left, extra))
-        chance = interp1d(KNOTS, _chance(fitted, seen.names, theta), axis=1)(SIZES)
+        white = (each @ fitted.whitening.T for each in (left, extra))
+        visible, whole = (interp1d(KNOTS, each, axis=1)(CODED_SIZES) for each in white)
+        chance = interp1d(KNOTS, _chance(fitted, seen.names, theta), axis=1)(CODED_SIZES)
         return cls(seen.names, visible, (whole**2).sum(axis=2), chance, seen.correlations)
 
     @property
@@ -121,13 +122,13 @@ def _chance(fitted: Fitted, names: Sequence[str], theta: np.ndarray) -> np.ndarr
     return out
 
 
-def alike(effects: Effects, name: str, size: float, margin: float) -> frozenset[str]:
+def alike(effects: Effects, name: str, coded_size: float, margin: float) -> frozenset[str]:
     """Mechanisms whose Q, refitted, would be less than the margin above that of one of a coded size.
 
     What fresh runs then show between them is their own noise.
     """
     index = effects.names.index(name)
-    apart = effects.apart(index)[:, np.abs(SIZES - size).argmin()]
+    apart = effects.apart(index)[:, np.abs(CODED_SIZES - coded_size).argmin()]
     others = (rival for rival in range(len(effects.names)) if rival != index)
     return frozenset(effects.names[rival] for rival in others if apart[rival] < margin)
 
@@ -175,8 +176,8 @@ def detectable_coded_size(power: np.ndarray, settings: Settings) -> float:
     Parameters
     ----------
     power : (sizes,) array
-        At the coded `SIZES`.
+        At `CODED_SIZES`.
     settings : Settings
     """
     shown = power >= settings.power
-    return float(SIZES[shown.argmax()]) if shown.any() else float("inf")
+    return float(CODED_SIZES[shown.argmax()]) if shown.any() else float("inf")

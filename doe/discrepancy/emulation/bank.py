@@ -65,7 +65,7 @@ class Bank:
     """Factors in coded units, (n, factors)."""
     mechanism: np.ndarray
     """Number of the mechanism in the space; -1 without one, (n,)."""
-    size: np.ndarray
+    coded_size: np.ndarray
     """Its coded size; 0 without one, (n,)."""
     condition: np.ndarray
     """Number of the condition, (n,)."""
@@ -107,7 +107,7 @@ class Bank:
             observables=np.array(self.observables),
             theta=self.theta,
             mechanism=self.mechanism.astype(np.int16),
-            size=self.size,
+            size=self.coded_size,
             condition=self.condition.astype(np.int16),
             values=self.values.astype(np.float32),
             reasons=self.reasons,
@@ -132,6 +132,7 @@ def load_bank(path: Path) -> Bank:
         space = SearchSpace(**{name: tuple(value) for name, value in document.items()}, mechanisms=ranges)
         names = tuple(str(name) for name in columns.pop("observables"))
         columns["values"] = columns["values"].astype(float)
+        columns["coded_size"] = columns.pop("size")
         made_for = str(columns.pop("study", ""))
         made_by = json.loads(str(columns.pop("maker", "null"))) or {}
         return Bank(space, names, **columns, study=made_for, maker=made_by)
@@ -164,7 +165,7 @@ def make_bank(
         tuple(observables),
         theta=space.coded_theta(np.array([point.theta for point in points])),
         mechanism=np.array([-1 if entry is None else names.index(entry[0]) for entry in sizes]),
-        size=np.array(coded),
+        coded_size=np.array(coded),
         condition=np.array([space.conditions.index(point.condition) for point in points]),
         values=np.asarray(outcomes.values, dtype=float),
         reasons=np.array(outcomes.reasons, dtype=np.str_),

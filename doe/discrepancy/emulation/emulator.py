@@ -79,7 +79,7 @@ def fit_emulator(bank: Bank) -> Emulator:
         for number, base in enumerate(bases):
             rows = bank.rows(number, index)
             values = bank.values[np.ix_(rows, columns)]
-            runs.append(AddedRuns(base, bank.theta[rows], bank.size[rows], values))
+            runs.append(AddedRuns(base, bank.theta[rows], bank.coded_size[rows], values))
         for own, addition in zip(additions, fit_additions(runs), strict=True):
             own[name] = addition
     surfaces = {

@@ -17,8 +17,8 @@ SLOPE_SD = 0.7
 CORRELATION_SHRINKAGE = 0.02
 """Share of the identity in a correlation matrix, which keeps nearly equal observables apart."""
 ALIKE = 100.0
-"""Repeats that the correlation of all conditions is worth in that of one. In the bank of the trial study (160
-repeats a condition) correlations differ between conditions by about what 100 repeats leave open."""
+"""Repeats that the correlation of all conditions is worth in that of one. In a bank of 160 repeats a
+condition correlations differed between conditions by about what 100 repeats leave open."""
 NEWTON_STEPS = 30
 
 

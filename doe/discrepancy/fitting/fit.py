@@ -60,12 +60,12 @@ class Fitted:
         return self.model.mechanisms
 
     @property
-    def sizes(self) -> np.ndarray:
+    def coded_sizes(self) -> np.ndarray:
         """Coded sizes of the mechanisms."""
         return self.x[len(self.x) - len(self.mechanisms) :]
 
     @property
-    def size_errors(self) -> np.ndarray:
+    def coded_size_errors(self) -> np.ndarray:
         """Standard errors of the coded sizes."""
         return self.errors[len(self.x) - len(self.mechanisms) :]
 
@@ -200,7 +200,7 @@ def whiten(covariance: np.ndarray) -> np.ndarray:
     return np.asarray(solve_triangular(triangle, np.eye(len(triangle)), lower=True))
 
 
-def size_interval(fitted: Fitted, number: int, coverage: float = 0.9) -> tuple[float, float]:
+def coded_size_interval(fitted: Fitted, number: int, coverage: float = 0.9) -> tuple[float, float]:
     """Profile-likelihood interval of a coded size.
 
     It ends where q, with all else refitted, has risen by the point of chi2 for the coverage.
@@ -213,7 +213,7 @@ def size_interval(fitted: Fitted, number: int, coverage: float = 0.9) -> tuple[f
     coverage : float
     """
     column = len(fitted.x) - len(fitted.mechanisms) + number
-    se = max(float(fitted.size_errors[number]), 1e-3)
+    se = max(float(fitted.coded_size_errors[number]), 1e-3)
     low, high = max(fitted.x[column] - 5.0 * se, 0.0), min(fitted.x[column] + 5.0 * se, 1.0)
     grid = np.unique(np.append(np.linspace(low, high, PROFILE_POINTS), fitted.x[column]))
     starts = np.repeat(fitted.x[None], len(grid), axis=0)

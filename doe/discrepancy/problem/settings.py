@@ -95,21 +95,6 @@ class Settings:
         path.write_text(self.text, encoding="utf-8")
 
 
-def read_settings(path: Path) -> Settings:
-    """Read settings that `Settings.write` wrote; what the file leaves out has its default.
-
-    Raises
-    ------
-    RuleError
-        For text that is not JSON, an unknown name or a value out of its range.
-    """
-    try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-    except json.JSONDecodeError as error:
-        raise RuleError("must be a JSON object", str(error), str(path)) from None
-    return settings_of(document, str(path))
-
-
 def settings_of(document: Mapping[str, Any], place: str) -> Settings:
     """Build settings from their values by name; what is left out has its default.
 

@@ -50,7 +50,7 @@ class Assessment:
     @property
     def ratios(self) -> np.ndarray:
         """Each size over its standard error."""
-        return np.asarray(self.fitted.sizes / self.fitted.size_errors)
+        return np.asarray(self.fitted.coded_sizes / self.fitted.coded_size_errors)
 
 
 @dataclass(frozen=True)

@@ -57,7 +57,7 @@ class Fit:
     """Additions to the base; empty for the base itself."""
     theta: tuple[float, ...]
     theta_se: tuple[float, ...]
-    """The study's factors and their standard errors."""
+    """The factors and their standard errors."""
     sizes: tuple[Interval, ...]
     """Size of each mechanism."""
     at_bounds: tuple[str, ...]

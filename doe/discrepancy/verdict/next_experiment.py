@@ -43,7 +43,7 @@ def propose(first: Fitted, second: Fitted, replicates: int) -> NextExperiment:
     Returns
     -------
     NextExperiment
-        Without its ``changes``, which the study knows.
+        Without its ``changes``, which whoever defined the conditions knows.
     """
     emulator = first.model.emulator
     best: tuple[float, str, str] | None = None

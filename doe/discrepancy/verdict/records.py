@@ -10,7 +10,7 @@ from doe.discrepancy.contest.held_out import forecast
 from doe.discrepancy.contest.signatures import Signatures, projector
 from doe.discrepancy.emulation.emulator import Emulator
 from doe.discrepancy.fitting.evidence import Block, Evidence
-from doe.discrepancy.fitting.fit import AT_BOUND, Fitted, Interval, size_interval
+from doe.discrepancy.fitting.fit import AT_BOUND, Fitted, Interval, coded_size_interval
 from doe.discrepancy.problem.settings import Settings
 from doe.discrepancy.verdict.conclusion import Assessment, objections
 from doe.discrepancy.verdict.discovery import Candidate, Data, Drift, Fit
@@ -66,8 +66,8 @@ def size_intervals(fitted: Fitted) -> tuple[Interval, ...]:
     """Natural size of each mechanism with its 90 % interval."""
     space = fitted.model.emulator.space
     out = []
-    for number, (name, size) in enumerate(zip(fitted.mechanisms, fitted.sizes, strict=True)):
-        ends = [space.natural_size(name, end) for end in size_interval(fitted, number)]
+    for number, (name, size) in enumerate(zip(fitted.mechanisms, fitted.coded_sizes, strict=True)):
+        ends = [space.natural_size(name, end) for end in coded_size_interval(fitted, number)]
         out.append(Interval(min(ends), space.natural_size(name, float(size)), max(ends)))
     return tuple(out)
 

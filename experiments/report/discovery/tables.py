@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from typing import TypeVar
+
 import numpy as np
 import pandas as pd
 
-from doe.discrepancy import BeforeAfter, Candidate, Discovery, Fit, Interval
+from doe.discrepancy import BeforeAfter, Candidate, Discovery, Fit, Interval, Power
 from experiments.report.discovery.terms import GAP, Terms, condition_name
 from experiments.report.numbers import MISSING, fixed, interval, trimmed
 from experiments.report.tables import Column, Table, make_table
+
+T = TypeVar("T")
+Entries = dict[Column, Callable[[T], object]]
+"""Columns of a table, each with what it shows of an item."""
 
 SHOWN_PAIRS = 5
 """Pairs of mechanisms that the page shows."""
@@ -84,33 +91,20 @@ def candidates_table(found: Discovery, terms: Terms) -> Table:
     """Lay out the candidates that `shown_candidates` picks."""
     shown = shown_candidates(found)
     excess = found.base.excess if found.base else 0.0
-    frame = pd.DataFrame(
-        [
-            {
-                "rank": rank,
-                "mechanism": terms.titles(candidate.mechanisms),
-                "explained": 100.0 * candidate.explained if excess else None,
-                "q": candidate.q,
-                "p": candidate.p_value,
-                "size": _sizes(candidate, terms),
-                "over_se": min(candidate.size_over_se),
-                "gain": _interval(candidate.held_out_gain, 1),
-                "judged": "admitted" if candidate.admitted else candidate.objection,
-            }
-            for rank, candidate in enumerate(shown, start=1)
-        ]
-    )
-    columns = [
-        Column("rank", "", "count"),
-        Column("mechanism", "mechanism"),
-        Column("explained", "explains", "percent", "% of excess"),
-        Column("q", "Q", "free"),
-        Column("p", "p of the fit", "p"),
-        Column("size", "size [90 % interval]"),
-        Column("over_se", "size / se", "ratio"),
-        Column("gain", "held-out gain"),
-        Column("judged", "judgement"),
-    ]
+    ranks = {id(candidate): rank for rank, candidate in enumerate(shown, start=1)}
+    entries: Entries[Candidate] = {
+        Column("rank", "", "count"): lambda one: ranks[id(one)],
+        Column("mechanism", "mechanism"): lambda one: terms.titles(one.mechanisms),
+        Column("explained", "explains", "percent", "% of excess"): lambda one: (
+            100.0 * one.explained if excess else None
+        ),
+        Column("q", "Q", "free"): lambda one: one.q,
+        Column("p", "p of the fit", "p"): lambda one: one.p_value,
+        Column("size", "size [90 % interval]"): lambda one: _sizes(one, terms),
+        Column("over_se", "size / se", "ratio"): lambda one: min(one.size_over_se),
+        Column("gain", "held-out gain"): lambda one: _interval(one.held_out_gain, 1),
+        Column("judged", "judgement"): lambda one: "admitted" if one.admitted else one.objection,
+    }
     note = (
         "Q: squared residuals in standard deviations, after factors and size were fitted together to the"
         " training conditions; held-out conditions count by how far their forecast misses them."
@@ -132,70 +126,47 @@ def candidates_table(found: Discovery, terms: Terms) -> Table:
     ]
     pairs = any(len(candidate.mechanisms) > 1 for candidate in shown)
     title = f"Mechanisms of the library{', and pairs of them, each' if pairs else ','} best first."
-    return make_table("candidates", frame, columns, title, note, marks)
+    return _laid_out("candidates", shown, entries, title, note, marks)
 
 
 def power_table(found: Discovery, terms: Terms) -> Table:
     """Lay out the smallest size of each mechanism that the data could show."""
-    frame = pd.DataFrame(
-        [
-            {
-                "mechanism": terms.title(power.mechanism),
-                "what": terms.mechanisms[power.mechanism].sentence,
-                "size": terms.value(power.mechanism, power.detectable_size),
-                "maximum": terms.value(power.mechanism, power.maximum),
-                "share": 100.0 * power.detectable_size / power.maximum,
-                "visible": 100.0 * power.visible_share,
-                "resolvable": "yes" if power.resolvable else "no",
-            }
-            for power in found.power
-        ]
-    )
-    columns = [
-        Column("mechanism", "mechanism"),
-        Column("what", "what it does"),
-        Column("size", "smallest size named"),
-        Column("maximum", "end of its range"),
-        Column("share", "of the range", "percent", "%"),
-        Column("visible", "left after calibration", "percent", "%"),
-        Column("resolvable", "resolvable"),
-    ]
+    entries: Entries[Power] = {
+        Column("mechanism", "mechanism"): lambda one: terms.title(one.mechanism),
+        Column("what", "what it does"): lambda one: terms.mechanisms[one.mechanism].sentence,
+        Column("detectable", "smallest size named"): lambda one: terms.value(
+            one.mechanism, one.detectable_size
+        ),
+        Column("maximum", "end of its range"): lambda one: terms.value(one.mechanism, one.maximum),
+        Column("share", "of the range", "percent", "%"): lambda one: (
+            100.0 * one.detectable_size / one.maximum
+        ),
+        Column("visible", "left after calibration", "percent", "%"): lambda one: 100.0 * one.visible_share,
+        Column("resolvable", "resolvable"): lambda one: "yes" if one.resolvable else "no",
+    }
     note = (
         "Smallest size named: found and told from every other in four of five data sets like this one, at a"
         " false-alarm rate of 2.5 %, as the emulator has it; resolvable is what has such a size in its range."
         " Left after calibration: the share of its signature that other values of the factors cannot imitate."
     )
-    return make_table("power", frame, columns, "The smallest size of each mechanism that shows.", note)
+    return _laid_out("power", found.power, entries, "The smallest size of each mechanism that shows.", note)
 
 
 def before_after_table(found: Discovery) -> Table:
     """Lay out the gap of fresh runs before and after."""
-    frame = pd.DataFrame(
-        [
-            {
-                "set": "held-out conditions" if both.held_out else "training conditions",
-                "df": both.degrees_of_freedom,
-                "before": _interval(both.before, 1),
-                "after": _interval(both.after, 1),
-                "removed": _interval(_times(both.removed, 100.0), 0),
-                "runs": both.runs,
-            }
-            for both in found.before_after
-        ]
-    )
-    columns = [
-        Column("set", ""),
-        Column("df", "degrees of freedom", "count"),
-        Column("before", "Q of the base"),
-        Column("after", "Q with the mechanism"),
-        Column("removed", "excess removed [%]"),
-        Column("runs", "fresh runs a model and condition", "count"),
-    ]
+    entries: Entries[BeforeAfter] = {
+        Column("set", ""): lambda one: "held-out conditions" if one.held_out else "training conditions",
+        Column("df", "degrees of freedom", "count"): lambda one: one.degrees_of_freedom,
+        Column("before", "Q of the base"): lambda one: _interval(one.before, 1),
+        Column("after", "Q with the mechanism"): lambda one: _interval(one.after, 1),
+        Column("removed", "excess removed [%]"): lambda one: _interval(_times(one.removed, 100.0), 0),
+        Column("runs", "fresh runs a model and condition", "count"): lambda one: one.runs,
+    }
     note = (
         "Values with 90 % bootstrap intervals. Noise alone gives a Q near the degrees of freedom. What the"
         " noise of the means adds to a Q is taken off its interval, whose lower end may so fall below zero."
     )
-    return make_table("before-after", frame, columns, "The gap before and after.", note)
+    return _laid_out("before-after", found.before_after, entries, "The gap before and after.", note)
 
 
 def parameters_table(found: Discovery, terms: Terms) -> Table:
@@ -267,6 +238,14 @@ def data_table(found: Discovery, terms: Terms) -> Table:
     ]
     columns = [Column("observable", "observable"), *heads]
     return make_table("data", pd.DataFrame(rows), columns, "Measured means and their standard errors.")
+
+
+def _laid_out(
+    name: str, items: Sequence[T], entries: Entries[T], caption: str, note: str, marks: Sequence[str] = ()
+) -> Table:
+    """Lay out one item a row, each column with what it takes from an item."""
+    frame = pd.DataFrame([{column.key: take(one) for column, take in entries.items()} for one in items])
+    return make_table(name, frame, list(entries), caption, note, marks or None)
 
 
 def _models(found: Discovery) -> dict[str, Fit]:

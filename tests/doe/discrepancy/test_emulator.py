@@ -40,7 +40,7 @@ def test_a_bank_comes_back_from_its_file(tmp_path: Path) -> None:
     assert back.space == bank().space
     # Values are kept in single precision.
     np.testing.assert_allclose(back.values, bank().values, rtol=2.0**-23)
-    np.testing.assert_array_equal(back.size, bank().size)
+    np.testing.assert_array_equal(back.coded_size, bank().coded_size)
 
 
 def test_a_file_that_is_no_bank_is_refused_with_its_name(tmp_path: Path) -> None:
@@ -141,7 +141,7 @@ def test_what_a_cubic_cannot_follow_is_kriged() -> None:
 
 
 def _warped(theta: np.ndarray) -> np.ndarray:
-    """What a factor acts as: less than itself inside its range, and more at the ends (coded)."""
+    """Act as a factor: less than itself inside its range, and more at the ends (coded)."""
     return np.asarray(theta + 0.4 * (theta**3 - 0.6 * theta))
 
 

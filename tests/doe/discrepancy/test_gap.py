@@ -12,10 +12,10 @@ from synthetic import SETTINGS, emulator, measure, space
 from doe.discrepancy import Answer, Measured, Power, Question
 from doe.discrepancy.contest.gap import OF_A_CANDIDATE, OF_THE_BASE, drift_p, find_gap, holm
 from doe.discrepancy.contest.held_out import forecast
-from doe.discrepancy.contest.power import SIZES, Effects, powers
+from doe.discrepancy.contest.power import CODED_SIZES, Effects, powers
 from doe.discrepancy.contest.signatures import projector, secants, signatures
 from doe.discrepancy.fitting.evidence import gather
-from doe.discrepancy.fitting.fit import Fitted, fit, size_interval, weigh
+from doe.discrepancy.fitting.fit import Fitted, coded_size_interval, fit, weigh
 from doe.discrepancy.fitting.model import Model, Stack
 
 NULLS = 100
@@ -65,7 +65,7 @@ def test_intervals_of_sizes_cover_the_truth() -> None:
     for seed in range(count):
         name = ("alpha", "beta", "gamma", "delta")[seed % 4]
         fitted = _calibrated(measure({name: 0.4}, seed), name)
-        low, high = size_interval(fitted, 0)
+        low, high = coded_size_interval(fitted, 0)
         covered += low <= 0.2 <= high
     # 90 % intervals, all but 1 in 1000 either way.
     assert stats.binom.ppf(1e-3, count, 0.9) <= covered <= count
@@ -192,7 +192,7 @@ def test_what_an_effect_shows_is_the_q_that_a_calibration_leaves_of_it() -> None
 
 
 def test_of_a_large_effect_that_calibration_takes_up_a_small_rest_is_not_believed() -> None:
-    visible = 10.0 * SIZES[None, :, None]
+    visible = 10.0 * CODED_SIZES[None, :, None]
     squares, nothing = (visible**2).sum(axis=2), stats.norm.cdf(-SETTINGS.least_ratio)
     for whole, chance, power in ((1.0, 0.0, 1.0), (30.0, 0.0, nothing), (1.0, 0.96, nothing)):
         effects = Effects(("one",), visible, whole * squares, chance * squares, np.eye(1))
@@ -212,7 +212,7 @@ def test_the_detectable_size_is_found_and_told_from_the_rest_with_80_percent_pro
         data = measure({name: size}, seed, theta=middle)
         one = _calibrated(data, name)
         behind = [_calibrated(data, rival).q - one.q for rival in rivals]
-        seen = one.sizes[0] / one.size_errors[0] >= SETTINGS.least_ratio
+        seen = one.coded_sizes[0] / one.coded_size_errors[0] >= SETTINGS.least_ratio
         found += seen and all(q >= SETTINGS.tie_margin for q in behind)
     assert stats.binom.ppf(1e-3, count, 0.8) <= found <= stats.binom.isf(1e-3, count, 0.8)
 

@@ -1,4 +1,4 @@
-"""What fresh runs say of an emulator that is off."""
+"""Fresh runs around the optimum of an emulator that is off."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from scipy import stats
 from synthetic import CONDITIONS, emulator, measure
 
 from doe.discrepancy.fitting.evidence import gather
-from doe.discrepancy.fitting.fit import fit, size_interval, weigh
+from doe.discrepancy.fitting.fit import coded_size_interval, fit, weigh
 from doe.discrepancy.fitting.model import Model, Shift, Stack
 from doe.discrepancy.fitting.refinement import Runs, correct, likeliest_shift
 
@@ -65,7 +65,7 @@ def test_the_error_of_the_shift_widens_what_is_said_of_a_size() -> None:
     spread = 3.0 * plain.spread
     shifted = weigh(Stack(replace(model(), shift=Shift(np.zeros(4), spread)), evidence.training), plain.x)
     np.testing.assert_allclose(shifted.errors, 2.0 * plain.errors, rtol=1e-9)
-    widths = [np.diff(size_interval(one, 0))[0] for one in (plain, shifted)]
+    widths = [np.diff(coded_size_interval(one, 0))[0] for one in (plain, shifted)]
     # Twice as wide where the profile is a parabola.
     assert 1.8 < widths[1] / widths[0] < 2.2
 

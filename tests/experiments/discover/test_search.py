@@ -1,4 +1,4 @@
-"""What a search is settled on before the data are opened, and which bank it may use."""
+"""The settlement of a search before the data are opened, and the banks that it may use."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from doe.discrepancy import Measured, Outcomes, Point, Verdict, drive
+from doe.discrepancy import Measured, Outcomes, Point, Verdict, drive, load_bank
 from doe.errors import RuleError
+from experiments.discover.library import FORMER_NAMES
 from experiments.discover.maker import maker_of_today
 from experiments.discover.observables import NAMES, OBSERVABLES
 from experiments.discover.search import Search
@@ -116,6 +117,17 @@ def test_what_changes_no_heap_leaves_the_bank_in_use(bank: Path) -> None:
     assert kept.space.names == Search.of(trial()).space.names
     with pytest.raises(InputError, match="looked for"):
         Search.of(trial(discover={"mechanisms": ["shape"]})).read_bank(bank)
+
+
+def test_an_older_study_and_its_bank_may_call_a_mechanism_as_it_was(tmp_path: Path) -> None:
+    search = Search.of(trial())
+    older = {now: former for former, now in FORMER_NAMES.items()}
+    kept = load_bank(TRIAL.with_name("bank-bench.npz"))
+    kept.renamed(older).save(tmp_path / "older.npz")
+    assert "contact_cohesion" in load_bank(tmp_path / "older.npz").space.names
+    assert search.read_bank(tmp_path / "older.npz").space == kept.space
+    names = [older.get(name, name) for name in search.space.names]
+    assert Search.of(trial(discover={"mechanisms": names})).space == search.space
 
 
 @pytest.mark.parametrize(

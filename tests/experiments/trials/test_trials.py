@@ -22,7 +22,7 @@ from doe.discrepancy import (
     Settings,
     Verdict,
 )
-from doe.discrepancy.contest.power import SIZES
+from doe.discrepancy.contest.power import CODED_SIZES
 from doe.factors import Factor
 from experiments.discover.observables import OBSERVABLES, PHOTOGRAPHED
 from experiments.errors import InputError
@@ -341,7 +341,7 @@ def test_what_is_declared_comes_back_with_its_hash(tmp_path: Path) -> None:
 
 def test_a_mechanism_that_shows_in_a_part_of_the_ranges_only_may_not_be_named() -> None:
     settings, span = Settings(), MechanismRange("glue", 1.0, 3.0)
-    shown = np.tile(SIZES >= 0.25, (20, 1)).astype(float)
+    shown = np.tile(CODED_SIZES >= 0.25, (20, 1)).astype(float)
     everywhere = declared_effect(span, shown, settings)
     assert everywhere.detectable == pytest.approx(0.5)
     assert everywhere.resolvable

@@ -180,7 +180,7 @@ def made_power() -> tuple[Power, ...]:
 
 
 def made_discovery(verdict: Verdict) -> Discovery:
-    """What an analysis with this verdict would find."""
+    """Build what an analysis with this verdict would find."""
     rng = np.random.default_rng(5)
     data = made_data(rng)
     noise = np.where(np.isnan(data.means), np.nan, rng.standard_normal(data.means.shape))
