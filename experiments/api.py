@@ -20,9 +20,11 @@ from experiments.runs.campaign import (
     run_campaign,
 )
 from experiments.runs.choices import chosen_device, chosen_devices, chosen_study, default_folder
-from experiments.runs.search import Ended, Job, run_search
+from experiments.runs.search import Job, SearchResult, run_search
 from experiments.studies.buckwheat.replay import Replay
 from experiments.studyfile import Study
+
+__all__ = ["Calibration", "SearchResult", "calibrate", "discover"]
 
 
 @dataclass(frozen=True)
@@ -117,7 +119,7 @@ def discover(
     workers: int | None = None,
     resume: bool = False,
     watch: Watch = lambda title: nullcontext(),
-) -> Ended:
+) -> SearchResult:
     """Find the effect that a study's model lacks, and write the report into a folder.
 
     Parameters

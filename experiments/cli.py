@@ -31,7 +31,8 @@ app = typer.Typer(
 
 def _show_version(wanted: bool) -> None:
     if wanted:
-        from dem_warp.version import __version__, source_commit
+        from dem_warp import __version__
+        from dem_warp.version import source_commit
 
         commit = source_commit()
         typer.echo(f"dem-warp {__version__}" + (f" ({commit})" if commit else ""))

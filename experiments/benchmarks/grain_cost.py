@@ -19,7 +19,7 @@ import pandas as pd
 import typer
 import warp as wp
 
-from dem_warp.clumps import ClumpShape
+from dem_warp import ClumpShape
 from dem_warp.device import resolve_device
 from dem_warp.model import ContactCoefficients, Grains, WorldSetup
 from dem_warp.solver import Solver

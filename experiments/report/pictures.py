@@ -16,8 +16,7 @@ from experiments.calibrate.results import Campaign
 from experiments.cases import measure_heap
 from experiments.report.numbers import trimmed
 from experiments.studyfile import Study
-from imaging import HeapAngle, overlay, snapshot
-from imaging.render import Snapshot
+from imaging import HeapAngle, Snapshot, overlay, snapshot
 
 JPEG_QUALITY = 88
 

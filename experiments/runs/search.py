@@ -69,7 +69,7 @@ class Job:
 
 
 @dataclass(frozen=True)
-class Ended:
+class SearchResult:
     """How a search ended."""
 
     discovery: Discovery | None
@@ -122,7 +122,7 @@ class _Watched:
             self._listener(progress)
 
 
-def run_search(job: Job, resume: bool = False, watch: Watch = lambda title: nullcontext()) -> Ended:
+def run_search(job: Job, resume: bool = False, watch: Watch = lambda title: nullcontext()) -> SearchResult:
     """Look for what a study lacks, and write the report.
 
     Nothing is written before study, data and bank have been read without an error.
@@ -158,7 +158,7 @@ def run_search(job: Job, resume: bool = False, watch: Watch = lambda title: null
             bank = search.make_bank(simulator, Maker.of_today(source_commit()))
             bank.save(job.folder / BANK)
         if measured is None:
-            return Ended(None, terms, job.folder / BANK)
+            return SearchResult(None, terms, job.folder / BANK)
         simulator.title, started = "fresh runs", time.perf_counter()
         found = drive(search.analysis(measured, bank, job.seed), simulator)
         walls = [*simulator.walls, {"wave": "analysis, its waves included", "seconds": _since(started)}]
@@ -166,7 +166,7 @@ def run_search(job: Job, resume: bool = False, watch: Watch = lambda title: null
     page = write_discovery(
         found, job.study, terms, search.settings, job.folder, pictures, _provenance(job, bank, walls)
     )
-    return Ended(found, terms, page)
+    return SearchResult(found, terms, page)
 
 
 def heaps_side_by_side(

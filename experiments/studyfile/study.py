@@ -15,8 +15,8 @@ from typing import Any
 
 from pydantic import Field, PrivateAttr, field_validator
 
-from dem_warp.case import Case
-from doe.factors import Factor
+from dem_warp import Case
+from doe import Factor
 from experiments.errors import StudyError
 from experiments.studyfile.campaign import (
     TARGET_SCENE,

@@ -7,7 +7,7 @@ Kratos Multiphysics (its DEM benchmarks 1 to 8), which agree where both have the
 polyethylene (test 5), nylon (test 6) and copper (test 7), and which two pairs test 8 compares.
 """
 
-from dem_warp.materials import Material
+from dem_warp import Material
 from experiments.benchmarks.problems.impact import Impact, Partner
 from experiments.benchmarks.problems.setups import material
 

@@ -5,8 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from dem_warp.clumps import ClumpShape
-from dem_warp.materials import Material, rayleigh_time
+from dem_warp import ClumpShape, Material, rayleigh_time
 from dem_warp.model import ContactCoefficients, WorldSetup
 from dem_warp.walls import Cylinder, Plane
 from experiments.benchmarks.problems.chapter import (

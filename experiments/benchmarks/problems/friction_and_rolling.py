@@ -4,8 +4,7 @@ import math
 
 import numpy as np
 
-from dem_warp.clumps import ClumpShape
-from dem_warp.materials import Material, rayleigh_time
+from dem_warp import ClumpShape, Material, rayleigh_time
 from dem_warp.model import ContactCoefficients, WorldSetup
 from dem_warp.solver import CHUNK, Solver
 from dem_warp.walls import Plane

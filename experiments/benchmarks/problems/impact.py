@@ -8,9 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from dem_warp.clumps import ClumpShape
-from dem_warp.laws.mechanism import Mechanism
-from dem_warp.materials import Material, rayleigh_time
+from dem_warp import ClumpShape, Material, Mechanism, rayleigh_time
 from dem_warp.model import ContactCoefficients, WorldSetup
 from dem_warp.walls import Plane
 from experiments.benchmarks.problems.setups import RIGID, bodies, contact, record, world

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
-from dem_warp.clumps import ClumpShape
-from dem_warp.materials import Material, rayleigh_time
+from dem_warp import ClumpShape, Material, rayleigh_time
 from dem_warp.model import WorldSetup
 from dem_warp.solver import CHUNK, Solver
 from dem_warp.walls import Cylinder, Motion, Plane

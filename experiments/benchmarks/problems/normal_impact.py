@@ -5,8 +5,7 @@ import math
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from dem_warp.clumps import ClumpShape
-from dem_warp.materials import Material, rayleigh_time
+from dem_warp import ClumpShape, Material, rayleigh_time
 from dem_warp.walls import Plane
 from experiments.benchmarks.problems import chung_ooi
 from experiments.benchmarks.problems.chapter import (

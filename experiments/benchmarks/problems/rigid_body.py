@@ -5,7 +5,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from dem_warp.clumps import ClumpShape
+from dem_warp import ClumpShape
 from dem_warp.model import WorldSetup
 from dem_warp.solver import CHUNK, Solver
 from experiments.benchmarks.problems.chapter import (

@@ -8,9 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dem_warp.clumps import ClumpShape
-from dem_warp.laws.mechanism import Mechanism
-from dem_warp.materials import Interaction, Material
+from dem_warp import ClumpShape, Interaction, Material, Mechanism
 from dem_warp.model import ContactCoefficients, Grains, WorldSetup
 from dem_warp.solver import Solver
 from dem_warp.walls import Plane, Wall

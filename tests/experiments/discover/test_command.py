@@ -17,7 +17,7 @@ from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.wave import WaveRunner
 from experiments.report.discovery import Terms
 from experiments.runs.campaign import check_runs
-from experiments.runs.search import OUTCOMES, Ended, Job, run_search
+from experiments.runs.search import OUTCOMES, Job, SearchResult, run_search
 from experiments.studyfile import load_study
 
 TRIAL = Path(__file__).parents[3] / "experiments" / "studies" / "trial"
@@ -111,9 +111,9 @@ def test_a_wave_is_spread_over_the_devices_that_are_named(
 ) -> None:
     asked: list[str | None] = []
 
-    def note(job: Job, *_: object) -> Ended:
+    def note(job: Job, *_: object) -> SearchResult:
         asked.append(job.device)
-        return Ended(None, Terms({}, {}, {}), job.folder)
+        return SearchResult(None, Terms({}, {}, {}), job.folder)
 
     monkeypatch.setattr(api, "run_search", note)
     code, _, err = discover(DATA / "nothing-missing.csv", "--out", tmp_path / "out", device="cuda, cuda:1")
