@@ -23,7 +23,7 @@ from experiments.report.sections import (
     replay_sections,
     stage_sections,
 )
-from experiments.studies.buckwheat.replay import Replay
+from experiments.studies.buckwheat.replay.replay import Replay
 from experiments.studyfile import Study
 
 OUTCOMES = {

@@ -11,7 +11,7 @@ import plotly.graph_objects as go
 from doe import ScreenResult
 from doe.plot_data import half_normal_points, pareto_points
 from experiments.calibrate.results import ClimbResult, NoiseFloorResult, TargetResult, VerificationResult
-from experiments.report.theme import (
+from experiments.report.kit.chart import (
     ANGLE_AXIS,
     BLUE,
     GREEN,
@@ -26,8 +26,8 @@ from experiments.report.theme import (
     add_target,
     new_figure,
 )
-from experiments.studies.buckwheat.replay import Replay
-from experiments.studies.buckwheat.runs import STAGES
+from experiments.studies.buckwheat.replay.replay import Replay
+from experiments.studies.buckwheat.replay.runs import STAGES
 
 
 def noise_floor_chart(result: NoiseFloorResult, target: TargetResult) -> Chart:

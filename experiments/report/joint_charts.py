@@ -7,7 +7,7 @@ import itertools
 from doe import JointFit, Surface
 from experiments.calibrate.results import OptimumResult, SurfaceResult, TargetResult
 from experiments.report.surfaces import REGION_FILL, Slice, add_contours, add_design, add_region, point_in
-from experiments.report.theme import (
+from experiments.report.kit.chart import (
     BLUE,
     GREEN,
     MUTED,

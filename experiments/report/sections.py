@@ -9,11 +9,11 @@ from experiments.calibrate.results import Campaign
 from experiments.report import charts, stage_tables, surfaces
 from experiments.report.joint_charts import joint_charts
 from experiments.report.published import Published
-from experiments.report.replay_tables import replay_tables
+from experiments.studies.buckwheat.replay.replay_tables import replay_tables
 from experiments.report.response_tables import response_tables
-from experiments.report.tables import Table
-from experiments.report.theme import Chart
-from experiments.studies.buckwheat.replay import Replay
+from experiments.report.kit.table import Table
+from experiments.report.kit.chart import Chart
+from experiments.studies.buckwheat.replay.replay import Replay
 from experiments.studyfile.campaign import Response
 
 TITLES = {

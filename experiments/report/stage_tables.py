@@ -17,9 +17,9 @@ from experiments.calibrate.results import (
     SurfaceResult,
     VerificationResult,
 )
-from experiments.report.numbers import fixed, term
+from experiments.report.kit.numbers import fixed, term
 from experiments.report.published import QUALITY, Published
-from experiments.report.tables import Column, Table, make_table
+from experiments.report.kit.table import Column, Table, make_table
 
 SIGNIFICANT = 0.05
 """Rows of an analysis of variance with p below this are marked."""

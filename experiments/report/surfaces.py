@@ -14,7 +14,7 @@ import plotly.graph_objects as go
 from doe import Design, Region, Surface
 from doe.plot_data import SurfaceGrid, normal_points, surface_grid
 from experiments.calibrate.results import OptimumResult, SurfaceResult, TargetResult
-from experiments.report.theme import (
+from experiments.report.kit.chart import (
     ANGLE_AXIS,
     BLUE,
     GREEN,

@@ -14,9 +14,9 @@ from experiments.calibrate.export import jsonable
 from experiments.calibrate.results import Campaign
 from experiments.files import write_text
 from experiments.report.material_card import write_material_card
-from experiments.report.page import render_page
+from experiments.report.campaign_page import render_page
 from experiments.report.pictures import HeapPicture
-from experiments.studies.buckwheat.replay import Replay
+from experiments.studies.buckwheat.replay.replay import Replay
 from experiments.studyfile import Study
 
 LIBRARIES = ("warp-lang", "numpy", "scipy", "pandas", "statsmodels", "opencv-python-headless")

@@ -11,8 +11,8 @@ import plotly.graph_objects as go
 from experiments.discover.discovery import Confounding, Discovery, Fit
 from experiments.report.discovery.tables import shown_candidates
 from experiments.report.discovery.terms import Terms, condition_name, spaced
-from experiments.report.numbers import MISSING, capital, fixed
-from experiments.report.theme import (
+from experiments.report.kit.numbers import MISSING, capital, fixed
+from experiments.report.kit.chart import (
     BLUE,
     GREEN,
     INK,

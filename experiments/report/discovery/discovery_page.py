@@ -21,11 +21,11 @@ from experiments.report.discovery.verdict import (
     reason_sentence,
     verdict_sentence,
 )
-from experiments.report.numbers import capital, trimmed
-from experiments.report.page import environment, flat, study_facts
+from experiments.report.kit.numbers import capital, trimmed
+from experiments.report.campaign_page import environment, flat, study_facts
 from experiments.report.pictures import HeapPicture
-from experiments.report.tables import Table
-from experiments.report.theme import Chart
+from experiments.report.kit.table import Table
+from experiments.report.kit.chart import Chart
 from experiments.studyfile import Study
 
 TITLES = {

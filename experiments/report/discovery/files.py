@@ -12,7 +12,7 @@ from experiments.calibrate.export import jsonable
 from experiments.discover.discovery import Discovery
 from experiments.discover.settings import Settings
 from experiments.files import write_text
-from experiments.report.discovery.page import render_discovery
+from experiments.report.discovery.discovery_page import render_discovery
 from experiments.report.discovery.study_file import write_study_files
 from experiments.report.discovery.tables import frames
 from experiments.report.discovery.terms import Terms

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from experiments.report.tables import Row, Table
+from experiments.report.kit.table import Row, Table
 
 
 def markdown_table(table: Table) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from markupsafe import Markup, escape
 
-from experiments.report.numbers import KINDS
+from experiments.report.kit.numbers import KINDS
 
 
 @dataclass(frozen=True)
