@@ -75,8 +75,8 @@ def calibrate(
             Desk,
             check_runs,
             found_by,
-            record_paper,
-            replay_paper,
+            record_published,
+            replay_published,
             run_campaign,
         )
 
@@ -88,10 +88,10 @@ def calibrate(
     with clear_errors(resume=_resume_command(study, folder, chosen.scale, device, again, paper_replicates)):
         messages.print(f"{chosen.name}, on {device}", chosen.note, sep="\n", markup=False)
         desk = Desk.open(chosen, folder, device, workers, resume, CaseProgress)
-        replay = replay_paper(desk, paper_replicates) if follow_paper or only_paper else None
+        replay = replay_published(desk, paper_replicates) if follow_paper or only_paper else None
         campaign = None if only_paper else run_campaign(desk, _show_stage, replay)
         if replay is not None:
-            messages.print(f"The paper's runs: {record_paper(desk, replay, campaign)}")
+            messages.print(f"Published runs: {record_published(desk, replay, campaign)}")
     if as_json:
         typer.echo(json.dumps(found_by(campaign, replay), allow_nan=False))
     if campaign is None:

@@ -1,29 +1,17 @@
-"""The page: every stage's tables and charts, rendered by the templates."""
+"""The page of a campaign: every stage's tables and charts."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import jinja2
-from markupsafe import Markup
-from plotly.offline import get_plotlyjs
-
-from dem_warp import GrainPopulation
 from experiments.calibrate.results import STAGES, Campaign, Outcome
-from experiments.report import numbers
+from experiments.report.companion import Replay, companion_of
+from experiments.report.kit import html
+from experiments.report.kit.html import flat
 from experiments.report.pictures import HeapPicture
-from experiments.report.published import published_for
-from experiments.report.sections import (
-    TITLES,
-    Context,
-    Section,
-    failed_section,
-    paper_sections,
-    replay_sections,
-    stage_sections,
-)
-from experiments.studies.buckwheat.replay.replay import Replay
+from experiments.report.sections import TITLES, Context, chapter, failed_chapter, stage_chapters
+from experiments.report.study_facts import study_facts
 from experiments.studyfile import Study
 
 OUTCOMES = {
@@ -56,106 +44,29 @@ def render_page(
     provenance
         What made the numbers: names and values, nested as they come.
     replay
-        The paper's own runs simulated again.
+        Published runs simulated again, to be shown beside.
     """
-    context = Context(campaign, _labels(study), published_for(study), study.responses)
-    sections = stage_sections(context)
+    companion = companion_of(study)
+    labels = {section.name: section.label for section in study.factor_sections}
+    context = Context(campaign, labels, companion.published(), study.responses)
+    chapters = stage_chapters(context)
     if pictures:
-        sections.append(Section("heaps"))
-    sections += [failed_section(campaign), *replay_sections(replay, campaign)]
-    sections += [*paper_sections(context.published), Section("provenance")]
-    page = environment().get_template("page.html.j2")
-    return page.render(
-        kind="calibration report",
-        folder="sections",
-        campaign=campaign,
-        study=study,
-        outcome=OUTCOMES[campaign.outcome],
-        calibrated=campaign.outcome is Outcome.CALIBRATED,
-        sections=sections,
-        unreached=[TITLES[name] for name in STAGES if name not in campaign.stages],
-        published=context.published,
-        labels=context.labels,
-        facts=study_facts(study),
-        pictures=pictures,
-        provenance=flat(provenance or {}),
-        settings=flat(campaign.settings.model_dump()),
-        document=flat(study.document),
-        plotly=Markup(get_plotlyjs()),
-    )
-
-
-def study_facts(study: Study) -> dict[str, str]:
-    """Say what was simulated and measured, in the terms in which scales differ."""
-    tube, numerics, measurement = study.scene.lifted_cylinder, study.numerics, study.measurement
-    if tube is None:
-        raise ValueError("a report is about heaps of a lifted cylinder, got a study of another test")
-    grains = f"{tube.grain_count} grains" if tube.grain_count else "as many grains as fill it"
-    spheres = _sphere_counts(study.grain.population())
-    softened = "real" if numerics.modulus_scale == 1.0 else f"divided by {numerics.modulus_scale:g}"
-    return {
-        "Scale": study.scale or "the study as written",
-        "Tube": f"{1e3 * tube.diameter:g} mm wide, {1e3 * tube.height:g} mm high",
-        "Lift": f"{tube.lift_speed:g} m/s",
-        "Grains": f"{grains}, {spheres} each",
-        "Shear modulus": softened,
-        "Time step": f"{100.0 * numerics.time_step_fraction:g} % of the Rayleigh time",
-        "Angle": f"“{measurement.fit}” fit, mean of {measurement.azimuths} views of a heap, both flanks",
-    } | {f"Scene “{name}”": _scene_text(study, name) for name in study.response_scenes}
-
-
-def _scene_text(study: Study, name: str) -> str:
-    """Say what a further scene is, as the study writes it."""
-    [(kind, settings)] = study.document["response-scene"][name].items()
-    return ", ".join([kind, *(f"{key.replace('_', ' ')} {value}" for key, value in settings.items())])
-
-
-def _sphere_counts(grains: GrainPopulation) -> str:
-    """Say of how many spheres the grains are: ``9 spheres``, or ``1 or 9 spheres`` of several shapes."""
-    counts = sorted({shape.sphere_count for shape in grains.mixture.shapes})
-    return f"{' or '.join(map(str, counts))} sphere{'' if counts == [1] else 's'}"
-
-
-def flat(settings: Mapping[str, Any], prefix: str = "") -> dict[str, str]:
-    """Lay out nested settings as dotted names with their values as text."""
-    rows: dict[str, str] = {}
-    for name, value in settings.items():
-        path = f"{prefix}{name}"
-        match value:
-            case Mapping() if value:
-                rows |= flat(value, f"{path}.")
-            case [Mapping(), *_]:
-                for position, item in enumerate(value, start=1):
-                    rows |= flat(item, f"{path} {position}.")
-            case _:
-                rows[path] = numbers.plain(value)
-    return rows
-
-
-def _labels(study: Study) -> dict[str, str]:
-    return {section.name: section.label for section in study.factor_sections}
-
-
-def environment() -> jinja2.Environment:
-    """Open the templates, with the filters that they use."""
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("experiments.report"),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters |= {
-        "fixed": numbers.fixed,
-        "trimmed": numbers.trimmed,
-        "p_value": numbers.p_value,
-        "interval": numbers.interval,
-        "plain": numbers.plain,
-        "named_number": numbers.named_number,
-        "prose": numbers.prose,
-        "capital": numbers.capital,
-        "enumeration": numbers.enumeration,
-        "equation": numbers.equation,
-        "term": numbers.term,
+        chapters.append(chapter("heaps"))
+    chapters.append(failed_chapter(campaign))
+    chapters += replay.chapters(campaign) if replay else ()
+    chapters += [*companion.campaign_chapters(campaign), chapter("provenance")]
+    drawn_on = {
+        "campaign": campaign,
+        "study": study,
+        "outcome": OUTCOMES[campaign.outcome],
+        "calibrated": campaign.outcome is Outcome.CALIBRATED,
+        "unreached": [TITLES[name] for name in STAGES if name not in campaign.stages],
+        "published": context.published,
+        "labels": labels,
+        "facts": study_facts(study),
+        "pictures": pictures,
+        "provenance": flat(provenance or {}),
+        "settings": flat(campaign.settings.model_dump()),
+        "document": flat(study.document),
     }
-    return environment
+    return html.render_page("calibration report", study.name, "sections/summary.html.j2", chapters, drawn_on)

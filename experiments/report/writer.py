@@ -13,13 +13,16 @@ from typing import Any
 from experiments.calibrate.export import jsonable
 from experiments.calibrate.results import Campaign
 from experiments.files import write_text
-from experiments.report.material_card import write_material_card
 from experiments.report.campaign_page import render_page
+from experiments.report.companion import Replay
+from experiments.report.material_card import write_material_card
 from experiments.report.pictures import HeapPicture
-from experiments.studies.buckwheat.replay.replay import Replay
 from experiments.studyfile import Study
 
-LIBRARIES = ("warp-lang", "numpy", "scipy", "pandas", "statsmodels", "opencv-python-headless")
+LIBRARIES = (
+    "dem-warp", "warp-lang", "numpy", "scipy", "pandas", "statsmodels", "scikit-learn",
+    "opencv-python-headless",
+)  # fmt: skip
 """Packages whose version may change a number."""
 
 
@@ -44,7 +47,7 @@ def write_report(
     provenance
         What the caller knows of the run (device, seconds, ...), nested as it comes; versions are added.
     replay
-        The paper's own runs simulated again, to be shown beside.
+        Published runs simulated again, to be shown beside.
 
     Returns
     -------

@@ -83,8 +83,8 @@ class Study(Physics):
     """What is calibrated, in words."""
     note: str = ""
     """What a reader must know about the study at this scale."""
-    paper: bool = False
-    """The study is the paper's buckwheat: the report shows the published numbers beside."""
+    companion: str = ""
+    """Folder of ``experiments/studies`` whose ``companion.py`` brings published numbers and chapters."""
     measurement: MeasurementSection = MeasurementSection()
     """How the angle is read."""
     target_section: TargetSection | None = Field(default=None, alias="target")

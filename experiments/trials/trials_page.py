@@ -6,13 +6,12 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
-import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 
-from experiments.benchmarks.tables import markdown_table
-from experiments.files import write_text
+from doe.palette import BLUE, MUTED, VERMILION
+from experiments.report.kit.figure import new_axes, save_figure
+from experiments.report.kit.markdown import markdown_table, write_page
 from experiments.trials.declaration import Declaration, read_declaration
 from experiments.trials.drawing import STRONG
 from experiments.trials.findings import EVERYTHING, PHOTOGRAPHS, read_findings
@@ -52,7 +51,7 @@ and nothing else; it is wrong as soon as it names one that is not there. Interva
 """
 
 
-def write_page(folder: Path) -> Path:
+def write_trials_page(folder: Path) -> Path:
     """Write the page and the pictures of a record from its files, its notes after the introduction.
 
     Parameters
@@ -80,10 +79,8 @@ def write_page(folder: Path) -> Path:
     for view, title in TITLES.items():
         if len(rows := table[table["view"] == view]):
             some = f" of {len(sealed)}" if len(rows) < len(sealed) else ""
-            parts.append(_view(rows, view, f"## {title}\n\n{len(rows)}{some} trials.", declared, folder))
-    page = folder / PAGE
-    write_text(page, "\n".join(parts))
-    return page
+            parts += _view(rows, view, f"## {title}\n\n{len(rows)}{some} trials.", declared, folder)
+    return write_page(folder / PAGE, *parts)
 
 
 def _runs(path: Path) -> str:
@@ -119,28 +116,29 @@ def _declared(declared: Declaration) -> str:
     return f"## Declared beforehand\n\n{stated}\n\n{markdown_table(table)}\n{aim}"
 
 
-def _view(rows: pd.DataFrame, view: str, heading: str, declared: Declaration, folder: Path) -> str:
+def _view(rows: pd.DataFrame, view: str, heading: str, declared: Declaration, folder: Path) -> list[str]:
     found = aims(rows, [effect.name for effect in declared.library if not effect.resolvable])
     _draw_power(power_curve(rows), folder / f"power-{view}.png")
     _draw_confusion(confusion(rows), folder / f"confusion-{view}.png")
-    parts = [
-        f"{heading} {_UNAIMED.get(view, '')}".rstrip() + "\n",
+    return [
+        f"{heading} {_UNAIMED.get(view, '')}",
         _figures(found) if view in _UNAIMED else _aims(found),
-        f"![shares of alarms and names by effect](power-{view}.png)\n",
-        f"![answers by truth](confusion-{view}.png)\n",
-        "Strong effects have a row each. In brackets: trials.\n",
-        "### Strong effects, by mechanism\n",
+        f"![shares of alarms and names by effect](power-{view}.png)",
+        f"![answers by truth](confusion-{view}.png)",
+        "Strong effects have a row each. In brackets: trials.",
+        "### Strong effects, by mechanism",
         markdown_table(by_mechanism(rows).reset_index()),
-        "### Effects that may not be named\n",
+        "### Effects that may not be named",
         markdown_table(by_outsider(rows).reset_index()),
     ]
-    return "\n".join(parts)
 
 
 def _aims(found: Sequence[Aim]) -> str:
-    lines = ["| question | wanted | found | verdict |", "|---|---|---|---|"]
-    lines += [f"| {aim.question} | {aim.wanted} | {aim.found} | {_VERDICTS[aim.passed]} |" for aim in found]
-    return "\n".join(lines) + "\n"
+    rows = [
+        {"question": aim.question, "wanted": aim.wanted, "found": aim.found, "verdict": _VERDICTS[aim.passed]}
+        for aim in found
+    ]
+    return markdown_table(pd.DataFrame(rows))
 
 
 def _figures(found: Sequence[Aim]) -> str:
@@ -148,10 +146,9 @@ def _figures(found: Sequence[Aim]) -> str:
 
 
 def _draw_power(curve: pd.DataFrame, path: Path) -> None:
-    mpl.use("agg")
-    figure, axes = plt.subplots(figsize=(7.2, 3.8), layout="constrained")
+    figure, axes = new_axes(7.2, 3.8, "y")
     places = np.arange(len(curve))
-    series = (("alarm", "gap found", "#0072B2", -0.08), ("right", "named right", "#D55E00", 0.08))
+    series = (("alarm", "gap found", BLUE, -0.08), ("right", "named right", VERMILION, 0.08))
     for name, label, colour, aside in series if len(curve) else ():
         value = curve[name].to_numpy()
         spread = np.abs(curve[[f"{name}_low", f"{name}_high"]].to_numpy().T - value)
@@ -159,14 +156,10 @@ def _draw_power(curve: pd.DataFrame, path: Path) -> None:
     if len(curve):
         axes.set_xticks(places, [_class_label(row) for row in curve.itertuples()])
         strong = int((curve["most"] <= STRONG).sum())
-        axes.axvline(strong - 0.5, color="#5d6673", linestyle=":", linewidth=1.0)
+        axes.axvline(strong - 0.5, color=MUTED, linestyle=":", linewidth=1.0)
         figure.legend(frameon=False, loc="outside upper right", ncols=len(series))
     axes.set(xlabel="effect [gamma80], and trials", ylabel="share of trials", ylim=(-0.03, 1.03))
-    axes.grid(axis="y", color="#eceff3")
-    axes.set_axisbelow(True)
-    axes.spines[["top", "right"]].set_visible(False)
-    figure.savefig(path, dpi=110, metadata={"Software": None})
-    plt.close(figure)
+    save_figure(figure, path)
 
 
 def _class_label(row: Any) -> str:
@@ -175,11 +168,10 @@ def _class_label(row: Any) -> str:
 
 
 def _draw_confusion(counts: pd.DataFrame, path: Path) -> None:
-    mpl.use("agg")
     trials = counts.sum(axis=1)
     shares = counts.div(trials, axis=0).to_numpy()
-    size = (2.8 + 0.42 * counts.shape[1], 2.0 + 0.27 * counts.shape[0])
-    figure, axes = plt.subplots(figsize=size, layout="constrained")
+    width, height = 2.8 + 0.42 * counts.shape[1], 2.0 + 0.27 * counts.shape[0]
+    figure, axes = new_axes(width, height, grid=None)
     axes.imshow(shares, cmap="Blues", vmin=0.0, vmax=1.2, aspect="auto")
     for (row, column), count in np.ndenumerate(counts.to_numpy()):
         if count:
@@ -195,12 +187,10 @@ def _draw_confusion(counts: pd.DataFrame, path: Path) -> None:
     axes.set_yticks(np.arange(1, len(labels)) - 0.5, minor=True)
     axes.grid(which="minor", color="white", linewidth=1.0)
     axes.tick_params(which="both", length=0)
-    axes.spines[:].set_visible(False)
-    axes.axhline(_mechanisms(counts.index) - 0.5, color="#5d6673", linewidth=1.0)
-    axes.axvline(_mechanisms(counts.columns) - 0.5, color="#5d6673", linewidth=1.0)
+    axes.axhline(_mechanisms(counts.index) - 0.5, color=MUTED, linewidth=1.0)
+    axes.axvline(_mechanisms(counts.columns) - 0.5, color=MUTED, linewidth=1.0)
     axes.set(xlabel="verdict", ylabel="truth")
-    figure.savefig(path, dpi=110, metadata={"Software": None})
-    plt.close(figure)
+    save_figure(figure, path)
 
 
 def _mechanisms(names: Iterable[str]) -> int:

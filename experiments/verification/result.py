@@ -1,4 +1,4 @@
-"""What a family of verification problems hands to the page: rows with a verdict, curves, and words."""
+"""Results of a verification problem for the page: rows with a verdict, curves, and words."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -125,8 +125,8 @@ class Plot:
 
 
 @dataclass(frozen=True)
-class Chapter:
-    """One family of problems."""
+class Result:
+    """Everything that one problem gave."""
 
     title: str
     text: str
@@ -135,5 +135,5 @@ class Chapter:
     plots: tuple[Plot, ...] = field(default=())
 
 
-Problem = Callable[[str], Chapter]
-"""Runs a family of problems on a device."""
+Problem = Callable[[str], Result]
+"""A family of comparisons with closed forms or published numbers, run on a device."""

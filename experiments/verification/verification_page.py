@@ -1,67 +1,50 @@
-"""The page of the verification: tables, plots with their data, and one Markdown text to be read in one go."""
+"""Page of the verification: tables, plots with their data, and one Markdown text to be read in one go."""
 
-import csv
 import json
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.ticker import NullLocator
 
-from experiments.benchmarks.problems.chapter import Chapter, Curve, Plot, Row
+from doe.palette import SERIES
 from experiments.files import write_text
-
-COLOURS = (
-    "#0072B2",
-    "#D55E00",
-    "#00795a",
-    "#b0578d",
-    "#E69F00",
-    "#56B4E9",
-    "#5d6673",
-    "#1c2430",
-    "#8c6d31",
-    "#a05195",
-    "#999999",
-)
-"""Okabe and Ito's palette and some more, which colour-blind readers tell apart."""
+from experiments.report.kit.figure import new_axes, save_figure
+from experiments.report.kit.markdown import markdown_table, write_page
+from experiments.verification.result import Curve, Plot, Result, Row
 
 VERDICTS = {True: "pass", False: "**FAIL**", None: "stated"}
-COLUMNS = (
-    "problem",
-    "case",
-    "quantity",
-    "reference",
-    "expected",
-    "simulated",
-    "error",
-    "relative",
-    "tolerance",
-    "verdict",
-)
 
-HEADING = "| case | quantity | reference | expected | simulated | error | tolerance | verdict |"
+COLUMNS = (
+    "chapter", "problem", "case", "quantity", "reference", "expected", "simulated", "error", "relative",
+    "tolerance", "verdict",
+)  # fmt: skip
+"""Of the table of rows."""
+
+STYLES = {"points": "o", "dashed": "--", "line": "-"}
+"""Formats of curves."""
 
 INTRODUCTION = """# Verification
 
-Written by `python -m experiments.benchmarks.verification`; the same rows are in `rows.csv`, and every
-plot has its data beside it. Every chapter says what it ran on. An error is relative (in %) or in the unit
-of the quantity. A row passes when its error is within its tolerance; a row that is only *stated* has
-none. "Production precision" has poses in float64 and forces in float32.
+Written by `python -m experiments.verification`; the same rows are in `rows.csv`, and every plot has its
+data beside it. Every chapter says what it ran on. An error is relative (in %) or in the unit of the
+quantity. A row passes when its error is within its tolerance; a row that is only *stated* has none.
+"Production precision" has poses in float64 and forces in float32.
 """
 
 
 @dataclass(frozen=True)
-class Section:
-    """A chapter as the page has it, its plots drawn already.
+class StoredResult:
+    """A problem's result as its folder keeps it, its plots drawn already.
 
     Attributes
     ----------
     title, text : str
     machine : str
-        What it ran on, in words.
+        Machine that it ran on, in words.
     rows : tuple of Row
     pictures : tuple of (str, str)
         Stem of each picture's files, and its title.
@@ -73,62 +56,70 @@ class Section:
     rows: tuple[Row, ...]
     pictures: tuple[tuple[str, str], ...]
 
+    @classmethod
+    def read(cls, path: Path) -> "StoredResult":
+        """Read what `write_result` wrote."""
+        values = json.loads(path.read_text(encoding="utf-8"))
+        rows = tuple(Row(**row) for row in values.pop("rows"))
+        pictures = tuple((stem, title) for stem, title in values.pop("pictures"))
+        return cls(rows=rows, pictures=pictures, **values)
 
-def write_chapter(name: str, chapter: Chapter, machine: str, folder: Path) -> None:
-    """Write plots, their data and the section of one problem into a folder, for `write_page`.
+
+def write_result(name: str, result: Result, machine: str, folder: Path) -> None:
+    """Write rows, plots and their data of one problem into a folder, for `write_verification`.
 
     Parameters
     ----------
     name
         Of the problem.
-    chapter
-        What it gave.
+    result
+        Everything that it gave.
     machine
-        What it ran on, in words.
+        Machine that it ran on, in words.
     folder
         Made if missing; files of the same names are written over.
     """
-    folder.mkdir(parents=True, exist_ok=True)
-    for plot in chapter.plots:
+    for plot in result.plots:
         _draw(plot, folder / f"{plot.name}.png")
         _write_data(plot, folder / f"{plot.name}.csv")
-    pictures = tuple((plot.name, plot.title) for plot in chapter.plots)
-    section = Section(chapter.title, chapter.text, machine, chapter.rows, pictures)
-    write_text(_section_file(folder, name), json.dumps(asdict(section), indent=1) + "\n")
+    pictures = tuple((plot.name, plot.title) for plot in result.plots)
+    stored = StoredResult(result.title, result.text, machine, result.rows, pictures)
+    write_text(_file(folder, name), json.dumps(asdict(stored), indent=1) + "\n")
 
 
-def write_page(folder: Path, names: Iterable[str]) -> Path:
-    """Write the page and the table of rows from the sections that a folder has.
+def write_verification(folder: Path, names: Iterable[str]) -> Path:
+    """Write the page and the table of rows from the results that a folder has.
 
     Parameters
     ----------
     folder
-        Where `write_chapter` wrote, perhaps on several machines.
+        Folder that `write_result` wrote to, perhaps on several machines.
     names
-        Of the problems, in the order of the page; one without a section is left out.
+        Of the problems, in the order of the page; one without a result is left out.
 
     Returns
     -------
     Path
         The page.
     """
-    files = [_section_file(folder, name) for name in names]
-    sections = [_read_section(file) for file in files if file.exists()]
-    _write_rows(sections, folder / "rows.csv")
-    page = folder / "README.md"
-    write_text(page, _page(sections))
-    return page
+    files = [_file(folder, name) for name in names]
+    results = [StoredResult.read(file) for file in files if file.exists()]
+    rows = [row for result in results for row in result.rows]
+    table = [
+        {"chapter": result.title, **asdict(row), "verdict": VERDICTS[row.passed].strip("*").lower()}
+        for result in results
+        for row in result.rows
+    ]
+    write_text(folder / "rows.csv", pd.DataFrame(table, columns=COLUMNS).to_csv(index=False))
+    parts = [INTRODUCTION, f"**{summary(rows)}.**", _contents(results)]
+    for result in results:
+        pictures = "\n".join(f"![{title}]({stem}.png)" for stem, title in result.pictures)
+        parts += [f"## {result.title}", result.text, f"*{result.machine}*", pictures, *_tables(result.rows)]
+    return write_page(folder / "README.md", *parts)
 
 
-def _section_file(folder: Path, name: str) -> Path:
+def _file(folder: Path, name: str) -> Path:
     return folder / f"{name}.json"
-
-
-def _read_section(path: Path) -> Section:
-    values = json.loads(path.read_text(encoding="utf-8"))
-    rows = tuple(Row(**row) for row in values.pop("rows"))
-    pictures = tuple((stem, title) for stem, title in values.pop("pictures"))
-    return Section(rows=rows, pictures=pictures, **values)
 
 
 def summary(rows: Iterable[Row]) -> str:
@@ -142,96 +133,58 @@ def _counts(rows: Iterable[Row]) -> tuple[int, int, int]:
     return verdicts.count(True), verdicts.count(False), verdicts.count(None)
 
 
-def _page(sections: Sequence[Section]) -> str:
-    every = summary(row for section in sections for row in section.rows)
-    parts = [INTRODUCTION, f"**{every}.**\n", _contents(sections)]
-    for section in sections:
-        parts += [
-            f"## {section.title}\n",
-            section.text.strip() + "\n",
-            f"*{section.machine}*\n",
-            _pictures(section.pictures),
-            _table(section.rows),
-        ]
-    return "\n".join(part for part in parts if part)
+def _contents(results: Sequence[StoredResult]) -> str:
+    rows = []
+    for result in results:
+        counts = dict(zip(("pass", "fail", "stated"), _counts(result.rows), strict=True))
+        anchor = result.title.lower().replace(" ", "-")
+        rows.append({"chapter": f"[{result.title}](#{anchor})", **counts, "ran on": result.machine})
+    return markdown_table(pd.DataFrame(rows))
 
 
-def _contents(sections: Sequence[Section]) -> str:
-    lines = ["| chapter | pass | fail | stated | ran on |", "|---|---|---|---|---|"]
-    for section in sections:
-        counts = " | ".join(str(count) for count in _counts(section.rows))
-        anchor = section.title.lower().replace(" ", "-")
-        lines.append(f"| [{section.title}](#{anchor}) | {counts} | {section.machine} |")
-    return "\n".join(lines) + "\n"
-
-
-def _pictures(pictures: Sequence[tuple[str, str]]) -> str:
-    return "\n".join(f"![{title}]({stem}.png)" for stem, title in pictures) + "\n" if pictures else ""
-
-
-def _table(rows: Sequence[Row]) -> str:
-    """One table a problem, in the order in which they first come."""
-    lines: list[str] = []
+def _tables(rows: Sequence[Row]) -> Iterable[str]:
+    """Yield heading and table of each problem, in the order in which they first come."""
     for problem in dict.fromkeys(row.problem for row in rows):
-        lines += ["", f"**{problem}**", "", HEADING, "|---" * HEADING.count(" | ") + "|---|"]
-        lines += [_line(row) for row in rows if row.problem == problem]
-    return "\n".join(lines) + "\n"
+        table = pd.DataFrame([_texts(row) for row in rows if row.problem == problem])
+        yield from (f"**{problem}**", markdown_table(table))
 
 
-def _line(row: Row) -> str:
-    numbers = (f"{row.expected:.6g}", f"{row.simulated:.6g}", _error(row.error, row.relative))
-    tolerance = "" if row.tolerance is None else _error(row.tolerance, row.relative)
-    cells = (row.case, row.quantity, row.reference, *numbers, tolerance, VERDICTS[row.passed])
-    return "| " + " | ".join(cells) + " |"
+def _texts(row: Row) -> dict[str, str]:
+    return {
+        "case": row.case,
+        "quantity": row.quantity,
+        "reference": row.reference,
+        "expected": f"{row.expected:.6g}",
+        "simulated": f"{row.simulated:.6g}",
+        "error": _error(row.error, row.relative),
+        "tolerance": "" if row.tolerance is None else _error(row.tolerance, row.relative),
+        "verdict": VERDICTS[row.passed],
+    }
 
 
 def _error(value: float, relative: bool) -> str:
     return f"{100.0 * value:.2g} %" if relative else f"{value:.2g}"
 
 
-def _write_rows(sections: Sequence[Section], path: Path) -> None:
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(("chapter", *COLUMNS))
-        for section in sections:
-            for row in section.rows:
-                verdict = VERDICTS[row.passed].strip("*").lower()
-                writer.writerow((section.title, *(getattr(row, name) for name in COLUMNS[:-1]), verdict))
-
-
 def _write_data(plot: Plot, path: Path) -> None:
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(("curve", plot.x, plot.y))
-        for curve in plot.curves:
-            writer.writerows(
-                (curve.label, f"{x:.7g}", f"{y:.7g}") for x, y in zip(curve.x, curve.y, strict=True)
-            )
+    curves = [pd.DataFrame({"curve": curve.label, plot.x: curve.x, plot.y: curve.y}) for curve in plot.curves]
+    write_text(path, pd.concat(curves).to_csv(index=False, float_format="%.7g"))
 
 
 def _draw(plot: Plot, path: Path) -> None:
-    figure, axes = plt.subplots(figsize=(7.2, 4.2), layout="constrained")
+    figure, axes = new_axes()
     for k, curve in enumerate(plot.curves):
-        _draw_curve(axes, curve, COLOURS[(k if curve.colour is None else curve.colour) % len(COLOURS)])
+        _draw_curve(axes, curve, SERIES[(k if curve.colour is None else curve.colour) % len(SERIES)])
     if plot.logarithmic:
         axes.set(xscale="log", yscale="log")
         ticks = np.unique(np.concatenate([curve.x for curve in plot.curves]))
         axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
         axes.xaxis.set_minor_locator(NullLocator())
     axes.set(title=plot.title, xlabel=plot.x, ylabel=plot.y)
-    axes.grid(color="#eceff3")
-    axes.set_axisbelow(True)
-    axes.spines[["top", "right"]].set_visible(False)
     axes.legend(fontsize="small", frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
-    figure.savefig(path, dpi=110, metadata={"Software": None})
-    plt.close(figure)
+    save_figure(figure, path)
 
 
-def _draw_curve(axes: plt.Axes, curve: Curve, colour: str) -> None:
+def _draw_curve(axes: Axes, curve: Curve, colour: str) -> None:
     x, y = np.asarray(curve.x), np.asarray(curve.y)
-    if curve.style == "points":
-        axes.plot(x, y, "o", color=colour, markersize=4, label=curve.label)
-    else:
-        axes.plot(
-            x, y, "--" if curve.style == "dashed" else "-", color=colour, linewidth=1.5, label=curve.label
-        )
+    axes.plot(x, y, STYLES[curve.style], color=colour, markersize=4, linewidth=1.5, label=curve.label)

@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
-
-from markupsafe import Markup
-from plotly.offline import get_plotlyjs
 
 from experiments.discover.discovery import Discovery, Verdict
 from experiments.discover.settings import Settings
@@ -21,11 +18,12 @@ from experiments.report.discovery.verdict import (
     reason_sentence,
     verdict_sentence,
 )
-from experiments.report.kit.numbers import capital, trimmed
-from experiments.report.campaign_page import environment, flat, study_facts
-from experiments.report.pictures import HeapPicture
-from experiments.report.kit.table import Table
 from experiments.report.kit.chart import Chart
+from experiments.report.kit.html import Chapter, flat, render_page
+from experiments.report.kit.numbers import capital, trimmed
+from experiments.report.kit.table import Table
+from experiments.report.pictures import HeapPicture
+from experiments.report.study_facts import study_facts
 from experiments.studyfile import Study
 
 TITLES = {
@@ -39,22 +37,16 @@ TITLES = {
     "data": "The data, and notes on them",
     "provenance": "Settings and provenance",
 }
-"""Headings by section, in the order of the page."""
+"""Headings by chapter, in the order of the page."""
 
 
-@dataclass(frozen=True)
-class Section:
-    """One section of the page."""
-
-    name: str
-    """Its anchor, and the name of the template that fills it."""
-    tables: dict[str, Table] = field(default_factory=dict)
-    charts: dict[str, list[Chart]] = field(default_factory=dict)
-
-    @property
-    def title(self) -> str:
-        """Heading."""
-        return TITLES[self.name]
+def _chapter(
+    name: str,
+    tables: Mapping[str, Table] | None = None,
+    charts: Mapping[str, Sequence[Chart]] | None = None,
+) -> Chapter:
+    """Build a chapter that a template of its name fills."""
+    return Chapter(name, TITLES[name], tables or {}, charts or {}, template=f"discovery/{name}.html.j2")
 
 
 def render_discovery(
@@ -65,6 +57,7 @@ def render_discovery(
     pictures: Sequence[HeapPicture] = (),
     files: Sequence[str] = (),
     provenance: Mapping[str, Any] | None = None,
+    further: Sequence[Chapter] = (),
 ) -> str:
     """Render the report of an analysis as one self-contained HTML page.
 
@@ -84,33 +77,36 @@ def render_discovery(
         Study files with the mechanism added that lie beside the page.
     provenance
         What made the numbers: names and values, nested as they come.
+    further
+        Chapters that the study's companion adds.
     """
     if found.verdict is Verdict.NOT_IDENTIFIABLE:
         # A fit with nothing left to test it by would fill the page with zeros.
         found = replace(found, base=None, gap=None, drifts=(), candidates=(), power=(), confounding=None)
-    page = environment().get_template("page.html.j2")
-    return page.render(
-        kind="report on a disagreement",
-        folder="discovery",
-        found=found,
-        study=study,
-        terms=terms,
-        headline=headline(found, terms),
-        sentence=verdict_sentence(found, terms),
-        reason=reason_sentence(found),
-        settled=found.verdict in SETTLED,
-        cards=_cards(found, terms),
-        explained=found.named,
-        next_step=next_step(found, terms),
-        changes=changes(found, terms, settings),
-        sections=[section for section in _sections(found, terms) if pictures or section.name != "heaps"],
-        pictures=pictures,
-        files=files,
-        facts=study_facts(study),
-        provenance=flat(provenance or {}),
-        rules=flat(asdict(settings)),
-        document=flat(study.document),
-        plotly=Markup(get_plotlyjs()),
+    *chapters, last = _chapters(found, terms)
+    shown = [chapter for chapter in chapters if pictures or chapter.name != "heaps"]
+    drawn_on = {
+        "found": found,
+        "study": study,
+        "terms": terms,
+        "headline": headline(found, terms),
+        "sentence": verdict_sentence(found, terms),
+        "reason": reason_sentence(found),
+        "settled": found.verdict in SETTLED,
+        "cards": _cards(found, terms),
+        "explained": found.named,
+        "next_step": next_step(found, terms),
+        "changes": changes(found, terms, settings),
+        "pictures": pictures,
+        "files": files,
+        "facts": study_facts(study),
+        "provenance": flat(provenance or {}),
+        "rules": flat(asdict(settings)),
+        "document": flat(study.document),
+    }
+    chapters = [*shown, *further, last]
+    return render_page(
+        "report on a disagreement", study.name, "discovery/summary.html.j2", chapters, drawn_on
     )
 
 
@@ -144,32 +140,32 @@ def _cards(found: Discovery, terms: Terms) -> list[Card]:
     return cards
 
 
-def _sections(found: Discovery, terms: Terms) -> list[Section]:
-    """Build the sections that this discovery has something for."""
+def _chapters(found: Discovery, terms: Terms) -> list[Chapter]:
+    """Build the chapters that this discovery has something for."""
     built = {
         "gap": _gap(found, terms),
         "candidates": _candidates(found, terms),
         "before_after": _before_after(found),
         "compared": _compared(found, terms),
-        "heaps": Section("heaps"),
-        "power": Section("power", {"power": tables.power_table(found, terms)}) if found.power else None,
-        "changes": Section("changes"),
-        "data": Section("data", {"data": tables.data_table(found, terms)}),
-        "provenance": Section("provenance"),
+        "heaps": _chapter("heaps"),
+        "power": _chapter("power", {"power": tables.power_table(found, terms)}) if found.power else None,
+        "changes": _chapter("changes"),
+        "data": _chapter("data", {"data": tables.data_table(found, terms)}),
+        "provenance": _chapter("provenance"),
     }
-    return [section for name in TITLES if (section := built[name]) is not None]
+    return [chapter for name in TITLES if (chapter := built[name]) is not None]
 
 
-def _gap(found: Discovery, terms: Terms) -> Section | None:
+def _gap(found: Discovery, terms: Terms) -> Chapter | None:
     if found.base is None:
         return None
     shown = {"parameters": tables.parameters_table(found, terms)}
     if found.drifts:
         shown["drifts"] = tables.drifts_table(found)
-    return Section("gap", shown, {"maps": charts.residual_maps(found, terms)})
+    return _chapter("gap", shown, {"maps": charts.residual_maps(found, terms)})
 
 
-def _candidates(found: Discovery, terms: Terms) -> Section | None:
+def _candidates(found: Discovery, terms: Terms) -> Chapter | None:
     if not found.candidates:
         return None
     drawn = {}
@@ -177,18 +173,18 @@ def _candidates(found: Discovery, terms: Terms) -> Section | None:
         drawn["explained"] = [charts.explained_chart(found, terms)]
     if found.confounding:
         drawn["confounding"] = [charts.confounding_chart(found.confounding, terms)]
-    return Section("candidates", {"candidates": tables.candidates_table(found, terms)}, drawn)
+    return _chapter("candidates", {"candidates": tables.candidates_table(found, terms)}, drawn)
 
 
-def _before_after(found: Discovery) -> Section | None:
+def _before_after(found: Discovery) -> Chapter | None:
     if not found.before_after:
         return None
-    return Section(
+    return _chapter(
         "before_after", {"gaps": tables.before_after_table(found)}, {"gaps": [charts.gap_chart(found)]}
     )
 
 
-def _compared(found: Discovery, terms: Terms) -> Section | None:
+def _compared(found: Discovery, terms: Terms) -> Chapter | None:
     if found.base is None:
         return None
-    return Section("compared", charts={"compared": charts.comparison_charts(found, terms)})
+    return _chapter("compared", charts={"compared": charts.comparison_charts(found, terms)})

@@ -1,4 +1,4 @@
-"""How every chart of the page looks, and its plain form for plotly.js."""
+"""Charts of a page: one look, and a plain form for plotly.js."""
 
 from __future__ import annotations
 
@@ -7,16 +7,7 @@ from typing import Any
 
 import plotly.graph_objects as go
 
-BLUE = "#0072B2"
-VERMILION = "#D55E00"
-GREEN = "#00795a"
-ORANGE = "#E69F00"
-PURPLE = "#b0578d"
-"""Okabe and Ito's palette, which colour-blind readers tell apart; green and purple darker, for thin lines."""
-
-INK = "#1c2430"
-MUTED = "#5d6673"
-GRID = "#eceff3"
+from doe.palette import GREEN, GRID, INK, MUTED
 
 LANDSCAPE = "YlGnBu_r"
 """Colour scale of a response: even steps of lightness, also in grey print."""

@@ -72,6 +72,15 @@ def shortest_decimals(values: Iterable[float], tolerance: float = COLUMN_TOLERAN
     return MOST_DECIMALS
 
 
+def measured(value: float | None) -> str:
+    """Write a number of a measurement: whole numbers whole, any other to four significant digits."""
+    if value is None or not math.isfinite(value):
+        return ""
+    if value.is_integer() or abs(value) >= 1000.0:
+        return f"{value:.0f}"
+    return f"{value:.4g}" if abs(value) >= 1e-3 else f"{value:.1e}"
+
+
 def _per_value(write: Callable[[float | None], str]) -> Callable[[list[float | None]], list[str]]:
     return lambda values: [write(value) for value in values]
 
@@ -104,6 +113,7 @@ KINDS: Mapping[str, Callable[[list[float | None]], list[str]]] = MappingProxyTyp
         "sum": _sums,
         "level": _per_value(trimmed),
         "free": _per_value(significant),
+        "measured": _per_value(measured),
     }
 )
 """How a column of numbers is written, by the kind of quantity."""

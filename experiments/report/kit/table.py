@@ -1,4 +1,4 @@
-"""Tables of the page: a DataFrame's columns with heads, units and digits, and the rows that matter marked."""
+"""Tables of pages: a DataFrame's columns with heads, units and digits, and the rows that matter marked."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from markupsafe import Markup, escape
+from pandas.api.types import is_numeric_dtype
 
 from experiments.report.kit.numbers import KINDS
 
@@ -90,6 +91,15 @@ def make_table(
     styles = [""] * len(frame) if marks is None else list(marks)
     rows = tuple(Row(tuple(entries), style) for *entries, style in zip(*cells, styles, strict=True))
     return Table(name, caption, shown, rows, note)
+
+
+def plain_table(frame: pd.DataFrame) -> Table:
+    """Lay out a DataFrame as it is: heads as they stand, texts as they stand, numbers to four digits."""
+    columns = [
+        Column(str(name), str(name), "measured" if is_numeric_dtype(values) else "text", write=str)
+        for name, values in frame.items()
+    ]
+    return make_table("", frame, columns, "")
 
 
 def _cells(column: Column, values: pd.Series) -> list[Cell]:

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from dem_warp import Case, CaseResult, ClumpShape, GrainPopulation, Hopper, Interaction, Material
-from experiments.benchmarks.problems.chapter import Chapter, Curve, Plot, Row, absolute_row, detection_row
-from experiments.benchmarks.problems.setups import GRAVITY, STEEL
-from experiments.benchmarks.problems.stored import finished_cases
+from experiments.verification.problems.setups import GRAVITY, STEEL
+from experiments.verification.problems.stored import finished_cases
+from experiments.verification.result import Curve, Plot, Result, Row, absolute_row, detection_row
 
 K, K_SPREAD = 1.4, 0.2
 """Correction of the outlet, in sphere diameters, fixed before any run."""
@@ -141,7 +141,7 @@ def _plot(flows: Mapping[float, Sequence[Flow]]) -> Plot:
     return Plot("beverloo", "Flow out of a hopper", "outlet D / d", "W / (rho sqrt(g) d^2.5)", tuple(curves))
 
 
-def beverloo(device: str) -> Chapter:
+def beverloo(device: str) -> Result:
     """Rates of flow through five outlets at three frictions."""
     seeds = range(1, 1 + SEEDS["cpu" if device == "cpu" else "cuda"])
     settings = [(friction, outlet, seed) for friction in FRICTIONS for outlet in OUTLETS for seed in seeds]
@@ -153,4 +153,4 @@ def beverloo(device: str) -> Chapter:
     labels = (PROBLEM, f"all {len(cases)} hoppers", "hoppers without a rate", "none clogs")
     lost = len(cases) - sum(len(each) for each in flows.values())
     rows = (absolute_row(labels, 0.0, lost, 0.0), *_rows(flows))
-    return Chapter("Beverloo", TEXT, rows, (_plot(flows),))
+    return Result("Beverloo", TEXT, rows, (_plot(flows),))

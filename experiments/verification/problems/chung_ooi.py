@@ -8,8 +8,8 @@ polyethylene (test 5), nylon (test 6) and copper (test 7), and which two pairs t
 """
 
 from dem_warp.materials import Material
-from experiments.benchmarks.problems.impact import Impact, Partner
-from experiments.benchmarks.problems.setups import material
+from experiments.verification.problems.impact import Impact, Partner
+from experiments.verification.problems.setups import material
 
 GLASS = material(48e9, 0.20, 2800.0)
 LIMESTONE = material(20e9, 0.25, 2500.0)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from experiments.benchmarks.problems.impact import Impact
+from experiments.verification.problems.impact import Impact
 
 START = 1e-7
 """Overlap at the start, of the largest one: what is left out is its power of 2.5."""

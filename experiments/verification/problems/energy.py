@@ -9,17 +9,8 @@ from dem_warp.clumps import ClumpShape
 from dem_warp.materials import Material, rayleigh_time
 from dem_warp.model import ContactCoefficients, WorldSetup
 from dem_warp.walls import Cylinder, Plane
-from experiments.benchmarks.problems.chapter import (
-    Chapter,
-    Curve,
-    Plot,
-    Row,
-    absolute_row,
-    detection_row,
-    order_row,
-)
-from experiments.benchmarks.problems.energy_account import PARTS, STORED, EnergyAccount
-from experiments.benchmarks.problems.setups import (
+from experiments.verification.problems.energy_account import PARTS, STORED, EnergyAccount
+from experiments.verification.problems.setups import (
     BUCKWHEAT,
     CLUMP,
     GRAVITY,
@@ -27,6 +18,15 @@ from experiments.benchmarks.problems.setups import (
     bodies,
     contact,
     world,
+)
+from experiments.verification.result import (
+    Curve,
+    Plot,
+    Result,
+    Row,
+    absolute_row,
+    detection_row,
+    order_row,
 )
 
 SOFT = Material(BUCKWHEAT.density, BUCKWHEAT.shear_modulus / 400.0, BUCKWHEAT.poisson_ratio)
@@ -139,7 +139,7 @@ def _parts_plot(account: EnergyAccount) -> Plot:
     return Plot("energy", "Settling column of 16 grains", "time [ms]", "energy [uJ]", tuple(curves))
 
 
-def energy(device: str) -> Chapter:
+def energy(device: str) -> Result:
     """The closed account of a settling column."""
     problem = "Settling column"
     shape = ClumpShape.read(CLUMP)
@@ -173,4 +173,4 @@ def energy(device: str) -> Chapter:
         detection_row(problem, case, f"{quantity}, over the true law's", 5.0, left[-1, 1] / left[-1, 0])
     )
     rows += _wrong_law_rows(problem, setups[0], device)
-    return Chapter("Energy", TEXT, tuple(rows), (_parts_plot(books[-1][0]),))
+    return Result("Energy", TEXT, tuple(rows), (_parts_plot(books[-1][0]),))

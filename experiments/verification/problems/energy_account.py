@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from dem_warp.model import ContactCoefficients, WorldSetup
-from experiments.benchmarks.problems.contact_geometry import ContactFinder, Touching
+from experiments.verification.problems.contact_geometry import ContactFinder, Touching
 
 STORED = ("kinetic", "height", "normal springs", "tangential springs")
 LOST = (

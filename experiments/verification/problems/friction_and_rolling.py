@@ -9,8 +9,7 @@ from dem_warp.materials import Material, rayleigh_time
 from dem_warp.model import ContactCoefficients, WorldSetup
 from dem_warp.solver import CHUNK, Solver
 from dem_warp.walls import Plane
-from experiments.benchmarks.problems.chapter import Chapter, Curve, Plot, Row, absolute_row, relative_row
-from experiments.benchmarks.problems.setups import (
+from experiments.verification.problems.setups import (
     BUCKWHEAT,
     CLUMP,
     GRAVITY,
@@ -20,6 +19,7 @@ from experiments.benchmarks.problems.setups import (
     record,
     world,
 )
+from experiments.verification.result import Curve, Plot, Result, Row, absolute_row, relative_row
 
 RADIUS = 5e-3
 SUBSTANCE = Material(density=1000.0, shear_modulus=10e6, poisson_ratio=0.25)
@@ -166,7 +166,7 @@ def clump_rows(precision: str, device: str) -> list[Row]:
     ]
 
 
-def friction_and_rolling(device: str) -> Chapter:
+def friction_and_rolling(device: str) -> Result:
     """Item by item: sliding to rolling, stopping, no creep, and a clump's friction angle."""
     rows: list[Row] = []
     for precision in PRECISIONS:
@@ -175,4 +175,4 @@ def friction_and_rolling(device: str) -> Chapter:
         rows += creep_rows(precision, device)
         rows += clump_rows(precision, device)
     spin_rows, plot = twisting(device)
-    return Chapter("Friction and rolling", TEXT, (*rows, *spin_rows), (plot,))
+    return Result("Friction and rolling", TEXT, (*rows, *spin_rows), (plot,))

@@ -10,9 +10,9 @@ from dem_warp import Case, CaseResult, LiftedCylinder, simulate
 from dem_warp.scenes.poured_scene import default_skin
 from dem_warp.walls import Mesh, Wall
 from doe import Comparison, Sample, compare_means
-from experiments.benchmarks.problems.chapter import Chapter, Curve, Plot, Row, absolute_row
-from experiments.benchmarks.problems.stored import finished_cases, repose_angles
 from experiments.studyfile import Study, load_study
+from experiments.verification.problems.stored import finished_cases, repose_angles
+from experiments.verification.result import Curve, Plot, Result, Row, absolute_row
 
 MARGIN = 1.0
 """Shift of the mean angle that does not matter [deg]: twice the standard deviation of the measured heaps."""
@@ -138,7 +138,7 @@ def _plot(angles: Mapping[str, np.ndarray]) -> Plot:
     )
 
 
-def heap_angle(device: str) -> Chapter:
+def heap_angle(device: str) -> Result:
     """Shift of the angle under other numerics."""
     problem = "Heaps of buckwheat"
     trial = TRIALS["cpu" if device == "cpu" else "cuda"]
@@ -158,4 +158,4 @@ def heap_angle(device: str) -> Chapter:
     labels = (problem, f"half the skin, {SKIN_SEEDS} heaps", "arrays of a heap that differ", "the same bits")
     rows.append(absolute_row(labels, 0.0, changed_arrays(study, device), 0.0))
     text = TEXT + trial.words.format(trial.replicates)
-    return Chapter("Heap angle and numerics", text, tuple(rows), (_plot(angles),))
+    return Result("Heap angle and numerics", text, tuple(rows), (_plot(angles),))

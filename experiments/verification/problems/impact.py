@@ -13,7 +13,7 @@ from dem_warp.laws.mechanism import Mechanism
 from dem_warp.materials import Material, rayleigh_time
 from dem_warp.model import ContactCoefficients, WorldSetup
 from dem_warp.walls import Plane
-from experiments.benchmarks.problems.setups import RIGID, bodies, contact, record, world
+from experiments.verification.problems.setups import RIGID, bodies, contact, record, world
 
 HERTZ_DURATION = 0.8 * math.sqrt(math.pi) * math.gamma(0.4) / math.gamma(0.9)
 """Duration of an elastic Hertz impact over (largest overlap / impact speed): 2.9432750."""

@@ -11,16 +11,16 @@ from dem_warp.materials import Material, rayleigh_time
 from dem_warp.model import WorldSetup
 from dem_warp.solver import CHUNK, Solver
 from dem_warp.walls import Cylinder, Motion, Plane
-from experiments.benchmarks.problems.chapter import (
-    Chapter,
+from experiments.verification.problems.setups import GRAVITY, STEEL, bodies, contact
+from experiments.verification.result import (
     Curve,
     Plot,
+    Result,
     Row,
     absolute_row,
     detection_row,
     relative_row,
 )
-from experiments.benchmarks.problems.setups import GRAVITY, STEEL, bodies, contact
 
 GLASS = Material(density=2500.0, shear_modulus=1e6, poisson_ratio=0.25)
 """As heavy as glass, but so soft that a second takes 17,000 steps; overlaps stay below a hundredth."""
@@ -272,7 +272,7 @@ def _mobilisation_plot(loads: Mapping[int, Sequence[Loads]]) -> Plot:
     return Plot("janssen-mobilisation", title, "path of the tube [mm]", "mobilised friction", tuple(curves))
 
 
-def janssen(device: str) -> Chapter:
+def janssen(device: str) -> Result:
     """Loads on the floor and the wall of a tube that is drawn upwards."""
     problem = "Spheres in a tube that is drawn upwards"
     setups = [column(ratio, seed) for ratio in TUBES for seed in range(SEEDS)]
@@ -283,4 +283,4 @@ def janssen(device: str) -> Chapter:
     rows = [row for ratio, columns in loads.items() for row in _tube_rows(problem, ratio, columns, common)]
     labels = (problem, "both tubes", "K from the load on the floor, wide tube", "the same in the narrow tube")
     rows.append(relative_row(labels, k[TUBES[0]], k[TUBES[1]], 0.15))
-    return Chapter("Janssen", TEXT, tuple(rows), (_stress_plot(loads, common), _mobilisation_plot(loads)))
+    return Result("Janssen", TEXT, tuple(rows), (_stress_plot(loads, common), _mobilisation_plot(loads)))

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from experiments.benchmarks.problems.chapter import Row, absolute_row, relative_row
-from experiments.benchmarks.problems.contact_ode import solve_impact
-from experiments.benchmarks.problems.impact import Course, Impact, simulate_impacts
-from experiments.benchmarks.problems.normal_impact import clamped_restitution
+from experiments.verification.problems.contact_ode import solve_impact
+from experiments.verification.problems.impact import Course, Impact, simulate_impacts
+from experiments.verification.problems.normal_impact import clamped_restitution
+from experiments.verification.result import Row, absolute_row, relative_row
 
 STEPS = 800
 """Steps an impact: the damping is of first order in the step."""

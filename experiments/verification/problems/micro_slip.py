@@ -6,18 +6,9 @@ from dataclasses import replace
 import numpy as np
 
 from dem_warp.laws.micro_slip import MicroSlip
-from experiments.benchmarks.problems import chung_ooi
-from experiments.benchmarks.problems.chapter import (
-    Chapter,
-    Curve,
-    Plot,
-    Row,
-    absolute_row,
-    order_row,
-    relative_row,
-)
-from experiments.benchmarks.problems.impact import Impact, simulate_impacts
-from experiments.benchmarks.problems.kicks import (
+from experiments.verification.problems import chung_ooi
+from experiments.verification.problems.impact import Impact, simulate_impacts
+from experiments.verification.problems.kicks import (
     STEPS,
     kicks_of,
     law_rows,
@@ -25,8 +16,17 @@ from experiments.benchmarks.problems.kicks import (
     sliding_rows,
     solved_kicks,
 )
-from experiments.benchmarks.problems.one_spring import LAWS, one_spring_rebound
-from experiments.benchmarks.problems.partial_slip import rebound_slip
+from experiments.verification.problems.one_spring import LAWS, one_spring_rebound
+from experiments.verification.problems.partial_slip import rebound_slip
+from experiments.verification.result import (
+    Curve,
+    Plot,
+    Result,
+    Row,
+    absolute_row,
+    order_row,
+    relative_row,
+)
 
 PROBLEM = "Chung and Ooi test 5: micro-slip"
 THEORY = "Maw, Barber and Fawcett (1976)"
@@ -76,7 +76,7 @@ it. At the production step, 14 steps an impact, the error of the step comes on t
 it."""
 
 
-def micro_slip(device: str) -> Chapter:
+def micro_slip(device: str) -> Result:
     """Chung and Ooi's test 5: elastic impact at constant normal speed, against Maw, Barber and Fawcett."""
     impacts = _impacts(SLIPS)
     ratio = 4.0 * impacts[0].law.shear_modulus / impacts[0].law.modulus
@@ -97,7 +97,7 @@ def micro_slip(device: str) -> Chapter:
     ring = kicks_of(simulated_courses(with_ring, STEPS, device))
     rows += _ring_rows(with_ring, ring, theory, device)
     rows += _theory_rows(_production("base law", impacts), _produced(impacts, device), theory, None)
-    return Chapter("Oblique impact and micro-slip", TEXT, tuple(rows), _plots(ratio, got, ring))
+    return Result("Oblique impact and micro-slip", TEXT, tuple(rows), _plots(ratio, got, ring))
 
 
 def _impacts(slips: np.ndarray, *mechanisms: MicroSlip) -> list[Impact]:

@@ -8,18 +8,18 @@ from scipy.integrate import solve_ivp
 from dem_warp.clumps import ClumpShape
 from dem_warp.materials import Material, rayleigh_time
 from dem_warp.walls import Plane
-from experiments.benchmarks.problems import chung_ooi
-from experiments.benchmarks.problems.chapter import (
-    Chapter,
+from experiments.verification.problems import chung_ooi
+from experiments.verification.problems.impact import HERTZ_DURATION, Course, Impact, simulate_impacts
+from experiments.verification.problems.setups import BUCKWHEAT, CLUMP, STEEL, bodies, contact, record, world
+from experiments.verification.result import (
     Curve,
     Plot,
+    Result,
     Row,
     absolute_row,
     order_row,
     relative_row,
 )
-from experiments.benchmarks.problems.impact import HERTZ_DURATION, Course, Impact, simulate_impacts
-from experiments.benchmarks.problems.setups import BUCKWHEAT, CLUMP, STEEL, bodies, contact, record, world
 
 PHASES = (0.0, 0.25, 0.5, 0.75)
 """Where within a step the surfaces meet; what is seen of an impact depends on it, and the worst counts."""
@@ -169,7 +169,7 @@ def clamped_restitution(chosen: float) -> float:
     return math.exp(-2.0 * angle / math.tan(angle))
 
 
-def elastic_impact(device: str) -> Chapter:
+def elastic_impact(device: str) -> Result:
     """Chung and Ooi's tests 1 and 2: elastic normal impact of two spheres, and of a sphere on a plane."""
     rows: list[Row] = []
     plots: list[Plot] = []
@@ -196,7 +196,7 @@ def elastic_impact(device: str) -> Chapter:
         plots.append(_force_plot(test, names, [courses[0] for courses in seen[50]]))
     # the errors of both tests are the same: a Hertz impact is one curve, whatever its size
     plots.append(_order_plot("hertz-order", "Tests 1 and 2", HERTZ_ORDERS, errors.T, QUANTITIES))
-    return Chapter("Elastic normal impact", ELASTIC_TEXT, (*rows, *_grain_rows(device)), tuple(plots))
+    return Result("Elastic normal impact", ELASTIC_TEXT, (*rows, *_grain_rows(device)), tuple(plots))
 
 
 def _grain_rows(device: str) -> list[Row]:
@@ -236,7 +236,7 @@ def _order_plot(
     return Plot(name, title, "steps an impact", "relative error", (*curves, slope), logarithmic=True)
 
 
-def restitution(device: str) -> Chapter:
+def restitution(device: str) -> Result:
     """Chung and Ooi's test 3: the restitution that was chosen comes back; the clamped form's does not."""
     problem = "Chung and Ooi test 3: restitution"
     rows: list[Row] = []
@@ -273,7 +273,7 @@ def restitution(device: str) -> Chapter:
     )
     labels = tuple(f"e = {e:g}" for e in (0.1, 0.18, 0.5))
     order = _order_plot("restitution-order", "Test 3", RESTITUTION_ORDERS, errors, labels, power=1)
-    return Chapter("Restitution", RESTITUTION_TEXT, (*rows, *orders), (plot, order))
+    return Result("Restitution", RESTITUTION_TEXT, (*rows, *orders), (plot, order))
 
 
 def _restitution_orders(problem: str, device: str) -> tuple[list[Row], np.ndarray]:

@@ -5,10 +5,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from experiments.benchmarks.problems import chung_ooi
-from experiments.benchmarks.problems.chapter import Chapter, Curve, Plot, Row, absolute_row
-from experiments.benchmarks.problems.impact import Course, Impact, Partner
-from experiments.benchmarks.problems.kicks import (
+from experiments.verification.problems import chung_ooi
+from experiments.verification.problems.impact import Course, Impact, Partner
+from experiments.verification.problems.kicks import (
     STEPS,
     friction_speed,
     kicks_of,
@@ -18,7 +17,8 @@ from experiments.benchmarks.problems.kicks import (
     slip_before,
     solved_kicks,
 )
-from experiments.benchmarks.problems.setups import material
+from experiments.verification.problems.setups import material
+from experiments.verification.result import Curve, Plot, Result, Row, absolute_row
 
 ANGLES = np.array([2.0, *np.arange(5.0, 86.0, 5.0)])
 SPINS = np.array([0.1, 0.2, 0.4, 0.6, 0.8, 1.0, 1.3, 1.6, 2.0, 2.5, 3.0, 3.5, 4.0, 4.5, 5.0, 6.0, 7.0, 8.0])
@@ -37,7 +37,7 @@ thousand times as stiff and dense must act as the plane does. References as in t
 linear momentum is kept to rounding. Over the normal speed, the slips of all pairs fall on one curve."""
 
 
-def oblique_impact(device: str) -> Chapter:
+def oblique_impact(device: str) -> Result:
     """Chung and Ooi's test 4: constant speed, angles from 2 to 85 degrees."""
     problem = "Chung and Ooi test 4: oblique impact"
     rows: list[Row] = []
@@ -69,7 +69,7 @@ def oblique_impact(device: str) -> Chapter:
         Plot(f"oblique-{key}", "Test 4", "angle of incidence [deg]", title, tuple(curves[key]))
         for key, title in titles.items()
     )
-    return Chapter("Oblique impact at constant speed", OBLIQUE_TEXT, tuple(rows), plots)
+    return Result("Oblique impact at constant speed", OBLIQUE_TEXT, tuple(rows), plots)
 
 
 def _angle_curves(
@@ -88,7 +88,7 @@ def _angle_curves(
     return [(key, shown[0][k], shown[1][k]) for k, key in enumerate(("restitution", "spin", "rebound"))]
 
 
-def spinning_impact(device: str) -> Chapter:
+def spinning_impact(device: str) -> Result:
     """Chung and Ooi's tests 6 to 8: a spinning sphere on a plane, on its like and on a larger sphere."""
     alloy = chung_ooi.ALUMINIUM_ALLOY
     heavy = material(70e12, 0.33, 2700e3)
@@ -118,7 +118,7 @@ def spinning_impact(device: str) -> Chapter:
         if impacts[0].partner:
             rows += _momentum_rows(problem, case, courses)
     plots = (_recoil_plot(tests, kicks),)
-    return Chapter("Impacts of spinning spheres", SPIN_TEXT, tuple(rows), plots)
+    return Result("Impacts of spinning spheres", SPIN_TEXT, tuple(rows), plots)
 
 
 def _surface_change(course: Course) -> float:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.benchmarks.problems.impact import HERTZ_DURATION
+from experiments.verification.problems.impact import HERTZ_DURATION
 
 STEPS = 4000
 

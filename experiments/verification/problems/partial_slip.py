@@ -9,7 +9,7 @@ it gives their solution.
 
 import numpy as np
 
-from experiments.benchmarks.problems.impact import HERTZ_DURATION
+from experiments.verification.problems.impact import HERTZ_DURATION
 
 SPRINGS = 2000
 STEPS = 4000

@@ -8,16 +8,16 @@ from scipy.spatial.transform import Rotation
 from dem_warp.clumps import ClumpShape
 from dem_warp.model import WorldSetup
 from dem_warp.solver import CHUNK, Solver
-from experiments.benchmarks.problems.chapter import (
-    Chapter,
+from experiments.verification.problems.setups import BUCKWHEAT, CLUMP, bodies, contact, world
+from experiments.verification.result import (
     Curve,
     Plot,
+    Result,
     Row,
     absolute_row,
     detection_row,
     order_row,
 )
-from experiments.benchmarks.problems.setups import BUCKWHEAT, CLUMP, bodies, contact, world
 
 BOOT = ClumpShape.from_spheres(
     1e-3 * np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 1.2, 0.0]]), 1e-3 * np.array([1.0, 0.8, 0.6])
@@ -190,7 +190,7 @@ def _momenta(setup: WorldSetup, solver: Solver) -> tuple[np.ndarray, np.ndarray,
     return linear.sum(axis=0), turning.sum(axis=0), energy
 
 
-def rigid_body(device: str) -> Chapter:
+def rigid_body(device: str) -> Result:
     """Poinsot's invariants, Euler's equations, and momentum in collisions."""
     rows, plot = _top(device)
-    return Chapter("Rigid bodies", TEXT, (*rows, *_orders(device), *_collision_rows(device)), (plot,))
+    return Result("Rigid bodies", TEXT, (*rows, *_orders(device), *_collision_rows(device)), (plot,))

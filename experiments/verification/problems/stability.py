@@ -5,11 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from dem_warp import Case, CaseResult
-from experiments.benchmarks.problems.chapter import Chapter, Curve, Plot, Row, absolute_row
-from experiments.benchmarks.problems.heap_angle import with_numerics
-from experiments.benchmarks.problems.stored import finished_cases, repose_angles
-from experiments.studies.buckwheat.runs import planned_cases
+from experiments.studies.buckwheat.replay.runs import planned_cases
 from experiments.studyfile import Study, load_study
+from experiments.verification.problems.heap_angle import with_numerics
+from experiments.verification.problems.stored import finished_cases, repose_angles
+from experiments.verification.result import Curve, Plot, Result, Row, absolute_row
 
 FRACTIONS = (0.25, 0.5, 1.0)
 """Time steps over the Rayleigh time of the smallest sphere; the first is production's."""
@@ -69,7 +69,7 @@ def _rows(problem: str, results: Sequence[CaseResult]) -> list[Row]:
     ]
 
 
-def stability(device: str) -> Chapter:
+def stability(device: str) -> Result:
     """Each corner of the screening, at three time steps."""
     scale, words = SCALES["cpu" if device == "cpu" else "cuda"]
     study = load_study(scale=scale)
@@ -85,4 +85,4 @@ def stability(device: str) -> Chapter:
         if np.isfinite(angles).any():
             curves.append(Curve(name, 1.0 + np.arange(len(runs)), angles, "points"))
     plot = Plot("stability", "Corners of the screening", "run", "repose angle [deg]", tuple(curves))
-    return Chapter("Stability", TEXT + words, tuple(rows), (plot,))
+    return Result("Stability", TEXT + words, tuple(rows), (plot,))

@@ -17,9 +17,10 @@ from experiments.benchmarks.contacts import count_contacts, placed_centers
 from experiments.benchmarks.grain_cost import bed
 from experiments.benchmarks.heap_throughput import speed_tables
 from experiments.benchmarks.record import record_page
+from experiments.benchmarks.results import parse_counts
 from experiments.benchmarks.roofline import step_traffic
-from experiments.benchmarks.tables import markdown_table, parse_counts
 from experiments.benchmarks.timing import run_in, start, time_steps
+from experiments.report.kit.markdown import markdown_table
 from experiments.studyfile import load_study
 
 DEVICE = "cpu"

@@ -11,11 +11,11 @@ import pandas as pd
 import pytest
 
 from experiments.commands import run
-from experiments.commands.run import Desk, check_runs, replay_paper
+from experiments.commands.run import Desk, check_runs, replay_published
 from experiments.errors import StudyError
 from experiments.studies.buckwheat import paper
-from experiments.studies.buckwheat.replay import ALL, Replay, published_noise
-from experiments.studies.buckwheat.runs import DESIGNS, OPTIMUM, STAGES, planned_cases, published_runs
+from experiments.studies.buckwheat.replay.replay import ALL, Replay, published_noise
+from experiments.studies.buckwheat.replay.runs import DESIGNS, OPTIMUM, STAGES, planned_cases, published_runs
 from experiments.studyfile import Study, load_study
 
 
@@ -167,15 +167,15 @@ def test_each_stage_is_one_batch_and_its_wall_time_is_kept(
 
     monkeypatch.setattr(run, "run_cases", run_cases)
     desk = Desk.open(load_study(scale="bench"), tmp_path / "out")
-    replay = replay_paper(desk, 2)
+    replay = replay_published(desk, 2)
     assert batches == [[stage] for stage in STAGES]
     assert len(replay.cases) == 2 * 34
-    assert desk.walls["stage"].tolist() == ["paper, screening", "paper, climb"]
-    assert desk.walls["simulated"].tolist() == [1, 1]
+    assert desk.wall_times["stage"].tolist() == ["paper, screening", "paper, climb"]
+    assert desk.wall_times["simulated"].tolist() == [1, 1]
 
 
 def test_only_the_papers_study_has_its_runs(small_study: Study) -> None:
-    with pytest.raises(StudyError, match=r"small.toml: only the paper's own study has its runs"):
+    with pytest.raises(StudyError, match=r"small.toml: only a study whose companion has published runs"):
         check_runs(small_study, paper=True)
     check_runs(load_study(scale="bench"), paper=True)
 

@@ -10,9 +10,16 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from experiments.benchmarks.point_record import CASES, STUDY, KeptCases, gather, kept_campaign, write_page
 from experiments.calibrate import Campaign, calibrate
 from experiments.errors import InputError
+from experiments.studies.buckwheat.records.point_record import (
+    CASES,
+    STUDY,
+    KeptCases,
+    gather,
+    kept_campaign,
+    write_record_page,
+)
 from experiments.studyfile import Study, load_study
 
 
@@ -48,7 +55,7 @@ def folder(campaign: Campaign, tmp_path: Path) -> Path:
     (tmp_path / "out" / "tables").mkdir(parents=True)
     campaign.tables()["cases"].to_csv(tmp_path / "out" / "tables" / CASES, index=False)
     (tmp_path / "out" / "results.json").write_text(json.dumps({"provenance": {"device": "cpu"}}))
-    (tmp_path / "out" / "walls.csv").write_text("stage,simulated,seconds\nsurface,28,61.0\n")
+    (tmp_path / "out" / "wall_times.csv").write_text("stage,simulated,seconds\nsurface,28,61.0\n")
     return tmp_path / "out"
 
 
@@ -66,8 +73,8 @@ def test_kept_cases_repeat_the_campaigns_findings_to_the_bit(
 def test_the_page_is_the_same_whenever_it_is_written(folder: Path, tmp_path: Path) -> None:
     record = tmp_path / "record"
     gather("bench", folder, record)
-    first = write_page(record).read_text(encoding="utf-8")
-    assert write_page(record).read_text(encoding="utf-8") == first
+    first = write_record_page(record).read_text(encoding="utf-8")
+    assert write_record_page(record).read_text(encoding="utf-8") == first
     assert "In all 28 cases in 61 s." in first
     assert "| density |" in first
     assert (record / "bench" / "joint.png").stat().st_size > 10_000

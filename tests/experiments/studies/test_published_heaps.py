@@ -9,10 +9,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from experiments.benchmarks.paper_disagreement import PAGE, disagreement_page
-from experiments.benchmarks.paper_record import FOLDER
 from experiments.discover.discovery import Discovery, Verdict
-from experiments.discover.paper_tables import (
+from experiments.discover.settings import Settings
+from experiments.studies.buckwheat import paper
+from experiments.studies.buckwheat.records.disagreement import PAGE, disagreement_page
+from experiments.studies.buckwheat.records.paper_record import FOLDER
+from experiments.studies.buckwheat.records.published_heaps import (
     CENTRE,
     READING,
     base_q,
@@ -23,11 +25,9 @@ from experiments.discover.paper_tables import (
     published_settings,
     tables_emulator,
 )
-from experiments.discover.settings import Settings
-from experiments.studies.buckwheat import paper
-from experiments.studies.buckwheat.replay import Replay
-from experiments.studies.buckwheat.runs import DESIGNS, planned_cases
-from experiments.studies.buckwheat.sensitivities import Sensitivities
+from experiments.studies.buckwheat.replay.replay import Replay
+from experiments.studies.buckwheat.replay.runs import DESIGNS, planned_cases
+from experiments.studies.buckwheat.sensitivity.sensitivities import Sensitivities
 
 NOISE = 0.6
 """Seed noise of a made-up heap [deg], as simulated ones have it."""

@@ -15,10 +15,11 @@ from dem_warp import Case, CaseResult
 from dem_warp.clumps import ClumpShape
 from experiments.cases import Store, execute
 from experiments.errors import InputError, StoreError
-from experiments.studies.buckwheat import clumps, sensitivities
-from experiments.studies.buckwheat.replay import Replay
-from experiments.studies.buckwheat.sensitivities import Sensitivities
-from experiments.studies.buckwheat.variants import BASE, chosen_variants, variants
+from experiments.studies.buckwheat import clumps
+from experiments.studies.buckwheat.replay.replay import Replay
+from experiments.studies.buckwheat.sensitivity import __main__ as sensitivities
+from experiments.studies.buckwheat.sensitivity.sensitivities import Sensitivities
+from experiments.studies.buckwheat.sensitivity.variants import BASE, chosen_variants, variants
 from experiments.studyfile import Study
 
 FREE = {"base", "fit-middle", "fit-lower", "fit-upper", "two-views"}

@@ -8,13 +8,13 @@ import pytest
 
 from dem_warp import simulate
 from dem_warp.walls import Mesh
-from experiments.benchmarks.problems import stored
-from experiments.benchmarks.problems.beverloo import EXPONENT, Flow, exponent, hopper_case, rate_constant
-from experiments.benchmarks.problems.heap_angle import KINDS, SEGMENTS, shift, shift_rows, with_numerics
-from experiments.benchmarks.problems.janssen import FRICTION, WALL_FRICTION, Loads, column, draw
-from experiments.benchmarks.problems.stability import corners, ended_in_order, outcome
 from experiments.cases import Store
 from experiments.studyfile import load_study
+from experiments.verification.problems import stored
+from experiments.verification.problems.beverloo import EXPONENT, Flow, exponent, hopper_case, rate_constant
+from experiments.verification.problems.heap_angle import KINDS, SEGMENTS, shift, shift_rows, with_numerics
+from experiments.verification.problems.janssen import FRICTION, WALL_FRICTION, Loads, column, draw
+from experiments.verification.problems.stability import corners, ended_in_order, outcome
 
 # ---- Janssen ---------------------------------------------------------------------------------------------
 

@@ -11,24 +11,24 @@ import typer
 
 from dem_warp.clumps import ClumpShape
 from dem_warp.laws.micro_slip import MicroSlip
-from experiments.benchmarks import verification
-from experiments.benchmarks.problems import chung_ooi
-from experiments.benchmarks.problems.chapter import (
-    Chapter,
+from experiments.verification import __main__ as verification
+from experiments.verification.problems import chung_ooi
+from experiments.verification.problems.contact_ode import solve_impact
+from experiments.verification.problems.energy import column, unaccounted, watched
+from experiments.verification.problems.energy_account import EnergyAccount
+from experiments.verification.problems.impact import Impact, Partner, simulate_impacts
+from experiments.verification.problems.one_spring import BASE, one_spring_rebound
+from experiments.verification.problems.partial_slip import rebound_slip
+from experiments.verification.problems.setups import CLUMP
+from experiments.verification.result import (
     Curve,
     Plot,
+    Result,
     Row,
     absolute_row,
     order_row,
     relative_row,
 )
-from experiments.benchmarks.problems.contact_ode import solve_impact
-from experiments.benchmarks.problems.energy import column, unaccounted, watched
-from experiments.benchmarks.problems.energy_account import EnergyAccount
-from experiments.benchmarks.problems.impact import Impact, Partner, simulate_impacts
-from experiments.benchmarks.problems.one_spring import BASE, one_spring_rebound
-from experiments.benchmarks.problems.partial_slip import rebound_slip
-from experiments.benchmarks.problems.setups import CLUMP
 
 LABELS = ("problem", "case", "quantity", "reference")
 
@@ -158,14 +158,14 @@ def test_an_order_is_the_slope_of_the_errors():
     assert not order_row("problem", "case", "order", steps, 3.0 / steps, 2.0, 1.9).passed
 
 
-def _chapter(error: float) -> Chapter:
+def _result(error: float) -> Result:
     plot = Plot("curve", "A curve", "x", "y", (Curve("line", np.arange(3.0), np.arange(3.0)),))
     row = Row("A problem", "a case", "speed [m/s]", "a closed form", 1.0, 1.0 + error, error, 0.1)
-    return Chapter("A chapter", "Words.", (row,), (plot,))
+    return Result("A chapter", "Words.", (row,), (plot,))
 
 
 def test_the_page_holds_rows_plots_and_their_data(tmp_path: Path, monkeypatch):
-    monkeypatch.setattr(verification, "PROBLEMS", {"one": lambda device: _chapter(0.01)})
+    monkeypatch.setattr(verification, "PROBLEMS", {"one": lambda device: _result(0.01)})
     verification.main(out=tmp_path)
     page = (tmp_path / "README.md").read_text(encoding="utf-8")
     assert "| a case | speed [m/s] | a closed form | 1 | 1.01 | 1 % | 10 % | pass |" in page
@@ -179,10 +179,10 @@ def test_the_page_holds_rows_plots_and_their_data(tmp_path: Path, monkeypatch):
 
 
 def test_a_page_keeps_the_chapters_that_ran_elsewhere(tmp_path: Path, monkeypatch):
-    def second(device: str) -> Chapter:
-        return replace(_chapter(0.02), title="A heavy chapter", plots=())
+    def second(device: str) -> Result:
+        return replace(_result(0.02), title="A heavy chapter", plots=())
 
-    problems = {"one": lambda device: _chapter(0.01), "stability": second}
+    problems = {"one": lambda device: _result(0.01), "stability": second}
     monkeypatch.setattr(verification, "PROBLEMS", problems)
     verification.main(only=["stability"], out=tmp_path)
     page = tmp_path / "README.md"
@@ -200,7 +200,7 @@ def test_a_page_keeps_the_chapters_that_ran_elsewhere(tmp_path: Path, monkeypatc
 
 
 def test_a_failing_row_ends_the_command_with_1(tmp_path: Path, monkeypatch):
-    monkeypatch.setattr(verification, "PROBLEMS", {"one": lambda device: _chapter(0.2)})
+    monkeypatch.setattr(verification, "PROBLEMS", {"one": lambda device: _result(0.2)})
     with pytest.raises(typer.Exit) as ending:
         verification.main(out=tmp_path)
     assert ending.value.exit_code == 1

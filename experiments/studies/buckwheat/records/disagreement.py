@@ -1,6 +1,6 @@
-"""What the search for a missing effect says of the paper's own data: its tables, and its one measured angle.
+"""The search for a missing effect on the paper's own data: its tables, and its one measured angle.
 
-    python -m experiments.benchmarks.paper_disagreement
+    python -m experiments.studies.buckwheat.records.disagreement
 
 Reads the record of the paper's runs in ``experiments/studies/buckwheat/record`` and writes there
 ``disagreement.md`` and ``disagreement.json``. The analysis is that of ``dem-warp discover``, with its default
@@ -18,10 +18,16 @@ import numpy as np
 import pandas as pd
 import typer
 
-from experiments.benchmarks.paper_record import FOLDER
 from experiments.discover.discovery import Candidate, Discovery, Fit, Interval
 from experiments.discover.emulator import Emulator
-from experiments.discover.paper_tables import (
+from experiments.discover.settings import Settings
+from experiments.files import write_text
+from experiments.report.kit.markdown import markdown_page, markdown_table
+from experiments.report.kit.numbers import fixed, interval
+from experiments.report.kit.table import Column, make_table
+from experiments.studies.buckwheat.records.paper_page import Record
+from experiments.studies.buckwheat.records.paper_record import FOLDER
+from experiments.studies.buckwheat.records.published_heaps import (
     base_q,
     concluded,
     physical_emulator,
@@ -29,21 +35,15 @@ from experiments.discover.paper_tables import (
     published_heaps,
     tables_emulator,
 )
-from experiments.discover.settings import Settings
-from experiments.files import write_text
-from experiments.report.markdown import markdown_table
-from experiments.report.numbers import fixed, interval
-from experiments.report.record import Record
-from experiments.report.tables import Column, make_table
-from experiments.studies.buckwheat.variants import variants
+from experiments.studies.buckwheat.sensitivity.variants import variants
 
 PAGE, RESULTS = "disagreement.md", "disagreement.json"
 
 _INTRODUCTION = """\
 # The paper's data, asked what the model lacks
 
-Made by `python -m experiments.benchmarks.paper_disagreement` from the runs beside this page, with the
-analysis of `dem-warp discover` and its default rules (SHA-256 `{rules}`). Nothing was simulated for it.
+Made by `python -m experiments.studies.buckwheat.records.disagreement` from the runs beside this page, with
+the analysis of `dem-warp discover` and its default rules (SHA-256 `{rules}`). Nothing was simulated for it.
 
 ## EDEM's angles as reality
 
@@ -80,9 +80,7 @@ def disagreement_page(tables: Discovery, physical: Discovery, emulator: Emulator
         rules=tables.effort.settings_sha256, library=library, heaps=tables.effort.bank_cases
     )
     parts = [head, _verdict(tables), *_fits(tables), *_candidates(tables.candidates, emulator, settings)]
-    parts += _power(tables)
-    parts += [_PHYSICAL, _verdict(physical)]
-    return "\n".join(part.rstrip() + "\n" for part in parts)
+    return markdown_page(*parts, *_power(tables), _PHYSICAL, _verdict(physical))
 
 
 def _verdict(found: Discovery) -> str:
@@ -175,7 +173,7 @@ def _candidates(candidates: Sequence[Candidate], emulator: Emulator, settings: S
 
 
 def _power(found: Discovery) -> list[str]:
-    """What the tables could have shown."""
+    """Smallest effects that the tables could have shown."""
     if not found.power:
         return []
     rows = [

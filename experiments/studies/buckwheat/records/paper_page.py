@@ -16,16 +16,16 @@ from doe.plots import agreement_plot
 from experiments.calibrate.export import jsonable
 from experiments.calibrate.results import Campaign
 from experiments.files import replacing, write_text
-from experiments.report.markdown import markdown_table
+from experiments.report.kit.figure import save_figure
+from experiments.report.kit.markdown import facts_list, markdown_page, markdown_table, wall_times_table
+from experiments.report.kit.table import Column, Table, make_table
 from experiments.report.material_card import CARD
-from experiments.report.numbers import fixed, plain
 from experiments.report.pictures import heap_row
-from experiments.report.replay_tables import ranking_sentence, replay_tables
-from experiments.report.sensitivity_tables import sensitivity_tables
-from experiments.report.tables import Column, Table, make_table
-from experiments.studies.buckwheat.replay import RUN, Replay
-from experiments.studies.buckwheat.runs import DESIGNS, STAGES
-from experiments.studies.buckwheat.sensitivities import Sensitivities
+from experiments.studies.buckwheat.replay.replay import RUN, Replay
+from experiments.studies.buckwheat.replay.replay_tables import ranking_sentence, replay_tables
+from experiments.studies.buckwheat.replay.runs import DESIGNS, STAGES
+from experiments.studies.buckwheat.sensitivity.sensitivities import Sensitivities
+from experiments.studies.buckwheat.sensitivity.sensitivity_tables import sensitivity_tables
 from experiments.studyfile import Study
 from imaging import save_picture
 
@@ -40,7 +40,7 @@ SHOWN = {"Screening 3": ("screening", 3), "Screening 12": ("screening", 12), "Op
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """What a record's page is made from."""
+    """Everything that a record's page is made from."""
 
     replay: Replay
     """The paper's runs at full scale."""
@@ -49,12 +49,12 @@ class Record:
     campaign: Mapping[str, Any] | None = None
     """A campaign of our own beside it: outcome, reason, effects of its screening."""
     card: bool = False
-    """Whether there is a card of the material that it chose."""
+    """There is a card of the material that it chose."""
     scales: Mapping[str, Replay] = field(default_factory=dict)
     """The same runs at smaller scales, by name."""
     sensitivities: Sensitivities | None = None
     picture: bool = False
-    """Whether there is a picture of heaps."""
+    """There is a picture of heaps."""
     notes: str = ""
     """What a person makes of the numbers, Markdown."""
 
@@ -106,7 +106,7 @@ def write_record(
     write_text(folder / PROVENANCE, _json(provenance))
     if campaign is not None:
         write_text(folder / CAMPAIGN, _json(campaign_facts(campaign)))
-    return write_page(folder)
+    return write_record_page(folder)
 
 
 def draw_heaps(folder: Path, study: Study, replay: Replay, load: Callable[[str], CaseResult]) -> None:
@@ -138,20 +138,19 @@ def draw_heaps(folder: Path, study: Study, replay: Replay, load: Callable[[str],
         save_picture(temporary, heap_row(study, shown))
 
 
-def write_page(folder: Path) -> Path:
+def write_record_page(folder: Path) -> Path:
     """Write the page of a record, and its plot, anew from the tables beside it."""
     record = Record.read(folder)
     runs = record.replay.runs[lambda runs: runs["stage"].isin(DESIGNS) & runs["angle"].notna()]
     groups = [STAGES[stage].partition(",")[0] for stage in runs["stage"]]
     figure = agreement_plot(record.replay.agreement(), groups, "simulated angle [°]", "published angle [°]")
-    with replacing(folder / SCATTER) as temporary:
-        figure.savefig(temporary, dpi=130)
+    save_figure(figure, folder / SCATTER, dpi=130)
     write_text(folder / PAGE, record_page(record))
     return folder / PAGE
 
 
 def campaign_facts(campaign: Campaign) -> dict[str, Any]:
-    """What a record keeps of a campaign."""
+    """Keep of a campaign what a record shows: outcome, reason, effects of its screening."""
     facts: dict[str, Any] = {"outcome": campaign.outcome.value, "reason": campaign.reason}
     if campaign.screening is not None:
         effects = campaign.screening.screen.table[["effect", "p", "rank"]]
@@ -169,11 +168,13 @@ def campaign_effects(campaign: Mapping[str, Any] | None) -> pd.DataFrame | None:
 def record_page(record: Record) -> str:
     """Write the page as Markdown."""
     tables = replay_tables(record.replay, campaign_effects(record.campaign))
-    parts = [
+    return markdown_page(
         "# The paper's runs, simulated again",
         "Every run of Tables 3, 5 and 6 of the paper and its verification, beside the published angles. This "
-        "page is made from the files beside it: `python -m experiments.benchmarks.paper_record --help`.",
-        *_provenance(record.provenance),
+        "page is made from the files beside it: "
+        "`python -m experiments.studies.buckwheat.records.paper_record --help`.",
+        facts_list(record.provenance),
+        wall_times_table(record.provenance, "heaps"),
         "## Agreement",
         markdown_table(tables["agreement"]),
         f"![Simulated against published angles]({SCATTER})",
@@ -190,27 +191,12 @@ def record_page(record: Record) -> str:
         "## Every run",
         markdown_table(tables["runs"]),
         f"Every heap, with its seed, stands in [{RUNS}]({RUNS}).",
-    ]
-    return "\n\n".join(text for part in parts if (text := part.strip())) + "\n"
+    )
 
 
 def _section(title: str, tables: Mapping[str, Table], *names: str) -> list[str]:
     found = [markdown_table(tables[name]) for name in names if name in tables]
     return [f"## {title}", *found] if found else []
-
-
-def _provenance(provenance: Mapping[str, Any]) -> list[str]:
-    rows = [f"- {name}: {plain(value)}" for name, value in provenance.items() if name != "walls"]
-    walls = pd.DataFrame(provenance.get("walls", []))
-    if walls.empty:
-        return ["\n".join(rows)]
-    columns = [
-        Column("stage", "batch"),
-        Column("simulated", "heaps simulated", "label"),
-        Column("seconds", "wall time", "count", "s"),
-    ]
-    total = f"In all {fixed(walls['simulated'].sum(), 0)} heaps in {fixed(walls['seconds'].sum(), 0)} s."
-    return ["\n".join(rows), markdown_table(make_table("walls", walls, columns, "Wall times.", total))]
 
 
 def _picture(record: Record) -> list[str]:

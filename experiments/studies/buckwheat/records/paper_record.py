@@ -1,10 +1,10 @@
 """The record of the paper's runs: gathered from the folders that made it, its page written anew.
 
     dem-warp calibrate --scale paper --follow-paper --out out/paper
-    python -m experiments.studies.buckwheat.sensitivities --modulus-scale 10 --out out/sensitivities
+    python -m experiments.studies.buckwheat.sensitivity --modulus-scale 10 --out out/sensitivities
     dem-warp calibrate --scale bench --only-paper --out out/bench
-    python -m experiments.benchmarks.paper_record --paper out/paper --smaller bench=out/bench \\
-        --sensitivities out/sensitivities
+    python -m experiments.studies.buckwheat.records.paper_record --paper out/paper \\
+        --smaller bench=out/bench --sensitivities out/sensitivities
 
 Without a folder it writes the page again from the tables of the record. The record lies in
 ``experiments/studies/buckwheat/record``.
@@ -23,10 +23,17 @@ from experiments.commands.run import RECORD
 from experiments.errors import InputError
 from experiments.files import replacing, write_text
 from experiments.report.material_card import CARD
-from experiments.report.record import CAMPAIGN, HEAPS, PROVENANCE, RUNS, SENSITIVITIES, write_page
 from experiments.studies.buckwheat import paper
-from experiments.studies.buckwheat.sensitivities import SETTINGS
-from experiments.studies.buckwheat.variants import variants
+from experiments.studies.buckwheat.records.paper_page import (
+    CAMPAIGN,
+    HEAPS,
+    PROVENANCE,
+    RUNS,
+    SENSITIVITIES,
+    write_record_page,
+)
+from experiments.studies.buckwheat.sensitivity.sensitivities import SETTINGS
+from experiments.studies.buckwheat.sensitivity.variants import variants
 
 FOLDER = Path(paper.__file__).with_name(RECORD)
 
@@ -97,7 +104,7 @@ def main(
         gather_scale(name, Path(source), out)
     if sensitivities:
         gather_sensitivities(sensitivities, out)
-    print(write_page(out))
+    print(write_record_page(out))
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """The record of what further responses buy: gathered from campaigns' folders, its page written anew.
 
     dem-warp calibrate experiments/studies/buckwheat/curve_to_point.toml --scale paper --out out/point
-    python -m experiments.benchmarks.point_record --from paper=out/point
+    python -m experiments.studies.buckwheat.records.point_record --from paper=out/point
 
 Without a folder it writes the page again from the cases of the record, which lies in
 ``experiments/studies/buckwheat/point``: the campaign's statistics are repeated on them.
@@ -12,7 +12,7 @@ from __future__ import annotations
 import json
 import shutil
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 import pandas as pd
@@ -20,13 +20,19 @@ import typer
 
 from doe.joint_plots import joint_plot
 from experiments.calibrate import Campaign, calibrate
-from experiments.commands.run import WALLS
+from experiments.commands.run import WALL_TIMES_FILE
 from experiments.errors import InputError
 from experiments.files import replacing, write_text
-from experiments.report.markdown import markdown_table
-from experiments.report.numbers import fixed, plain, prose
+from experiments.report.kit.figure import save_figure
+from experiments.report.kit.markdown import (
+    WALL_TIMES,
+    facts_list,
+    markdown_table,
+    wall_times_table,
+    write_page,
+)
+from experiments.report.kit.numbers import prose
 from experiments.report.response_tables import response_tables
-from experiments.report.tables import Column, Table, make_table
 from experiments.studies.buckwheat import paper
 from experiments.studyfile import Study, load_study
 
@@ -94,34 +100,33 @@ def gather(scale: str, source: Path, record: Path, commit: str | None = None) ->
         When the folder holds no finished campaign.
     """
     cases, results = source / "tables" / CASES, source / "results.json"
-    for path in (cases, results, source / WALLS):
+    for path in (cases, results, source / WALL_TIMES_FILE):
         if not path.is_file():
             raise InputError("a folder to gather from must hold a campaign", "no such file", str(path))
     with replacing(record / scale / CASES) as temporary:
         shutil.copyfile(cases, temporary)
     made_by = json.loads(results.read_text(encoding="utf-8"))["provenance"]
     facts = made_by | ({"commit": commit} if commit else {})
-    facts["walls"] = pd.read_csv(source / WALLS).to_dict("records")
+    facts[WALL_TIMES] = pd.read_csv(source / WALL_TIMES_FILE).to_dict("records")
     write_text(record / scale / PROVENANCE, json.dumps(facts, indent=1) + "\n")
 
 
-def write_page(record: Path = FOLDER, study_file: Path = STUDY) -> Path:
+def write_record_page(record: Path = FOLDER, study_file: Path = STUDY) -> Path:
     """Write the page, and a picture for every scale that was gathered."""
     parts = [
         "# From a curve to a point",
         "One repose angle leaves a curve of frictions. Here the density of the filled tube and the flow out "
         "of a hopper stand beside it, in a twin experiment: all three come from simulations with hidden "
         f"frictions. The study is [{study_file.name}](../{study_file.name}); this page is made from the "
-        "cases beside it by `python -m experiments.benchmarks.point_record`.",
+        "cases beside it by `python -m experiments.studies.buckwheat.records.point_record`.",
     ]
     for folder in sorted(path.parent for path in record.glob(f"*/{CASES}")):
         study = load_study(study_file, folder.name)
         campaign = kept_campaign(study, folder)
         facts = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))
         parts += [f"## Scale: {folder.name}", study.note, *_findings(campaign, study, folder)]
-        parts += [_made_by(facts), markdown_table(_walls(facts["walls"]))]
-    write_text(record / PAGE, "\n\n".join(part.strip() for part in parts) + "\n")
-    return record / PAGE
+        parts += [facts_list(facts), wall_times_table(facts, "cases")]
+    return write_page(record / PAGE, *parts)
 
 
 def kept_campaign(study: Study, folder: Path) -> Campaign:
@@ -130,7 +135,7 @@ def kept_campaign(study: Study, folder: Path) -> Campaign:
 
 
 def _findings(campaign: Campaign, study: Study, folder: Path) -> list[str]:
-    """What was found; where the campaign ended early, why."""
+    """Findings of a campaign; where it ended early, why."""
     outcome = f"Outcome: {campaign.outcome}. {campaign.reason}"
     if campaign.optimum is None or campaign.optimum.joint is None:
         return [prose(outcome)]
@@ -138,8 +143,7 @@ def _findings(campaign: Campaign, study: Study, folder: Path) -> list[str]:
     decisions = [decision.outcome for decision in optimum.decisions if "Chosen" not in decision.outcome]
     picture, hidden = [], campaign.target.truth if campaign.target else None
     if len(joint.factors) > 1:
-        with replacing(folder / "joint.png") as temporary:
-            joint_plot(joint, hidden).savefig(temporary, dpi=130)
+        save_figure(joint_plot(joint, hidden), folder / "joint.png", dpi=130)
         picture = [
             f"![Where each response agrees, and where all do]({folder.name}/joint.png)",
             "Each panel is a cut through the point of the smallest chi². The hidden truth may lie in the "
@@ -154,21 +158,6 @@ def _findings(campaign: Campaign, study: Study, folder: Path) -> list[str]:
     ]
 
 
-def _made_by(facts: dict[str, Any]) -> str:
-    return "\n".join(f"- {name}: {plain(value)}" for name, value in facts.items() if name != "walls")
-
-
-def _walls(rows: list[dict[str, Any]]) -> Table:
-    walls = pd.DataFrame(rows)
-    columns = [
-        Column("stage", "batch"),
-        Column("simulated", "cases simulated", "label"),
-        Column("seconds", "wall time", "count", "s"),
-    ]
-    total = f"In all {fixed(walls['simulated'].sum(), 0)} cases in {fixed(walls['seconds'].sum(), 0)} s."
-    return make_table("walls", walls, columns, "Wall times.", total)
-
-
 def main(
     sources: Annotated[
         list[str] | None, typer.Option("--from", metavar="SCALE=FOLDER", help="Folder of a campaign.")
@@ -180,7 +169,7 @@ def main(
     for text in sources or []:
         scale, _, source = text.partition("=")
         gather(scale, Path(source), out, commit)
-    print(write_page(out))
+    print(write_record_page(out))
 
 
 if __name__ == "__main__":

@@ -28,10 +28,10 @@ from experiments.discover.simulator import Outcomes, Point
 from experiments.discover.space import MechanismRange, SearchSpace
 from experiments.discover.surfaces import Addition, Polynomial, Surfaces, added, cubic
 from experiments.studies.buckwheat import paper
-from experiments.studies.buckwheat.replay import Replay
-from experiments.studies.buckwheat.runs import DESIGNS, published_runs
-from experiments.studies.buckwheat.sensitivities import Sensitivities
-from experiments.studies.buckwheat.variants import BASE, variants
+from experiments.studies.buckwheat.replay.replay import Replay
+from experiments.studies.buckwheat.replay.runs import DESIGNS, published_runs
+from experiments.studies.buckwheat.sensitivity.sensitivities import Sensitivities
+from experiments.studies.buckwheat.sensitivity.variants import BASE, variants
 
 OBSERVABLE = "flank_angle"
 

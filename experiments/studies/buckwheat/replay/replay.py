@@ -25,7 +25,7 @@ from doe import (
     screen,
 )
 from experiments.studies.buckwheat import paper
-from experiments.studies.buckwheat.runs import (
+from experiments.studies.buckwheat.replay.runs import (
     DESIGNS,
     STAGES,
     published_runs,

@@ -1,4 +1,4 @@
-"""Tables of the paper's runs simulated again, beside the published angles and their analysis."""
+"""Tables and chart of the paper's runs simulated again, beside the published angles and their analysis."""
 
 from __future__ import annotations
 
@@ -6,10 +6,12 @@ from collections.abc import Mapping
 
 import pandas as pd
 
-from experiments.report.numbers import fixed, interval, p_value, term
-from experiments.report.tables import Column, Table, make_table
-from experiments.studies.buckwheat.replay import COURSE, Replay, published_noise
-from experiments.studies.buckwheat.runs import STAGES
+from doe.palette import BLUE, GREEN, MUTED, PURPLE, VERMILION
+from experiments.report.kit.chart import Chart, add_line, add_points, new_figure
+from experiments.report.kit.numbers import fixed, interval, p_value, term
+from experiments.report.kit.table import Column, Table, make_table
+from experiments.studies.buckwheat.replay.replay import COURSE, Replay, published_noise
+from experiments.studies.buckwheat.replay.runs import STAGES
 
 STRAY = 5.0
 """A run is marked when its angle strays from the published one by more than this [deg]."""
@@ -239,3 +241,25 @@ def ranking_sentence(replay: Replay) -> str:
 def _against(p: float) -> str:
     text = p_value(p)
     return text if text.startswith("<") else f"= {text}"
+
+
+def replay_chart(replay: Replay) -> Chart:
+    """Draw the angles of the paper's runs, simulated again, against the published ones."""
+    runs = replay.runs.dropna(subset=["angle"])
+    figure = new_figure("published angle [°]", "simulated again [°]")
+    ends = [float(runs[["published", "angle"]].min().min()), float(runs[["published", "angle"]].max().max())]
+    add_line(figure, ends, ends, "equal", MUTED, "dot")
+    colors = dict(zip(STAGES, (BLUE, VERMILION, GREEN, PURPLE), strict=True))
+    for stage, points in runs.groupby("stage", sort=False):
+        spread = {"type": "data", "array": points["sd"].fillna(0.0).to_list(), "thickness": 1}
+        add_points(
+            figure,
+            points["published"],
+            points["angle"],
+            STAGES[str(stage)].partition(",")[0],
+            colors[str(stage)],
+            error_y=spread,
+            text=[f"run {run}" for run in points["run"]],
+        )
+    caption = "Mean angle of each run against the published one; bars: ± 1 sd over its heaps."
+    return Chart("replay-chart", caption, figure, height="tall")

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from experiments.report.numbers import fixed
-from experiments.report.tables import Column, Table, make_table
-from experiments.studies.buckwheat.runs import DESIGNS, STAGES
-from experiments.studies.buckwheat.sensitivities import Sensitivities
-from experiments.studies.buckwheat.variants import variants
+from experiments.report.kit.numbers import fixed
+from experiments.report.kit.table import Column, Table, make_table
+from experiments.studies.buckwheat.replay.runs import DESIGNS, STAGES
+from experiments.studies.buckwheat.sensitivity.sensitivities import Sensitivities
+from experiments.studies.buckwheat.sensitivity.variants import variants
 
 NOT_RUN, TOO_FEW = "not run", "too few angles"
 

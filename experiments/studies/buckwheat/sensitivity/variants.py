@@ -12,7 +12,7 @@ import pandas as pd
 from pydantic import Field
 
 from experiments.errors import InputError
-from experiments.studies.buckwheat.runs import DESIGNS, planned_cases
+from experiments.studies.buckwheat.replay.runs import DESIGNS, planned_cases
 from experiments.studyfile import Study, load_study
 from experiments.studyfile.factor_section import merge
 from experiments.studyfile.places import Places
