@@ -24,6 +24,7 @@ from experiments.benchmarks.peers.library import PEERS, PeerName
 from experiments.benchmarks.peers.peer import PeerRun, Plan
 from experiments.benchmarks.roofline import world_contacts
 from experiments.benchmarks.timing import start
+from experiments.export.lammps import TSUJI
 
 PLAN = Plan((1e-4, 2e-4), run_in=700, steps=300, stretches=2)
 MODULUS = 2.0 * 34.325e6 / 400.0 * 1.29  # E = 2 G (1 + v), softened
@@ -238,7 +239,7 @@ def test_lammps_gets_the_case_in_its_own_terms(
         assert spring == pytest.approx(8.0 * shear * share, rel=1e-5)
         assert slip == friction
         assert float(words[13]) == 0.055
-        coefficient = np.polyval(lammps.TSUJI, tsuji)
+        coefficient = np.polyval(TSUJI, tsuji)
         # the normal damping gives the restitution, to the digits of its closed form's fit
         assert rebound(lambda x, c=coefficient: c * x**0.25) == pytest.approx(restitution, abs=2e-3)
         # both dampings are one part of the critical one, of a spring 8 G* a and of one 2 E* a
@@ -269,10 +270,12 @@ def test_yade_gets_the_case_in_its_own_terms(small_columns: Columns, column: Mom
         [MODULUS, 2.0 * 70e9 * 1.3]
     )
     assert [material["poisson"] for material in given["materials"]] == [0.29, 0.30]
-    assert np.tan(given["friction_angles"]) == pytest.approx([0.46, 0.38])
-    for ratio, restitution in zip(given["damping_ratios"], RESTITUTIONS, strict=True):
+    contacts = given["contacts"]
+    assert np.tan([contact["frictAngle"] for contact in contacts]) == pytest.approx([0.46, 0.38])
+    for contact, restitution in zip(contacts, RESTITUTIONS, strict=True):
         # of critical damping 2 sqrt(S m) with the slope S of the spring
-        damped = rebound(lambda x, ratio=ratio: 2 * ratio * np.sqrt(1.5 * np.sqrt(x)))
+        assert contact["betas"] == contact["betan"]
+        damped = rebound(lambda x, ratio=contact["betan"]: 2 * ratio * np.sqrt(1.5 * np.sqrt(x)))
         assert damped == pytest.approx(restitution, abs=2e-3)
     compile((tmp_path / "column.py").read_text(), "column.py", "exec")
 
