@@ -144,6 +144,9 @@ def test_a_variant_is_one_batch_and_is_not_run_twice(
     assert read is not None
     assert set(read.replays) == {"base", "fit-middle", "fill-slow"}
     assert read.shifts["shift"][["fill-slow", "fit-middle"]].tolist() == pytest.approx([0.0, -2.0])
+    # What was not run has no rows in any table.
+    printed = capsys.readouterr().out
+    assert [name for name in variants() if f"\n{name} " in printed] == ["base", "fit-middle", "fill-slow"]
     sensitivities.main(["fill-slow", "base"], "bench", None, 1, None, tmp_path)
     assert batches == [31, 31]
     assert "fit-middle" in capsys.readouterr().out

@@ -99,7 +99,7 @@ def main(
         print(f"nothing to compare yet: the variant {BASE} is missing, or gave too few angles")
         return
     for table in (
-        found.shifts.drop(columns=["group", "title"]).dropna(how="all"),
+        found.shifts.drop(columns=["group", "title", "candidate"]).dropna(how="all"),
         found.effects,
         found.left_out,
     ):
