@@ -113,13 +113,13 @@ def calibrate(
             workers=workers,
             engine=engine,
             resume=resume,
-            paper_replicates=paper_replicates if follow_paper or only_paper else 0,
+            published_replicates=paper_replicates if follow_paper or only_paper else 0,
             campaign=not only_paper,
             watch=CaseProgress,
             on_stage=_show_stage,
         )
     if ended.record is not None:
-        messages.print(f"The paper's runs: {ended.record}")
+        messages.print(f"Published runs: {ended.record}")
     if as_json:
         typer.echo(json.dumps(ended.to_dict(), allow_nan=False))
     if (campaign := ended.campaign) is None:

@@ -208,6 +208,13 @@ def test_an_import_loads_no_more_than_it_needs(module: str, unwanted: set[str]) 
     assert unwanted & set(loaded) == set()
 
 
+def test_no_generic_room_knows_a_study() -> None:
+    named = re.compile(r"studies\.(buckwheat|trial)")
+    evidence = ("experiments/studies/", "experiments/verification/", "experiments/benchmarks/")
+    rooms = [s for s in sources("experiments") if not s.name.startswith(evidence)]
+    assert [s.name for s in rooms if named.search(s.path.read_text(encoding="utf-8"))] == []
+
+
 def test_package_files_only_hand_names_on() -> None:
     def hands_on(node: ast.stmt) -> bool:
         docstring = isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)

@@ -24,6 +24,7 @@ from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.search import Search, drive
 from experiments.discover.simulator import Outcomes, Point
 from experiments.report import HeapPicture
+from experiments.report.companion import companion_of
 from experiments.report.discovery import Terms, write_discovery
 from experiments.report.discovery.pictures import photograph, simulated_heaps
 from experiments.studyfile import Study
@@ -98,7 +99,7 @@ class _Watched:
             search.study, search.library, table, job.device, job.workers, progress=self._report
         )
         self.title = "library waves"
-        self.walls: list[dict[str, Any]] = []
+        self.waves: list[dict[str, Any]] = []
         self._watch = watch
         self._listener: Callable[[Progress], None] | None = None
 
@@ -114,7 +115,7 @@ class _Watched:
         with self._watch(self.title) as self._listener:
             outcomes = self.engine(points)
         seconds, simulated = time.perf_counter() - started, len(self.engine.table) - before
-        self.walls.append({"wave": self.title, "simulated": simulated, "seconds": round(seconds, 1)})
+        self.waves.append({"wave": self.title, "simulated": simulated, "seconds": round(seconds, 1)})
         return outcomes
 
     def _report(self, progress: Progress) -> None:
@@ -143,7 +144,7 @@ def run_search(job: Job, resume: bool = False, watch: Watch = lambda title: null
     """
     if not resume:
         require_unused(job.folder, "; --resume goes on in it")
-    search = Search.of(job.study)
+    companion, search = companion_of(job.study), Search.of(job.study)
     terms = Terms.of(search.library, OBSERVABLES, job.study.factor_sections)
     bank = _known_bank(job, search)
     measured = _measured(job)
@@ -161,10 +162,18 @@ def run_search(job: Job, resume: bool = False, watch: Watch = lambda title: null
             return SearchResult(None, terms, job.folder / BANK)
         simulator.title, started = "fresh runs", time.perf_counter()
         found = drive(search.analysis(measured, bank, job.seed), simulator)
-        walls = [*simulator.walls, {"wave": "analysis, its waves included", "seconds": _since(started)}]
+        waves = [*simulator.waves, {"wave": "analysis, its waves included", "seconds": _since(started)}]
         pictures = heaps_side_by_side(simulator.engine, found, terms, measured, job)
+    further = companion.discovery_chapters(found, terms, job.measured) if job.measured else ()
     page = write_discovery(
-        found, job.study, terms, search.settings, job.folder, pictures, _provenance(job, bank, walls)
+        found,
+        job.study,
+        terms,
+        search.settings,
+        job.folder,
+        pictures,
+        _provenance(job, bank, waves),
+        further,
     )
     return SearchResult(found, terms, page)
 
@@ -211,7 +220,7 @@ def _point(fit: Fit, condition: str, seed: int) -> Point:
     return Point(fit.theta, tuple(sorted(sizes)), condition, seed)
 
 
-def _provenance(job: Job, bank: Bank, walls: Sequence[dict[str, Any]]) -> dict[str, Any]:
+def _provenance(job: Job, bank: Bank, waves: Sequence[dict[str, Any]]) -> dict[str, Any]:
     return {
         "device": job.device,
         "workers": job.workers,
@@ -220,7 +229,7 @@ def _provenance(job: Job, bank: Bank, walls: Sequence[dict[str, Any]]) -> dict[s
         "bank": asdict(bank.maker) if bank.maker else None,
         "photographs only": job.photographs_only,
         "data": job.measured.name if job.measured else None,
-        "waves": list(walls),
+        "waves": list(waves),
     }
 
 

@@ -74,8 +74,8 @@ class Study(Physics):
     """Name of what is calibrated, in words."""
     note: str = ""
     """Note that a reader needs of the study at this scale."""
-    paper: bool = False
-    """The study is the paper's buckwheat: the report shows the published numbers beside."""
+    companion: str = ""
+    """Folder of ``experiments/studies`` whose ``companion.py`` brings published numbers and chapters."""
     measurement: MeasurementSection = MeasurementSection()
     """The reading of the angle."""
     target_section: TargetSection | None = Field(default=None, alias="target")

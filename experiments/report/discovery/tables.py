@@ -7,8 +7,8 @@ import pandas as pd
 
 from experiments.discover.discovery import BeforeAfter, Candidate, Discovery, Fit, Interval
 from experiments.report.discovery.terms import GAP, Terms, condition_name
-from experiments.report.numbers import MISSING, fixed, interval, trimmed
-from experiments.report.tables import Column, Table, make_table
+from experiments.report.kit.numbers import MISSING, fixed, interval, trimmed
+from experiments.report.kit.table import Column, Table, make_table
 
 SHOWN_PAIRS = 5
 """Pairs of mechanisms that the page shows."""
