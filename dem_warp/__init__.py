@@ -2,17 +2,23 @@
 
 from dem_warp.case import Case, Numerics
 from dem_warp.clumps import ClumpShape
+from dem_warp.laws.library import MECHANISMS
+from dem_warp.laws.mechanism import Mechanism
 from dem_warp.materials import Interaction, Material, effective_moduli, rayleigh_time
+from dem_warp.parameters import Parameter
 from dem_warp.population import GrainPopulation, ShapeMixture
 from dem_warp.result import CaseResult, Progress
 from dem_warp.scenes.draw_down import DrawDown
 from dem_warp.scenes.drum import Drum
 from dem_warp.scenes.hopper import Hopper
+from dem_warp.scenes.library import SCENES
 from dem_warp.scenes.lifted_cylinder import LiftedCylinder
 from dem_warp.simulation import simulate
 from dem_warp.version import __version__
 
 __all__ = [
+    "MECHANISMS",
+    "SCENES",
     "Case",
     "CaseResult",
     "ClumpShape",
@@ -23,7 +29,9 @@ __all__ = [
     "Interaction",
     "LiftedCylinder",
     "Material",
+    "Mechanism",
     "Numerics",
+    "Parameter",
     "Progress",
     "ShapeMixture",
     "__version__",

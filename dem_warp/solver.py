@@ -1,7 +1,7 @@
 """The sequence of launches that moves a batch on, captured once as a graph and replayed."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,7 @@ from dem_warp.state import (
 )
 from dem_warp.triangles import place_triangles
 from dem_warp.types import FRAMES, PRECISIONS, Build, device_structs
+from dem_warp.view import WorldView, overviews
 from dem_warp.walls import Motion
 
 CHUNK = 256
@@ -47,67 +48,6 @@ FULL_DEVICE_THREADS = 84_480
 for more lanes a grain, which shorten a step."""
 
 MOST_LANES = 16
-
-
-@dataclass(frozen=True)
-class WorldView:
-    """View of one world that a scene has between two chunks; arrays are by grain slot.
-
-    Attributes
-    ----------
-    step : int
-        Steps done.
-    time : float
-        [s]
-    alive : (n,) bool array
-    released : (n,) bool array
-        Grains that move freely.
-    positions, velocities : (n, 3) arrays
-        [m], [m/s]
-    masses : (n,) array
-        [kg]
-    impulse : float
-        What the grains have given to the weighed wall since the first step [N s]; see `Solver.impulses`.
-    rms_speed, fastest : float
-        Root mean square, and largest, speed of the living grains [m/s]; 0 where none lives.
-    highest : float
-        Height of the highest centre of a living grain [m]; minus infinity where none lives.
-    """
-
-    step: int
-    time: float
-    alive: np.ndarray
-    released: np.ndarray
-    positions: np.ndarray
-    velocities: np.ndarray
-    masses: np.ndarray
-    impulse: float
-    rms_speed: float
-    fastest: float
-    highest: float
-
-
-def overviews(
-    positions: np.ndarray, velocities: np.ndarray, alive: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """`WorldView.rms_speed`, `fastest` and `highest` of many worlds at once.
-
-    Parameters
-    ----------
-    positions, velocities : (worlds, n, 3 or more) arrays
-        [m], [m/s]; what stands behind their three components is not looked at.
-    alive : (worlds, n) bool array
-
-    Returns
-    -------
-    rms_speeds, fastest, highest : (worlds,) arrays
-        [m/s], [m/s], [m]
-    """
-    x, y, z = (velocities[:, :, axis] for axis in range(3))
-    squares = np.where(alive, x * x + y * y + z * z, 0.0)
-    mean = squares.sum(axis=1) / np.maximum(np.count_nonzero(alive, axis=1), 1)
-    highest = np.where(alive, positions[:, :, 2], -np.inf).max(axis=1)
-    return np.sqrt(mean), np.sqrt(squares.max(axis=1)), highest
 
 
 class Solver:

@@ -11,10 +11,10 @@ from matplotlib.patches import Patch
 
 from doe.errors import DesignError
 from doe.joint import JointFit
-from doe.plots import BLUE, GREEN, GREY, ORANGE, RED
+from doe.palette import BLUE, GREEN, MUTED, ORANGE, PURPLE, VERMILION
 from doe.region import Region
 
-COLORS = (BLUE, ORANGE, "#7A5195", GREY)
+COLORS = (BLUE, ORANGE, PURPLE, MUTED)
 """Of the responses, in order."""
 
 SIZES = {"D": 6.0, "*": 13.0}
@@ -52,7 +52,9 @@ def joint_plot(fit: JointFit, truth: Mapping[str, float] | None = None) -> Figur
         for band, color in zip(bands.values(), cycle(COLORS), strict=False):
             _fill(axes, band, (x, y), fit.point, color, 0.25)
         _fill(axes, fit.region(), (x, y), fit.point, GREEN, 0.8)
-        axes.plot(fit.point[x], fit.point[y], "D", color=RED, markersize=SIZES["D"], markeredgecolor="white")
+        axes.plot(
+            fit.point[x], fit.point[y], "D", color=VERMILION, markersize=SIZES["D"], markeredgecolor="white"
+        )
         if truth is not None:
             axes.plot(truth[x], truth[y], "*", color="black", markersize=SIZES["*"], markeredgecolor="white")
         labels = {factor.name: factor.label for factor in fit.factors}
@@ -62,7 +64,7 @@ def joint_plot(fit: JointFit, truth: Mapping[str, float] | None = None) -> Figur
         Patch(color=color, alpha=0.25, label=f"{name} agrees")
         for name, color in zip(bands, cycle(COLORS), strict=False)
     ]
-    keys += [Patch(color=GREEN, alpha=0.8, label="all agree"), _marker("D", RED, "smallest chi²")]
+    keys += [Patch(color=GREEN, alpha=0.8, label="all agree"), _marker("D", VERMILION, "smallest chi²")]
     keys += [_marker("*", "black", "hidden truth")] if truth is not None else []
     figure.legend(
         handles=keys, frameon=False, loc="outside upper center", ncols=min(len(keys), 2 * len(pairs))

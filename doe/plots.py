@@ -13,6 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike
 
 from doe.agreement import Agreement
+from doe.palette import BLUE, GREEN, MUTED, ORANGE, VERMILION
 from doe.plot_data import (
     half_normal_points,
     normal_points,
@@ -24,8 +25,6 @@ from doe.screening import ScreenResult
 from doe.steepest import ClimbPath, climb_table
 from doe.surface import Surface
 
-# Okabe and Ito's palette, safe for colour-blind readers.
-BLUE, ORANGE, GREEN, RED, GREY = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#7F7F7F"
 WIDTH = 6.3
 """Inches: the text width of an A4 page."""
 
@@ -77,7 +76,7 @@ def half_normal_plot(result: ScreenResult, response_label: str = "response") -> 
         )
     top = float(points["quantile"].max())
     error = float(result.standard_error.median())
-    axes.plot([0.0, error * top], [0.0, top], color=GREY, linewidth=1.0, label="error alone")
+    axes.plot([0.0, error * top], [0.0, top], color=MUTED, linewidth=1.0, label="error alone")
     axes.set(xlabel=f"|effect| on the {response_label}", ylabel="half-normal quantile")
     axes.set_xlim(left=0.0)
     axes.set_ylim(bottom=0.0)
@@ -97,11 +96,11 @@ def climb_plot(
     table = climb_table(path, response, target)
     figure = Figure(figsize=(WIDTH, 3.8), layout="constrained")
     axes = figure.subplots()
-    axes.axhline(target, color=RED, linewidth=1.2, label=f"target {target:g}")
+    axes.axhline(target, color=VERMILION, linewidth=1.2, label=f"target {target:g}")
     if target_sd is not None:
-        axes.axhspan(target - target_sd, target + target_sd, color=RED, alpha=0.15, linewidth=0.0)
+        axes.axhspan(target - target_sd, target + target_sd, color=VERMILION, alpha=0.15, linewidth=0.0)
     steps = np.arange(len(table))
-    axes.plot(steps, path.predicted, color=GREY, linestyle="--", label="predicted")
+    axes.plot(steps, path.predicted, color=MUTED, linestyle="--", label="predicted")
     axes.plot(steps, table["response"], color=BLUE, marker="o", label="run")
     settings = ["\n".join(f"{row[name]:.4g}" for name in path.names) for _, row in path.natural.iterrows()]
     axes.set_xticks(steps, settings)
@@ -117,12 +116,12 @@ def residual_plots(surface: Surface) -> Figure:
     figure = Figure(figsize=(WIDTH, 3.1), layout="constrained")
     left, right = figure.subplots(1, 2)
     reach = 1.1 * max(points.abs().to_numpy().max(), 1.0)
-    left.plot([-reach, reach], [-reach, reach], color=GREY, linewidth=1.0)
+    left.plot([-reach, reach], [-reach, reach], color=MUTED, linewidth=1.0)
     left.scatter(points["value"], points["quantile"], color=BLUE, zorder=3)
     left.set(xlabel="studentized residual", ylabel="normal quantile")
-    right.axhline(0.0, color=GREY, linewidth=1.0)
+    right.axhline(0.0, color=MUTED, linewidth=1.0)
     for limit in (-3.0, 3.0):
-        right.axhline(limit, color=RED, linestyle="--", linewidth=1.0)
+        right.axhline(limit, color=VERMILION, linestyle="--", linewidth=1.0)
     right.scatter(surface.fitted[surface.studentized_residuals.notna()], residuals, color=BLUE, zorder=3)
     right.set(xlabel="fitted response", ylabel="studentized residual")
     return _plain(figure)
@@ -156,8 +155,8 @@ def contour_plot(
     if region is not None and region.mask.any():
         legend.append(_draw_region(axes, region, x_name, y_name))
     if target is not None and grid.mean.min() < target < grid.mean.max():
-        axes.contour(grid.x, grid.y, grid.mean, levels=[target], colors=[RED], linewidths=2.0)
-        legend.append(Line2D([], [], color=RED, linewidth=2.0, label=f"target {target:g}"))
+        axes.contour(grid.x, grid.y, grid.mean, levels=[target], colors=[VERMILION], linewidths=2.0)
+        legend.append(Line2D([], [], color=VERMILION, linewidth=2.0, label=f"target {target:g}"))
     runs = surface.design.natural
     axes.plot(runs[x_name], runs[y_name], "o", color="black", markersize=4, clip_on=True)
     legend.append(Line2D([], [], marker="o", color="black", markersize=4, linestyle="", label="runs"))
@@ -188,7 +187,7 @@ def surface_plot(
     axes = figure.add_subplot(projection="3d", computed_zorder=False)
     axes.plot_surface(*np.meshgrid(grid.x, grid.y), grid.mean, cmap="cividis", alpha=0.85, linewidth=0.2)
     if target is not None and grid.mean.min() < target < grid.mean.max():
-        curve = {"levels": [target], "colors": [RED], "linewidths": 3.0}
+        curve = {"levels": [target], "colors": [VERMILION], "linewidths": 3.0}
         axes.contour(*np.meshgrid(grid.x, grid.y), grid.mean, **curve)
     axes.set(xlabel=grid.x_factor.label, ylabel=grid.y_factor.label, zlabel=response_label)
     axes.view_init(elev=24.0, azim=-128.0)
@@ -219,9 +218,9 @@ def agreement_plot(
         min(result.response.min(), result.reference.min()),
         max(result.response.max(), result.reference.max()),
     ]
-    axes.plot(ends, ends, color=GREY, linewidth=1.0, linestyle="--", label="equal")
+    axes.plot(ends, ends, color=MUTED, linewidth=1.0, linestyle="--", label="equal")
     names = list(dict.fromkeys(groups))
-    for name, color in zip(names, cycle((BLUE, RED, GREEN, ORANGE)), strict=False):
+    for name, color in zip(names, cycle((BLUE, VERMILION, GREEN, ORANGE)), strict=False):
         rows = np.flatnonzero(np.asarray(groups) == name)
         axes.errorbar(
             result.reference[rows],
@@ -245,7 +244,7 @@ def _draw_region(axes: Axes, region: Region, x: str, y: str) -> Patch:
     drawn = (region.axis(x), region.axis(y), region.projection(x, y).T.astype(float))
     axes.contourf(*drawn, levels=[0.5, 1.5], colors=["white"], alpha=0.35)
     axes.contour(*drawn, levels=[0.5], colors=["white"], linewidths=1.5)
-    return Patch(facecolor="white", edgecolor=GREY, label=f"compatible: {100.0 * region.fraction:.0f} %")
+    return Patch(facecolor="white", edgecolor=MUTED, label=f"compatible: {100.0 * region.fraction:.0f} %")
 
 
 def _plain(figure: Figure) -> Figure:

@@ -1,7 +1,8 @@
-"""What a person runs, from the bottom up.
+"""Everything that a person runs, from the bottom up.
 
-``calibrate`` turns tables of angles into decisions, ``study`` reads what a person configures, ``cases``
-simulates, stores and measures, ``studies`` holds studies to start from, ``report`` shows a campaign, and
-``commands`` is what the command line in ``cli`` calls; ``benchmarks`` measures the speed. Each imports only
-what is named before it, and ``errors`` and ``files`` below them all.
+``studyfile`` reads what a person configures, ``cases`` simulates, stores and measures, ``calibrate`` turns
+tables of angles into decisions, ``studies`` holds studies to start from, ``discover`` asks what a model
+lacks, ``report`` shows both, and ``runs`` does all of it in a folder. ``api`` has it as two functions, which
+the command line in ``cli`` and ``commands`` calls. ``benchmarks`` and ``trials`` are evidence and are not
+installed. Each imports only what is named before it, and ``errors`` and ``files`` below them all.
 """

@@ -10,19 +10,21 @@ from typing import Any
 from experiments.calibrate import Campaign
 from experiments.calibrate.campaign import StageHook
 from experiments.cases.engines import engine_named
+from experiments.report.companion import Replay
 from experiments.runs.campaign import (
     Desk,
     Watch,
     check_runs,
     found_by,
-    record_paper,
-    replay_paper,
+    record_published,
+    replay_published,
     run_campaign,
 )
 from experiments.runs.choices import chosen_device, chosen_devices, chosen_study, default_folder
-from experiments.runs.search import Ended, Job, run_search
-from experiments.studies.buckwheat.replay import Replay
+from experiments.runs.search import Job, SearchResult, run_search
 from experiments.studyfile import Study
+
+__all__ = ["Calibration", "SearchResult", "calibrate", "discover"]
 
 
 @dataclass(frozen=True)
@@ -32,11 +34,11 @@ class Calibration:
     folder: Path
     """Folder of everything that it wrote."""
     campaign: Campaign | None
-    """Results of every stage; None where only the paper's runs were wanted."""
+    """Results of every stage; None where only published runs were wanted."""
     replay: Replay | None
-    """The paper's own runs, simulated again; None where they were not wanted."""
+    """Runs published for the study, simulated again; None where they were not wanted."""
     record: Path | None
-    """Page on the paper's runs."""
+    """Page on the published runs."""
 
     @property
     def report(self) -> Path:
@@ -57,7 +59,7 @@ def calibrate(
     workers: int | None = None,
     engine: str | None = None,
     resume: bool = False,
-    paper_replicates: int = 0,
+    published_replicates: int = 0,
     campaign: bool = True,
     watch: Watch = lambda title: nullcontext(),
     on_stage: StageHook | None = None,
@@ -80,10 +82,10 @@ def calibrate(
         Name of an engine from outside (`experiments.cases.ENGINES`); None: `dem_warp.simulate`.
     resume
         Go on in the folder of an earlier run: no finished case is simulated again.
-    paper_replicates
-        Heaps of each of the paper's own runs, to be set beside; 0: none of them.
+    published_replicates
+        Heaps of each of the runs published for the study, to be set beside; 0: none of them.
     campaign
-        Run the campaign; without it, the paper's own runs alone.
+        Run the campaign; without it, the published runs alone.
     watch
         Opens the display of a batch of cases, by its title, and hands out what its progress is reported to.
     on_stage
@@ -96,11 +98,11 @@ def calibrate(
     """
     chosen = chosen_study(study, scale, device := chosen_device(device))
     folder = Path(out) if out is not None else default_folder(chosen)
-    check_runs(chosen, campaign=campaign, paper=paper_replicates > 0)
+    check_runs(chosen, campaign=campaign, paper=published_replicates > 0)
     desk = Desk.open(chosen, folder, device, workers, resume, watch, engine_named(engine))
-    replay = replay_paper(desk, paper_replicates) if paper_replicates else None
+    replay = replay_published(desk, published_replicates) if published_replicates else None
     found = run_campaign(desk, on_stage, replay) if campaign else None
-    record = record_paper(desk, replay, found) if replay is not None else None
+    record = record_published(desk, replay, found) if replay is not None else None
     return Calibration(folder, found, replay, record)
 
 
@@ -117,7 +119,7 @@ def discover(
     workers: int | None = None,
     resume: bool = False,
     watch: Watch = lambda title: nullcontext(),
-) -> Ended:
+) -> SearchResult:
     """Find the effect that a study's model lacks, and write the report into a folder.
 
     Parameters

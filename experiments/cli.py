@@ -31,7 +31,8 @@ app = typer.Typer(
 
 def _show_version(wanted: bool) -> None:
     if wanted:
-        from dem_warp.version import __version__, source_commit
+        from dem_warp import __version__
+        from dem_warp.version import source_commit
 
         commit = source_commit()
         typer.echo(f"dem-warp {__version__}" + (f" ({commit})" if commit else ""))
@@ -112,13 +113,13 @@ def calibrate(
             workers=workers,
             engine=engine,
             resume=resume,
-            paper_replicates=paper_replicates if follow_paper or only_paper else 0,
+            published_replicates=paper_replicates if follow_paper or only_paper else 0,
             campaign=not only_paper,
             watch=CaseProgress,
             on_stage=_show_stage,
         )
     if ended.record is not None:
-        messages.print(f"The paper's runs: {ended.record}")
+        messages.print(f"Published runs: {ended.record}")
     if as_json:
         typer.echo(json.dumps(ended.to_dict(), allow_nan=False))
     if (campaign := ended.campaign) is None:

@@ -9,11 +9,12 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 
-# Of `experiments`, from the bottom up: a room imports itself and what is named before it. Trials are run by a
-# person, as benchmarks are, though they lie beside what they try.
+# Of `experiments`, from the bottom up: a room imports itself and what is named before it. Studies, with their
+# companions, stand above the commands, which load a companion by its name. Verification, benchmarks and
+# trials are evidence: nothing imports them.
 ROOMS = (
-    "errors", "files", "studyfile", "cases", "calibrate", "studies", "discover", "report", "runs", "api",
-    "commands", "cli", "benchmarks", "trials",
+    "errors", "files", "export", "studyfile", "cases", "calibrate", "discover", "report", "runs", "api",
+    "commands", "cli", "studies", "verification", "benchmarks", "trials",
 )  # fmt: skip
 
 # Of `doe.discrepancy`, the folders in the order of use.

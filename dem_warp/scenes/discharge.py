@@ -12,7 +12,7 @@ from dem_warp.model import WorldSetup
 from dem_warp.scenes.poured_controller import UNREST, Phase, PouredController
 from dem_warp.scenes.scene import Course, Decision, Observable
 from dem_warp.scenes.surfaces import LEAST_POINTS, slope
-from dem_warp.solver import WorldView
+from dem_warp.view import WorldView
 from dem_warp.walls import Motion
 
 STEADY = (0.2, 0.7)

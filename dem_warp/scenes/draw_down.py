@@ -16,7 +16,7 @@ from dem_warp.scenes.poured_scene import FILL_OBSERVABLES, PouredScene
 from dem_warp.scenes.rain import CrossSection
 from dem_warp.scenes.scene import Observable
 from dem_warp.scenes.surfaces import flank_angle, profile
-from dem_warp.solver import WorldView
+from dem_warp.view import WorldView
 from dem_warp.walls import Mesh, Plane, Wall
 
 GATE = 2

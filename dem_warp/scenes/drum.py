@@ -16,7 +16,7 @@ from dem_warp.scenes.poured_scene import FILL_OBSERVABLES, PouredScene
 from dem_warp.scenes.rain import CrossSection
 from dem_warp.scenes.scene import Course, Decision, Observable
 from dem_warp.scenes.surfaces import profile, slope
-from dem_warp.solver import WorldView
+from dem_warp.view import WorldView
 from dem_warp.walls import Cylinder, Disc, Motion, Wall
 
 SHELL, ENDS = 0, (1, 2)

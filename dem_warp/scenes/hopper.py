@@ -14,7 +14,7 @@ from dem_warp.scenes.discharge import DISCHARGE_OBSERVABLES, DischargeController
 from dem_warp.scenes.poured_scene import FILL_OBSERVABLES, PouredScene
 from dem_warp.scenes.rain import CrossSection
 from dem_warp.scenes.scene import Observable
-from dem_warp.solver import WorldView
+from dem_warp.view import WorldView
 from dem_warp.walls import Cylinder, Disc, Wall
 
 PLUG = 2

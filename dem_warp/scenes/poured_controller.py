@@ -11,7 +11,7 @@ from dem_warp.model import WorldSetup
 from dem_warp.scenes.poured_scene import PouredScene
 from dem_warp.scenes.scene import CourseT, Decision
 from dem_warp.scenes.surfaces import bed_level
-from dem_warp.solver import WorldView
+from dem_warp.view import WorldView
 from dem_warp.walls import Motion
 
 HEAPED = 4

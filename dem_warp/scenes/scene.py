@@ -7,7 +7,7 @@ from typing import Any, NamedTuple, Protocol, TypeVar
 import numpy as np
 
 from dem_warp.model import WorldSetup
-from dem_warp.solver import WorldView
+from dem_warp.view import WorldView
 from dem_warp.walls import Motion
 
 

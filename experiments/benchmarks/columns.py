@@ -17,7 +17,7 @@ from dem_warp import Case, ClumpShape, GrainPopulation, Interaction, LiftedCylin
 from dem_warp.batch import Batch
 from dem_warp.model import Grains, WorldSetup
 from dem_warp.scenes.lifted_cylinder import TUBE
-from dem_warp.solver import WorldView
+from dem_warp.view import WorldView
 from dem_warp.walls import Motion
 
 CLUMP = Path(__file__).parents[1] / "studies" / "buckwheat" / "clump.txt"

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from dem_warp.clumps import ClumpShape
+from dem_warp import ClumpShape
 from dem_warp.walls import Cylinder, Plane, Wall
 
 

@@ -19,15 +19,18 @@ import pandas as pd
 import typer
 import warp as wp
 
-from dem_warp.clumps import ClumpShape
+from dem_warp import ClumpShape
 from dem_warp.device import resolve_device
 from dem_warp.model import ContactCoefficients, Grains, WorldSetup
 from dem_warp.solver import Solver
 from dem_warp.walls import Cylinder, Plane
+from doe.palette import BLUE, GRID, VERMILION
 from experiments.benchmarks.columns import CLUMP, reference_case
+from experiments.benchmarks.results import parse_counts, write_results
 from experiments.benchmarks.roofline import memory_bytes
-from experiments.benchmarks.tables import machine, parse_counts, write_page
 from experiments.benchmarks.timing import run_in, time_steps
+from experiments.report.kit.figure import new_axes, save_figure
+from experiments.report.kit.machine import machine
 
 DEPTH = 0.020
 """Of a bed at rest, roughly [m]."""
@@ -126,24 +129,20 @@ def cost_row(grains: int, worlds: int, device: str) -> dict[str, float]:
 
 def draw_cost(table: pd.DataFrame, singles: int, title: str, path: Path) -> None:
     """Plot the cost against the grains of the batch; the table's first `singles` rows are single worlds."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(7.0, 4.2), layout="constrained")
-    axes = figure.subplots()
+    figure, axes = new_axes(7.0, 4.2)
     one, many = table.iloc[:singles], table.iloc[singles:]
-    axes.loglog(one["grains"], one["ns a grain and step"], "o-", color="#1f5f8b", label="one world")
+    axes.loglog(one["grains"], one["ns a grain and step"], "o-", color=BLUE, label="one world")
     label = f"worlds of {many['grains a world'].iloc[0]:.0f} grains"
-    axes.loglog(many["grains"], many["ns a grain and step"], "s--", color="#c8641b", label=label)
+    axes.loglog(many["grains"], many["ns a grain and step"], "s--", color=VERMILION, label=label)
     axes.set(xlabel="grains of the batch", ylabel="time [ns] a grain and step", title=title)
     decades = np.log10(table["ns a grain and step"])
     axes.set_ylim(10.0 ** np.floor(decades.min()), 10.0 ** np.ceil(decades.max()))
     for axis, form in ((axes.xaxis, "{x:,.0f}"), (axes.yaxis, "{x:g}")):
         axis.set_major_formatter(form)
         axis.set_minor_formatter("")
-    axes.grid(which="both", color="#dddddd", linewidth=0.6)
-    axes.spines[["top", "right"]].set_visible(False)
+    axes.grid(which="minor", color=GRID)
     axes.legend(frameon=False)
-    figure.savefig(path, dpi=150)
+    save_figure(figure, path, dpi=150)
 
 
 def main(
@@ -162,7 +161,7 @@ def main(
     rows = []
     for batch in batches:
         rows.append(cost_row(*batch, name))
-        page = write_page(out, "cost", [("cost", text, pd.DataFrame(rows))])
+        page = write_results(out, "cost", [("cost", text, pd.DataFrame(rows))])
     draw_cost(pd.DataFrame(rows), len(sizes), machine(name), out / "cost.png")
     print(page.read_text(encoding="utf-8"))
 

@@ -25,14 +25,15 @@ from experiments.benchmarks.columns import MOMENTS, Columns
 from experiments.benchmarks.parallel import processes_table
 from experiments.benchmarks.peers.comparison import compare
 from experiments.benchmarks.peers.library import PEERS, PeerName
+from experiments.benchmarks.results import parse_counts, write_results
 from experiments.benchmarks.roofline import Traffic, copy_bandwidth, step_traffic
-from experiments.benchmarks.tables import machine, parse_counts, write_page
 from experiments.benchmarks.timing import Timing, run_in, start, time_steps
+from experiments.report.kit.machine import machine
 
-Section = tuple[str, str, pd.DataFrame]
+Part = tuple[str, str, pd.DataFrame]
 
 
-def speed_tables(columns: Columns, counts: Sequence[int], steps: int) -> Iterator[list[Section]]:
+def speed_tables(columns: Columns, counts: Sequence[int], steps: int) -> Iterator[list[Part]]:
     """Time every phase with each number of worlds, and count what a settled grain must move.
 
     Parameters
@@ -102,15 +103,15 @@ def main(
         raise typer.BadParameter("--peer and --processes are for --device cpu")
     _require_installed(peer or [])
     prepared = Columns(scale, min(max(counts), seeds), name, columns)
-    sections: list[Section] = []
-    for sections in speed_tables(prepared, counts, steps):
-        write_page(out, "throughput", sections)
+    parts: list[Part] = []
+    for parts in speed_tables(prepared, counts, steps):
+        write_results(out, "throughput", parts)
     if processes > 1:
-        sections.append(processes_table(prepared, columns, processes, steps))
-    pages = [write_page(out, "throughput", sections)]
+        parts.append(processes_table(prepared, columns, processes, steps))
+    pages = [write_results(out, "throughput", parts)]
     if peer:
         comparisons = [compare(code, prepared, steps, out / code) for code in peer]
-        pages.append(write_page(out / "peers", "peers", comparisons))
+        pages.append(write_results(out / "peers", "peers", comparisons))
     print("\n".join(page.read_text(encoding="utf-8") for page in pages))
 
 

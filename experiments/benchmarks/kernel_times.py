@@ -17,8 +17,9 @@ import warp as wp
 from dem_warp.device import resolve_device
 from dem_warp.solver import Solver
 from experiments.benchmarks.columns import Columns
-from experiments.benchmarks.tables import machine, write_page
+from experiments.benchmarks.results import write_results
 from experiments.benchmarks.timing import run_in, start
+from experiments.report.kit.machine import machine
 
 REPEATS = 20
 
@@ -62,7 +63,7 @@ def main(
     solver = start(Columns(scale, worlds, name, columns).moments("settled", worlds), name)
     run_in(solver)
     text = f"One step, and one rebuild of {worlds} settled columns, by kernel; {machine(name)}."
-    page = write_page(out, "kernels", [("kernels", text, kernel_times(solver))])
+    page = write_results(out, "kernels", [("kernels", text, kernel_times(solver))])
     print(page.read_text(encoding="utf-8"))
 
 

@@ -14,6 +14,7 @@ import typer
 
 from dem_warp import (
     Case,
+    CaseResult,
     ClumpShape,
     DrawDown,
     Drum,
@@ -26,8 +27,7 @@ from dem_warp import (
 )
 from dem_warp.batch import Batch
 from dem_warp.device import resolve_device
-from dem_warp.result import CaseResult
-from dem_warp.solver import WorldView
+from dem_warp.view import WorldView
 from experiments.benchmarks.cut_pictures import View, draw_cut, layers, speeds, wall_section
 from imaging import save_picture
 from imaging.geometry import Picture

@@ -38,7 +38,7 @@ def clear_errors(resume: str | None = None) -> Iterator[None]:
     resume
         Command that goes on after an interruption.
     """
-    from doe.errors import DesignError
+    from doe import DesignError
     from experiments.errors import InputError
     from imaging import PictureError
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from dem_warp import ClumpShape
 from dem_warp.clump_fitting import ClumpFit, fit_clump
-from dem_warp.clumps import ClumpShape
 from dem_warp.solids import parse_solid, read_mesh
 from experiments.errors import InputError
 from experiments.files import replacing

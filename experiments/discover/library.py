@@ -16,8 +16,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from dem_warp.case import Case
-from dem_warp.materials import effective_moduli
+from dem_warp import Case, effective_moduli
 from dem_warp.registry import Registry
 from dem_warp.scenes.poured_scene import GRAVITY
 from experiments.studyfile import Study, StudyError

@@ -30,7 +30,7 @@ from experiments.errors import InputError, StudyError
 from experiments.studyfile import Study
 from experiments.studyfile.schema import nearest_name
 
-WITHOUT_EFFECT = ("name", "note", "paper", "target", "response", "campaign", "discover", "factor")
+WITHOUT_EFFECT = ("name", "note", "companion", "target", "response", "campaign", "discover", "factor")
 """Keys of a study that change no heap at given factors."""
 
 

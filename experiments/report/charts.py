@@ -9,25 +9,10 @@ import pandas as pd
 import plotly.graph_objects as go
 
 from doe import ScreenResult
+from doe.palette import BLUE, GREEN, INK, MUTED, ORANGE, VERMILION
 from doe.plot_data import half_normal_points, pareto_points
 from experiments.calibrate.results import ClimbResult, NoiseFloorResult, TargetResult, VerificationResult
-from experiments.report.theme import (
-    ANGLE_AXIS,
-    BLUE,
-    GREEN,
-    INK,
-    MUTED,
-    ORANGE,
-    PURPLE,
-    VERMILION,
-    Chart,
-    add_line,
-    add_points,
-    add_target,
-    new_figure,
-)
-from experiments.studies.buckwheat.replay import Replay
-from experiments.studies.buckwheat.runs import STAGES
+from experiments.report.kit.chart import ANGLE_AXIS, Chart, add_line, add_points, add_target, new_figure
 
 
 def noise_floor_chart(result: NoiseFloorResult, target: TargetResult) -> Chart:
@@ -173,25 +158,3 @@ def _add_effects(figure: go.Figure, points: pd.DataFrame, name: str, symbol: str
         hovertemplate="%{text}: %{y:.2f}°<extra></extra>",
         **(written if name == "significant" else {}),
     )
-
-
-def replay_chart(replay: Replay) -> Chart:
-    """Draw the angles of the paper's runs, simulated again, against the published ones."""
-    runs = replay.runs.dropna(subset=["angle"])
-    figure = new_figure("published angle [°]", "simulated again [°]")
-    ends = [float(runs[["published", "angle"]].min().min()), float(runs[["published", "angle"]].max().max())]
-    add_line(figure, ends, ends, "equal", MUTED, "dot")
-    colors = dict(zip(STAGES, (BLUE, VERMILION, GREEN, PURPLE), strict=True))
-    for stage, points in runs.groupby("stage", sort=False):
-        spread = {"type": "data", "array": points["sd"].fillna(0.0).to_list(), "thickness": 1}
-        add_points(
-            figure,
-            points["published"],
-            points["angle"],
-            STAGES[str(stage)].partition(",")[0],
-            colors[str(stage)],
-            error_y=spread,
-            text=[f"run {run}" for run in points["run"]],
-        )
-    caption = "Mean angle of each run against the published one; bars: ± 1 sd over its heaps."
-    return Chart("replay-chart", caption, figure, height="tall")

@@ -5,22 +5,13 @@ from __future__ import annotations
 import itertools
 
 from doe import JointFit, Surface
+from doe.palette import BLUE, GREEN, MUTED, ORANGE, PURPLE, SKY, VERMILION
 from experiments.calibrate.results import OptimumResult, SurfaceResult, TargetResult
+from experiments.report.kit.chart import Chart, add_points, new_figure
 from experiments.report.surfaces import REGION_FILL, Slice, add_contours, add_design, add_region, point_in
-from experiments.report.theme import (
-    BLUE,
-    GREEN,
-    MUTED,
-    ORANGE,
-    PURPLE,
-    VERMILION,
-    Chart,
-    add_points,
-    new_figure,
-)
 from experiments.studyfile.campaign import ANGLE
 
-COLORS = (BLUE, ORANGE, "#7a5195", "#8c6d46", MUTED)
+COLORS = (BLUE, ORANGE, PURPLE, SKY, MUTED)
 """Of the responses, in order."""
 
 OPACITY = 0.20

@@ -14,10 +14,9 @@ import pandas as pd
 from dem_warp import CaseResult
 from experiments.calibrate.results import Campaign
 from experiments.cases import measure_heap
-from experiments.report.numbers import trimmed
+from experiments.report.kit.numbers import trimmed
 from experiments.studyfile import Study
-from imaging import HeapAngle, overlay, snapshot
-from imaging.render import Snapshot
+from imaging import HeapAngle, Snapshot, overlay, snapshot
 
 JPEG_QUALITY = 88
 

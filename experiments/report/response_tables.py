@@ -11,8 +11,8 @@ from markupsafe import Markup
 from doe import JointFit
 from experiments.calibrate.joint import direction_text, open_directions
 from experiments.calibrate.results import Campaign
-from experiments.report.numbers import term
-from experiments.report.tables import Column, Table, make_table
+from experiments.report.kit.numbers import term
+from experiments.report.kit.table import Column, Table, make_table
 from experiments.studyfile.campaign import ANGLE, TARGET_SCENE, OptimumSettings, Response
 
 HEAP_ANGLE = Response(name=ANGLE, observable=ANGLE, unit="deg")

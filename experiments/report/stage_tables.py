@@ -17,9 +17,9 @@ from experiments.calibrate.results import (
     SurfaceResult,
     VerificationResult,
 )
-from experiments.report.numbers import fixed, term
+from experiments.report.kit.numbers import fixed, term
+from experiments.report.kit.table import Column, Table, make_table
 from experiments.report.published import QUALITY, Published
-from experiments.report.tables import Column, Table, make_table
 
 SIGNIFICANT = 0.05
 """Rows of an analysis of variance with p below this are marked."""
@@ -322,15 +322,6 @@ def tests_table(result: VerificationResult, published: Published | None) -> Tabl
     ]
     note = "A large p of no difference is weak evidence with few heaps; equivalence says how near is shown."
     return make_table("tests", pd.DataFrame(rows), columns, "Tests of the difference from the target.", note)
-
-
-def misprints_table(published: Published) -> Table:
-    """Lay out what the paper's own numbers contradict."""
-    names = ("place", "item", "printed", "recomputed", "reason")
-    columns = [Column(name, name) for name in names]
-    return make_table(
-        "misprints", published.misprints, columns, "Where the print and its own numbers differ."
-    )
 
 
 def failed_table(campaign: Campaign) -> Table | None:

@@ -12,16 +12,12 @@ import pandas as pd
 import plotly.graph_objects as go
 
 from doe import Design, Region, Surface
+from doe.palette import BLUE, GREEN, MUTED, PURPLE, VERMILION
 from doe.plot_data import SurfaceGrid, normal_points, surface_grid
 from experiments.calibrate.results import OptimumResult, SurfaceResult, TargetResult
-from experiments.report.theme import (
+from experiments.report.kit.chart import (
     ANGLE_AXIS,
-    BLUE,
-    GREEN,
     LANDSCAPE,
-    MUTED,
-    PURPLE,
-    VERMILION,
     Chart,
     add_line,
     add_points,

@@ -9,14 +9,14 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from dem_warp.version import __version__
+from dem_warp import __version__
 from experiments.calibrate.export import jsonable
 from experiments.calibrate.results import Campaign
 from experiments.files import write_text
+from experiments.report.campaign_page import render_page
+from experiments.report.companion import Replay
 from experiments.report.material_card import write_material_card
-from experiments.report.page import render_page
 from experiments.report.pictures import HeapPicture
-from experiments.studies.buckwheat.replay import Replay
 from experiments.studyfile import Study
 
 LIBRARIES = (
@@ -52,7 +52,7 @@ def write_report(
     provenance
         What the caller knows of the run (device, seconds, ...), nested as it comes; versions are added.
     replay
-        The paper's own runs simulated again, to be shown beside.
+        Published runs simulated again, to be shown beside.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""A calibration in a folder, and the paper's own runs: cases stored as they finish, reports at the end."""
+"""A calibration in a folder, and published runs: cases stored as they finish, reports at the end."""
 
 from __future__ import annotations
 
@@ -23,20 +23,19 @@ from experiments.cases import Engine, Store, open_folder, run_cases
 from experiments.errors import StudyError
 from experiments.files import write_text
 from experiments.report import heap_pictures, write_report
-from experiments.report.record import draw_heaps, write_record
+from experiments.report.companion import Replay, companion_of
+from experiments.report.kit.markdown import WALL_TIMES
 from experiments.report.writer import library_versions
-from experiments.studies.buckwheat.replay import Replay
-from experiments.studies.buckwheat.runs import STAGES, planned_cases
 from experiments.studyfile import Study
 
 Watch = Callable[[str], AbstractContextManager[Callable[[Progress], None] | None]]
 """Opens the display of one batch, named by its stages, and hands out what its progress is reported to."""
 
-WALLS = "walls.csv"
+WALL_TIMES_FILE = f"{WALL_TIMES}.csv"
 """File of the wall times of a folder's batches, over all runs that went on in it."""
 
 RECORD = "record"
-"""Folder of the page on the paper's runs."""
+"""Folder of the page on published runs."""
 
 _log = logging.getLogger(__name__)
 
@@ -98,21 +97,21 @@ class Desk:
         with self.watch(title) as progress:
             cases = run_cases(self.study, table, self.store, self.device, self.workers, progress)
         if simulated := len(self.store) - before:
-            self._note_wall(title, simulated, time.perf_counter() - started)
+            self._note_wall_time(title, simulated, time.perf_counter() - started)
         return cases
 
     @property
-    def walls(self) -> pd.DataFrame:
+    def wall_times(self) -> pd.DataFrame:
         """Wall times so far: stage, simulated (cases), seconds."""
-        path = self.folder / WALLS
+        path = self.folder / WALL_TIMES_FILE
         return (
             pd.read_csv(path) if path.is_file() else pd.DataFrame(columns=["stage", "simulated", "seconds"])
         )
 
-    def _note_wall(self, title: str, simulated: int, seconds: float) -> None:
+    def _note_wall_time(self, title: str, simulated: int, seconds: float) -> None:
         row = {"stage": title, "simulated": simulated, "seconds": round(seconds, 1)}
-        noted = [*self.walls.to_dict("records"), row]
-        write_text(self.folder / WALLS, pd.DataFrame(noted).to_csv(index=False))
+        noted = [*self.wall_times.to_dict("records"), row]
+        write_text(self.folder / WALL_TIMES_FILE, pd.DataFrame(noted).to_csv(index=False))
 
 
 def run_campaign(desk: Desk, on_stage: StageHook | None = None, replay: Replay | None = None) -> Campaign:
@@ -125,7 +124,7 @@ def run_campaign(desk: Desk, on_stage: StageHook | None = None, replay: Replay |
     on_stage
         Called with the name and the result of every finished stage.
     replay
-        The paper's own runs simulated again, to be shown beside.
+        Published runs simulated again, to be shown beside.
 
     Returns
     -------
@@ -150,29 +149,38 @@ def run_campaign(desk: Desk, on_stage: StageHook | None = None, replay: Replay |
     return campaign
 
 
-def replay_paper(desk: Desk, replicates: int) -> Replay:
-    """Simulate the paper's own runs again, each of its stages as one batch.
+def replay_published(desk: Desk, replicates: int) -> Replay:
+    """Simulate the published runs of a study again, each of their stages as one batch.
 
     Parameters
     ----------
     desk
-        The paper's study, and where it is run.
+        A study with published runs, and where it is run.
     replicates
         Heaps of every run.
+
+    Raises
+    ------
+    StudyError
+        When the study has no published runs.
     """
-    tables = [desk.run(planned_cases(replicates, [stage]), f"paper, {stage}") for stage in STAGES]
-    return Replay(pd.concat(tables, ignore_index=True))
+    companion = companion_of(desk.study)
+    tables = [desk.run(table, title) for title, table in companion.planned_runs(replicates).items()]
+    replay = companion.replay(pd.concat(tables, ignore_index=True)) if tables else None
+    if replay is None:
+        raise _no_published_runs(desk.study)
+    return replay
 
 
-def record_paper(desk: Desk, replay: Replay, campaign: Campaign | None = None) -> Path:
-    """Write the page on the paper's runs, its tables and its picture into the folder ``record``."""
-    folder = desk.folder / RECORD
-    draw_heaps(folder, desk.study, replay, desk.store.load)
-    return write_record(folder, replay.cases, _provenance(desk, replay), campaign)
+def record_published(desk: Desk, replay: Replay, campaign: Campaign | None = None) -> Path:
+    """Write the page on published runs, its tables and its picture into the folder ``record``."""
+    return replay.write_record(
+        desk.folder / RECORD, desk.study, desk.store.load, _provenance(desk, replay), campaign
+    )
 
 
 def found_by(campaign: Campaign | None, replay: Replay | None) -> dict[str, Any]:
-    """Everything that was found as JSON-able data: the campaign's results, the paper's runs as ``paper``."""
+    """Everything that was found as JSON-able data: the campaign's results, published runs as ``paper``."""
     found = campaign.to_dict() if campaign else {}
     return found | ({"paper": jsonable(replay.tables())} if replay else {})
 
@@ -187,17 +195,15 @@ def check_runs(study: Study, campaign: bool = True, paper: bool = False) -> None
     campaign
         Whether it is to be calibrated.
     paper
-        Whether the paper's own runs are to be simulated.
+        Whether published runs are to be simulated.
 
     Raises
     ------
     StudyError
-        When the study has no factors, its decisions do not fit them, or it is not the paper's.
+        When the study has no factors, its decisions do not fit them, or it has no published runs.
     """
-    if paper and not study.paper:
-        raise StudyError(
-            "only the paper's own study has its runs (paper = true)", study.name, str(study.file)
-        )
+    if not companion_of(study).planned_runs(1) and paper:
+        raise _no_published_runs(study)
     if not campaign:
         return
     if not study.scene.leaves_a_heap:
@@ -213,15 +219,20 @@ def check_runs(study: Study, campaign: bool = True, paper: bool = False) -> None
         raise StudyError("the decisions must fit the factors", str(error), str(study.file)) from error
 
 
+def _no_published_runs(study: Study) -> StudyError:
+    rule = "only a study whose companion has published runs can follow them"
+    return StudyError(rule, study.companion or "no companion", str(study.file))
+
+
 def _provenance(desk: Desk, replay: Replay) -> dict[str, Any]:
-    """What made the paper's runs: commit, day, machine, scale, wall times."""
+    """What made the published runs: commit, day, machine, scale, wall times."""
     return {
         "scale": desk.study.scale,
         "fit": desk.study.measurement.fit,
         **_source_and_day(),
         **_engine(desk, replay.cases),
         "versions": library_versions(),
-        "walls": desk.walls.to_dict("records"),
+        WALL_TIMES: desk.wall_times.to_dict("records"),
     }
 
 

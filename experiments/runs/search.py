@@ -22,6 +22,7 @@ from experiments.discover.observables import OBSERVABLES, PHOTOGRAPHED
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.search import Search
 from experiments.report import HeapPicture
+from experiments.report.companion import companion_of
 from experiments.report.discovery import Terms, write_discovery
 from experiments.report.discovery.pictures import photograph, simulated_heaps
 from experiments.studyfile import Study
@@ -67,7 +68,7 @@ class Job:
 
 
 @dataclass(frozen=True)
-class Ended:
+class SearchResult:
     """How a search ended."""
 
     discovery: Discovery | None
@@ -96,7 +97,7 @@ class _Watched:
             search.study, search.library, table, job.device, job.workers, progress=self._report
         )
         self.title = "library waves"
-        self.walls: list[dict[str, Any]] = []
+        self.waves: list[dict[str, Any]] = []
         self._watch = watch
         self._listener: Callable[[Progress], None] | None = None
 
@@ -112,7 +113,7 @@ class _Watched:
         with self._watch(self.title) as self._listener:
             outcomes = self.engine(points)
         seconds, simulated = time.perf_counter() - started, len(self.engine.table) - before
-        self.walls.append({"wave": self.title, "simulated": simulated, "seconds": round(seconds, 1)})
+        self.waves.append({"wave": self.title, "simulated": simulated, "seconds": round(seconds, 1)})
         return outcomes
 
     def _report(self, progress: Progress) -> None:
@@ -120,7 +121,7 @@ class _Watched:
             self._listener(progress)
 
 
-def run_search(job: Job, resume: bool = False, watch: Watch = lambda title: nullcontext()) -> Ended:
+def run_search(job: Job, resume: bool = False, watch: Watch = lambda title: nullcontext()) -> SearchResult:
     """Look for what a study lacks, and write the report.
 
     Nothing is written before study, data and bank have been read without an error.
@@ -141,7 +142,7 @@ def run_search(job: Job, resume: bool = False, watch: Watch = lambda title: null
     """
     if not resume:
         require_unused(job.folder, "; --resume goes on in it")
-    search = Search.of(job.study)
+    companion, search = companion_of(job.study), Search.of(job.study)
     terms = Terms.of(search.library, OBSERVABLES, job.study.factor_sections)
     bank = _known_bank(job, search)
     measured = _measured(job)
@@ -156,15 +157,23 @@ def run_search(job: Job, resume: bool = False, watch: Watch = lambda title: null
             bank = search.make_bank(simulator, maker_of_today(source_commit()))
             bank.save(job.folder / BANK)
         if measured is None:
-            return Ended(None, terms, job.folder / BANK)
+            return SearchResult(None, terms, job.folder / BANK)
         simulator.title, started = "fresh runs", time.perf_counter()
         found = drive(search.analysis(measured, bank, job.seed), simulator)
-        walls = [*simulator.walls, {"wave": "analysis, its waves included", "seconds": _since(started)}]
+        waves = [*simulator.waves, {"wave": "analysis, its waves included", "seconds": _since(started)}]
         pictures = heaps_side_by_side(simulator.engine, found, terms, measured, job)
+    further = companion.discovery_chapters(found, terms, job.measured) if job.measured else ()
     page = write_discovery(
-        found, job.study, terms, search.settings, job.folder, pictures, _provenance(job, bank, walls)
+        found,
+        job.study,
+        terms,
+        search.settings,
+        job.folder,
+        pictures,
+        _provenance(job, bank, waves),
+        further,
     )
-    return Ended(found, terms, page)
+    return SearchResult(found, terms, page)
 
 
 def heaps_side_by_side(
@@ -209,7 +218,7 @@ def _point(fit: Fit, condition: str, seed: int) -> Point:
     return Point(fit.theta, tuple(sorted(sizes)), condition, seed)
 
 
-def _provenance(job: Job, bank: Bank, walls: Sequence[dict[str, Any]]) -> dict[str, Any]:
+def _provenance(job: Job, bank: Bank, waves: Sequence[dict[str, Any]]) -> dict[str, Any]:
     return {
         "device": job.device,
         "workers": job.workers,
@@ -218,7 +227,7 @@ def _provenance(job: Job, bank: Bank, walls: Sequence[dict[str, Any]]) -> dict[s
         "bank": dict(bank.maker) or None,
         "photographs only": job.photographs_only,
         "data": job.measured.name if job.measured else None,
-        "waves": list(walls),
+        "waves": list(waves),
     }
 
 

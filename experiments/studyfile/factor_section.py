@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 from pydantic import Field, PlainValidator, ValidationInfo, field_validator, model_validator
 
-from doe.factors import Factor
+from doe import Factor
 from experiments.errors import StudyError
 from experiments.studyfile.places import Places, nested, value_at
 from experiments.studyfile.schema import Dimension, RawQuantity, Section, nearest_name

@@ -15,7 +15,8 @@ from typing import Annotated, Any, ClassVar, Self, get_args, get_type_hints
 from annotated_types import Ge, Gt, Le, Lt
 from pydantic import AfterValidator, Field, create_model, model_validator
 
-from dem_warp.parameters import Parameter, parameters_of
+from dem_warp import Parameter
+from dem_warp.parameters import parameters_of
 from experiments.studyfile.schema import Dimension, Section
 from experiments.studyfile.units import dimension_of_unit
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dem_warp.laws.library import MECHANISMS
-from dem_warp.laws.mechanism import Mechanism, clashes
+from dem_warp import MECHANISMS, Mechanism
+from dem_warp.laws.mechanism import clashes
 from experiments.studyfile.generated import EngineSection, LibrarySection, library_section
 
 

@@ -11,10 +11,8 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from dem_warp.case import Case, Numerics
-from dem_warp.clumps import ClumpShape
-from dem_warp.materials import Interaction, Material
-from dem_warp.population import FRACTION_TOLERANCE, GrainPopulation, ShapeMixture, size_of_mean_mass
+from dem_warp import Case, ClumpShape, GrainPopulation, Interaction, Material, Numerics, ShapeMixture
+from dem_warp.population import FRACTION_TOLERANCE, size_of_mean_mass
 from experiments.studyfile.generated import section_for
 from experiments.studyfile.mechanisms import MechanismsSection, mechanisms_section
 from experiments.studyfile.scene_sections import SceneSection, scene_section

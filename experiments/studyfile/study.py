@@ -15,8 +15,8 @@ from typing import Any
 
 from pydantic import Field, PrivateAttr, field_validator
 
-from dem_warp.case import Case
-from doe.factors import Factor
+from dem_warp import Case
+from doe import Factor
 from experiments.errors import StudyError
 from experiments.studyfile.campaign import (
     TARGET_SCENE,
@@ -74,8 +74,8 @@ class Study(Physics):
     """Name of what is calibrated, in words."""
     note: str = ""
     """Note that a reader needs of the study at this scale."""
-    paper: bool = False
-    """The study is the paper's buckwheat: the report shows the published numbers beside."""
+    companion: str = ""
+    """Folder of ``experiments/studies`` whose ``companion.py`` brings published numbers and chapters."""
     measurement: MeasurementSection = MeasurementSection()
     """The reading of the angle."""
     target_section: TargetSection | None = Field(default=None, alias="target")

@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from doe.factors import Factor
+from doe import Factor
 from experiments.errors import InputError
 from experiments.trials.truth import Kind, Label, Sealed
 

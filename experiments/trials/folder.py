@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 
-from experiments.benchmarks.tables import machine
 from experiments.discover.devices import resolve_devices
 from experiments.discover.outcome_table import OutcomeTable
+from experiments.report.kit.machine import machine
 
 DECLARED, SEALED, LABELS, FINDINGS, RUNS, NOTES, PAGE = (
     "declared.json",

@@ -19,7 +19,7 @@ from experiments.commands.console import clear_errors
 from experiments.errors import InputError
 from experiments.files import replacing
 from experiments.trials.folder import DECLARED, FINDINGS, LABELS, RUNS, SEALED, Folder
-from experiments.trials.page import write_page
+from experiments.trials.trials_page import write_trials_page
 
 
 def gather(folder: Folder, record: Path) -> None:
@@ -50,7 +50,7 @@ def main(
     with clear_errors():
         if folder is not None:
             gather(Folder(folder), out)
-        print(write_page(out))
+        print(write_trials_page(out))
 
 
 if __name__ == "__main__":

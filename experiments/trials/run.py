@@ -20,12 +20,12 @@ from typing import Annotated
 import typer
 
 from doe.discrepancy import fit_emulator, load_bank
-from experiments.benchmarks.tables import markdown_table
 from experiments.commands.console import clear_errors
 from experiments.discover.engine import EngineSimulator
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.search import Search
 from experiments.errors import InputError
+from experiments.report.kit.markdown import markdown_table
 from experiments.runs.choices import chosen_devices
 from experiments.studyfile import load_study
 from experiments.trials.cost import planned_cases

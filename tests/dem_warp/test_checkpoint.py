@@ -61,7 +61,7 @@ def handful(seed: int) -> Case:
     return replace(case, grain_grain=replace(case.grain_grain, static_friction=0.1 + 0.02 * seed))
 
 
-class Ended(NamedTuple):
+class SearchResult(NamedTuple):
     """The end of one case."""
 
     result: CaseResult
@@ -69,10 +69,10 @@ class Ended(NamedTuple):
 
 
 @pytest.fixture(scope="module")
-def alone() -> Ended:
+def alone() -> SearchResult:
     """The small case by itself and never interrupted."""
     batch = start(small_case())
-    return Ended(finish(batch)[0], state(batch.solver))
+    return SearchResult(finish(batch)[0], state(batch.solver))
 
 
 @pytest.fixture(scope="module")

@@ -29,7 +29,7 @@ from worlds import (
 from dem_warp import Case, CaseResult, simulate
 from dem_warp.device import resolve_device
 from dem_warp.model import WorldSetup
-from dem_warp.solver import WorldView, overviews
+from dem_warp.view import WorldView, overviews
 from dem_warp.walls import Plane
 
 WEIGHT = ball_mass() * GRAVITY

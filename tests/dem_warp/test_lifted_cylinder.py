@@ -11,7 +11,7 @@ from dem_warp import Case, CaseResult, ClumpShape, GrainPopulation, ShapeMixture
 from dem_warp.device import resolve_device
 from dem_warp.scenes.scene import Decision
 from dem_warp.simulation import batches
-from dem_warp.solver import WorldView, overviews
+from dem_warp.view import WorldView, overviews
 
 
 def with_shapes(shapes: tuple[ClumpShape, ...], fractions: tuple[float, ...]) -> Case:

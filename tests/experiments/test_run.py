@@ -90,9 +90,15 @@ def test_a_campaign_leaves_its_report_results_and_tables(
     assert campaign.optimum.point["E"] == pytest.approx(0.5, abs=0.3 / SLOPE)
     assert stages[0] == "target"
     assert stages[-1] == "verification"
-    assert {"report.html", "results.json", "study.json", "tables", "cases", "walls.csv", "material.toml"} == {
-        p.name for p in folder.iterdir()
-    }
+    assert {
+        "report.html",
+        "results.json",
+        "study.json",
+        "tables",
+        "cases",
+        "wall_times.csv",
+        "material.toml",
+    } == {p.name for p in folder.iterdir()}
     results = json.loads((folder / "results.json").read_text(encoding="utf-8"))
     assert results["campaign"]["outcome"] == "calibrated"
     assert len(list((folder / "cases").iterdir())) == len(engine.seeds) == len(campaign.cases)
@@ -145,10 +151,10 @@ def test_the_papers_runs_stand_beside_the_campaign_and_in_the_record(engine: Eng
     rough = {"measurement": {"azimuths": 2, "pixels": 200}}  # the picture of heaps in less time
     study, folder = load_study(scale="bench", changes=rough), tmp_path / "out"
     desk = Desk.open(study, folder)
-    replay = run.replay_paper(desk, 1)
+    replay = run.replay_published(desk, 1)
     assert len(engine.seeds) == 34
     campaign = run.run_campaign(desk, replay=replay)
-    page = run.record_paper(desk, replay, campaign)
+    page = run.record_published(desk, replay, campaign)
     agreement = pd.read_csv(folder / "tables" / "paper_agreement.csv")
     assert agreement["runs"].tolist() == [12, 6, 13, 3, 31]
     assert 'id="replay"' in (folder / "report.html").read_text(encoding="utf-8")
@@ -156,6 +162,6 @@ def test_the_papers_runs_stand_beside_the_campaign_and_in_the_record(engine: Eng
     assert (folder / "record" / "heaps.png").is_file()
     total, found = len(engine.seeds), run.found_by(campaign, replay)
     assert json.loads(json.dumps(found))["paper"]["paper_agreement"][-1]["runs"] == 31
-    again = run.replay_paper(Desk.open(study, folder, resume=True), 1)
+    again = run.replay_published(Desk.open(study, folder, resume=True), 1)
     pd.testing.assert_frame_equal(again.cases, replay.cases)
     assert len(engine.seeds) == total

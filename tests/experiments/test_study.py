@@ -66,7 +66,7 @@ def test_the_paper_study_is_the_papers() -> None:
     study = load_study()
     assert {f.name: (f.low, f.high, f.unit) for f in study.factors} == PAPER_FACTORS
     assert study.target == MeasuredTarget(mean=30.148, sd=0.518, n=5)
-    assert study.paper
+    assert study.companion == "buckwheat"
     case = study.case({}, seed=3)
     assert (case.scene.diameter, case.scene.height, case.scene.lift_speed) == (0.035, 0.110, 0.05)
     assert (case.grains.material.density, case.scene.wall_material.shear_modulus) == (698.0, 70.0e9)

@@ -40,10 +40,6 @@ def test_an_installed_package_knows_its_version_and_its_commit(installed: Instal
     assert Path(file).is_relative_to(installed.sites[0])
 
 
-def test_the_citation_names_the_version() -> None:
-    assert f"\nversion: {PROJECT['version']}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
-
-
 def test_the_installed_studies_are_complete(installed: Installed) -> None:
     program = """
 from pathlib import Path

@@ -2,23 +2,19 @@
 
 The same clumps in the same poses are bodies of `fix rigid/small`, whose masses and inertias are given. The
 contact law is put together from `pair_style granular`: Hertz, Mindlin's spring with history, Tsuji's damping.
-Its coefficients are those of the case in LAMMPS' terms, so that both springs, both dampings and the friction
-are the same. The resistance to rolling is another one: LAMMPS has `sds` alone, a spring of its own with a
-slider, whose limit is the case's. The tube is an endless cylinder; LAMMPS takes its curvature into the radius
-of the contacts, half of it being counted.
+Its coefficients are those of the case in LAMMPS' terms (`experiments.export.lammps`), so that both springs,
+both dampings and the friction are the same. The resistance to rolling is another one: LAMMPS has `sds` alone,
+a spring of its own with a slider, whose limit is the case's. The tube is an endless cylinder; LAMMPS takes
+its curvature into the radius of the contacts, half of it being counted.
 """
 
-import math
 import re
 from pathlib import Path
 
 import numpy as np
-from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from dem_warp import Case, LiftedCylinder
-from dem_warp.model import ContactCoefficients
-from dem_warp.scenes.lifted_cylinder import PLATE, TUBE
 from experiments.benchmarks.columns import Moment
 from experiments.benchmarks.peers.lammps_files import (
     END,
@@ -38,12 +34,8 @@ from experiments.benchmarks.peers.peer import (
     judged,
     spheres_in_place,
 )
-
-TSUJI = (4.8218, -18.022, 27.467, -22.348, 11.087, -4.2783, 1.2728)
-"""Polynomial of the restitution that LAMMPS makes the coefficient of Tsuji's damping from."""
-
-ROLLING_OVERLAP = 0.01
-"""The spring that resists rolling is as stiff as a tangential one at this overlap, in radii."""
+from experiments.export import contacts_of
+from experiments.export.lammps import granular_words
 
 _INPUT = """\
 units si
@@ -62,8 +54,8 @@ group nothing empty
 # acts on the bodies alone: spheres of a body overlap, and together are heavier than it is
 fix weight nothing gravity {gravity} vector 0 0 -1
 fix bodies all rigid/small molecule infile bodies.txt gravity weight
-fix plate all wall/gran granular {on_plate} zplane 0 NULL
-fix tube all wall/gran granular {in_tube} zcylinder {radius}
+fix plate all wall/gran granular {with_wall} zplane 0 NULL
+fix tube all wall/gran granular {with_wall} zcylinder {radius}
 timestep {time_step!r}
 compute energy all ke/rigid bodies
 thermo_style custom step c_energy
@@ -109,22 +101,13 @@ def simulate(program: str, folder: Path, case: Case[LiftedCylinder], moment: Mom
 def write_input(folder: Path, case: Case[LiftedCylinder], moment: Moment, plan: Plan) -> None:
     """Write `column.in`, the spheres to `column.data` and the bodies to `bodies.txt`."""
     setup = moment.setup
-    kinds = [pair for _, pair in setup.walls]
     radius = float(setup.shapes[0].radii.max() * setup.grains.sizes.max())
-    among, on_plate, in_tube = (
-        contact_terms(setup.contacts[kind], reduced, reduced_mass)
-        for kind, reduced, reduced_mass in (
-            (0, radius / 2, setup.masses[0] / 2),
-            (kinds[PLATE], radius, setup.masses[0]),
-            (kinds[TUBE], radius, setup.masses[0]),
-        )
-    )
+    among, with_wall = map(granular_words, contacts_of(case, radius, setup.masses[0]))
     text = _INPUT.format(
         reach=2.0 * setup.shapes[0].bounding_radius * setup.grains.sizes.max(),
         skin=plan.skins[0],
         among=among,
-        on_plate=on_plate,
-        in_tube=in_tube,
+        with_wall=with_wall,
         gravity=-setup.gravity[2],
         radius=case.scene.diameter / 2,
         time_step=setup.time_step,
@@ -137,41 +120,6 @@ def write_input(folder: Path, case: Case[LiftedCylinder], moment: Moment, plan: 
     (folder / INPUT).write_text(text, encoding="utf-8")
     (folder / "column.data").write_text(_data(case, moment), encoding="utf-8")
     (folder / "bodies.txt").write_text(_bodies(moment), encoding="utf-8")
-
-
-def contact_terms(contact: ContactCoefficients, radius: float, mass: float) -> str:
-    """LAMMPS' words for a contact.
-
-    Parameters
-    ----------
-    contact : ContactCoefficients
-    radius, mass : float
-        Reduced ones, for the spring and the critical damping of rolling alone [m], [kg].
-    """
-    # LAMMPS' E* is E / 2 (1 - v^2), and of walls E / 2 (1 - v) in some versions: without v both are E / 2
-    modulus, spring = 2.0 * contact.modulus, 8.0 * contact.shear_modulus
-    rolling = spring * radius * math.sqrt(2.0 * ROLLING_OVERLAP)
-    # the tangential damping is given as a multiple of the normal one
-    share = 2.0 * math.sqrt(contact.shear_modulus / contact.modulus) * contact.tangential_damping
-    return (
-        f"hertz/material {modulus!r} {tsuji_restitution(contact.damping)!r} 0 "
-        f"tangential mindlin {spring!r} {share!r} {contact.static_friction!r} "
-        f"rolling sds {rolling!r} {math.sqrt(rolling * mass)!r} {contact.rolling_friction!r} damping tsuji"
-    )
-
-
-def tsuji_restitution(damping: float) -> float:
-    """The restitution from which LAMMPS comes to a given damping.
-
-    LAMMPS damps with a sqrt(m* 4/3 E* sqrt(R* d)), a being a polynomial of it; dem-warp with a
-    coefficient times sqrt(m* 2 E* sqrt(R* d)).
-
-    Raises
-    ------
-    ValueError
-        If the polynomial does not reach so far.
-    """
-    return float(brentq(lambda e: np.polyval(TSUJI, e) - math.sqrt(1.5) * damping, 0.0, 1.0))
 
 
 def _data(case: Case[LiftedCylinder], moment: Moment) -> str:

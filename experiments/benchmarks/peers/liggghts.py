@@ -26,6 +26,8 @@ from experiments.benchmarks.peers.lammps_files import (
     timed_runs,
 )
 from experiments.benchmarks.peers.peer import MARGIN, PeerRun, Plan, common_size, judged
+from experiments.export import contacts_of, values
+from experiments.export.liggghts import LAWS, contact_terms, material_terms
 
 SPOT = 1e-9
 """Half the side of the region that a grain is inserted in [m]."""
@@ -45,15 +47,11 @@ region box block {low} {high} {low} {high} -{margin} {top} units box
 create_box 2 box
 neighbor {skin} bin
 neigh_modify delay 0 every 1 check yes
-fix young all property/global youngsModulus peratomtype {young}
-fix poisson all property/global poissonsRatio peratomtype {poisson}
-fix restitution all property/global coefficientRestitution peratomtypepair 2 {restitution}
-fix friction all property/global coefficientFriction peratomtypepair 2 {friction}
-fix rolling all property/global coefficientRollingFriction peratomtypepair 2 {rolling}
-pair_style gran model hertz tangential history rolling_friction cdt
+{properties}
+pair_style gran model {laws}
 pair_coeff * *
-fix plate all wall/gran model hertz tangential history rolling_friction cdt primitive type 2 zplane 0.0
-fix tube all wall/gran model hertz tangential history rolling_friction cdt &
+fix plate all wall/gran model {laws} primitive type 2 zplane 0.0
+fix tube all wall/gran model {laws} &
     primitive type 2 zcylinder {radius} 0.0 0.0
 fix weight all gravity {gravity} vector 0.0 0.0 -1.0
 fix bodies all multisphere
@@ -117,23 +115,27 @@ def write_input(folder: Path, case: Case[LiftedCylinder], moment: Moment, plan: 
 def _head(case: Case[LiftedCylinder], moment: Moment, skin: float) -> str:
     setup, grain, wall = moment.setup, case.grain_material, case.scene.wall_material
     shape, reach = setup.shapes[0], case.scene.diameter / 2 + MARGIN
-    among, with_wall = case.grain_grain, case.grain_wall
-
-    def pairs(name: str) -> str:
-        other = getattr(with_wall, name)
-        return f"{getattr(among, name)} {other} {other} {other}"
-
+    among, with_wall = (
+        values(contact_terms(contact))
+        for contact in contacts_of(case, float(shape.radii.max()), float(setup.masses[0]))
+    )
+    materials = [values(material_terms(material)) for material in (grain, wall)]
+    by_type = {name: " ".join(repr(terms[name]) for terms in materials) for name in materials[0]}
+    by_pair = {name: f"{value} {' '.join(3 * [str(with_wall[name])])}" for name, value in among.items()}
     return _HEAD.format(
         low=-reach,
         high=reach,
         margin=MARGIN,
         top=case.scene.height + MARGIN,
         skin=skin,
-        young=f"{grain.youngs_modulus!r} {wall.youngs_modulus!r}",
-        poisson=f"{grain.poisson_ratio} {wall.poisson_ratio}",
-        restitution=pairs("restitution"),
-        friction=pairs("static_friction"),
-        rolling=pairs("rolling_friction"),
+        laws=LAWS,
+        properties="\n".join(
+            [f"fix {name} all property/global {name} peratomtype {text}" for name, text in by_type.items()]
+            + [
+                f"fix {name} all property/global {name} peratomtypepair 2 {text}"
+                for name, text in by_pair.items()
+            ]
+        ),
         radius=case.scene.diameter / 2,
         gravity=-setup.gravity[2],
         seeds=_SEEDS,

@@ -14,10 +14,11 @@ from pathlib import Path
 import numpy as np
 
 from dem_warp import Case, LiftedCylinder
-from dem_warp.scenes.lifted_cylinder import TUBE
 from experiments.benchmarks.columns import Moment
 from experiments.benchmarks.peers.peer import MARGIN, PeerRun, Plan, common_size, execute, judged
 from experiments.benchmarks.timing import Timing
+from experiments.export import contacts_of, values
+from experiments.export.yade import contact_terms, material_terms
 
 SIDES = 180
 """Sides of the prism; its edges stand out of the tube by 0.015 % of the radius."""
@@ -79,9 +80,8 @@ collider = wrapper.InsertionSortCollider(
     [wrapper.Bo1_Sphere_Aabb(), wrapper.Bo1_Facet_Aabb(), wrapper.Bo1_Wall_Aabb()],
     verletDist=given["skins"][0] / 2,
 )
-damping = by_pair(*given["damping_ratios"])
 physics = wrapper.Ip2_FrictMat_FrictMat_MindlinPhys(
-    frictAngle=by_pair(*given["friction_angles"]), betan=damping, betas=damping
+    **{name: by_pair(*(contact[name] for contact in given["contacts"])) for name in given["contacts"][0]}
 )
 scene.engines = [
     wrapper.ForceResetter(),
@@ -141,17 +141,17 @@ def write_input(folder: Path, case: Case[LiftedCylinder], moment: Moment, plan: 
     grains, shape, scene = setup.grains, setup.shapes[0], case.scene
     size = common_size(moment)
     centers, radii = shape.centers * size, shape.radii * size
-    contacts = [setup.contacts[0], setup.contacts[setup.walls[TUBE][1]]]
+    contacts = [
+        values(contact_terms(contact))
+        for contact in contacts_of(case, float(radii.max()), float(setup.masses[0]))
+    ]
     given = {
         "time_step": setup.time_step,
         "gravity": setup.gravity,
         "materials": [
-            {"young": material.youngs_modulus, "poisson": material.poisson_ratio}
-            for material in (case.grain_material, scene.wall_material)
+            values(material_terms(material)) for material in (case.grain_material, scene.wall_material)
         ],
-        # Yade's ratios are of critical damping, 2 sqrt(S m*)
-        "damping_ratios": [contact.damping / 2 for contact in contacts],
-        "friction_angles": [math.atan(contact.static_friction) for contact in contacts],
+        "contacts": contacts,
         "facets": _prism(scene.diameter / 2, scene.height + MARGIN).tolist(),
         "centers": centers.tolist(),
         "radii": radii.tolist(),

@@ -27,8 +27,7 @@ from experiments.discover.data.readings import CLOGGED, CLOGGED_ROW, Reading, re
 from experiments.discover.data.table import Row, read_rows
 from experiments.discover.observables import NAMES
 from experiments.errors import InputError, Problem
-from experiments.studyfile import Study
-from experiments.studyfile.conditions import Condition
+from experiments.studyfile import Condition, Study
 from experiments.studyfile.schema import nearest_name
 from imaging import PictureError
 

@@ -14,8 +14,7 @@ from experiments.discover.data.readings import CLOGGED_ROW
 from experiments.discover.observables import OBSERVABLES
 from experiments.errors import InputError
 from experiments.files import write_text
-from experiments.studyfile import Study
-from experiments.studyfile.conditions import Condition
+from experiments.studyfile import Condition, Study
 
 REPLICATES = 5
 """Heaps of each condition that the file has room for."""

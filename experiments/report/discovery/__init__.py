@@ -1,7 +1,7 @@
 """Reports of disagreements: the page on what is missing, its tables, and the study with it added."""
 
+from experiments.report.discovery.discovery_page import render_discovery
 from experiments.report.discovery.files import results_of, write_discovery
-from experiments.report.discovery.page import render_discovery
 from experiments.report.discovery.terms import Terms
 from experiments.report.discovery.verdict import verdict_line, verdict_sentence
 

@@ -9,20 +9,11 @@ import numpy as np
 import plotly.graph_objects as go
 
 from doe.discrepancy import Confounding, Discovery, Fit
+from doe.palette import BLUE, GREEN, INK, MUTED, ORANGE, VERMILION
 from experiments.report.discovery.tables import shown_candidates
 from experiments.report.discovery.terms import Terms, condition_name, spaced
-from experiments.report.numbers import MISSING, capital, fixed
-from experiments.report.theme import (
-    BLUE,
-    GREEN,
-    INK,
-    MUTED,
-    ORANGE,
-    VERMILION,
-    Chart,
-    add_points,
-    new_figure,
-)
+from experiments.report.kit.chart import Chart, add_points, new_figure
+from experiments.report.kit.numbers import MISSING, capital, fixed
 
 DIVERGING = [[0.0, "#b35806"], [0.25, "#fdb863"], [0.5, "#f7f7f7"], [0.75, "#92c5de"], [1.0, "#2166ac"]]
 """Orange below, blue above: even steps of lightness, told apart by colour-blind readers."""

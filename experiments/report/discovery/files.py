@@ -11,11 +11,12 @@ from typing import Any
 from doe.discrepancy import Discovery, Settings
 from experiments.calibrate.export import jsonable
 from experiments.files import write_text
-from experiments.report.discovery.page import render_discovery
+from experiments.report.discovery.discovery_page import render_discovery
 from experiments.report.discovery.study_file import write_study_files
 from experiments.report.discovery.tables import frames
 from experiments.report.discovery.terms import Terms
 from experiments.report.discovery.verdict import headline, verdict_sentence
+from experiments.report.kit.html import Chapter
 from experiments.report.pictures import HeapPicture
 from experiments.report.writer import library_versions
 from experiments.studyfile import Study
@@ -29,6 +30,7 @@ def write_discovery(
     folder: Path,
     pictures: Sequence[HeapPicture] = (),
     provenance: Mapping[str, Any] | None = None,
+    further: Sequence[Chapter] = (),
 ) -> Path:
     """Write ``report.html``, ``results.json``, ``tables/*.csv`` and ``study-with-NAME.toml``.
 
@@ -48,6 +50,8 @@ def write_discovery(
         Heaps to show side by side.
     provenance
         What the caller knows of the run (device, seconds, ...), nested as it comes; versions are added.
+    further
+        Chapters that the study's companion adds.
 
     Returns
     -------
@@ -68,7 +72,7 @@ def write_discovery(
     }
     text = json.dumps(results, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
     files = [path.name for path in write_study_files(found, study, terms, folder)]
-    page = render_discovery(found, study, terms, settings, pictures, files, made_by)
+    page = render_discovery(found, study, terms, settings, pictures, files, made_by, further)
     for name, table in frames(found).items():
         write_text(folder / "tables" / f"{name}.csv", table.to_csv(index=False))
     write_text(folder / "results.json", text)

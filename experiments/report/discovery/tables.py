@@ -10,8 +10,8 @@ import pandas as pd
 
 from doe.discrepancy import BeforeAfter, Candidate, Discovery, Fit, Interval, Power
 from experiments.report.discovery.terms import GAP, Terms, condition_name
-from experiments.report.numbers import MISSING, fixed, interval, trimmed
-from experiments.report.tables import Column, Table, make_table
+from experiments.report.kit.numbers import MISSING, fixed, interval, trimmed
+from experiments.report.kit.table import Column, Table, make_table
 
 T = TypeVar("T")
 Entries = dict[Column, Callable[[T], object]]

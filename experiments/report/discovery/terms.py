@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from doe.discrepancy import Interval
 from experiments.discover.library import Mechanism
 from experiments.discover.observables import Observable
-from experiments.report.numbers import MISSING, enumeration, fixed, trimmed
+from experiments.report.kit.numbers import MISSING, enumeration, fixed, trimmed
 from experiments.studyfile.factor_section import FactorSection
 
 SHOWN_UNITS = {"m": (1e3, "mm"), "deg": (1.0, "°"), "1": (1.0, "")}

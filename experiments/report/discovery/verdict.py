@@ -18,7 +18,7 @@ from doe.discrepancy import (
     Verdict,
 )
 from experiments.report.discovery.terms import Terms, percent, spaced
-from experiments.report.numbers import capital, fixed, p_value, trimmed
+from experiments.report.kit.numbers import capital, fixed, p_value, trimmed
 
 SETTLED = (Verdict.NONE, Verdict.NAMED)
 """Verdicts that leave no question open."""

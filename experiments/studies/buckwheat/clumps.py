@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
+from dem_warp import ClumpShape
 from dem_warp.clump_fitting import fit_clump
-from dem_warp.clumps import ClumpShape
 
 FOLDER = Path(__file__).with_name("clumps")
 

@@ -17,7 +17,7 @@ from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.wave import WaveRunner
 from experiments.report.discovery import Terms
 from experiments.runs.campaign import check_runs
-from experiments.runs.search import OUTCOMES, Ended, Job, run_search
+from experiments.runs.search import OUTCOMES, Job, SearchResult, run_search
 from experiments.studyfile import load_study
 
 TRIAL = Path(__file__).parents[3] / "experiments" / "studies" / "trial"
@@ -111,9 +111,9 @@ def test_a_wave_is_spread_over_the_devices_that_are_named(
 ) -> None:
     asked: list[str | None] = []
 
-    def note(job: Job, *_: object) -> Ended:
+    def note(job: Job, *_: object) -> SearchResult:
         asked.append(job.device)
-        return Ended(None, Terms({}, {}, {}), job.folder)
+        return SearchResult(None, Terms({}, {}, {}), job.folder)
 
     monkeypatch.setattr(api, "run_search", note)
     code, _, err = discover(DATA / "nothing-missing.csv", "--out", tmp_path / "out", device="cuda, cuda:1")
@@ -155,6 +155,8 @@ def test_a_tilted_plate_is_found_on_the_real_engine(tmp_path: Path) -> None:
     # Hidden: 5 degrees. Half a 90 % interval is 1.64 standard errors, so its full width holds 99.9 %.
     width = size.high - size.low
     assert size.value - width < 5.0 < size.value + width
+    # The trial's companion sets the truth beside.
+    assert "What was hidden" in ended.page.read_text(encoding="utf-8")
     training, held_out = found.before_after
     assert training.after.value < training.before.value
     assert held_out.after.value < held_out.before.value

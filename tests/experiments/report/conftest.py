@@ -125,11 +125,11 @@ class Page(HTMLParser):
         return np.array(numeric, dtype=np.float64)
 
 
-def study_with(study: Study, paper_study: bool | None = None, **campaign: Mapping) -> Study:
+def study_with(study: Study, companion: str | None = None, **campaign: Mapping) -> Study:
     """Copy a study with other decisions of its campaign."""
     settings = CampaignSettings.model_validate(study.campaign.model_dump() | campaign)
     update = {"campaign": settings}
-    return study.model_copy(update=update if paper_study is None else update | {"paper": paper_study})
+    return study.model_copy(update=update if companion is None else update | {"companion": companion})
 
 
 @pytest.fixture(scope="session")

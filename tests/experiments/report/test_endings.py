@@ -8,7 +8,7 @@ import pytest
 
 from experiments.calibrate import Outcome, calibrate
 from experiments.report import render_page
-from experiments.report.numbers import prose
+from experiments.report.kit.numbers import prose
 from experiments.studyfile import Study, load_study
 
 

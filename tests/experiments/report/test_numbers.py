@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from experiments.report.numbers import (
+from experiments.report.campaign_page import flat
+from experiments.report.kit.numbers import (
     enumeration,
     equation,
     fixed,
@@ -14,7 +15,6 @@ from experiments.report.numbers import (
     significant,
     trimmed,
 )
-from experiments.report.page import flat
 
 
 @pytest.mark.parametrize(

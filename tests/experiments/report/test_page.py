@@ -10,8 +10,8 @@ import numpy as np
 
 from experiments.calibrate import Campaign, Outcome
 from experiments.report import HeapPicture, render_page
-from experiments.report.numbers import prose
-from experiments.report.page import study_facts
+from experiments.report.campaign_page import study_facts
+from experiments.report.kit.numbers import prose
 from experiments.studies.buckwheat import paper
 from experiments.studyfile import Study, load_study
 
@@ -111,7 +111,7 @@ def test_the_summary_says_what_was_found(campaign: Campaign, page) -> None:
 def test_only_the_papers_study_shows_the_papers_numbers(
     campaign: Campaign, study: Study, page, read_page: type, changed: Callable[..., Study]
 ) -> None:
-    other = read_page(render_page(campaign, changed(study, paper_study=False)))
+    other = read_page(render_page(campaign, changed(study, companion="")))
     for shown, expected in ((page, True), (other, False)):
         assert ("paper" in shown.ids) is expected
         assert ("table-paper-climb" in shown.tables) is expected

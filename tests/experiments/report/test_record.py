@@ -10,22 +10,30 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from experiments.benchmarks import paper_record
 from experiments.calibrate import Campaign
 from experiments.errors import InputError
 from experiments.report import render_page
-from experiments.report.markdown import markdown_table
+from experiments.report.kit.markdown import markdown_table
+from experiments.report.kit.table import Column, make_table
 from experiments.report.material_card import CARD, write_material_card
-from experiments.report.record import PAGE, RUNS, Record, record_page, scale_cost, write_record
-from experiments.report.replay_tables import ranking_sentence, replay_tables
-from experiments.report.tables import Column, make_table
-from experiments.studies.buckwheat.replay import Replay
-from experiments.studies.buckwheat.runs import planned_cases
-from experiments.studies.buckwheat.variants import variants
+from experiments.studies.buckwheat.companion import COMPANION
+from experiments.studies.buckwheat.records import paper_record
+from experiments.studies.buckwheat.records.paper_page import (
+    PAGE,
+    RUNS,
+    Record,
+    record_page,
+    scale_cost,
+    write_record,
+)
+from experiments.studies.buckwheat.replay.replay import Replay
+from experiments.studies.buckwheat.replay.replay_tables import ranking_sentence, replay_tables
+from experiments.studies.buckwheat.replay.runs import planned_cases
+from experiments.studies.buckwheat.sensitivity.variants import variants
 from experiments.studyfile import Study, load_study
 from experiments.studyfile.card import read_card, with_material
 
-WALLS = [{"stage": "paper, climb", "simulated": 6, "seconds": 44.7}]
+WALL_TIMES = [{"stage": "paper, climb", "simulated": 6, "seconds": 44.7}]
 
 
 def cases(shift: float = 0.0, replicates: int = 2) -> pd.DataFrame:
@@ -62,7 +70,9 @@ def test_the_committed_card_is_that_of_the_committed_campaign() -> None:
 
 
 def test_a_page_shows_the_numbers_of_its_cases(tmp_path: Path, campaign: Campaign) -> None:
-    page = write_record(tmp_path, cases(1.5), {"device": "CPU", "walls": WALLS}, campaign).read_text("utf-8")
+    page = write_record(
+        tmp_path, cases(1.5), {"device": "CPU", "wall_times": WALL_TIMES}, campaign
+    ).read_text("utf-8")
     replay = Replay(cases(1.5))
     shown = numbers_of(page, "Agreement")
     expected = replay.agreement().bias
@@ -119,7 +129,7 @@ def test_a_folder_without_the_papers_runs_is_refused(tmp_path: Path) -> None:
 def test_a_report_shows_the_papers_runs_beside_the_campaign(
     campaign: Campaign, study: Study, read_page: type
 ) -> None:
-    replay = Replay(cases())
+    replay = COMPANION.replay(cases())
     page = read_page(render_page(campaign, study, replay=replay))
     assert page.mismatches == []
     runs = replay.runs

@@ -20,7 +20,6 @@ from experiments.trials.findings import (
     write_findings,
 )
 from experiments.trials.folder import Folder
-from experiments.trials.page import write_page
 from experiments.trials.record import gather
 from experiments.trials.score import (
     Share,
@@ -32,6 +31,7 @@ from experiments.trials.score import (
     removed,
     scored,
 )
+from experiments.trials.trials_page import write_trials_page
 from experiments.trials.truth import Kind, Label, Sealed, write_labels, write_sealed
 
 KEPT = Path(__file__).parents[3] / "experiments" / "trials" / "record" / "sixth"
@@ -164,7 +164,7 @@ def test_the_page_is_written_from_the_record_alone(tmp_path: Path) -> None:
     (tmp_path / "runs.csv").write_text(
         "what,machine,warp,date,cases,seconds\nheaps,GPU,1.19,2026-01-01,40,3.5\n"
     )
-    text = write_page(tmp_path).read_text(encoding="utf-8")
+    text = write_trials_page(tmp_path).read_text(encoding="utf-8")
     assert text.count("| pass |") == len(aims(scored(findings, labels, []), []))
     # The mechanisms of this library are not those that must be resolvable.
     assert text.count("FAIL") == 1

@@ -1,0 +1,87 @@
+"""Contacts of a case, and the terms that another code has for them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from dem_warp import Case, Interaction, Material
+from dem_warp.model import ContactCoefficients
+
+
+@dataclass(frozen=True)
+class Contact:
+    """Two surfaces that touch.
+
+    Attributes
+    ----------
+    first, second : Material
+        Their materials.
+    surface : Interaction
+        Properties of the pair.
+    coefficients : ContactCoefficients
+        What the contact law makes of them.
+    radius, mass : float
+        Reduced ones [m], [kg], for codes whose resistance to rolling asks for them.
+
+    Raises
+    ------
+    ValueError
+        When the contact has more than the base law: no other code has the same mechanisms or clamps alike.
+    """
+
+    first: Material
+    second: Material
+    surface: Interaction
+    coefficients: ContactCoefficients
+    radius: float
+    mass: float
+
+    def __post_init__(self) -> None:
+        if names := [mechanism.name for mechanism in self.coefficients.mechanisms]:
+            raise ValueError(f"Contact: other codes have terms for the base law alone, got {names}")
+        if self.coefficients.clamp_attraction:
+            raise ValueError("Contact: other codes have a damping that may attract, got a clamped one")
+
+
+def contacts_of(case: Case[Any], radius: float, mass: float) -> tuple[Contact, Contact]:
+    """Contacts of a case: of grains with grains, and with walls.
+
+    Parameters
+    ----------
+    case
+        Any test whose walls are of one material.
+    radius, mass
+        Radius of a grain's largest sphere [m], and mass of a grain [kg].
+
+    Raises
+    ------
+    ValueError
+        When the case has a mechanism beside the base law, or a clamped damping.
+    """
+    grain, wall = case.grain_material, case.scene.wall_material
+    among, with_wall = case.contacts(wall)
+    return (
+        Contact(grain, grain, case.grain_grain, among, radius / 2, mass / 2),
+        Contact(grain, wall, case.grain_wall, with_wall, radius, mass),
+    )
+
+
+@dataclass(frozen=True)
+class Term:
+    """One number in the words of another code."""
+
+    name: str
+    """What it is called there."""
+    value: float
+    unit: str
+    """SI; "1" for a number without one."""
+    formula: str
+    """How it follows from the case."""
+    source: str
+    """Where that code defines it."""
+
+
+def values(terms: tuple[Term, ...]) -> dict[str, float]:
+    """Values of terms by their names."""
+    return {term.name: term.value for term in terms}

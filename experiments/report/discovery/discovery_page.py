@@ -1,0 +1,189 @@
+"""The page on what is missing: the verdict, and all that it rests on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+from doe.discrepancy import Discovery, Settings, Verdict
+from experiments.report.discovery import charts, tables
+from experiments.report.discovery.terms import Terms, percent
+from experiments.report.discovery.verdict import (
+    SETTLED,
+    changes,
+    headline,
+    next_step,
+    reason_sentence,
+    verdict_sentence,
+)
+from experiments.report.kit.chart import Chart
+from experiments.report.kit.html import Chapter, flat, render_page
+from experiments.report.kit.numbers import capital, trimmed
+from experiments.report.kit.table import Table
+from experiments.report.pictures import HeapPicture
+from experiments.report.study_facts import study_facts
+from experiments.studyfile import Study
+
+TITLES = {
+    "gap": "Where the model disagrees",
+    "candidates": "What could be missing",
+    "before_after": "The gap before and after",
+    "compared": "Predicted against measured",
+    "heaps": "Heaps side by side",
+    "power": "What these data could show",
+    "changes": "What would change the verdict",
+    "data": "The data, and notes on them",
+    "provenance": "Settings and provenance",
+}
+"""Headings by chapter, in the order of the page."""
+
+
+def _chapter(
+    name: str,
+    tables: Mapping[str, Table] | None = None,
+    charts: Mapping[str, Sequence[Chart]] | None = None,
+) -> Chapter:
+    """Build a chapter that a template of its name fills."""
+    return Chapter(name, TITLES[name], tables or {}, charts or {}, template=f"discovery/{name}.html.j2")
+
+
+def render_discovery(
+    found: Discovery,
+    study: Study,
+    terms: Terms,
+    settings: Settings,
+    pictures: Sequence[HeapPicture] = (),
+    files: Sequence[str] = (),
+    provenance: Mapping[str, Any] | None = None,
+    further: Sequence[Chapter] = (),
+) -> str:
+    """Render the report of an analysis as one self-contained HTML page.
+
+    Parameters
+    ----------
+    found
+        What the analysis found.
+    study
+        The study that was analysed.
+    terms
+        What the names mean.
+    settings
+        The rules of the analysis.
+    pictures
+        Heaps to show side by side.
+    files
+        Study files with the mechanism added that lie beside the page.
+    provenance
+        What made the numbers: names and values, nested as they come.
+    further
+        Chapters that the study's companion adds.
+    """
+    if found.verdict is Verdict.NOT_IDENTIFIABLE:
+        # A fit with nothing left to test it by would fill the page with zeros.
+        found = replace(found, base=None, gap=None, drifts=(), candidates=(), power=(), confounding=None)
+    *chapters, last = _chapters(found, terms)
+    shown = [chapter for chapter in chapters if pictures or chapter.name != "heaps"]
+    drawn_on = {
+        "found": found,
+        "study": study,
+        "terms": terms,
+        "headline": headline(found, terms),
+        "sentence": verdict_sentence(found, terms),
+        "reason": reason_sentence(found),
+        "settled": found.verdict in SETTLED,
+        "cards": _cards(found, terms),
+        "explained": found.named,
+        "next_step": next_step(found, terms),
+        "changes": changes(found, terms, settings),
+        "pictures": pictures,
+        "files": files,
+        "facts": study_facts(study),
+        "provenance": flat(provenance or {}),
+        "rules": flat(asdict(settings)),
+        "document": flat(study.document),
+    }
+    chapters = [*shown, *further, last]
+    return render_page(
+        "report on a disagreement", study.name, "discovery/summary.html.j2", chapters, drawn_on
+    )
+
+
+@dataclass(frozen=True)
+class Card:
+    """One figure of the summary."""
+
+    title: str
+    value: str
+    more: str
+
+
+def _cards(found: Discovery, terms: Terms) -> list[Card]:
+    cards = []
+    if found.base:
+        more = (
+            f"{found.base.degrees_of_freedom:.0f} degrees of freedom, limit {trimmed(found.base.q_limit, 3)}"
+        )
+        cards.append(Card("Q of the calibrated base", trimmed(found.base.q, 3), more))
+    if found.gap and found.gap.drop_mechanism and not found.chosen:
+        more = f"{terms.title(found.gap.drop_mechanism)}; limit {trimmed(found.gap.drop_limit, 3)}"
+        cards.append(Card("Largest fall of Q by one mechanism", trimmed(found.gap.largest_drop, 3), more))
+    if found.chosen:
+        for name, size in zip(found.chosen.mechanisms, found.chosen.sizes, strict=True):
+            ends = f"90 % interval {trimmed(size.low, 3)} to {trimmed(size.high, 3)}"
+            cards.append(Card(capital(terms.title(name)), terms.value(name, size.value), ends))
+    for both in found.before_after:
+        where = "held out" if both.held_out else "training"
+        ends = f"90 % interval {percent(both.removed.low)} to {percent(both.removed.high)}, fresh runs"
+        cards.append(Card(f"Excess removed, {where}", percent(both.removed.value), ends))
+    return cards
+
+
+def _chapters(found: Discovery, terms: Terms) -> list[Chapter]:
+    """Build the chapters that this discovery has something for."""
+    built = {
+        "gap": _gap(found, terms),
+        "candidates": _candidates(found, terms),
+        "before_after": _before_after(found),
+        "compared": _compared(found, terms),
+        "heaps": _chapter("heaps"),
+        "power": _chapter("power", {"power": tables.power_table(found, terms)}) if found.power else None,
+        "changes": _chapter("changes"),
+        "data": _chapter("data", {"data": tables.data_table(found, terms)}),
+        "provenance": _chapter("provenance"),
+    }
+    return [chapter for name in TITLES if (chapter := built[name]) is not None]
+
+
+def _gap(found: Discovery, terms: Terms) -> Chapter | None:
+    if found.base is None:
+        return None
+    shown = {"parameters": tables.parameters_table(found, terms)}
+    if found.drifts:
+        shown["drifts"] = tables.drifts_table(found)
+    return _chapter("gap", shown, {"maps": charts.residual_maps(found, terms)})
+
+
+def _candidates(found: Discovery, terms: Terms) -> Chapter | None:
+    if not found.candidates:
+        return None
+    drawn = {}
+    if found.base and found.base.excess:
+        drawn["explained"] = [charts.explained_chart(found, terms)]
+    if found.confounding:
+        drawn["confounding"] = [charts.confounding_chart(found.confounding, terms)]
+    return _chapter("candidates", {"candidates": tables.candidates_table(found, terms)}, drawn)
+
+
+def _before_after(found: Discovery) -> Chapter | None:
+    if not found.before_after:
+        return None
+    return _chapter(
+        "before_after", {"gaps": tables.before_after_table(found)}, {"gaps": [charts.gap_chart(found)]}
+    )
+
+
+def _compared(found: Discovery, terms: Terms) -> Chapter | None:
+    if found.base is None:
+        return None
+    return _chapter("compared", charts={"compared": charts.comparison_charts(found, terms)})

@@ -1,0 +1,1 @@
+"""One kit for pages: palette, numbers, tables, charts, figures, HTML and Markdown pages."""

@@ -1,0 +1,106 @@
+"""Charts of a page: one look, and a plain form for plotly.js."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import plotly.graph_objects as go
+
+from doe.palette import GREEN, GRID, INK, MUTED
+
+LANDSCAPE = "YlGnBu_r"
+"""Colour scale of a response: even steps of lightness, also in grey print."""
+
+ANGLE_AXIS = "repose angle [°]"
+
+
+@dataclass(frozen=True)
+class Chart:
+    """One chart of the page."""
+
+    name: str
+    """Its anchor in the page."""
+    caption: str
+    figure: go.Figure
+    height: str = ""
+    """"tall" or "low" where it takes more or less height than the usual."""
+
+    @property
+    def json(self) -> str:
+        """The figure for plotly.js, safe inside a script element."""
+        return str(self.figure.to_json()).replace("</", "<\\/")
+
+
+def new_figure(x: str = "", y: str = "", legend: bool = True) -> go.Figure:
+    """Start an empty figure with axis titles."""
+    axis = {
+        "showline": True,
+        "linecolor": MUTED,
+        "gridcolor": GRID,
+        "zeroline": False,
+        "ticks": "outside",
+        "tickcolor": MUTED,
+        "automargin": True,
+    }
+    figure = go.Figure()
+    figure.update_layout(
+        template="none",
+        font={
+            "family": "system-ui, Segoe UI, Roboto, Helvetica, Arial, sans-serif",
+            "size": 13,
+            "color": INK,
+        },
+        paper_bgcolor="#ffffff",
+        plot_bgcolor="#ffffff",
+        margin={"l": 56, "r": 18, "t": 36 if legend else 14, "b": 48},
+        showlegend=legend,
+        legend={
+            "orientation": "h",
+            "x": 0.0,
+            "y": 1.0,
+            "xanchor": "left",
+            "yanchor": "bottom",
+            "itemsizing": "constant",
+        },
+        dragmode=False,  # a finger that scrolls the page must not zoom the chart
+        xaxis=axis | {"title": {"text": x, "standoff": 8}},
+        yaxis=axis | {"title": {"text": y, "standoff": 8}},
+    )
+    return figure
+
+
+def add_points(
+    figure: go.Figure,
+    x: Any,
+    y: Any,
+    name: str,
+    color: str,
+    symbol: str = "circle",
+    size: int = 9,
+    **more: Any,
+) -> None:
+    """Draw points as one entry of the legend; `more` goes to plotly's scatter."""
+    edge = {
+        "width": 2 if symbol.endswith("open") else 1,
+        "color": color if symbol.endswith("open") else "#ffffff",
+    }
+    marker = {"color": color, "symbol": symbol, "size": size, "line": edge}
+    figure.add_scatter(x=x, y=y, name=name, marker=marker, **{"mode": "markers", **more})
+
+
+def add_line(
+    figure: go.Figure, x: Any, y: Any, name: str, color: str, dash: str = "solid", **more: Any
+) -> None:
+    """Draw a line as one entry of the legend; `more` goes to plotly's scatter."""
+    figure.add_scatter(
+        x=x, y=y, name=name, mode="lines", line={"color": color, "dash": dash, "width": 2}, **more
+    )
+
+
+def add_target(figure: go.Figure, mean: float, reach: float) -> None:
+    """Draw the target across a figure whose y axis is the angle: its mean, and a band of +- `reach`."""
+    figure.add_hrect(
+        y0=mean - reach, y1=mean + reach, fillcolor=GREEN, opacity=0.13, line_width=0, layer="below"
+    )
+    figure.add_hline(y=mean, line={"color": GREEN, "width": 2})

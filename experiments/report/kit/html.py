@@ -1,0 +1,108 @@
+"""Self-contained pages in HTML: a summary, chapters with tables and charts, one style."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import jinja2
+from markupsafe import Markup
+from plotly.offline import get_plotlyjs
+
+from doe import palette
+from experiments.report.kit import numbers
+from experiments.report.kit.chart import Chart
+from experiments.report.kit.table import Table
+
+TEMPLATE = "chapter.html.j2"
+"""Template of a chapter that needs none of its own: its text, its charts, its tables."""
+
+
+@dataclass(frozen=True)
+class Chapter:
+    """One chapter of a page."""
+
+    name: str
+    """Its anchor."""
+    title: str
+    """Its heading."""
+    tables: Mapping[str, Table] = field(default_factory=dict)
+    """Tables by the names that its template uses."""
+    charts: Sequence[Chart] | Mapping[str, Sequence[Chart]] = ()
+    """Charts in the order of the page, or by the names that its template uses."""
+    text: str = ""
+    """What stands above charts and tables, where the template is the common one."""
+    template: str = TEMPLATE
+    """What fills it."""
+
+
+def render_page(
+    kind: str, heading: str, summary: str, chapters: Sequence[Chapter], context: Mapping[str, Any]
+) -> str:
+    """Render a page.
+
+    Parameters
+    ----------
+    kind, heading
+        What the page is, and what it is about.
+    summary
+        Template of the summary.
+    chapters
+        In their order.
+    context
+        What the templates of summary and chapters draw on.
+    """
+    page = environment().get_template("page.html.j2")
+    return page.render(
+        kind=kind,
+        heading=heading,
+        summary=summary,
+        chapters=chapters,
+        palette=palette,
+        plotly=Markup(get_plotlyjs()),
+        **context,
+    )
+
+
+def flat(settings: Mapping[str, Any], prefix: str = "") -> dict[str, str]:
+    """Lay out nested settings as dotted names with their values as text."""
+    rows: dict[str, str] = {}
+    for name, value in settings.items():
+        path = f"{prefix}{name}"
+        match value:
+            case Mapping() if value:
+                rows |= flat(value, f"{path}.")
+            case [Mapping(), *_]:
+                for position, item in enumerate(value, start=1):
+                    rows |= flat(item, f"{path} {position}.")
+            case _:
+                rows[path] = numbers.plain(value)
+    return rows
+
+
+def environment() -> jinja2.Environment:
+    """Open the templates, with the filters that they use."""
+    opened = jinja2.Environment(
+        loader=jinja2.ChoiceLoader(
+            [jinja2.PackageLoader("experiments.report.kit"), jinja2.PackageLoader("experiments.report")]
+        ),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    opened.filters |= {
+        "fixed": numbers.fixed,
+        "trimmed": numbers.trimmed,
+        "p_value": numbers.p_value,
+        "interval": numbers.interval,
+        "plain": numbers.plain,
+        "named_number": numbers.named_number,
+        "prose": numbers.prose,
+        "capital": numbers.capital,
+        "enumeration": numbers.enumeration,
+        "equation": numbers.equation,
+        "term": numbers.term,
+    }
+    return opened

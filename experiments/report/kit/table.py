@@ -1,0 +1,119 @@
+"""Tables of pages: a DataFrame's columns with heads, units and digits, and the rows that matter marked."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from markupsafe import Markup, escape
+from pandas.api.types import is_numeric_dtype
+
+from experiments.report.kit.numbers import KINDS
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column of a table."""
+
+    key: str
+    """Column of the DataFrame."""
+    head: str | Markup
+    """What stands above it."""
+    kind: str = "text"
+    """"text", or one of ``numbers.KINDS``."""
+    unit: str = ""
+    write: Callable[[str], str | Markup] = escape
+    """Typesets a text."""
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One entry."""
+
+    text: str | Markup
+    value: str | None = None
+    """The number in full, as Python writes it; None for a text or where there is no number."""
+    numeric: bool = False
+
+
+@dataclass(frozen=True)
+class Row:
+    """One row of a table."""
+
+    cells: tuple[Cell, ...]
+    mark: str = ""
+    """Style of the row: "strong" (significant), "weak", "chosen", "failed" or none."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of the page."""
+
+    name: str
+    """Its anchor in the page."""
+    caption: str
+    columns: tuple[Column, ...]
+    rows: tuple[Row, ...]
+    note: str = ""
+
+
+def make_table(
+    name: str,
+    frame: pd.DataFrame,
+    columns: Sequence[Column],
+    caption: str,
+    note: str = "",
+    marks: Sequence[str] | pd.Series | None = None,
+) -> Table:
+    """Lay out a DataFrame.
+
+    Parameters
+    ----------
+    name
+        Anchor in the page.
+    frame
+        One row a row. A named index is a column like any other.
+    columns
+        What to show, in order; a column that the frame lacks is left out.
+    caption, note
+        Above and below the table.
+    marks
+        Style of each row.
+    """
+    if frame.index.name is not None:
+        frame = frame.reset_index()
+    shown = tuple(column for column in columns if column.key in frame.columns)
+    cells = [_cells(column, frame[column.key]) for column in shown]
+    styles = [""] * len(frame) if marks is None else list(marks)
+    rows = tuple(Row(tuple(entries), style) for *entries, style in zip(*cells, styles, strict=True))
+    return Table(name, caption, shown, rows, note)
+
+
+def plain_table(frame: pd.DataFrame) -> Table:
+    """Lay out a DataFrame as it is: heads as they stand, texts as they stand, numbers to four digits."""
+    columns = [
+        Column(str(name), str(name), "measured" if is_numeric_dtype(values) else "text", write=str)
+        for name, values in frame.items()
+    ]
+    return make_table("", frame, columns, "")
+
+
+def _cells(column: Column, values: pd.Series) -> list[Cell]:
+    if column.kind == "text":
+        return [Cell("" if _absent(value) else column.write(str(value))) for value in values]
+    numbers = [None if _absent(value) else float(value) for value in values]
+    texts = KINDS[column.kind](numbers)
+    return [
+        Cell(text, None if number is None else repr(number), numeric=True)
+        for number, text in zip(numbers, texts, strict=True)
+    ]
+
+
+def _absent(value: Any) -> bool:
+    return (
+        value is None or value == "" or (isinstance(value, float | np.floating) and not math.isfinite(value))
+    )

@@ -1,0 +1,37 @@
+"""Facts of a study that a reader of its report needs: what was simulated and how it was measured."""
+
+from __future__ import annotations
+
+from dem_warp import GrainPopulation
+from experiments.studyfile import Study
+
+
+def study_facts(study: Study) -> dict[str, str]:
+    """Say what was simulated and measured, in the terms in which scales differ."""
+    tube, numerics, measurement = study.scene.given.get("lifted-cylinder"), study.numerics, study.measurement
+    if tube is None:
+        raise ValueError("a report is about heaps of a lifted cylinder, got a study of another test")
+    grains = f"{tube.grain_count} grains" if tube.grain_count else "as many grains as fill it"
+    spheres = _sphere_counts(study.grain.population())
+    softened = "real" if numerics.modulus_scale == 1.0 else f"divided by {numerics.modulus_scale:g}"
+    return {
+        "Scale": study.scale or "the study as written",
+        "Tube": f"{1e3 * tube.diameter:g} mm wide, {1e3 * tube.height:g} mm high",
+        "Lift": f"{tube.lift_speed:g} m/s",
+        "Grains": f"{grains}, {spheres} each",
+        "Shear modulus": softened,
+        "Time step": f"{100.0 * numerics.time_step_fraction:g} % of the Rayleigh time",
+        "Angle": f"“{measurement.fit}” fit, mean of {measurement.azimuths} views of a heap, both flanks",
+    } | {f"Scene “{name}”": _scene_text(study, name) for name in study.response_scenes}
+
+
+def _scene_text(study: Study, name: str) -> str:
+    """Say what a further scene is, as the study writes it."""
+    [(kind, settings)] = study.document["response-scene"][name].items()
+    return ", ".join([kind, *(f"{key.replace('_', ' ')} {value}" for key, value in settings.items())])
+
+
+def _sphere_counts(grains: GrainPopulation) -> str:
+    """Say of how many spheres the grains are: ``9 spheres``, or ``1 or 9 spheres`` of several shapes."""
+    counts = sorted({shape.sphere_count for shape in grains.mixture.shapes})
+    return f"{' or '.join(map(str, counts))} sphere{'' if counts == [1] else 's'}"

@@ -1,0 +1,1 @@
+"""Pages of the kept records, written from the files beside them."""

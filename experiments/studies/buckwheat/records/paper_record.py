@@ -1,0 +1,111 @@
+"""The record of the paper's runs: gathered from the folders that made it, its page written anew.
+
+    dem-warp calibrate --scale paper --follow-paper --out out/paper
+    python -m experiments.studies.buckwheat.sensitivity --modulus-scale 10 --out out/sensitivities
+    dem-warp calibrate --scale bench --only-paper --out out/bench
+    python -m experiments.studies.buckwheat.records.paper_record --paper out/paper \\
+        --smaller bench=out/bench --sensitivities out/sensitivities
+
+Without a folder it writes the page again from the tables of the record. The record lies in
+``experiments/studies/buckwheat/record``.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from experiments.errors import InputError
+from experiments.files import replacing, write_text
+from experiments.report.material_card import CARD
+from experiments.runs.campaign import RECORD
+from experiments.studies.buckwheat import paper
+from experiments.studies.buckwheat.records.paper_page import (
+    CAMPAIGN,
+    HEAPS,
+    PROVENANCE,
+    RUNS,
+    SENSITIVITIES,
+    write_record_page,
+)
+from experiments.studies.buckwheat.sensitivity.sensitivities import SETTINGS
+from experiments.studies.buckwheat.sensitivity.variants import variants
+
+FOLDER = Path(paper.__file__).with_name(RECORD)
+
+
+def gather_paper(source: Path, record: Path, commit: str | None = None) -> None:
+    """Take over the paper's runs of a calibration's folder.
+
+    Parameters
+    ----------
+    source
+        Folder of ``dem-warp calibrate --follow-paper`` or ``--only-paper``.
+    record
+        The record's folder.
+    commit
+        Commit that made them, where the machine that did had no repository.
+    """
+    for name in (RUNS, PROVENANCE):
+        _copy(source / RECORD / name, record / name)
+    for name in (CAMPAIGN, HEAPS):
+        if (source / RECORD / name).is_file():
+            _copy(source / RECORD / name, record / name)
+    # The card of the campaign beside, with its clumps.
+    for path in source.glob(f"{Path(CARD).stem}*"):
+        _copy(path, record / path.name)
+    if commit:
+        made_by = json.loads((record / PROVENANCE).read_text(encoding="utf-8"))
+        write_text(record / PROVENANCE, json.dumps(made_by | {"commit": commit}, indent=1) + "\n")
+
+
+def gather_scale(name: str, source: Path, record: Path) -> None:
+    """Take over the paper's runs at a smaller scale."""
+    _copy(source / RECORD / RUNS, record / f"runs-{name}.csv")
+
+
+def gather_sensitivities(source: Path, record: Path) -> None:
+    """Take over the angles of every variant that was simulated."""
+    _copy(source / SETTINGS, record / SENSITIVITIES / SETTINGS)
+    for name in variants():
+        if (source / f"{name}.csv").is_file():
+            _copy(source / f"{name}.csv", record / SENSITIVITIES / f"{name}.csv")
+
+
+def _copy(source: Path, target: Path) -> None:
+    if not source.is_file():
+        raise InputError(
+            "a folder to gather from must hold what it is named for", "no such file", str(source)
+        )
+    with replacing(target) as temporary:
+        shutil.copyfile(source, temporary)
+
+
+def main(
+    paper_folder: Annotated[
+        Path | None, typer.Option("--paper", help="Folder of a calibration with the paper's runs.")
+    ] = None,
+    smaller: Annotated[
+        list[str] | None, typer.Option(metavar="NAME=FOLDER", help="The same at a smaller scale.")
+    ] = None,
+    sensitivities: Annotated[Path | None, typer.Option(help="Folder of the variants.")] = None,
+    commit: Annotated[str | None, typer.Option(help="Commit that made the paper's runs.")] = None,
+    out: Annotated[Path, typer.Option(help="Folder of the record.")] = FOLDER,
+) -> None:
+    """Gather the record and write its page."""
+    if paper_folder:
+        gather_paper(paper_folder, out, commit)
+    for text in smaller or []:
+        name, _, source = text.partition("=")
+        gather_scale(name, Path(source), out)
+    if sensitivities:
+        gather_sensitivities(sensitivities, out)
+    print(write_record_page(out))
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -1,0 +1,31 @@
+"""Problems of the verification: each is one file of `problems` and one line here."""
+
+from experiments.verification.problems.beverloo import beverloo
+from experiments.verification.problems.energy import energy
+from experiments.verification.problems.friction_and_rolling import friction_and_rolling
+from experiments.verification.problems.heap_angle import heap_angle
+from experiments.verification.problems.janssen import janssen
+from experiments.verification.problems.micro_slip import micro_slip
+from experiments.verification.problems.normal_impact import elastic_impact, restitution
+from experiments.verification.problems.oblique_impact import oblique_impact, spinning_impact
+from experiments.verification.problems.rigid_body import rigid_body
+from experiments.verification.problems.stability import stability
+from experiments.verification.result import Problem
+
+PROBLEMS: dict[str, Problem] = {
+    "elastic-impact": elastic_impact,
+    "restitution": restitution,
+    "oblique-impact": oblique_impact,
+    "micro-slip": micro_slip,
+    "spinning-impact": spinning_impact,
+    "friction-and-rolling": friction_and_rolling,
+    "rigid-body": rigid_body,
+    "energy": energy,
+    "janssen": janssen,
+    "beverloo": beverloo,
+    "heap-angle": heap_angle,
+    "stability": stability,
+}
+
+HEAVY = ("beverloo", "heap-angle", "stability")
+"""Problems that run only when they are named: minutes on a GPU, up to hours on two cores."""
