@@ -83,7 +83,7 @@ def calibrate(
         device = chosen_device(device)
         chosen = chosen_study(study, scale, device)
         folder = out or default_folder(chosen)
-        check_runs(chosen, campaign=not only_paper, paper=follow_paper or only_paper)
+        chosen = check_runs(chosen, campaign=not only_paper, paper=follow_paper or only_paper)
     again = {"--follow-paper": follow_paper, "--only-paper": only_paper}
     with clear_errors(resume=_resume_command(study, folder, chosen.scale, device, again, paper_replicates)):
         messages.print(f"{chosen.name}, on {device}", chosen.note, sep="\n", markup=False)
@@ -261,7 +261,7 @@ def new(
     """Write a commented study file to start from, or a file for the measured heaps of a study."""
     with clear_errors():
         if measured:
-            from experiments.discover.data.template import write_measured_template
+            from experiments.measurement.template import write_measured_template
             from experiments.studyfile import load_study
 
             study = Path(name) if name.endswith(".toml") else Path(f"{name}.toml")
@@ -342,7 +342,7 @@ def _print_measured(simulated: Heap) -> None:
         typer.echo(f"{simulated.angle.mean:.2f} +- {simulated.angle.se:.2f} degrees")
         return
     for name, unit in simulated.units.items():
-        value = simulated.result.observables[name]
+        value = simulated.observed.values[name]
         typer.echo(f"{name.replace('_', ' ')}: {value:.5g} {'' if unit == '1' else unit}".rstrip())
 
 

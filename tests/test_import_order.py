@@ -9,11 +9,12 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 
-# Of `experiments`, from the bottom up: a room imports itself and what is named before it. Trials are run by a
+# Of `experiments`, from the bottom up: a room imports itself and what is named before it. The registry of
+# observables knows no study, so that a study file can name them. Trials are run by a
 # person, as benchmarks are, though they lie beside what they try.
 ROOMS = (
-    "errors", "files", "studyfile", "cases", "calibrate", "studies", "discover", "report", "commands", "cli",
-    "benchmarks", "trials",
+    "errors", "files", "measurement.observables", "studyfile", "discover.measured", "measurement", "cases",
+    "calibrate", "studies", "discover", "report", "commands", "cli", "benchmarks", "trials",
 )  # fmt: skip
 
 

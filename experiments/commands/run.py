@@ -19,8 +19,9 @@ from experiments.calibrate.campaign import StageHook
 from experiments.calibrate.checks import check_study
 from experiments.calibrate.export import jsonable
 from experiments.cases import Store, open_folder, run_cases
-from experiments.errors import StudyError
+from experiments.errors import InputError, StudyError
 from experiments.files import write_text
+from experiments.measurement.target import with_measurements
 from experiments.report import heap_pictures, write_report
 from experiments.report.record import draw_heaps, write_record
 from experiments.report.writer import library_versions, source_commit
@@ -173,8 +174,8 @@ def found_by(campaign: Campaign | None, replay: Replay | None) -> dict[str, Any]
     return found | ({"paper": jsonable(replay.tables())} if replay else {})
 
 
-def check_runs(study: Study, campaign: bool = True, paper: bool = False) -> None:
-    """Check that what is wanted can be run, before a folder is made.
+def check_runs(study: Study, campaign: bool = True, paper: bool = False) -> Study:
+    """Check that what is wanted can be run, before a folder is made, and take the target's measurements.
 
     Parameters
     ----------
@@ -185,28 +186,35 @@ def check_runs(study: Study, campaign: bool = True, paper: bool = False) -> None
     paper
         Whether the paper's own runs are to be simulated.
 
+    Returns
+    -------
+    Study
+        The study to run: pictures or a file of its target are numbers now.
+
     Raises
     ------
-    StudyError
-        When the study has no factors, its decisions do not fit them, or it is not the paper's.
+    InputError
+        When the study has no factors, its decisions do not fit them, it is not the paper's, or what its target
+        was measured on cannot be used.
     """
     if paper and not study.paper:
         raise StudyError(
             "only the paper's own study has its runs (paper = true)", study.name, str(study.file)
         )
     if not campaign:
-        return
-    if not study.scene.leaves_a_heap:
-        rule = "a calibration measures heaps, so its test must be [scene.lifted-cylinder]"
-        raise StudyError(rule, "another", f"{study.file}: scene")
+        return study
     if not study.factors:
         raise StudyError("a calibration needs at least one [[factor]]", "none", str(study.file))
+    study, notes = with_measurements(study)
+    for note in notes:
+        _log.warning("The measurements: %s", note)
     try:
         check_study(study)
-    except StudyError:
+    except InputError:
         raise
     except ValueError as error:
         raise StudyError("the decisions must fit the factors", str(error), str(study.file)) from error
+    return study
 
 
 def _provenance(desk: Desk, replay: Replay) -> dict[str, Any]:

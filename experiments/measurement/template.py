@@ -9,11 +9,11 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from experiments.discover.data.file import COLUMNS
-from experiments.discover.data.readings import CLOGGED_ROW
-from experiments.discover.observables import OBSERVABLES
 from experiments.errors import InputError
 from experiments.files import write_text
+from experiments.measurement.measured_file import COLUMNS
+from experiments.measurement.observables import OBSERVABLES
+from experiments.measurement.readings import CLOGGED_ROW
 from experiments.studyfile import Study
 from experiments.studyfile.conditions import Condition
 

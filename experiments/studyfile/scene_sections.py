@@ -18,9 +18,6 @@ _ANY_WALL = Material(density=7800.0, shear_modulus=70e9, poisson_ratio=0.3)
 """To try a scene with: none of its rules is about the material of its walls."""
 
 
-_ANGLE = {"angle": Observable("deg", "repose angle of the heap, as [measurement] says")}
-
-
 class PouredSection(Section):
     """A test that begins with a rain of grains into a container."""
 
@@ -173,11 +170,6 @@ class SceneSection(Section):
     def observables(self) -> Mapping[str, Observable]:
         """What the test measures."""
         return self.scene(_ANY_WALL).observables
-
-    @property
-    def measures(self) -> Mapping[str, Observable]:
-        """What the test measures, with the repose angle of its heap where it leaves one."""
-        return {**(_ANGLE if self.leaves_a_heap else {}), **self.observables}
 
     def scene(self, wall: Material) -> PouredScene:
         """Build the engine's scene, its walls of a material."""

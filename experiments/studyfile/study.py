@@ -21,9 +21,7 @@ from experiments.errors import StudyError
 from experiments.studyfile.campaign import (
     TARGET_SCENE,
     CampaignSettings,
-    MeasuredTarget,
-    Response,
-    TwinTarget,
+    Target,
 )
 from experiments.studyfile.card import with_material
 from experiments.studyfile.conditions import BASE, Condition, ConditionSections, under_condition
@@ -40,7 +38,7 @@ from experiments.studyfile.places import Places, value_at
 from experiments.studyfile.scene_sections import SceneSection
 from experiments.studyfile.schema import Dimension, Section, nearest_name, validated
 from experiments.studyfile.sections import Physics
-from experiments.studyfile.target_section import ResponseSection, TargetSection, build_responses
+from experiments.studyfile.target_section import ResponseSection, TargetSection, build_target
 from experiments.studyfile.toml_files import read_toml
 from imaging import FITS
 
@@ -105,6 +103,8 @@ class Study(Physics):
     _document: dict[str, Any] = PrivateAttr(default_factory=dict)
     _places: Places = PrivateAttr(default_factory=lambda: Places(BUCKWHEAT, {}))
     _fixed: frozenset[str] = PrivateAttr(default=frozenset())
+    _tests: dict[str, Study] = PrivateAttr(default_factory=dict)
+    _target: Target | None = PrivateAttr(default=None)
 
     @property
     def file(self) -> Path:
@@ -122,34 +122,28 @@ class Study(Physics):
         return copy.deepcopy(self._document)
 
     @property
-    def target(self) -> MeasuredTarget | TwinTarget:
-        """What the heaps must match.
+    def target(self) -> Target:
+        """Responses that the cases must match.
 
         Raises
         ------
         StudyError
-            When the study has no ``[target]``.
+            When the study has none, or they are still to be measured.
         """
-        if self.target_section is None:
-            raise StudyError("a calibration needs a [target] section", "none", str(self.file))
-        return self.target_section.target(self.responses)
+        if self._target is None and self.target_section is not None:
+            rule = (
+                "names pictures or a file: measurement.target.with_measurements takes the numbers from them"
+            )
+            raise StudyError(rule, "no numbers", f"{self.file}: target")
+        if self._target is None:
+            raise StudyError("a calibration needs a [target] or a [[response]]", "none", str(self.file))
+        return self._target
 
     @property
     def scenes(self) -> dict[str, SceneSection]:
-        """Every scene by its name, the study's own first."""
-        return {TARGET_SCENE: self.scene, **self.response_scenes}
-
-    @cached_property
-    def responses(self) -> tuple[Response, ...]:
-        """What is to be matched beside the angle.
-
-        Raises
-        ------
-        StudyError
-            When two have one name, there is no such scene or observable, or a measurement is wrong.
-        """
-        measured = self.target_section is not None and self.target_section.twin is None
-        return build_responses(self.response_sections, self.scenes, measured, self._places)
+        """Every scene by its name: the study's own, further ones, those of its conditions."""
+        tests = {name: test.scene for name, test in self._tests.items()}
+        return {TARGET_SCENE: self.scene, **self.response_scenes, **tests}
 
     @cached_property
     def factors(self) -> tuple[Factor, ...]:
@@ -220,13 +214,15 @@ class Study(Physics):
         seed
             Seed of everything random in the case.
         scene
-            Name of the scene.
+            Name of the scene, or of the condition.
 
         Raises
         ------
         StudyError
             When there is no such factor or scene, or a value leaves what is physical.
         """
+        if scene in self._tests:
+            return self._tests[scene].case(settings, seed)
         names = [section.name for section in self.factor_sections]
         for name in settings:
             if name not in names and name not in self._fixed:
@@ -284,13 +280,16 @@ def _build(document: dict[str, Any], places: Places) -> Study:
     plain = with_factor_values(_without_units(document, sections, places), sections, {})
     study = validated(Study, plain, places)
     study._document, study._places = document, places
-    if TARGET_SCENE in study.response_scenes:
-        rule = f"a further scene has a name of its own: {TARGET_SCENE!r} is the study's own"
-        raise StudyError(rule, TARGET_SCENE, places.of(("response-scene", TARGET_SCENE)))
-    study.responses  # noqa: B018  (a wrong response is an error now, not when a campaign begins)
-    if study.condition_sections:
-        for condition in study.conditions:
-            study.under(condition.name)
+    for condition in study.condition_sections:
+        study._tests[condition] = study.under(condition)
+    for name in study.response_scenes:
+        if name == TARGET_SCENE or name in study._tests:
+            rule = f"a further scene has a name of its own: {name!r} is the study's own, or a condition"
+            raise StudyError(rule, name, places.of(("response-scene", name)))
+    held_out = [condition.name for condition in study.conditions if condition.held_out]
+    study._target = build_target(
+        study.target_section, study.response_sections, study.scenes, held_out, places
+    )
     return study
 
 

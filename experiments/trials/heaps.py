@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.discover.observables import OBSERVABLES
+from experiments.measurement.observables import OBSERVABLES
 from experiments.discover.simulator import Outcomes, Point
 from experiments.files import replacing
 from experiments.trials.camera import Camera

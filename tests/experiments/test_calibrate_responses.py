@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from doe import Factor
-from experiments.calibrate import CampaignSettings, MeasuredTarget, Outcome, TwinTarget, calibrate
-from experiments.studyfile.campaign import MeasuredResponse, Response
+from doe import Factor, Sample
+from experiments.calibrate import CampaignSettings, Outcome, Response, Target, Twin, calibrate
 
 FACTORS = (Factor("A", 0.1, 0.3), Factor("E", 0.3, 0.6), Factor("F", 0.2, 0.6), Factor("G", 0.02, 0.08))
 
-DENSITY = Response(name="density", observable="solid_fraction")
-LEFT = Response(name="left", observable="mass_left", unit="kg", scene="bin")
+ANGLE = Response("angle", "angle", "deg")
+DENSITY = Response("density", "solid_fraction")
+LEFT = Response("left", "mass_left", "kg", "bin")
 
 NOISE = {"angle": 0.3, "solid_fraction": 0.001, "mass_left": 0.0005}
 """Standard deviation of one case."""
@@ -49,7 +49,7 @@ MEASURED = {"target": {"angle": angle, "solid_fraction": solid_fraction}, "bin":
 class TwoScenes:
     """A study on the angle, the density of the same heaps, and what stays in a bin."""
 
-    target: MeasuredTarget | TwinTarget
+    target: Target
     campaign: CampaignSettings = field(default_factory=CampaignSettings)
     factors: tuple[Factor, ...] = FACTORS
     limits: Mapping[str, tuple[float, float]] = field(
@@ -81,7 +81,7 @@ class Cases:
 
 
 def twin(*responses: Response) -> TwoScenes:
-    return TwoScenes(TwinTarget(truth=TRUTH, replicates=5, responses=responses))
+    return TwoScenes(Target((ANGLE, *responses), Twin(TRUTH)))
 
 
 def test_every_further_response_takes_the_region_nearer_to_the_point() -> None:
@@ -132,12 +132,12 @@ def test_a_factor_that_moves_another_response_only_is_kept() -> None:
     assert both.table.loc["F", "reason"].startswith("significant for angle")
 
 
-def test_the_angles_factors_are_kept_before_those_of_other_responses() -> None:
+def test_the_first_responses_factors_are_kept_before_those_of_others() -> None:
     def density(row: Mapping[str, float]) -> float:
         return 0.55 + 0.05 * coded(row, "G") + 0.04 * coded(row, "A")
 
     study = TwoScenes(
-        TwinTarget(truth=TRUTH, responses=(DENSITY,)),
+        Target((ANGLE, DENSITY), Twin(TRUTH)),
         CampaignSettings.model_validate({"selection": {"at_most": 3}}),
     )
     selection = calibrate(study, Cases(solid_fraction=density)).selection
@@ -145,7 +145,7 @@ def test_the_angles_factors_are_kept_before_those_of_other_responses() -> None:
     assert selection.table.loc["A", "reason"] == "beyond the strongest 3"
 
 
-def test_all_scenes_of_a_stage_are_one_batch_and_the_climb_is_the_angles() -> None:
+def test_all_scenes_of_a_stage_are_one_batch_and_the_climb_is_the_first_responses() -> None:
     cases = Cases()
     campaign = calibrate(twin(DENSITY, LEFT), cases)
     scenes = [(sorted(set(table["stage"])), set(table["scene"])) for table in cases.tables]
@@ -173,12 +173,12 @@ def test_a_further_scene_leaves_the_heaps_as_they_were() -> None:
 
 def test_measured_responses_are_matched_and_a_wrong_one_is_named() -> None:
     def study(density: float) -> TwoScenes:
-        aim = MeasuredResponse(**DENSITY.model_dump(), mean=density, sd=0.001, n=5)
-        return TwoScenes(MeasuredTarget(mean=angle(TRUTH), sd=0.3, n=5, responses=(aim,)))
+        aims = {"angle": Sample(angle(TRUTH), 0.3, 5), "density": Sample(density, 0.001, 5)}
+        return TwoScenes(Target(tuple(replace(r, measured=aims[r.name]) for r in (ANGLE, DENSITY))))
 
     right, wrong = (calibrate(study(value), Cases()) for value in (solid_fraction(TRUTH), 0.62))
     assert right.outcome is Outcome.CALIBRATED
-    assert "no difference in density either" in right.reason
+    assert "density 0.5" in right.reason
     assert right.optimum.point == pytest.approx(TRUTH, abs=0.02)
     assert wrong.outcome is Outcome.NOT_VERIFIED
     assert wrong.optimum.region.fraction == 0.0
@@ -191,7 +191,8 @@ def test_clogged_bins_cost_their_own_response_only() -> None:
 
     campaign = calibrate(twin(LEFT), Cases(clogs))
     assert campaign.outcome is Outcome.CALIBRATED
-    assert len(campaign.surface.full.response) == len(campaign.surface.responses["left"].full.response) + 2
+    measured = {name: len(found.full.response) for name, found in campaign.surface.responses.items()}
+    assert measured["angle"] == measured["left"] + 2
     assert len(campaign.failed_cases) == 2
 
 
@@ -201,17 +202,19 @@ def test_a_response_whose_cases_all_fail_ends_the_campaign(stage: str) -> None:
     campaign = calibrate(twin(DENSITY, LEFT), fails)
     assert campaign.outcome is Outcome.TOO_MANY_FAILED_RUNS
     assert stage not in campaign.stages
-    assert "for mass_left" in campaign.reason
+    assert "for left" in campaign.reason
 
 
 def test_results_and_tables_hold_every_response() -> None:
     campaign = calibrate(twin(DENSITY, LEFT), Cases())
     found = json.loads(json.dumps(campaign.to_dict(), allow_nan=False))
     for stage in ("target", "noise_floor", "screening", "surface", "verification"):
-        assert set(found[stage]["responses"]) == {"density", "left"}
+        assert list(found[stage]["responses"]) == ["angle", "density", "left"]
     joint = found["optimum"]["joint"]
     assert [row["response"] for row in joint["responses"]] == ["angle", "density", "left"]
     tables = campaign.tables()
     assert tables["joint_shrinkage"]["share"].tolist() == campaign.optimum.joint.shrinkage["share"].tolist()
     assert tables["scene_costs"]["scene"].tolist() == ["target", "bin"]
-    assert {"screening_effects_density", "surface_anova_left", "joint_directions"} <= set(tables)
+    for name in ("screening_effects", "surface_anova_full"):
+        assert list(dict.fromkeys(tables[name]["response"])) == ["angle", "density", "left"]
+    assert "joint_directions" in tables

@@ -12,7 +12,7 @@ from dem_warp import Case, CaseResult, Progress, simulate
 from experiments.discover import wave
 from experiments.discover.engine import EngineSimulator
 from experiments.discover.library import library_for
-from experiments.discover.observables import NAMES, measure
+from experiments.measurement.observables import NAMES, measure
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.simulator import Point
 from experiments.errors import StoreError

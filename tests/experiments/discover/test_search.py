@@ -12,7 +12,7 @@ import pytest
 from experiments.discover.bank import Maker
 from experiments.discover.discovery import Verdict
 from experiments.discover.measured import Measured
-from experiments.discover.observables import NAMES, OBSERVABLES
+from experiments.measurement.observables import NAMES, OBSERVABLES
 from experiments.discover.search import Search, drive
 from experiments.discover.simulator import Outcomes, Point
 from experiments.errors import InputError, StudyError

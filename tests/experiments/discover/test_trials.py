@@ -14,7 +14,7 @@ import synthetic
 from doe.factors import Factor
 from experiments.discover.analysis import Analysis
 from experiments.discover.discovery import Data, Discovery, Effort, Verdict
-from experiments.discover.observables import OBSERVABLES, PHOTOGRAPHED
+from experiments.measurement.observables import OBSERVABLES, PHOTOGRAPHED
 from experiments.discover.ranking import SIZES
 from experiments.discover.settings import Settings
 from experiments.discover.simulator import Outcomes, Point
