@@ -342,7 +342,7 @@ def _print_measured(simulated: Heap) -> None:
         typer.echo(f"{simulated.angle.mean:.2f} +- {simulated.angle.se:.2f} degrees")
         return
     for name, unit in simulated.units.items():
-        value = simulated.observed.values[name]
+        value = simulated.observed.observables[name]
         typer.echo(f"{name.replace('_', ' ')}: {value:.5g} {'' if unit == '1' else unit}".rstrip())
 
 

@@ -105,8 +105,8 @@ def _purchase(joint: JointFit) -> Decision:
         )
     return Decision(
         STAGE,
-        f"The region of the {first} alone, then with the response that makes it smallest, and so on: shares of "
-        "the region that the design explored.",
+        f"The region of the {first} alone, then with the response that makes it smallest, and so on: shares "
+        "of the region that the design explored.",
         numbers,
         outcome,
     )

@@ -120,7 +120,7 @@ class NoiseFloorResult(_ByResponse[NoiseFloor]):
 class Screened:
     """Effects of the factors on a response."""
 
-    values: np.ndarray
+    measured: np.ndarray
     """The response by run and replicate of the plan, shape (runs, replicates); a failed case is NaN."""
     screen: ScreenResult
     """Its analysis; ``screen.design`` holds the cases that gave the response, a row each."""
@@ -140,7 +140,7 @@ class ScreeningResult(_ByResponse[Screened]):
         values = {
             f"{name}_{i}": column
             for name, found in self.responses.items()
-            for i, column in enumerate(found.values.T, start=1)
+            for i, column in enumerate(found.measured.T, start=1)
         }
         return {
             "screening_design": self.design.coded.assign(**values),
@@ -159,7 +159,7 @@ class SelectionResult(_Tabled):
     """By factor, strongest first: effect on the leading response, its p, percent, rank, visible (larger than
     noise alone explains), p_NAME of every further response, kept, reason."""
     visible_effect: float
-    """Smallest effect on the leading response that the noise floor lets this design see (at the power of the settings)."""
+    """Smallest effect on the leading response that the design could see, at the power of the settings."""
     decisions: tuple[Decision, ...]
 
     def tables(self) -> dict[str, pd.DataFrame]:
@@ -202,7 +202,7 @@ class ClimbResult(_Tabled):
 class FittedResponse:
     """Surfaces of a response over the composite design."""
 
-    values: np.ndarray
+    measured: np.ndarray
     """The response of every planned run, mean over its replicates; NaN where all of them failed."""
     full: Surface
     """``full.design`` holds the cases that gave the response, a row each."""
@@ -226,7 +226,7 @@ class SurfaceResult(_ByResponse[FittedResponse]):
     def tables(self) -> dict[str, pd.DataFrame]:
         """The design in both units with its responses, the analyses of variance, runs outside the ranges."""
         coded = self.design.coded.add_suffix("_coded")
-        values = {name: found.values for name, found in self.responses.items()}
+        values = {name: found.measured for name, found in self.responses.items()}
         return {
             "surface_design": pd.concat([self.design.natural, coded], axis=1).assign(**values),
             "surface_anova_full": self._stacked(lambda found: found.full.anova),
@@ -260,11 +260,11 @@ class OptimumResult(_Tabled):
     settings: dict[str, float]
     """The same with every other factor at its middle: what a case needs."""
     prediction: pd.Series
-    """The leading response's fit there: mean, se, confidence and prediction interval, named as by ``Surface.predict``."""
+    """Fit of the leading response there: mean, se, intervals, named as by ``Surface.predict``."""
     extent: float
     """Coded half width of the box that contour and region are drawn in: the reach of the axial points."""
     contour: pd.DataFrame
-    """Points of the leading response's target contour in that box, one column a kept factor, natural unit (index: piece)."""
+    """Points of the leading response's target contour in that box: a column a kept factor (index: piece)."""
     region: Region
     """Where the fit and the target agree within their uncertainties, for all responses."""
     unidentified: tuple[str, ...]

@@ -64,9 +64,9 @@ def require_kept(settings: SelectionSettings, selection: SelectionResult, respon
     raise StageEnd(
         Outcome.NO_SIGNIFICANT_FACTOR,
         f"No factor has p below {settings.alpha:g}; the strongest, {selection.table.index[0]}, has an effect "
-        f"of {quantity(strongest['effect'], response.unit, '+')} ({p_text(strongest['p'])}). With this noise the "
-        f"design sees effects from about {quantity(selection.visible_effect, response.unit)} on: widen the ranges, add screening "
-        "replicates or dummies, or name the factors to keep in selection.keep.",
+        f"of {quantity(strongest['effect'], response.unit, '+')} ({p_text(strongest['p'])}). With this noise "
+        f"the design sees effects from about {quantity(selection.visible_effect, response.unit)} on: widen "
+        "the ranges, add screening replicates or dummies, or name the factors to keep in selection.keep.",
     )
 
 

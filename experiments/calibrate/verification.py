@@ -72,7 +72,6 @@ def _decision(response: Response, test: Comparison, cases: pd.DataFrame) -> Deci
             of("smallest margin shown", response): test.smallest_margin,
         },
         f"{found} ({p_text(test.p)}): {quantity(test.difference, unit, '+')}, "
-        f"{100.0 * (1.0 - test.alpha):.3g} % interval "
-        f"{interval_text(test.interval, unit, '+')}. Equivalence {shown} ({p_text(test.equivalence_p)}); these "
-        f"cases show it from a margin of {smallest} on. {failure_summary(own, response)}".strip(),
+        f"{100.0 * (1.0 - test.alpha):.3g} % interval {interval_text(test.interval, unit, '+')}. "
+        f"Equivalence {shown} ({p_text(test.equivalence_p)}); these cases show it from a margin of {smallest} on. {failure_summary(own, response)}".strip(),
     )

@@ -59,7 +59,7 @@ def run_cases(
     -------
     pandas.DataFrame
         The same rows and index with ``status``, ``reason``, ``angle`` and ``angle_se`` [deg], ``case_key``,
-        and one column an observable of its scene. A case that fails is a row with its status and reason, and without an
+        and one column an observable. A case that fails is a row with its status and reason, and without an
         angle; so is a heap that cannot be measured. The cases of a test that leaves no heap have no angles.
 
     Raises
@@ -161,4 +161,4 @@ def _simulate_missing(
 def _outcome(status: str, found: Observed) -> dict[str, Any]:
     """Columns of a case; NaN where there is no angle."""
     error = math.nan if found.angle is None else found.angle.se
-    return {"status": status, "reason": found.reason, ANGLE: math.nan, "angle_se": error, **found.values}
+    return {"status": status, "reason": found.reason, ANGLE: math.nan, "angle_se": error, **found.observables}

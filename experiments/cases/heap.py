@@ -52,7 +52,7 @@ class Heap:
         """Unit of every observable that it gave."""
         scene = self.study.scenes[self.scene]
         known = observables_of(scene.observables, scene.leaves_a_heap)
-        return {name: known[name].unit for name in self.observed.values if name in known}
+        return {name: known[name].unit for name in self.observed.observables if name in known}
 
     def to_dict(self) -> dict[str, Any]:
         """Everything but the grains as JSON-able data: angles in degrees, observables in SI."""
@@ -69,7 +69,7 @@ class Heap:
             "fit": self.study.measurement.fit,
             "angle": {"mean": angle.mean, "se": angle.se} if angle else None,
             "views": _views(angle) if angle else [],
-            "observables": self.observed.values,
+            "observables": self.observed.observables,
             "observable_units": self.units,
             "provenance": self.result.provenance,
         }

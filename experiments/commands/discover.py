@@ -14,14 +14,14 @@ from dem_warp import Progress
 from dem_warp.provenance import engine_fingerprint
 from experiments.cases import open_folder, require_unused
 from experiments.discover.bank import Bank, Maker
-from experiments.measurement.measured_file import read_measured
 from experiments.discover.discovery import Discovery, Fit
 from experiments.discover.engine import EngineSimulator
 from experiments.discover.measured import Measured
-from experiments.measurement.observables import OBSERVABLES, PHOTOGRAPHED
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.search import Search, drive
 from experiments.discover.simulator import Outcomes, Point
+from experiments.measurement.measured_file import read_measured
+from experiments.measurement.observables import OBSERVABLES, PHOTOGRAPHED
 from experiments.report import HeapPicture
 from experiments.report.discovery import Terms, write_discovery
 from experiments.report.discovery.pictures import photograph, simulated_heaps

@@ -194,8 +194,8 @@ def check_runs(study: Study, campaign: bool = True, paper: bool = False) -> Stud
     Raises
     ------
     InputError
-        When the study has no factors, its decisions do not fit them, it is not the paper's, or what its target
-        was measured on cannot be used.
+        When the study has no factors, its decisions do not fit them, it is not the paper's, or the pictures
+        or the file of its target cannot be used.
     """
     if paper and not study.paper:
         raise StudyError(

@@ -1,7 +1,7 @@
 """The registry of observables: numbers that a test yields, and how a picture or a simulated state gives them.
 
 One angle is never enough: retuned friction imitates almost anything in it. To add an observable of the lifted
-cylinder, add its entry to `OBSERVABLES`; any other number that a scene of the engine tells of is here by that.
+cylinder, add its entry to `OBSERVABLES`; any other number that a scene tells of belongs to it by that alone.
 """
 
 from __future__ import annotations
@@ -127,7 +127,7 @@ _photographed = partial(Observable, instrument=Instrument.PHOTOGRAPH)
 
 
 def _told(name: str, title: str, instrument: Instrument, rule: str = "", **facts: object) -> Observable:
-    """Build an observable that the engine's lifted cylinder tells of, with the scene's unit and definition."""
+    """Build an observable that the lifted cylinder tells of, with the scene's unit and definition."""
     unit, meaning = LiftedCylinder.observables[name]
     return Observable(name, title, unit, meaning + rule, instrument, **facts)  # type: ignore[arg-type]
 

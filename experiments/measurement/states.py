@@ -19,7 +19,7 @@ class Observed:
 
     Attributes
     ----------
-    values : dict of float
+    observables : dict of float
         Observables by their columns, in their units; what could not be measured is left out.
     angle : HeapAngle or None
         The repose angle with its views; None without a measurable heap.
@@ -27,7 +27,7 @@ class Observed:
         Why the case failed or its heap cannot be measured; empty when neither did.
     """
 
-    values: Mapping[str, float] = field(default_factory=dict)
+    observables: Mapping[str, float] = field(default_factory=dict)
     angle: HeapAngle | None = None
     reason: str = ""
 
@@ -98,4 +98,4 @@ def measure(settings: MeasurementSection, result: CaseResult) -> tuple[np.ndarra
     found = observe(settings, result)
     if found.angle is None:
         return np.full(len(NAMES), np.nan), found.reason
-    return np.array([found.values[each.column] for each in OBSERVABLES]), ""
+    return np.array([found.observables[each.column] for each in OBSERVABLES]), ""

@@ -99,7 +99,8 @@ def target_tables(study: Study, measured: Iterable[Replicated]) -> dict[str, Any
     held_out = {condition.name for condition in study.conditions if condition.held_out}
     order = [TARGET_SCENE, *(condition.name for condition in study.conditions)]
     ranked = sorted(
-        measured, key=lambda one: (one.condition in held_out, order.index(one.condition), _column(one) != ANGLE)
+        measured,
+        key=lambda one: (one.condition in held_out, order.index(one.condition), _column(one) != ANGLE),
     )
     if not ranked or ranked[0].condition in held_out:
         rule = "needs an observable with two values or more under a condition that is not held out"

@@ -58,7 +58,7 @@ def render_page(
     replay
         The paper's own runs simulated again.
     """
-    context = Context(campaign, _labels(study), published_for(study), study.responses)
+    context = Context(campaign, _labels(study), published_for(study))
     sections = stage_sections(context)
     if pictures:
         sections.append(Section("heaps"))
@@ -69,6 +69,7 @@ def render_page(
         kind="calibration report",
         folder="sections",
         campaign=campaign,
+        leading=context.leading,
         study=study,
         outcome=OUTCOMES[campaign.outcome],
         calibrated=campaign.outcome is Outcome.CALIBRATED,
@@ -150,6 +151,9 @@ def environment() -> jinja2.Environment:
         "trimmed": numbers.trimmed,
         "p_value": numbers.p_value,
         "interval": numbers.interval,
+        "quantity": numbers.quantity,
+        "span": numbers.span,
+        "unit_sign": numbers.unit_sign,
         "plain": numbers.plain,
         "named_number": numbers.named_number,
         "prose": numbers.prose,

@@ -154,7 +154,7 @@ def campaign_facts(campaign: Campaign) -> dict[str, Any]:
     """What a record keeps of a campaign."""
     facts: dict[str, Any] = {"outcome": campaign.outcome.value, "reason": campaign.reason}
     if campaign.screening is not None:
-        effects = campaign.screening.screen.table[["effect", "p", "rank"]]
+        effects = campaign.screening.leading.screen.table[["effect", "p", "rank"]]
         facts["effects"] = {str(name): dict(row) for name, row in effects.iterrows()}
     return facts
 

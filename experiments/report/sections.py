@@ -10,7 +10,7 @@ from experiments.report import charts, stage_tables, surfaces
 from experiments.report.joint_charts import joint_charts
 from experiments.report.published import Published
 from experiments.report.replay_tables import replay_tables
-from experiments.report.response_tables import response_tables
+from experiments.report.response_tables import goals_table, response_tables
 from experiments.report.tables import Table
 from experiments.report.theme import Chart
 from experiments.studies.buckwheat.replay import Replay
@@ -62,8 +62,11 @@ class Context:
     """What each factor is, in words."""
     published: Published | None
     """The paper's numbers, where the study is the paper's."""
-    responses: tuple[Response, ...] = ()
-    """What was to be matched beside the angle."""
+
+    @property
+    def leading(self) -> Response:
+        """The response that leads the campaign."""
+        return self.campaign.responses[0]
 
     @property
     def truth(self) -> dict[str, float] | None:
@@ -84,7 +87,7 @@ def stage_sections(context: Context) -> list[Section]:
 
 
 def failed_section(campaign: Campaign) -> Section:
-    """Build the section of the cases that gave no angle."""
+    """Build the section of the cases that failed or lack a response."""
     table = stage_tables.failed_table(campaign)
     return Section("failed", {"cases": table} if table else {})
 
@@ -93,7 +96,7 @@ def replay_sections(replay: Replay | None, campaign: Campaign) -> list[Section]:
     """Build the section on the paper's runs simulated again, where they were."""
     if replay is None:
         return []
-    effects = campaign.screening.screen.table if campaign.screening else None
+    effects = campaign.screening.leading.screen.table if campaign.screening else None
     return [Section("replay", replay_tables(replay, effects), [charts.replay_chart(replay)])]
 
 
@@ -105,19 +108,24 @@ def paper_sections(published: Published | None) -> list[Section]:
 
 
 def _target(context: Context) -> Section:
-    target = context.campaign.target
-    if target is None or target.cases is None:
-        return Section("target")
-    caption = "The heaps whose mean is the target."
-    return Section("target", {"heaps": stage_tables.heaps_table("target-heaps", target.cases, caption)})
+    campaign = context.campaign
+    tables = {"responses": goals_table(campaign)}
+    if campaign.target is not None and campaign.target.cases is not None:
+        caption = "The cases whose means are the target."
+        cases = campaign.target.cases
+        tables["cases"] = stage_tables.cases_table("target-cases", cases, campaign.responses, caption)
+    return Section("target", tables)
 
 
 def _noise_floor(context: Context) -> Section:
-    result, target = context.campaign.noise_floor, context.campaign.target
+    campaign = context.campaign
+    result, target = campaign.noise_floor, campaign.target
     if result is None or target is None:
         return Section("noise_floor")
-    table = stage_tables.heaps_table("noise-floor", result.cases, "Replicates at the middle.")
-    return Section("noise_floor", {"heaps": table}, [charts.noise_floor_chart(result, target)])
+    caption = "Replicates at the middle."
+    table = stage_tables.cases_table("noise-floor", result.cases, campaign.responses, caption)
+    chart = charts.noise_floor_chart(result, target, context.leading)
+    return Section("noise_floor", {"cases": table}, [chart])
 
 
 def _screening(context: Context) -> Section:
@@ -125,59 +133,62 @@ def _screening(context: Context) -> Section:
     if result is None:
         return Section("screening")
     published = context.published.screening if context.published else None
+    screen, response = result.leading.screen, context.leading
     tables = {
-        "design": stage_tables.screening_design_table(result),
-        "effects": stage_tables.effects_table(result, context.labels, alpha, published),
-        "anova": stage_tables.anova_table("screening-anova", result.screen.anova, "Analysis of variance."),
+        "design": stage_tables.screening_design_table(result, context.campaign.responses),
+        "effects": stage_tables.effects_table(screen, response, context.labels, alpha, published),
+        "anova": stage_tables.anova_table("screening-anova", screen.anova, "Analysis of variance."),
     }
-    drawn = [charts.pareto_chart(result.screen, alpha), charts.half_normal_chart(result.screen, alpha)]
+    drawn = [
+        charts.pareto_chart(screen, alpha, response),
+        charts.half_normal_chart(screen, alpha, response),
+    ]
     return Section("screening", tables, drawn)
 
 
 def _selection(context: Context) -> Section:
     result = context.campaign.selection
-    return Section("selection", {"reasons": stage_tables.selection_table(result)} if result else {})
+    tables = {"reasons": stage_tables.selection_table(result, context.leading)} if result else {}
+    return Section("selection", tables)
 
 
 def _climb(context: Context) -> Section:
     result, target = context.campaign.climb, context.campaign.target
     if result is None or target is None:
         return Section("climb")
-    tables = {"path": stage_tables.climb_table(result)}
+    tables = {"path": stage_tables.climb_table(result, context.leading)}
     if context.published:
         tables["paper"] = stage_tables.paper_climb_table(context.published.climb)
-    return Section("climb", tables, [charts.climb_chart(result, target)])
+    return Section("climb", tables, [charts.climb_chart(result, target, context.leading)])
 
 
 def _surface(context: Context) -> Section:
-    campaign = context.campaign
+    campaign, response = context.campaign, context.leading
     result, target = campaign.surface, campaign.target
     if result is None or target is None:
         return Section("surface")
-    published = context.published
+    published, fit = context.published, result.leading
     same = published is not None and set(published.kept) == set(result.design.names)
     names = tuple(result.design.names)
     paper = {
         model: published.anova(model, names) if published and same else None for model in ("full", "reduced")
     }
     tables = {
-        "design": stage_tables.surface_design_table(result),
+        "design": stage_tables.surface_design_table(result, campaign.responses),
         "full": stage_tables.anova_table(
-            "anova-full", result.full.anova, "Full quadratic model.", paper["full"]
+            "anova-full", fit.full.anova, "Full quadratic model.", paper["full"]
         ),
         "reduced": stage_tables.anova_table(
-            "anova-reduced", result.reduced.anova, "Reduced model.", paper["reduced"]
+            "anova-reduced", fit.reduced.anova, "Reduced model.", paper["reduced"]
         ),
-        "quality": stage_tables.quality_table(result, published.quality if published and same else None),
-        "coefficients": stage_tables.coefficients_table(result.reduced),
+        "quality": stage_tables.quality_table(fit, published.quality if published and same else None),
+        "coefficients": stage_tables.coefficients_table(fit.reduced, response),
     }
     outside = stage_tables.outside_table(result)
     if outside:
         tables["outside"] = outside
-    residuals = surfaces.residual_charts(result.reduced)
-    return Section(
-        "surface", tables, [*surfaces.surface_charts(result, campaign.optimum, target), *residuals]
-    )
+    drawn = surfaces.surface_charts(result, campaign.optimum, target, response)
+    return Section("surface", tables, [*drawn, *surfaces.residual_charts(fit.reduced, response)])
 
 
 def _optimum(context: Context) -> Section:
@@ -189,22 +200,26 @@ def _optimum(context: Context) -> Section:
 
 
 def _responses(context: Context) -> list[Section]:
-    """Build the section of several responses; none where the angle is alone."""
+    """Build the section of several responses; none where there is one."""
     campaign = context.campaign
     surface, optimum, target = campaign.surface, campaign.optimum, campaign.target
     if surface is None or optimum is None or target is None or optimum.joint is None:
         return []
-    drawn = joint_charts(surface, optimum, target)
-    return [Section("responses", response_tables(campaign, context.responses), drawn)]
+    tables = response_tables(campaign)
+    del tables["responses"]  # it stands with the target
+    return [Section("responses", tables, joint_charts(surface, optimum, target, campaign.responses))]
 
 
 def _verification(context: Context) -> Section:
-    result = context.campaign.verification
+    campaign = context.campaign
+    result, responses = campaign.verification, campaign.responses
     if result is None:
         return Section("verification")
-    table = stage_tables.heaps_table("verification-heaps", result.cases, "Fresh heaps at the chosen point.")
-    tests = stage_tables.tests_table(result, context.published)
-    return Section("verification", {"heaps": table, "tests": tests}, [charts.verification_chart(result)])
+    caption = "Fresh cases at the chosen point."
+    table = stage_tables.cases_table("verification-cases", result.cases, responses, caption)
+    tests = stage_tables.tests_table(result, responses, context.published)
+    chart = charts.verification_chart(result, context.leading)
+    return Section("verification", {"cases": table, "tests": tests}, [chart])
 
 
 _STAGES: dict[str, Callable[[Context], Section]] = {

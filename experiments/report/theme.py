@@ -21,8 +21,6 @@ GRID = "#eceff3"
 LANDSCAPE = "YlGnBu_r"
 """Colour scale of a response: even steps of lightness, also in grey print."""
 
-ANGLE_AXIS = "repose angle [°]"
-
 
 @dataclass(frozen=True)
 class Chart:

@@ -12,15 +12,15 @@ import numpy as np
 import pandas as pd
 
 from experiments.discover.analysis import Analysis, analyse
-from experiments.measurement.measured_file import read_measured
 from experiments.discover.discovery import Discovery
 from experiments.discover.emulator import Emulator
 from experiments.discover.measured import Measured
-from experiments.measurement.observables import PHOTOGRAPHED
 from experiments.discover.settings import Settings
 from experiments.discover.simulator import Outcomes, Point, Simulator
 from experiments.errors import InputError
 from experiments.files import write_text
+from experiments.measurement.measured_file import read_measured
+from experiments.measurement.observables import PHOTOGRAPHED
 from experiments.studyfile import Study
 from experiments.trials.findings import (
     PHOTOGRAPHS,

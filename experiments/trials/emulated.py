@@ -25,9 +25,9 @@ from experiments.discover.analysis import analyse
 from experiments.discover.discovery import Discovery, Verdict
 from experiments.discover.emulated import EmulatedSimulator, emulated_heaps, redrawn_bank
 from experiments.discover.emulator import Emulator, fit_emulator
-from experiments.measurement.observables import NAMES, PHOTOGRAPHED
 from experiments.discover.search import Search, drive
 from experiments.discover.settings import Settings
+from experiments.measurement.observables import NAMES, PHOTOGRAPHED
 from experiments.studyfile import load_study
 from experiments.trials.declaration import declared_effects, with_names
 from experiments.trials.drawing import STRONG, Effect

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.measurement.observables import OBSERVABLES
 from experiments.discover.simulator import Outcomes, Point
 from experiments.files import replacing
+from experiments.measurement.observables import OBSERVABLES
 from experiments.trials.camera import Camera
 from experiments.trials.truth import Label
 

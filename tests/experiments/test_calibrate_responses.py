@@ -5,13 +5,15 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 
 from doe import Factor, Sample
-from experiments.calibrate import CampaignSettings, Outcome, Response, Target, Twin, calibrate
+from experiments.calibrate import Campaign, CampaignSettings, Outcome, Response, Target, Twin, calibrate
 
 FACTORS = (Factor("A", 0.1, 0.3), Factor("E", 0.3, 0.6), Factor("F", 0.2, 0.6), Factor("G", 0.02, 0.08))
 
@@ -23,6 +25,16 @@ NOISE = {"angle": 0.3, "solid_fraction": 0.001, "mass_left": 0.0005}
 """Standard deviation of one case."""
 
 TRUTH = {"E": 0.47, "F": 0.42}
+
+KEPT = json.loads((Path(__file__).parent / "data" / "campaign_numbers.json").read_text(encoding="utf-8"))
+"""Numbers of two campaigns from before the angle was a response like any other."""
+
+LINEAR_ALGEBRA = 1e-6
+"""Relative difference that optimizers and decompositions of other hosts may make."""
+
+
+BARE = ("selection", "climb", "optimum")
+"""Stages whose results are those of all responses, or of the first."""
 
 
 def coded(row: Mapping[str, float], name: str) -> float:
@@ -218,3 +230,60 @@ def test_results_and_tables_hold_every_response() -> None:
     for name in ("screening_effects", "surface_anova_full"):
         assert list(dict.fromkeys(tables[name]["response"])) == ["angle", "density", "left"]
     assert "joint_directions" in tables
+
+
+def facts(found: Campaign) -> dict[str, Any]:
+    """Everything that decides a campaign, by response."""
+    climb, surface, optimum = found.climb, found.surface, found.optimum
+    by_name = {stage: getattr(found, stage).responses for stage in found.stages if stage not in BARE}
+    fits = by_name["surface"]
+    return {
+        "outcome": found.outcome.value,
+        "cases": len(found.cases),
+        "seeds": int(found.cases["seed"].sum()),
+        "target": {name: [one.mean, one.sd, one.n] for name, one in by_name["target"].items()},
+        "noise": {name: [one.sd, *one.sd_interval] for name, one in by_name["noise_floor"].items()},
+        "effects": {name: dict(one.screen.table["effect"]) for name, one in by_name["screening"].items()},
+        "p": {name: dict(one.screen.table["p"]) for name, one in by_name["screening"].items()},
+        "kept": list(found.selection.kept),
+        "visible_effect": found.selection.visible_effect,
+        "climb": climb.path["mean"].tolist(),
+        "crossing": climb.crossing,
+        "center": surface.center,
+        "half_range": surface.half_range,
+        "surfaces": {name: dict(one.reduced.coefficients) for name, one in fits.items()},
+        "full_p": {name: dict(one.full.anova["p"].dropna()) for name, one in fits.items()},
+        "point": optimum.point,
+        "predicted": optimum.prediction["mean"],
+        "fraction": optimum.region.fraction,
+        "low": dict(optimum.region.ranges["low"]),
+        "high": dict(optimum.region.ranges["high"]),
+        "unidentified": list(optimum.unidentified),
+        "truth_compatible": optimum.truth.compatible,
+        "truth_predicted": optimum.truth.predicted,
+        "shrinkage": dict(optimum.joint.shrinkage["share"]) if optimum.joint else {},
+        "verification": {
+            name: [one.a.mean, one.a.sd, one.difference, one.p, one.margin, one.equivalence_p]
+            for name, one in by_name["verification"].items()
+        },
+    }
+
+
+def flat(value: Any, place: str = "") -> dict[str, Any]:
+    """Leaves of nested data by their places."""
+    pairs = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    leaves = {} if isinstance(value, dict | list) else {place: value}
+    for key, item in pairs:
+        leaves |= flat(item, f"{place}.{key}")
+    return leaves
+
+
+@pytest.mark.parametrize(("name", "responses"), [("one", ()), ("three", (DENSITY, LEFT))])
+def test_a_campaign_gives_the_numbers_that_it_gave(name: str, responses: tuple[Response, ...]) -> None:
+    found, kept = flat(facts(calibrate(twin(*responses), Cases()))), flat(KEPT[name])
+    assert list(found) == list(kept)
+    for place, value in kept.items():
+        if isinstance(value, float):
+            np.testing.assert_allclose(found[place], value, rtol=LINEAR_ALGEBRA, atol=1e-12, err_msg=place)
+        else:
+            assert found[place] == value, place
