@@ -73,5 +73,6 @@ def _decision(response: Response, test: Comparison, cases: pd.DataFrame) -> Deci
         },
         f"{found} ({p_text(test.p)}): {quantity(test.difference, unit, '+')}, "
         f"{100.0 * (1.0 - test.alpha):.3g} % interval {interval_text(test.interval, unit, '+')}. "
-        f"Equivalence {shown} ({p_text(test.equivalence_p)}); these cases show it from a margin of {smallest} on. {failure_summary(own, response)}".strip(),
+        f"Equivalence {shown} ({p_text(test.equivalence_p)}); these cases show it from a margin of "
+        f"{smallest} on. {failure_summary(own, response)}".strip(),
     )

@@ -19,6 +19,7 @@ from experiments.calibrate.campaign import StageHook
 from experiments.cases import execute
 from experiments.commands import run
 from experiments.commands.run import Desk
+from experiments.measurement.states import Observed
 from experiments.studyfile import Study, load_study
 
 SLOPE = 30.0
@@ -50,7 +51,9 @@ def engine(cone: Callable[..., CaseResult], monkeypatch: pytest.MonkeyPatch) -> 
     engine = Engine(cone())
     monkeypatch.setattr(execute, "simulate", engine)
     monkeypatch.setattr(
-        execute, "measure_heap", lambda _, result: SimpleNamespace(mean=result.observables["truth"], se=0.1)
+        execute,
+        "observe",
+        lambda _, result, __: Observed({"angle": result.observables["truth"]}, SimpleNamespace(se=0.1)),
     )
     monkeypatch.setattr(run, "heap_pictures", lambda *_: [])
     return engine

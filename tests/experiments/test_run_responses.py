@@ -19,6 +19,7 @@ from experiments.cases import Store, execute, run_cases
 from experiments.cli import app
 from experiments.commands import run
 from experiments.commands.run import Desk
+from experiments.measurement.states import Observed
 from experiments.studyfile import Study, load_study
 
 BIN = """
@@ -90,13 +91,18 @@ class Engine:
             on_result(index, replace(self.heap, observables=seen))
 
 
+def observe(_: object, result: CaseResult, leaves_a_heap: bool) -> Observed:
+    """Take the angle that the stand-in engine tells of."""
+    seen = result.observables
+    heap = {"angle": seen["truth"]} if leaves_a_heap else {}
+    return Observed(seen | heap, SimpleNamespace(se=0.1) if heap else None)
+
+
 @pytest.fixture
 def engine(cone: Callable[..., CaseResult], monkeypatch: pytest.MonkeyPatch) -> Engine:
     engine = Engine(cone())
     monkeypatch.setattr(execute, "simulate", engine)
-    monkeypatch.setattr(
-        execute, "measure_heap", lambda _, result: SimpleNamespace(mean=result.observables["truth"], se=0.1)
-    )
+    monkeypatch.setattr(execute, "observe", observe)
     monkeypatch.setattr(run, "heap_pictures", lambda *_: [])
     return engine
 

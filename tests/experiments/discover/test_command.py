@@ -14,9 +14,9 @@ from experiments.commands import discover as commands
 from experiments.commands.discover import OUTCOMES, Ended, Job, run_search
 from experiments.commands.run import check_runs
 from experiments.discover import devices
-from experiments.measurement.observables import PHOTOGRAPHED
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.wave import WaveRunner
+from experiments.measurement.observables import PHOTOGRAPHED
 from experiments.report.discovery import Terms
 from experiments.studyfile import load_study
 

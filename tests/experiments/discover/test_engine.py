@@ -12,10 +12,11 @@ from dem_warp import Case, CaseResult, Progress, simulate
 from experiments.discover import wave
 from experiments.discover.engine import EngineSimulator
 from experiments.discover.library import library_for
-from experiments.measurement.observables import NAMES, measure
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.simulator import Point
 from experiments.errors import StoreError
+from experiments.measurement.observables import NAMES
+from experiments.measurement.states import measure
 from experiments.studyfile import Study, load_study
 
 CONDITIONS = """

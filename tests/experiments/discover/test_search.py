@@ -12,10 +12,10 @@ import pytest
 from experiments.discover.bank import Maker
 from experiments.discover.discovery import Verdict
 from experiments.discover.measured import Measured
-from experiments.measurement.observables import NAMES, OBSERVABLES
 from experiments.discover.search import Search, drive
 from experiments.discover.simulator import Outcomes, Point
 from experiments.errors import InputError, StudyError
+from experiments.measurement.observables import NAMES, OBSERVABLES
 from experiments.report.discovery import Terms, verdict_line, write_discovery
 from experiments.studyfile import Study, load_study
 

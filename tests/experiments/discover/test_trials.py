@@ -14,12 +14,12 @@ import synthetic
 from doe.factors import Factor
 from experiments.discover.analysis import Analysis
 from experiments.discover.discovery import Data, Discovery, Effort, Verdict
-from experiments.measurement.observables import OBSERVABLES, PHOTOGRAPHED
 from experiments.discover.ranking import SIZES
 from experiments.discover.settings import Settings
 from experiments.discover.simulator import Outcomes, Point
 from experiments.discover.space import MechanismRange
 from experiments.errors import InputError
+from experiments.measurement.observables import OBSERVABLES, PHOTOGRAPHED
 from experiments.trials.camera import Camera
 from experiments.trials.declaration import (
     Declaration,

@@ -10,10 +10,10 @@ from experiments.discover.emulator import fit_emulator
 from experiments.discover.engine import EngineSimulator
 from experiments.discover.library import library_for
 from experiments.discover.measured import Measured
-from experiments.measurement.observables import NAMES
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.search import Search
 from experiments.discover.settings import Settings
+from experiments.measurement.observables import NAMES
 from experiments.studyfile import load_study
 from experiments.trials.declaration import Declaration
 from experiments.trials.desk import Desk, read_data

@@ -11,11 +11,11 @@ import pytest
 from typer.testing import CliRunner
 
 from experiments.cli import app
+from experiments.discover.measured import CLOGGED, Measured
+from experiments.errors import InputError
 from experiments.measurement.measured_file import read_measured
 from experiments.measurement.notes import SUSPICION
-from experiments.discover.measured import CLOGGED, Measured
 from experiments.measurement.observables import NAMES
-from experiments.errors import InputError
 from experiments.studyfile import Study, load_study
 from imaging import save_picture
 from imaging.synthetic import Camera, DrawnHeap, draw

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from dem_warp import CaseResult
-from experiments.measurement.observables import NAMES, OBSERVABLES, PHOTOGRAPHED, measure
+from experiments.measurement.observables import NAMES, OBSERVABLES, PHOTOGRAPHED
+from experiments.measurement.states import measure
 from experiments.studyfile.study import MeasurementSection
 
 BALANCE = {name: 0.1 * index for index, name in enumerate(NAMES) if name not in PHOTOGRAPHED}

@@ -14,8 +14,8 @@ import pytest
 from experiments.commands.run import check_runs
 from experiments.discover.discovery import Discovery, Interval, Verdict
 from experiments.discover.library import library_for
-from experiments.measurement.observables import OBSERVABLES
 from experiments.discover.settings import Settings
+from experiments.measurement.observables import OBSERVABLES
 from experiments.report.discovery import Terms, write_discovery
 from experiments.studyfile import Study, load_study
 
