@@ -91,10 +91,10 @@ def target_tables(study: Study, measured: Iterable[Replicated]) -> dict[str, Any
     measured
         What was measured of them.
 
-    Raises
-    ------
-    InputError
-        When nothing was measured that can take part in a fit.
+    Returns
+    -------
+    dict
+        Empty where nothing was measured that can take part in a fit.
     """
     held_out = {condition.name for condition in study.conditions if condition.held_out}
     order = [TARGET_SCENE, *(condition.name for condition in study.conditions)]
@@ -103,8 +103,7 @@ def target_tables(study: Study, measured: Iterable[Replicated]) -> dict[str, Any
         key=lambda one: (one.condition in held_out, order.index(one.condition), _column(one) != ANGLE),
     )
     if not ranked or ranked[0].condition in held_out:
-        rule = "needs an observable with two values or more under a condition that is not held out"
-        raise InputError(rule, "none", f"{study.file}: target")
+        return {}
     first, *others = [_table(study, one) for one in ranked]
     return {"target": first} | ({"response": others} if others else {})
 
@@ -113,6 +112,9 @@ def _given(study: Study, measured: list[Replicated], note: str) -> Study:
     """Put measurements in place of where they come from; the responses of the study stay."""
     document = study.document
     tables = target_tables(study, measured)
+    if not tables:
+        rule = "needs an observable with two values or more under a condition that is not held out"
+        raise InputError(rule, note, f"{study.file}: target")
     responses = [*tables.get("response", []), *document.get("response", [])]
     document |= {"target": tables["target"] | {"note": note}}
     return study.with_document(document | ({"response": responses} if responses else {}))

@@ -37,11 +37,14 @@ PAPER_DECISIONS = CampaignSettings.model_validate(
 )
 
 
+MEASURED = Target((Response("angle", "angle", "deg", measured=Sample(30.148, 0.518, 5)),))
+
+
 @dataclass(frozen=True)
 class PaperStudy:
     campaign: CampaignSettings = PAPER_DECISIONS
     factors: tuple[Factor, ...] = field(default_factory=lambda: tuple(factors()))
-    target: Target = Target((Response("angle", "angle", "deg", measured=Sample(30.148, 0.518, 5)),))
+    target: Target = MEASURED
     limits: dict[str, tuple[float, float]] = field(
         default_factory=lambda: dict.fromkeys("ABCDEFGH", (0.0, math.inf))
     )

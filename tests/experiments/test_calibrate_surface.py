@@ -20,12 +20,14 @@ HALF_RANGE = 0.4
 NOISE = 0.01
 """Standard deviation of a heap [deg]; every slope and offset below is far larger."""
 
+MEASURED = Target((Response("angle", "angle", "deg", measured=Sample(20.0, NOISE, 5)),))
+
 
 @dataclass(frozen=True)
 class PlaneStudy:
     campaign: CampaignSettings = field(default_factory=CampaignSettings)
     factors: tuple[Factor, ...] = (Factor("E", 0.0, 2.0), Factor("F", 0.0, 2.0))
-    target: Target = Target((Response("angle", "angle", "deg", measured=Sample(20.0, NOISE, 5)),))
+    target: Target = MEASURED
     limits: dict[str, tuple[float, float]] = field(
         default_factory=lambda: dict.fromkeys("EF", (-math.inf, math.inf))
     )
