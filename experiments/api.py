@@ -98,7 +98,7 @@ def calibrate(
     """
     chosen = chosen_study(study, scale, device := chosen_device(device))
     folder = Path(out) if out is not None else default_folder(chosen)
-    check_runs(chosen, campaign=campaign, paper=published_replicates > 0)
+    chosen = check_runs(chosen, campaign=campaign, paper=published_replicates > 0)
     desk = Desk.open(chosen, folder, device, workers, resume, watch, engine_named(engine))
     replay = replay_published(desk, published_replicates) if published_replicates else None
     found = run_campaign(desk, on_stage, replay) if campaign else None

@@ -303,7 +303,7 @@ def new(
     """Write a commented study file to start from, or a file for the measured heaps of a study."""
     with clear_errors():
         if measured:
-            from experiments.discover.data.template import write_measured_template
+            from experiments.measurement.template import write_measured_template
             from experiments.studyfile import load_study
 
             study = Path(name) if name.endswith(".toml") else Path(f"{name}.toml")
@@ -375,7 +375,7 @@ def _print_measured(simulated: Heap) -> None:
         typer.echo(f"{simulated.angle.mean:.2f} +- {simulated.angle.se:.2f} degrees")
         return
     for name, unit in simulated.units.items():
-        value = simulated.result.observables[name]
+        value = simulated.observed.observables[name]
         typer.echo(f"{name.replace('_', ' ')}: {value:.5g} {'' if unit == '1' else unit}".rstrip())
 
 

@@ -9,12 +9,13 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 
-# Of `experiments`, from the bottom up: a room imports itself and what is named before it. Studies, with their
-# companions, stand above the commands, which load a companion by its name. Verification, benchmarks and
-# trials are evidence: nothing imports them.
+# Of `experiments`, from the bottom up: a room imports itself and what is named before it. The registry of
+# observables knows no study, so that a study file can name them. Studies, with their companions, stand above
+# the commands, which load a companion by its name. Verification, benchmarks and trials are evidence: nothing
+# imports them.
 ROOMS = (
-    "errors", "files", "export", "studyfile", "cases", "calibrate", "discover", "report", "runs", "api",
-    "commands", "cli", "studies", "verification", "benchmarks", "trials",
+    "errors", "files", "export", "measurement.observables", "studyfile", "measurement", "cases", "calibrate",
+    "discover", "report", "runs", "api", "commands", "cli", "studies", "verification", "benchmarks", "trials",
 )  # fmt: skip
 
 # Of `doe.discrepancy`, the folders in the order of use.

@@ -3,7 +3,7 @@
 from experiments.calibrate.campaign import calibrate
 from experiments.calibrate.cases import Runner, case_seed
 from experiments.calibrate.results import Campaign, ClimbEnd, Decision, Outcome
-from experiments.studyfile.campaign import CampaignSettings, CampaignStudy, MeasuredTarget, TwinTarget
+from experiments.studyfile.campaign import CampaignSettings, CampaignStudy, Response, Target, Twin
 
 __all__ = [
     "Campaign",
@@ -11,10 +11,11 @@ __all__ = [
     "CampaignStudy",
     "ClimbEnd",
     "Decision",
-    "MeasuredTarget",
     "Outcome",
+    "Response",
     "Runner",
-    "TwinTarget",
+    "Target",
+    "Twin",
     "calibrate",
     "case_seed",
 ]

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
 import pandas as pd
 
-from doe import Sample
 from experiments.calibrate.cases import Runner, StageEnd, simulate
 from experiments.calibrate.checks import check_study
 from experiments.calibrate.climb import climb, require_crossing
@@ -26,10 +25,10 @@ from experiments.calibrate.results import (
 from experiments.calibrate.screening import analyse_screening, plan_screening, screening_design
 from experiments.calibrate.selection import require_kept, select_factors
 from experiments.calibrate.surface import explore_surface, require_slope
-from experiments.calibrate.target import measured_target, plan_target, twin_target
-from experiments.calibrate.values import listed, p_text
+from experiments.calibrate.target import plan_target, settle_target
+from experiments.calibrate.values import listed, p_text, quantity
 from experiments.calibrate.verification import verify
-from experiments.studyfile.campaign import CampaignStudy, MeasuredTarget
+from experiments.studyfile.campaign import CampaignStudy, Response
 
 Found = TypeVar("Found", bound=StageResult)
 
@@ -46,7 +45,7 @@ def calibrate(study: CampaignStudy, runner: Runner, on_stage: StageHook | None =
         Factors, limits, target and decisions.
     runner
         Simulates all rows of a table at once, each in its ``scene``, and returns them with ``status``,
-        ``reason``, ``angle`` [deg] (NaN where there is none) and observables; a case that fails is a row,
+        ``reason`` and observables, NaN where there is none; a case that fails is a row,
         never an exception. Called once for the target, the noise floor and the screening together, then once
         for each batch of the climb, for the surface and for the verification.
     on_stage
@@ -70,11 +69,12 @@ def calibrate(study: CampaignStudy, runner: Runner, on_stage: StageHook | None =
     except StageEnd as end:
         outcome, reason = end.outcome, end.reason
     cases = pd.concat(record.tables, ignore_index=True)
-    return Campaign(tuple(study.factors), study.campaign, outcome, reason, cases, **record.stages)
+    target = study.target.responses
+    return Campaign(tuple(study.factors), target, study.campaign, outcome, reason, cases, **record.stages)
 
 
 class _Record:
-    """What a campaign has simulated and found so far."""
+    """Cases and results of a campaign so far."""
 
     def __init__(self, runner: Runner, on_stage: StageHook | None) -> None:
         self.stages: dict[str, Any] = {}
@@ -98,62 +98,52 @@ class _Record:
 
 def _run(study: CampaignStudy, record: _Record) -> tuple[Outcome, str]:
     """Run the stages one after another and return the outcome; StageEnd where the campaign cannot go on."""
-    settings = study.campaign
+    settings, response = study.campaign.selection, study.target.leading
     target, noise, screening = _open(study, record)
-    selection = record.keep("selection", select_factors(settings.selection, screening, noise))
-    require_kept(settings.selection, selection)
-    path = climb(study, screening.screen, selection.kept, noise.floor, target.sample, record.run)
-    require_crossing(study, record.keep("climb", path), target.sample)
+    selection = record.keep("selection", select_factors(settings, screening, noise, response))
+    require_kept(settings, selection, response)
+    path = climb(study, screening, selection.kept, noise, target, record.run)
+    require_crossing(study, record.keep("climb", path), target)
     surface = record.keep("surface", explore_surface(study, path, record.run))
     require_slope(surface)
     optimum = record.keep("optimum", find_optimum(study, surface, target))
     verification = record.keep("verification", verify(study, optimum, target, record.run))
-    return _verdict(optimum, verification, target.sample)
+    return _verdict(study.target.responses, optimum, verification)
 
 
 def _open(study: CampaignStudy, record: _Record) -> tuple[TargetResult, NoiseFloorResult, ScreeningResult]:
     """Run the stages that wait for nothing, in one batch: a twin's target, the noise floor, the screening."""
-    factors, settings, target = study.factors, study.campaign, study.target
-    design = screening_design(factors, settings.screening)
-    plans = [
-        plan_noise_floor(factors, settings.noise_floor, settings.seeds, target.responses),
-        plan_screening(factors, design, settings.screening, settings.seeds, target.responses),
-    ]
-    if isinstance(target, MeasuredTarget):
-        noise_cases, screening_cases = simulate(record.run, *plans)
-        aim = measured_target(target)
-    else:
-        heaps, noise_cases, screening_cases = simulate(
-            record.run, plan_target(factors, target, settings.seeds), *plans
-        )
-        aim = twin_target(study, target, heaps)
-    screened = analyse_screening(design, screening_cases, target.responses, settings.screening.design)
-    return (
-        record.keep("target", aim),
-        record.keep("noise_floor", analyse_noise_floor(settings.noise_floor, noise_cases, target.responses)),
-        record.keep("screening", screened),
-    )
+    design = screening_design(study.factors, study.campaign.screening)
+    plans = [plan_noise_floor(study), plan_screening(study, design)]
+    if study.target.twin is not None:
+        plans = [plan_target(study), *plans]
+    *hidden, noise_cases, screening_cases = simulate(record.run, *plans)
+    target = record.keep("target", settle_target(study, *hidden))
+    noise = record.keep("noise_floor", analyse_noise_floor(study, noise_cases))
+    name = study.campaign.screening.design
+    screening = analyse_screening(design, screening_cases, study.target.fitted, name)
+    return target, noise, record.keep("screening", screening)
 
 
-def _verdict(optimum: OptimumResult, verification: VerificationResult, target: Sample) -> tuple[Outcome, str]:
+def _verdict(
+    responses: Sequence[Response], optimum: OptimumResult, verification: VerificationResult
+) -> tuple[Outcome, str]:
     """Say how a campaign that reached its last stage ended."""
-    comparison = verification.comparison
-    found = (
-        f"At {listed(optimum.point)} fresh heaps gave {comparison.a.mean:.2f} deg against the target's "
-        f"{target.mean:.2f} deg (difference {comparison.difference:+.2f}, {p_text(comparison.p)})"
+    tests = [(response, verification.responses[response.name]) for response in responses]
+    gave = [
+        f"{r.name} {quantity(test.a.mean, r.unit)} against {quantity(test.a.mean - test.difference, r.unit)} "
+        f"(difference {quantity(test.difference, r.unit, '+')}, {p_text(test.p)})"
+        for r, test in tests
+    ]
+    found = f"At {listed(optimum.point)} fresh cases gave {'; '.join(gave)}"
+    if missed := [r.name for r, test in tests if test.different]:
+        return Outcome.NOT_VERIFIED, f"{found}: the chosen point misses the target of {', '.join(missed)}."
+    shown, unproven = (
+        [f"{r.name} within {quantity(test.margin or 0.0, r.unit)}" for r, test in tests if equal(test)]
+        for equal in (lambda test: test.equivalent, lambda test: not test.equivalent)
     )
-    if comparison.different:
-        return Outcome.NOT_VERIFIED, f"{found}: the chosen point does not give the target."
-    if missed := [name for name, test in verification.responses.items() if test.different]:
-        return Outcome.NOT_VERIFIED, f"{found}, but it does not give the target of {', '.join(missed)}."
-    within = "shown" if comparison.equivalent else "not shown"
-    equivalence = f"equivalence within {verification.margin:.2f} deg is {within}"
-    others = (
-        f"; no difference in {', '.join(verification.responses)} either" if verification.responses else ""
-    )
+    said = [f"equivalence is shown for {', '.join(shown)}"] if shown else []
+    said += [f"equivalence is not shown for {', '.join(unproven)}"] if unproven else []
     if verification.verified:
-        return Outcome.CALIBRATED, f"{found}; {equivalence}{others}."
-    unproven = [name for name, test in verification.responses.items() if not test.equivalent]
-    if comparison.equivalent:
-        equivalence = f"equivalence is not shown for {', '.join(unproven)}"
-    return Outcome.NOT_VERIFIED, f"{found}, but {equivalence}, which the study requires: add replicates."
+        return Outcome.CALIBRATED, f"{found}; {'; '.join(said)}."
+    return Outcome.NOT_VERIFIED, f"{found}, but {said[-1]}, which the study requires: add replicates."

@@ -9,18 +9,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from experiments.calibrate.results import STAGES, Outcome
-from experiments.studyfile.campaign import ANGLE, TARGET_SCENE
+from experiments.calibrate.results import STAGES, Outcome, failed
+from experiments.studyfile.campaign import TARGET_SCENE, Response
 
 if TYPE_CHECKING:
     from doe import Factor
 
 Runner = Callable[[pd.DataFrame], pd.DataFrame]
-"""Simulates all rows of a table at once and returns them in order, ``status`` and ``angle`` [deg] added."""
+"""Simulates all rows of a table at once and returns them in order, ``status`` and observables added."""
 
 
 class StageEnd(Exception):  # noqa: N818  (an ending that is foreseen, not an error)
-    """A campaign ends here, for a reason that its report states.
+    """End of a campaign, for a reason that its report states.
 
     Parameters
     ----------
@@ -105,59 +105,55 @@ def simulate(runner: Runner, *plans: pd.DataFrame) -> list[pd.DataFrame]:
     ]
 
 
-def scene_cases(cases: pd.DataFrame, scene: str = TARGET_SCENE) -> pd.DataFrame:
-    """Return the cases of one scene; a table without the column ``scene`` has those of the target's alone."""
-    if "scene" not in cases.columns:
-        return cases
-    return cases[cases["scene"] == scene].reset_index(drop=True)
+def measured(cases: pd.DataFrame, response: Response) -> pd.DataFrame:
+    """Return the cases that gave a response."""
+    if response.observable not in cases.columns:  # where every case failed before it could be measured
+        return cases.iloc[:0].assign(**{response.observable: np.nan})
+    found = (cases["scene"] == response.scene) & (cases["status"] == "finished")
+    return cases[found & cases[response.observable].notna()].reset_index(drop=True)
 
 
-def measured(cases: pd.DataFrame, observable: str = ANGLE) -> pd.DataFrame:
-    """Return the cases of a scene that gave an observable."""
-    if observable not in cases.columns:  # where every case failed before it could be measured
-        return cases.iloc[:0].assign(**{observable: np.nan})
-    return cases[(cases["status"] == "finished") & cases[observable].notna()]
-
-
-def values_of(cases: pd.DataFrame, stage: str, observable: str = ANGLE, least: int = 2) -> np.ndarray:
-    """Return an observable of replicated cases of a scene.
+def values_of(cases: pd.DataFrame, stage: str, response: Response, least: int = 2) -> np.ndarray:
+    """Return a response of replicated cases.
 
     Raises
     ------
     StageEnd
-        When fewer than ``least`` cases gave one.
+        When fewer than ``least`` cases gave it.
     """
-    values = measured(cases, observable)[observable].to_numpy(dtype=np.float64)
+    values = measured(cases, response)[response.observable].to_numpy(dtype=np.float64)
     if len(values) < least:
-        raise too_many_failed(cases, stage, f"needs at least {least} measured cases", observable)
+        raise too_many_failed(cases, stage, f"needs at least {least} measured cases", response)
     return values
 
 
-def response_table(cases: pd.DataFrame, runs: Sequence[int]) -> np.ndarray:
-    """Return angles [deg] by run and replicate, shape (runs, replicates); NaN where there is none."""
-    angles = measured(cases).pivot_table(index="run", columns="replicate", values=ANGLE)
+def response_table(cases: pd.DataFrame, response: Response, runs: Sequence[int]) -> np.ndarray:
+    """Return a response by run and replicate, shape (runs, replicates); NaN where there is none."""
+    values = measured(cases, response).pivot_table(
+        index="run", columns="replicate", values=response.observable
+    )
     columns = range(1, int(cases["replicate"].max()) + 1)
-    return angles.reindex(index=list(runs), columns=columns).to_numpy(dtype=np.float64)
+    return values.reindex(index=list(runs), columns=columns).to_numpy(dtype=np.float64)
 
 
-def failure_summary(cases: pd.DataFrame, observable: str = ANGLE) -> str:
-    """Say how many cases of a scene failed, and of what; empty when none did."""
-    failed = cases.drop(measured(cases, observable).index)
-    if failed.empty:
+def failure_summary(cases: pd.DataFrame, *responses: Response) -> str:
+    """Say how many cases failed or lack a response, and of what; empty when none did."""
+    lost = failed(cases, responses)
+    if lost.empty:
         return ""
-    # A finished case without an angle had no heap to measure.
-    missing = "no measurable heap" if observable == ANGLE else f"no {observable}"
-    kinds = failed["status"].replace("finished", missing).value_counts()
-    listed = ", ".join(f"{count} {kind}" for kind, count in kinds.items())
-    return f"{len(failed)} of {len(cases)} cases failed ({listed})"
+    names = ", ".join(response.name for response in responses)
+    # A finished case without its response had nothing to measure, no heap for one.
+    kinds = lost["status"].replace("finished", f"without {names}").value_counts()
+    counts = ", ".join(f"{count} {kind}" for kind, count in kinds.items())
+    return f"{len(lost)} of {len(cases)} cases failed ({counts})"
 
 
-def too_many_failed(cases: pd.DataFrame, stage: str, need: str, observable: str = ANGLE) -> StageEnd:
+def too_many_failed(cases: pd.DataFrame, stage: str, need: str, response: Response) -> StageEnd:
     """Return the end of a campaign whose stage cannot be analysed."""
-    failures = failure_summary(cases, observable) or "no case failed"
-    of = "" if observable == ANGLE else f" for {observable}"
+    own = cases[cases["scene"] == response.scene]
+    failures = failure_summary(own, response) or "no case failed"
     reason = (
-        f"The stage {stage.replace('_', ' ')}{of} {need}; {failures}. See the reasons in the table of cases, "
-        "then widen the time limit or narrow the factors' ranges."
+        f"The stage {stage.replace('_', ' ')} {need} for {response.name}; {failures}. See the reasons in the "
+        "table of cases, then widen the time limit or narrow the factors' ranges."
     )
     return StageEnd(Outcome.TOO_MANY_FAILED_RUNS, reason)

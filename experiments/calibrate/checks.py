@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from experiments.calibrate.screening import screening_design
 from experiments.calibrate.values import UNLIMITED, reach_limits
-from experiments.studyfile.campaign import CampaignStudy, TwinTarget
+from experiments.studyfile.campaign import CampaignStudy
 
 
 def check_study(study: CampaignStudy) -> None:
@@ -33,8 +33,12 @@ def check_study(study: CampaignStudy) -> None:
         for name, size in (sizes or {}).items():
             if not size > 0.0:
                 raise ValueError(f"campaign.{place}.{name}: must be positive (received {size:g})")
-    if isinstance(study.target, TwinTarget):
-        _check_values(study.target.truth, hard, "target.twin.truth")
+    if study.target.twin is not None:
+        _check_values(study.target.twin.truth, hard, "target.twin.truth")
+    leading = study.target.leading
+    if settings.verification.margin is not None and leading.unit != "deg":
+        rule = f"is an angle, but {leading.name} leads: state margin_sds instead"
+        raise ValueError(f"campaign.verification.margin: {rule} (received {settings.verification.margin:g})")
     screening_design(study.factors, settings.screening)
 
 

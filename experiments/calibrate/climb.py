@@ -20,14 +20,30 @@ from experiments.calibrate.cases import (
     simulate,
     too_many_failed,
 )
-from experiments.calibrate.results import ClimbEnd, ClimbResult, Decision, Outcome
-from experiments.calibrate.values import fixed_values, kept_factors, listed, numbered_values, reach_limits
-from experiments.studyfile.campaign import CampaignStudy, ClimbSettings
+from experiments.calibrate.results import (
+    ClimbEnd,
+    ClimbResult,
+    Decision,
+    NoiseFloorResult,
+    Outcome,
+    ScreeningResult,
+    TargetResult,
+)
+from experiments.calibrate.values import (
+    fixed_values,
+    kept_factors,
+    listed,
+    numbered_values,
+    of,
+    quantity,
+    reach_limits,
+)
+from experiments.studyfile.campaign import CampaignStudy, ClimbSettings, Response
 
 STAGE = "climb"
 
 LEAST_STEPS = 2
-"""Steps with an angle below which a path tells nothing."""
+"""Steps with a value below which a path tells nothing."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +58,7 @@ class _Line:
     limits: Mapping[str, tuple[float, float]]
 
     def walk(self, start: Mapping[str, float], moves: int, descend: bool = False) -> pd.DataFrame:
-        """Return the points of a path, the start first: kept factors (natural) and predicted angle [deg]."""
+        """Return the points of a path, the start first: kept factors (natural) and predicted response."""
         limits = {name: self.limits[name] for name in self.kept}
         path = steepest_path(
             self.screen, moves, factors=self.kept, step=self.step, start=start, limits=limits, descend=descend
@@ -54,27 +70,27 @@ class _Line:
 
 def climb(
     study: CampaignStudy,
-    screen: ScreenResult,
+    screening: ScreeningResult,
     kept: tuple[str, ...],
-    noise: NoiseFloor,
-    target: Sample,
+    noise: NoiseFloorResult,
+    target: TargetResult,
     runner: Runner,
 ) -> ClimbResult:
-    """Walk along the steepest path, every step at once, and on where the target is still ahead.
+    """Walk along the leading response's steepest path, every step at once, and on if the target is ahead.
 
     Raises
     ------
     StageEnd
-        When the path has no room, or fewer than two steps gave an angle.
+        When the path has no room, or fewer than two steps gave a value.
     """
-    settings = study.campaign.climb
-    line, rule = _line(study, screen, kept)
+    settings, response = study.campaign.climb, study.target.leading
+    line, rule = _line(study, screening.leading.screen, kept)
     batches, tables = [_first_points(line, settings)], []
     for _ in range(1 + settings.extensions):
         tables.append(_simulate_steps(study, batches[-1], kept, runner))
         points, cases = pd.concat(batches).sort_index(), pd.concat(tables, ignore_index=True)
-        path = _path_table(points, cases, target.mean)
-        end = _end(path, cases, noise, settings)
+        path = _path_table(points, cases, response, target.leading.mean)
+        end = _end(path, measured(cases, response)[["run", response.observable]], noise.leading, settings)
         more = _further_points(line, path, settings)
         if end is not ClimbEnd.BOUNDED or more.empty:
             break
@@ -89,12 +105,12 @@ def climb(
             numbered_values("start", line.start) | numbered_values("step", step),
             _direction(step),
         ),
-        _end_decision(path, cases, end, target, crossing, place, best),
+        _end_decision(path, cases, end, response, target.leading, crossing, place, best),
     )
     return ClimbResult(cases, kept, path, step, end, crossing, place, best, decisions)
 
 
-def require_crossing(study: CampaignStudy, result: ClimbResult, target: Sample) -> None:
+def require_crossing(study: CampaignStudy, result: ClimbResult, target: TargetResult) -> None:
     """Go on when the climb crossed the target, or when the study fixes the centre of the surface.
 
     Raises
@@ -105,8 +121,12 @@ def require_crossing(study: CampaignStudy, result: ClimbResult, target: Sample) 
     center = fixed_values(study.campaign.surface.center, result.kept)
     if result.end is ClimbEnd.CROSSED or center is not None:
         return
-    nearest = result.path.loc[result.best_step, "angle"]
-    best = f"{nearest:.2f} deg at best ({listed(result.best)}) against {target.mean:.2f} deg"
+    response = study.target.leading
+    nearest, aim = (
+        quantity(value, response.unit)
+        for value in (result.path.loc[result.best_step, "mean"], target.leading.mean)
+    )
+    best = f"{nearest} at best ({listed(result.best)}) against {aim}"
     if result.end is ClimbEnd.BOUNDED:
         at_bound = _factors_at_bound(study, result)
         where = f"at the bound: {', '.join(at_bound)}" if at_bound else "all batches were used up"
@@ -122,8 +142,8 @@ def require_crossing(study: CampaignStudy, result: ClimbResult, target: Sample) 
     }
     raise StageEnd(
         Outcome.PLATEAU,
-        f"The angle {what[result.end]} the target: {best}. More of {', '.join(result.kept)} does not "
-        "help: keep further factors, or look for a mechanism that the model lacks.",
+        f"The {response.name} {what[result.end]} the target: {best}. More of {', '.join(result.kept)} does "
+        "not help: keep further factors, or look for a mechanism that the model lacks.",
     )
 
 
@@ -156,7 +176,7 @@ def _first_points(line: _Line, settings: ClimbSettings) -> pd.DataFrame:
 
 
 def _further_points(line: _Line, path: pd.DataFrame, settings: ClimbSettings) -> pd.DataFrame:
-    """Return the next batch: past the last step when all angles are too low, else before the first."""
+    """Return the next batch: past the last step when all values are too low, else before the first."""
     descend = bool(path["error"].min() > 0.0)
     edge = path.iloc[0 if descend else -1]
     start = {name: float(edge[name]) for name in line.kept}
@@ -170,36 +190,36 @@ def _simulate_steps(
     study: CampaignStudy, points: pd.DataFrame, kept: tuple[str, ...], runner: Runner
 ) -> pd.DataFrame:
     settings = study.campaign
-    plan = plan_cases(
-        study.factors, STAGE, points[list(kept)], settings.climb.replicates, settings.seeds.campaign
-    )
+    points, replicates, seed = points[list(kept)], settings.climb.replicates, settings.seeds.campaign
+    plan = plan_cases(study.factors, STAGE, points, replicates, seed, (study.target.leading.scene,))
     return simulate(runner, plan)[0]
 
 
-def _path_table(points: pd.DataFrame, cases: pd.DataFrame, target: float) -> pd.DataFrame:
+def _path_table(points: pd.DataFrame, cases: pd.DataFrame, response: Response, target: float) -> pd.DataFrame:
     """Return the points with what was measured at each.
 
     Raises
     ------
     StageEnd
-        When fewer than two steps gave an angle.
+        When fewer than two steps gave a value.
     """
-    used = measured(cases).groupby("run")["angle"].agg(["mean", "std", "size"]).reindex(points.index)
+    found = measured(cases, response).groupby("run")[response.observable]
+    used = found.agg(["mean", "std", "size"]).reindex(points.index)
     if used["mean"].count() < LEAST_STEPS:
-        raise too_many_failed(cases, STAGE, f"needs at least {LEAST_STEPS} measured steps")
-    path = points.assign(angle=used["mean"], sd=used["std"], n=used["size"].fillna(0).astype(int))
-    path["error"] = path["angle"] - target
-    path["error_percent"] = 100.0 * path["error"].abs() / target
+        raise too_many_failed(cases, STAGE, f"needs at least {LEAST_STEPS} measured steps", response)
+    path = points.assign(mean=used["mean"], sd=used["std"], n=used["size"].fillna(0).astype(int))
+    path["error"] = path["mean"] - target
+    path["error_percent"] = 100.0 * path["error"].abs() / abs(target) if target else math.nan
     return path
 
 
-def _end(path: pd.DataFrame, cases: pd.DataFrame, noise: NoiseFloor, settings: ClimbSettings) -> ClimbEnd:
+def _end(path: pd.DataFrame, used: pd.DataFrame, noise: NoiseFloor, settings: ClimbSettings) -> ClimbEnd:
     """Judge a path: crossed, else flat, else turned, else it ends where it is bounded."""
-    known = path.dropna(subset="angle")
+    known = path.dropna(subset="mean")
     error, count = known["error"].to_numpy(), known["n"].to_numpy()
     if _sign_changes(error).size:
         return ClimbEnd.CROSSED
-    variance, df = _pooled_variance(measured(cases), noise)
+    variance, df = _pooled_variance(used, noise)
     others = len(error) - 1
     between = float((count * (error - np.average(error, weights=count)) ** 2).sum()) / others
     if between <= float(stats.f.isf(settings.alpha, others, df)) * variance:
@@ -214,9 +234,10 @@ def _end(path: pd.DataFrame, cases: pd.DataFrame, noise: NoiseFloor, settings: C
 
 
 def _pooled_variance(used: pd.DataFrame, noise: NoiseFloor) -> tuple[float, int]:
-    """Return the variance of one case [deg^2] from the noise floor and the climb's replicates, and its df."""
-    within = used["angle"] - used.groupby("run")["angle"].transform("mean")
-    df = noise.sample.df + len(used) - used["run"].nunique()
+    """Return the variance of one case from the noise floor and the climb's replicates, and its df."""
+    run, values = used["run"], used.iloc[:, -1]
+    within = values - values.groupby(run).transform("mean")
+    df = noise.sample.df + len(used) - run.nunique()
     return (noise.sample.df * noise.sd**2 + float((within**2).sum())) / df, df
 
 
@@ -227,7 +248,7 @@ def _sign_changes(error: np.ndarray) -> np.ndarray:
 
 def _crossing(path: pd.DataFrame, kept: tuple[str, ...]) -> tuple[float, dict[str, float]]:
     """Return the first place where the path crosses the target, interpolated: fractional step and values."""
-    known = path.dropna(subset="angle")
+    known = path.dropna(subset="mean")
     error = known["error"].to_numpy()
     before = int(_sign_changes(error)[0])
     span = error[before] - error[before + 1]
@@ -260,22 +281,27 @@ def _end_decision(
     path: pd.DataFrame,
     cases: pd.DataFrame,
     end: ClimbEnd,
+    response: Response,
     target: Sample,
     crossing: Mapping[str, float] | None,
     place: float | None,
     best: int,
 ) -> Decision:
-    numbers = {f"angle at step {step} [deg]": angle for step, angle in path["angle"].items()}
-    numbers |= {"target [deg]": target.mean, "nearest step": best}
+    numbers = {of(f"step {step}, mean", response): mean for step, mean in path["mean"].items()}
+    numbers |= {of("target", response): target.mean, "nearest step": best}
     if crossing is not None:
         numbers |= {"crossing step": place} | numbered_values("crossing", crossing)
         outcome = f"The path crosses the target at {listed(crossing)} (step {place:.2f}, interpolated)."
     else:
         outcome = {
             ClimbEnd.TURNED: "The path turned away before the target.",
-            ClimbEnd.FLAT: "The angle does not change beyond the noise and does not meet the target.",
+            ClimbEnd.FLAT: f"The {response.name} does not change beyond the noise and misses the target.",
             ClimbEnd.BOUNDED: "The path ends before the target.",
         }[end]
-    outcome += f" The nearest step is {best} ({path.loc[best, 'angle']:.2f} deg). {failure_summary(cases)}"
-    rule = "The climb goes on until its mean angle has crossed the target, turned away, or met its bounds."
+    nearest = quantity(path.loc[best, "mean"], response.unit)
+    outcome += f" The nearest step is {best} ({nearest}). {failure_summary(cases, response)}"
+    rule = (
+        f"The climb goes on until its mean {response.name} has crossed the target, turned away, or met its "
+        "bounds."
+    )
     return Decision(STAGE, rule, numbers, outcome.strip())

@@ -15,19 +15,23 @@ from pydantic import BaseModel
 
 from doe import Comparison, Design, JointFit, NoiseFloor, Region, Sample, ScreenResult, Surface
 
-_COMPARISON = (
-    "difference",
-    "se",
-    "df",
-    "t",
-    "p",
-    "interval",
-    "alpha",
-    "margin",
-    "equivalence_p",
-    "equivalent",
-)
-_QUALITY = ("r2", "r2_adjusted", "r2_predicted", "cv_percent", "adequate_precision")
+_PROPERTIES: dict[type, tuple[str, ...]] = {
+    Sample: ("mean", "sd", "n", "se"),
+    NoiseFloor: ("confidence", "mean_interval", "sd_interval"),
+    Comparison: (
+        "a", "b", "method", "difference", "se", "df", "t", "p", "interval", "alpha", "margin",
+        "equivalence_p", "equivalent", "smallest_margin",
+    ),
+    Design: ("factors", "dummies", "coded", "natural"),
+    ScreenResult: ("table", "anova", "error_rule", "error_df", "error_ms", "effects"),
+    Surface: (
+        "anova", "coefficients", "coded_coefficients", "dropped", "r2", "r2_adjusted", "r2_predicted",
+        "cv_percent", "adequate_precision",
+    ),
+    Region: ("fraction", "ranges", "extent", "resolution"),
+    JointFit: ("point", "alpha", "extent", "shrinkage", "directions"),
+}  # fmt: skip
+"""Properties of each result of `doe` that results.json tells."""
 
 
 @singledispatch
@@ -98,55 +102,18 @@ def _frame(value: pd.DataFrame) -> list[dict[str, Any]]:
     return [_mapping(row) for row in indexed(value).to_dict("records")]
 
 
-@jsonable.register
-def _sample(value: Sample) -> dict[str, Any]:
-    return _properties(value, "mean", "sd", "n", "se")
+def _result(value: Any) -> dict[str, Any]:
+    """Tell the properties of a result of `doe`."""
+    told = {name: jsonable(getattr(value, name)) for name in _PROPERTIES[type(value)]}
+    if isinstance(value, NoiseFloor):
+        return jsonable(value.sample) | told
+    if isinstance(value, Surface):
+        return told | {"equation": value.equation("natural"), "equation_coded": value.equation("coded")}
+    return told | ({"responses": jsonable(value.tests())} if isinstance(value, JointFit) else {})
 
 
-@jsonable.register
-def _noise_floor(value: NoiseFloor) -> dict[str, Any]:
-    return _properties(value.sample, "mean", "sd", "n", "se") | _properties(
-        value, "confidence", "mean_interval", "sd_interval"
-    )
-
-
-@jsonable.register
-def _comparison(value: Comparison) -> dict[str, Any]:
-    return _properties(value, "a", "b", "method", *_COMPARISON, "smallest_margin")
-
-
-@jsonable.register
-def _design(value: Design) -> dict[str, Any]:
-    return _properties(value, "factors", "dummies", "coded", "natural")
-
-
-@jsonable.register
-def _screen(value: ScreenResult) -> dict[str, Any]:
-    return _properties(value, "table", "anova", "error_rule", "error_df", "error_ms", "effects")
-
-
-@jsonable.register
-def _surface(value: Surface) -> dict[str, Any]:
-    return _properties(value, "anova", "coefficients", "coded_coefficients", "dropped", *_QUALITY) | {
-        "equation": value.equation("natural"),
-        "equation_coded": value.equation("coded"),
-    }
-
-
-@jsonable.register
-def _region(value: Region) -> dict[str, Any]:
-    return _properties(value, "fraction", "ranges", "extent", "resolution")
-
-
-@jsonable.register
-def _joint(value: JointFit) -> dict[str, Any]:
-    return _properties(value, "point", "alpha", "extent", "shrinkage", "directions") | {
-        "responses": jsonable(value.tests())
-    }
-
-
-def _properties(value: Any, *names: str) -> dict[str, Any]:
-    return {name: jsonable(getattr(value, name)) for name in names}
+for _kind in _PROPERTIES:
+    jsonable.register(_kind)(_result)
 
 
 def indexed(table: pd.DataFrame) -> pd.DataFrame:

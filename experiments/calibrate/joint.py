@@ -10,7 +10,7 @@ import pandas as pd
 from doe import Goal, JointFit, joint_fit
 from experiments.calibrate.results import Decision, SurfaceResult, TargetResult
 from experiments.calibrate.values import fixed_values, p_text
-from experiments.studyfile.campaign import ANGLE, OptimumSettings
+from experiments.studyfile.campaign import OptimumSettings
 
 STAGE = "optimum"
 
@@ -22,9 +22,8 @@ NO_HELP = 0.95
 
 
 def fit_jointly(surface: SurfaceResult, target: TargetResult, settings: OptimumSettings) -> JointFit:
-    """Fit the angle and the further responses together, by their reduced surfaces."""
-    goals = {ANGLE: Goal(surface.reduced, target.sample)}
-    goals |= {name: Goal(fit.reduced, target.responses[name]) for name, fit in surface.responses.items()}
+    """Fit all responses together, by their reduced surfaces."""
+    goals = {name: Goal(fit.reduced, target.responses[name]) for name, fit in surface.responses.items()}
     return joint_fit(goals, alpha=1.0 - settings.confidence)
 
 
@@ -94,20 +93,20 @@ def _purchase(joint: JointFit) -> Decision:
     numbers = {f"share with {name} added": share for name, share in table["share"].items()}
     numbers |= {f"share of {name} alone": share for name, share in table["alone"].items()}
     with_first = table["with_first"].iloc[1:]
-    best = str(with_first.idxmin())
+    first, best = table.index[0], str(with_first.idxmin())
     if not alone > 0.0:
-        outcome = f"No setting explored agrees with the {ANGLE} alone."
+        outcome = f"No setting explored agrees with the {first} alone."
     elif with_first[best] > NO_HELP * alone:
-        outcome = f"No response makes the {ANGLE}'s region smaller by more than {1.0 - NO_HELP:.0%}."
+        outcome = f"No response makes the {first}'s region smaller by more than {1.0 - NO_HELP:.0%}."
     else:
         outcome = (
-            f"{best} buys most: with it {with_first[best] / alone:.0%} of the {ANGLE}'s region are left. All "
+            f"{best} buys most: with it {with_first[best] / alone:.0%} of the {first}'s region are left. All "
             f"together leave {table['share'].iloc[-1] / alone:.0%} of it."
         )
     return Decision(
         STAGE,
-        "The region of the angle alone, then with the response that makes it smallest, and so on: shares of "
-        "the region that the design explored.",
+        f"The region of the {first} alone, then with the response that makes it smallest, and so on: shares "
+        "of the region that the design explored.",
         numbers,
         outcome,
     )

@@ -19,8 +19,15 @@ from experiments.calibrate.results import (
     TargetResult,
     TruthCheck,
 )
-from experiments.calibrate.values import fixed_values, listed, numbered_values
-from experiments.studyfile.campaign import CampaignStudy, OptimumSettings
+from experiments.calibrate.values import (
+    fixed_values,
+    interval_text,
+    listed,
+    numbered_values,
+    of,
+    quantity,
+)
+from experiments.studyfile.campaign import CampaignStudy, OptimumSettings, Response
 
 STAGE = "optimum"
 
@@ -31,12 +38,12 @@ def find_optimum(study: CampaignStudy, surface: SurfaceResult, target: TargetRes
     Raises
     ------
     StageEnd
-        When the fitted surface of the angle, which is alone, does not reach the target where the design
-        explored it.
+        When the fitted surface of a single response does not reach the target where the design explored it.
     """
-    settings, fit, sample = study.campaign.optimum, surface.reduced, target.sample
+    settings, fit, sample = study.campaign.optimum, surface.leading.reduced, target.leading
     reach = float(surface.design.coded.abs().to_numpy().max())
-    joint = fit_jointly(surface, target, settings) if target.responses else None
+    response = study.target.leading
+    joint = fit_jointly(surface, target, settings) if len(surface.responses) > 1 else None
     if joint is None:
         # The box of the two-level part first: inside it the fit is at its best. Axial points reach further.
         point, rule, extent = _choose(settings, surface, sample.mean, sorted({1.0, reach}))
@@ -44,6 +51,7 @@ def find_optimum(study: CampaignStudy, surface: SurfaceResult, target: TargetRes
     else:
         (point, rule), extent, region = choose_jointly(joint, settings), joint.extent, joint.region()
     prediction = fit.predict(point, alpha=1.0 - settings.confidence).iloc[0]
+    likely = (prediction["confidence_low"], prediction["confidence_high"])
     unidentified = _unidentified(settings, region)
     truth = None if target.truth is None else _check_truth(fit, target, settings.confidence, reach, joint)
     decisions = [
@@ -51,16 +59,19 @@ def find_optimum(study: CampaignStudy, surface: SurfaceResult, target: TargetRes
             STAGE,
             rule,
             numbered_values("chosen", point)
-            | {"predicted [deg]": prediction["mean"], "se of the fit [deg]": prediction["se"]},
-            f"Chosen: {listed(point)}; the surface predicts {prediction['mean']:.2f} deg "
-            f"({prediction['confidence_low']:.2f} to {prediction['confidence_high']:.2f}).",
+            | {
+                of("prediction", response): prediction["mean"],
+                of("se of the fit", response): prediction["se"],
+            },
+            f"Chosen: {listed(point)}; the surface of the {response.name} predicts "
+            f"{quantity(prediction['mean'], response.unit)} ({interval_text(likely, response.unit)}).",
         ),
         _region_decision(settings, region, unidentified, joint),
     ]
     if joint is not None:
         decisions += joint_decisions(joint, point, settings)
     if truth is not None:
-        decisions.append(_truth_decision(truth, sample.mean))
+        decisions.append(_truth_decision(truth, sample.mean, response))
     return OptimumResult(
         point=point,
         settings=middle(study.factors, point),
@@ -79,7 +90,7 @@ def _choose(
     settings: OptimumSettings, surface: SurfaceResult, target: float, extents: list[float]
 ) -> tuple[dict[str, float], str, float]:
     """Return the chosen point, the rule that chose it, and the extent that holds it."""
-    fit = surface.reduced
+    fit = surface.leading.reduced
     fixed = fixed_values(settings.point, surface.center)
     if fixed is not None:
         return fixed, "The study fixes the chosen point.", extents[-1] if _reach(fit, fixed) > 1.0 else 1.0
@@ -124,7 +135,7 @@ def _check_truth(
     fit: Surface, target: TargetResult, confidence: float, reach: float, joint: JointFit | None
 ) -> TruthCheck:
     """Say where the hidden settings lie; factors that were not kept are at their middle in the fit."""
-    truth, sample = target.truth or {}, target.sample
+    truth, sample = target.truth or {}, target.leading
     values = {name: truth[name] for name in fit.design.names}
     coded, far = _coded(fit, values), _reach(fit, values)
     try:
@@ -141,7 +152,7 @@ def _check_truth(
 
 
 def _agrees(fit: Surface, predicted: pd.Series, target: Sample, confidence: float) -> bool:
-    """Whether the fit at one point and the target agree: the compatible region's rule, without its grid.
+    """Tell if the fit at one point and the target agree: the compatible region's rule, without its grid.
 
     The rule is Welch's test of two means whose standard errors are the fit's and the target's.
     """
@@ -175,7 +186,7 @@ def _region_decision(
     )
 
 
-def _truth_decision(truth: TruthCheck, target: float) -> Decision:
+def _truth_decision(truth: TruthCheck, target: float, response: Response) -> Decision:
     verdict = {
         True: "The hidden truth lies in the compatible region: recovered as far as the target can tell.",
         False: "The hidden truth lies outside the compatible region: it was not recovered.",
@@ -185,10 +196,10 @@ def _truth_decision(truth: TruthCheck, target: float) -> Decision:
         STAGE,
         "A twin study: the hidden settings are looked up in the compatible region.",
         numbered_values("hidden", truth.values)
-        | {"distance to the contour, coded": truth.distance, "predicted at the truth [deg]": truth.predicted}
-        | {"target [deg]": target},
+        | {"distance to the contour, coded": truth.distance}
+        | {of("prediction at the truth", response): truth.predicted, of("target", response): target},
         f"{verdict} {_distance(truth.distance)}; the surface predicts "
-        f"{truth.predicted:.2f} deg there, the target is {target:.2f} deg.",
+        f"{quantity(truth.predicted, response.unit)} there, the target is {quantity(target, response.unit)}.",
     )
 
 

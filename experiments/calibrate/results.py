@@ -1,28 +1,30 @@
-"""What each stage of a campaign found, and the decisions that it took.
+"""Results of the stages of a campaign, and the decisions that they took.
 
-A stage that simulates keeps its heaps as ``cases``: one row a case as the runner returned it (every factor in
-its natural unit, ``seed``, ``stage``, ``scene``, ``run``, ``replicate``, ``status``, ``reason``, ``angle``,
-``angle_se`` [deg], observables, ``case_key``). Failed cases stay in it. Runs and replicates count from 1.
+A stage that simulates keeps its ``cases``: one row a case as the runner returned it (every factor in its
+natural unit, ``seed``, ``stage``, ``scene``, ``run``, ``replicate``, ``status``, ``reason``, observables,
+``case_key``). Failed cases stay in it. Runs and replicates count from 1.
 
-What a stage says of the responses beside the angle stands in its ``responses``, by the name of the response
-and in its unit.
+Results of a stage stand in its ``responses``, by the name of the response and in its unit; the first leads.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, fields
 from enum import StrEnum
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
 import pandas as pd
 
+from doe import Comparison, NoiseFloor, Sample
 from experiments.calibrate.export import indexed, jsonable
-from experiments.studyfile.campaign import TARGET_SCENE
 
 if TYPE_CHECKING:
-    from doe import Comparison, Design, Factor, JointFit, NoiseFloor, Region, Sample, ScreenResult, Surface
-    from experiments.studyfile.campaign import CampaignSettings
+    from doe import Design, Factor, JointFit, Region, ScreenResult, Surface
+    from experiments.studyfile.campaign import CampaignSettings, Response
+
+Found = TypeVar("Found")
 
 
 class Outcome(StrEnum):
@@ -44,6 +46,15 @@ class ClimbEnd(StrEnum):
     TURNED = "turned"
     FLAT = "flat"
     BOUNDED = "bounded"
+
+
+def failed(cases: pd.DataFrame, responses: Iterable[Response]) -> pd.DataFrame:
+    """Return the cases that failed, or lack one of the responses that their scene measures."""
+    lost = cases["status"] != "finished"
+    for response in responses:
+        values = cases.get(response.observable, pd.Series(np.nan, cases.index))
+        lost |= (cases["scene"] == response.scene) & values.isna()
+    return cases[lost]
 
 
 @dataclass(frozen=True)
@@ -69,51 +80,73 @@ class _Tabled:
 
 
 @dataclass(frozen=True)
-class TargetResult(_Tabled):
-    """The repose angle to be matched."""
+class _ByResponse(_Tabled, Generic[Found]):
+    """A stage's result that has a part for each response."""
 
-    sample: Sample
-    """Mean, standard deviation and count of the target's measurements [deg]."""
+    responses: dict[str, Found]
+    """Parts by the name of the response."""
+
+    @property
+    def leading(self) -> Found:
+        """Part of the response that leads."""
+        return next(iter(self.responses.values()))
+
+    def _stacked(self, table: Callable[[Found], pd.DataFrame]) -> pd.DataFrame:
+        """Put tables of all responses below each other, their names in the first column."""
+        tables = {name: indexed(table(found)) for name, found in self.responses.items()}
+        return pd.concat(tables, names=["response"]).reset_index(level="response").reset_index(drop=True)
+
+
+@dataclass(frozen=True)
+class TargetResult(_ByResponse[Sample]):
+    """Mean, standard deviation and count of every response's measurements."""
+
     truth: dict[str, float] | None
     """Twin study: hidden value of every factor; None for a physical target."""
     cases: pd.DataFrame | None
-    """Twin study: the heaps of the target; None for a physical target."""
+    """Twin study: the cases of the target; None for a physical target."""
     decisions: tuple[Decision, ...]
-    responses: dict[str, Sample] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
-class NoiseFloorResult(_Tabled):
+class NoiseFloorResult(_ByResponse[NoiseFloor]):
     """Replicates with every factor at its middle."""
 
     cases: pd.DataFrame
-    floor: NoiseFloor
-    """Mean, standard deviation and its interval [deg]."""
     decisions: tuple[Decision, ...]
-    responses: dict[str, NoiseFloor] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
-class ScreeningResult(_Tabled):
-    """The Plackett-Burman design, its response and analysis."""
+class Screened:
+    """Effects of the factors on a response."""
+
+    measured: np.ndarray
+    """The response by run and replicate of the plan, shape (runs, replicates); a failed case is NaN."""
+    screen: ScreenResult
+    """Its analysis; ``screen.design`` holds the cases that gave the response, a row each."""
+
+
+@dataclass(frozen=True)
+class ScreeningResult(_ByResponse[Screened]):
+    """The Plackett-Burman design and its analysis."""
 
     cases: pd.DataFrame
     design: Design
-    """As planned; ``screen.design`` holds the cases that gave an angle, a row each."""
-    response: np.ndarray
-    """Repose angles [deg] of the plan, shape (runs, replicates); a failed case is NaN."""
-    screen: ScreenResult
+    """As planned."""
     decisions: tuple[Decision, ...]
-    responses: dict[str, ScreenResult] = field(default_factory=dict)
 
     def tables(self) -> dict[str, pd.DataFrame]:
-        """The coded design with an angle for each replicate, the effects, the analysis of variance."""
-        angles = {f"angle_{i}": column for i, column in enumerate(self.response.T, start=1)}
+        """The coded design with each response of each replicate, the effects, the analyses of variance."""
+        values = {
+            f"{name}_{i}": column
+            for name, found in self.responses.items()
+            for i, column in enumerate(found.measured.T, start=1)
+        }
         return {
-            "screening_design": self.design.coded.assign(**angles),
-            "screening_effects": self.screen.table,
-            "screening_anova": self.screen.anova,
-        } | {f"screening_effects_{name}": screen.table for name, screen in self.responses.items()}
+            "screening_design": self.design.coded.assign(**values),
+            "screening_effects": self._stacked(lambda found: found.screen.table),
+            "screening_anova": self._stacked(lambda found: found.screen.anova),
+        }
 
 
 @dataclass(frozen=True)
@@ -123,10 +156,10 @@ class SelectionResult(_Tabled):
     kept: tuple[str, ...]
     """Names, in the study's order (``table`` ranks them)."""
     table: pd.DataFrame
-    """By factor, strongest first: effect [deg], p, percent, rank, visible (larger than noise alone explains),
-    p_NAME of every further response, kept, reason."""
+    """By factor, strongest first: effect on the leading response, its p, percent, rank, visible (larger than
+    noise alone explains), p_NAME of every further response, kept, reason."""
     visible_effect: float
-    """Smallest effect [deg] that the noise floor lets this design see (at the power of the settings)."""
+    """Smallest effect on the leading response that the design could see, at the power of the settings."""
     decisions: tuple[Decision, ...]
 
     def tables(self) -> dict[str, pd.DataFrame]:
@@ -136,14 +169,14 @@ class SelectionResult(_Tabled):
 
 @dataclass(frozen=True)
 class ClimbResult(_Tabled):
-    """The path of steepest ascent and where it meets the target."""
+    """The leading response's path of steepest ascent, and the place where it meets the target."""
 
     cases: pd.DataFrame
     kept: tuple[str, ...]
     path: pd.DataFrame
     """By step (index ``step``; 1 is the start, an extension below it counts 0, -1, ...): value of every kept
-    factor, predicted (by the screening) and measured angle, sd [deg], n (cases measured), error (angle less
-    target) [deg], error_percent; NaN where all cases of a step failed."""
+    factor, predicted (by the screening), mean (measured), sd, n (cases measured), error (mean less target),
+    error_percent; NaN where all cases of a step failed."""
     step: dict[str, float]
     """Move of every kept factor per step, natural unit."""
     end: ClimbEnd
@@ -166,41 +199,40 @@ class ClimbResult(_Tabled):
 
 
 @dataclass(frozen=True)
-class ResponseSurface:
-    """The surfaces of a response beside the angle, over the same design."""
+class FittedResponse:
+    """Surfaces of a response over the composite design."""
 
+    measured: np.ndarray
+    """The response of every planned run, mean over its replicates; NaN where all of them failed."""
     full: Surface
+    """``full.design`` holds the cases that gave the response, a row each."""
     reduced: Surface
+    """The surface that the optimum is taken from."""
 
 
 @dataclass(frozen=True)
-class SurfaceResult(_Tabled):
+class SurfaceResult(_ByResponse[FittedResponse]):
     """The composite design and the fitted surfaces (coded in the design's own half-ranges)."""
 
     cases: pd.DataFrame
     design: Design
-    """As planned; ``full.design`` holds the cases that gave an angle, a row each."""
-    response: np.ndarray
-    """Repose angle [deg] of every planned run, mean over its replicates; NaN where all of them failed."""
+    """As planned."""
     center: dict[str, float]
     half_range: dict[str, float]
-    full: Surface
-    reduced: Surface
-    """The surface that the optimum is taken from."""
     outside: pd.DataFrame
     """Runs outside the stated factor ranges: run, factor, value, low, high."""
     decisions: tuple[Decision, ...]
-    responses: dict[str, ResponseSurface] = field(default_factory=dict)
 
     def tables(self) -> dict[str, pd.DataFrame]:
-        """The design in both units with its angles, the analyses of variance, runs outside the ranges."""
+        """The design in both units with its responses, the analyses of variance, runs outside the ranges."""
         coded = self.design.coded.add_suffix("_coded")
+        values = {name: found.measured for name, found in self.responses.items()}
         return {
-            "surface_design": pd.concat([self.design.natural, coded], axis=1).assign(angle=self.response),
-            "surface_anova_full": self.full.anova,
-            "surface_anova_reduced": self.reduced.anova,
+            "surface_design": pd.concat([self.design.natural, coded], axis=1).assign(**values),
+            "surface_anova_full": self._stacked(lambda found: found.full.anova),
+            "surface_anova_reduced": self._stacked(lambda found: found.reduced.anova),
             "surface_outside_ranges": self.outside,
-        } | {f"surface_anova_{name}": fits.full.anova for name, fits in self.responses.items()}
+        }
 
 
 @dataclass(frozen=True)
@@ -216,23 +248,23 @@ class TruthCheck:
     distance: float | None
     """Coded distance from the truth to the target contour; None when there is no contour."""
     predicted: float
-    """The surface's angle at the truth [deg]."""
+    """The leading response's surface at the truth."""
 
 
 @dataclass(frozen=True)
 class OptimumResult(_Tabled):
-    """The chosen point of the target contour and everything that is as good."""
+    """The chosen point and everything that is as good."""
 
     point: dict[str, float]
     """Chosen value of every kept factor, natural unit."""
     settings: dict[str, float]
     """The same with every other factor at its middle: what a case needs."""
     prediction: pd.Series
-    """The fit there [deg]: mean, se, confidence and prediction interval, named as by ``Surface.predict``."""
+    """Fit of the leading response there: mean, se, intervals, named as by ``Surface.predict``."""
     extent: float
     """Coded half width of the box that contour and region are drawn in: the reach of the axial points."""
     contour: pd.DataFrame
-    """Points of the angle's contour in that box, one column a kept factor, natural unit (index: piece)."""
+    """Points of the leading response's target contour in that box: a column a kept factor (index: piece)."""
     region: Region
     """Where the fit and the target agree within their uncertainties, for all responses."""
     unidentified: tuple[str, ...]
@@ -241,10 +273,10 @@ class OptimumResult(_Tabled):
     """Twin study: where the hidden truth lies; None for a physical target."""
     decisions: tuple[Decision, ...]
     joint: JointFit | None = None
-    """The angle and the further responses together; None where there are none."""
+    """All responses together; None where there is one."""
 
     def tables(self) -> dict[str, pd.DataFrame]:
-        """The angle's contour, the range of each factor over the compatible region, the joint fit."""
+        """The contour, the range of each factor over the compatible region, the joint fit."""
         tables = {"contour": self.contour, "compatible_ranges": self.region.ranges}
         if self.joint is not None:
             tables["joint_responses"] = self.joint.tests(self.point)
@@ -254,18 +286,12 @@ class OptimumResult(_Tabled):
 
 
 @dataclass(frozen=True)
-class VerificationResult(_Tabled):
-    """Fresh cases at the chosen point against the target."""
+class VerificationResult(_ByResponse[Comparison]):
+    """Fresh cases at the chosen point against the target of every response, held-out ones too."""
 
     cases: pd.DataFrame
-    angles: np.ndarray
-    """Repose angles [deg] of the cases that gave one."""
-    comparison: Comparison
-    margin: float
-    """Equivalence margin [deg]."""
     verified: bool
     decisions: tuple[Decision, ...]
-    responses: dict[str, Comparison] = field(default_factory=dict)
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """The fresh cases."""
@@ -291,6 +317,8 @@ class Campaign:
     """A calibration campaign; the stages after the one where it ended are None."""
 
     factors: tuple[Factor, ...]
+    responses: tuple[Response, ...]
+    """Numbers to be matched; the first leads."""
     settings: CampaignSettings
     outcome: Outcome
     reason: str
@@ -318,13 +346,12 @@ class Campaign:
 
     @property
     def failed_cases(self) -> pd.DataFrame:
-        """Cases that failed, and heaps that gave no angle."""
-        heaps = self.cases["scene"] == TARGET_SCENE
-        return self.cases[(self.cases["status"] != "finished") | (heaps & self.cases["angle"].isna())]
+        """Cases that failed, or lack a response that their scene measures."""
+        return failed(self.cases, self.responses)
 
     @property
     def scene_costs(self) -> pd.DataFrame:
-        """What every scene took (index ``scene``): cases, simulated_time [s], grain_time [s].
+        """Cost of every scene (index ``scene``): cases, simulated_time [s], grain_time [s].
 
         The last is the simulated time of every grain together, to which the work is nearly proportional.
         """

@@ -1,4 +1,4 @@
-"""Stage (b): the factors that move the angle, found by a screening design."""
+"""Stage (b): the factors that move the responses, found by a screening design."""
 
 from __future__ import annotations
 
@@ -13,13 +13,11 @@ from experiments.calibrate.cases import (
     measured,
     plan_cases,
     response_table,
-    scene_cases,
     too_many_failed,
 )
-from experiments.calibrate.responses import each_response, scenes_of
-from experiments.calibrate.results import Decision, ScreeningResult
-from experiments.calibrate.values import p_text
-from experiments.studyfile.campaign import ANGLE, Response, ScreeningSettings, SeedSettings
+from experiments.calibrate.results import Decision, Screened, ScreeningResult
+from experiments.calibrate.values import of, p_text, quantity
+from experiments.studyfile.campaign import CampaignStudy, Response, ScreeningSettings, scenes_of
 
 STAGE = "screening"
 
@@ -47,20 +45,15 @@ def screening_design(factors: Sequence[Factor], settings: ScreeningSettings) -> 
     return DESIGNS[settings.design](factors, settings.runs or fewest)
 
 
-def plan_screening(
-    factors: Sequence[Factor],
-    design: Design,
-    settings: ScreeningSettings,
-    seeds: SeedSettings,
-    responses: Sequence[Response] = (),
-) -> pd.DataFrame:
+def plan_screening(study: CampaignStudy, design: Design) -> pd.DataFrame:
     """Lay out every run and replicate of the design."""
-    scenes = scenes_of(responses)
-    return plan_cases(factors, STAGE, design.natural, settings.replicates, seeds.campaign, scenes)
+    settings, scenes = study.campaign, scenes_of(study.target.fitted)
+    replicates, seed = settings.screening.replicates, settings.seeds.campaign
+    return plan_cases(study.factors, STAGE, design.natural, replicates, seed, scenes)
 
 
 def analyse_screening(
-    design: Design, cases: pd.DataFrame, responses: Sequence[Response] = (), name: str = "plackett-burman"
+    design: Design, cases: pd.DataFrame, responses: Sequence[Response], name: str = "plackett-burman"
 ) -> ScreeningResult:
     """Estimate and test the effects on every response from the cases that gave it, in a design of a name.
 
@@ -69,52 +62,33 @@ def analyse_screening(
     StageEnd
         When too few runs are left to tell the factors apart.
     """
-    heaps = scene_cases(cases)
-    result = _screen(design, heaps, ANGLE)
-    others = each_response(responses, cases, lambda found, column: _screen(design, found, column))
-    response = response_table(heaps, design.coded.index.tolist())
-    decisions = [_decision(name, design, heaps, result)]
-    if others:
-        decisions.append(_responses(others))
-    return ScreeningResult(heaps, design, response, result, tuple(decisions), others)
+    runs = design.coded.index.tolist()
+    found = {r.name: Screened(response_table(cases, r, runs), _screen(design, cases, r)) for r in responses}
+    decisions = [_decision(name, design, cases, r, found[r.name].screen) for r in responses]
+    return ScreeningResult(found, cases, design, tuple(decisions))
 
 
-def _screen(design: Design, cases: pd.DataFrame, observable: str) -> ScreenResult:
+def _screen(design: Design, cases: pd.DataFrame, response: Response) -> ScreenResult:
     """Test against dummies and replicates together; where there is neither, against Lenth's pseudo error."""
-    used = measured(cases, observable)
+    used = measured(cases, response)
     try:
         run = design.select(used["run"].tolist())
         spare = len(run.coded) - len(run.factors) - 1
-        return screen(run, used[observable].to_numpy(), error="pooled" if spare > 0 else "lenth")
+        return screen(run, used[response.observable].to_numpy(), error="pooled" if spare > 0 else "lenth")
     except DesignError as error:
-        need = f"cannot be analysed any more ({error})"
-        raise too_many_failed(cases, STAGE, need, observable) from error
+        raise too_many_failed(cases, STAGE, f"cannot be analysed any more ({error})", response) from error
 
 
-def _responses(screens: dict[str, ScreenResult]) -> Decision:
-    """Say what moves every further response most."""
-    strongest = []
-    for name, result in screens.items():
-        first = result.table.sort_values("rank").iloc[0]
-        strongest.append(
-            f"{name}: {first.name} ({first['effect']:+.4g} from low to high, {p_text(first['p'])})"
-        )
-    return Decision(
-        STAGE,
-        "The effects on every further response are tested on the same design, each against its own error.",
-        {f"error sd of {name}": result.error_ms**0.5 for name, result in screens.items()},
-        f"What moves them most: {'; '.join(strongest)}.",
-    )
-
-
-def _decision(name: str, design: Design, cases: pd.DataFrame, result: ScreenResult) -> Decision:
-    ranked = result.table.sort_values("rank")
-    strongest = ranked.index[0]
+def _decision(
+    name: str, design: Design, cases: pd.DataFrame, response: Response, result: ScreenResult
+) -> Decision:
+    first = result.table.sort_values("rank").iloc[0]
     replicates = int(cases["replicate"].max())
     against = {
         "pooled": "what the factors leave unexplained (dummy columns and replicates)",
         "lenth": "Lenth's pseudo standard error, the design having neither dummies nor replicates",
     }[result.error_rule]
+    own = cases[cases["scene"] == response.scene]
     return Decision(
         STAGE,
         f"A {name.title()} design of {len(design.coded)} runs, {replicates} "
@@ -123,11 +97,11 @@ def _decision(name: str, design: Design, cases: pd.DataFrame, result: ScreenResu
             "runs": len(design.coded),
             "dummy columns": len(design.dummies),
             "error df": result.error_df,
-            "error sd [deg]": result.error_ms**0.5,
+            of("error sd", response): result.error_ms**0.5,
             "critical |t| at 0.10": result.critical_t(0.10),
             "critical |t| at 0.05": result.critical_t(0.05),
             "critical |t| at 0.05, Bonferroni": result.critical_t(0.05, bonferroni=True),
         },
-        f"{strongest} moves the angle most: {ranked['effect'].iloc[0]:+.2f} deg from low to high "
-        f"({p_text(ranked['p'].iloc[0])}). {failure_summary(cases)}".strip(),
+        f"{first.name} moves the {response.name} most: {quantity(first['effect'], response.unit, '+')} from "
+        f"low to high ({p_text(first['p'])}). {failure_summary(own, response)}".strip(),
     )

@@ -16,37 +16,41 @@ from experiments.calibrate.results import (
     ScreeningResult,
     SelectionResult,
 )
-from experiments.calibrate.values import p_text
-from experiments.studyfile.campaign import ANGLE, SelectionSettings
+from experiments.calibrate.values import of, p_text, quantity
+from experiments.studyfile.campaign import Response, SelectionSettings
 
 STAGE = "selection"
 
 
 def select_factors(
-    settings: SelectionSettings, screening: ScreeningResult, noise: NoiseFloorResult
+    settings: SelectionSettings, screening: ScreeningResult, noise: NoiseFloorResult, response: Response
 ) -> SelectionResult:
-    """Keep the factors that the study names, or those that the rule finds significant for any response."""
-    ranked = screening.screen.table.sort_values("rank")
+    """Keep the factors that the study names, or those that the rule finds significant for any response.
+
+    The effects on the leading ``response`` rank them.
+    """
+    leading, floor = screening.leading, noise.leading
+    ranked = leading.screen.table.sort_values("rank")
     p = _p_values(screening, ranked.index)
     significant = [str(name) for name in ranked.index if (p.loc[name] < settings.alpha).any()]
     chosen = _chosen(settings, _by_strength(p, settings.alpha), significant)
     kept = tuple(name for name in screening.design.names if name in chosen)
-    cases = len(screening.screen.response)
+    cases = len(leading.screen.response)
     table = ranked[["effect", "p", "percent", "rank"]].copy()
-    table["visible"] = table["effect"].abs() > _noise_effect(noise.floor, cases, settings.alpha)
-    for name in screening.responses:
+    table["visible"] = table["effect"].abs() > _noise_effect(floor, cases, settings.alpha)
+    for name in p.columns[1:]:
         table[f"p_{name}"] = p[name]
     table["kept"] = table.index.isin(kept)
     table["reason"] = [_reason(settings, str(name), kept, p.loc[name]) for name in table.index]
-    visible = _visible_effect(settings, noise.floor, cases, screening.screen.error_df)
+    visible = _visible_effect(settings, floor, cases, leading.screen.error_df)
     decisions = (
         _kept_decision(settings, p, kept, significant),
-        _noise_decision(settings, table, visible, noise),
+        _noise_decision(settings, table, visible, floor, response),
     )
     return SelectionResult(kept, table, visible, decisions)
 
 
-def require_kept(settings: SelectionSettings, selection: SelectionResult) -> None:
+def require_kept(settings: SelectionSettings, selection: SelectionResult, response: Response) -> None:
     """Go on when a factor was kept.
 
     Raises
@@ -60,28 +64,27 @@ def require_kept(settings: SelectionSettings, selection: SelectionResult) -> Non
     raise StageEnd(
         Outcome.NO_SIGNIFICANT_FACTOR,
         f"No factor has p below {settings.alpha:g}; the strongest, {selection.table.index[0]}, has an effect "
-        f"of {strongest['effect']:+.2f} deg ({p_text(strongest['p'])}). With this noise the design sees "
-        f"effects from about {selection.visible_effect:.2f} deg on: widen the ranges, add screening "
-        "replicates or dummies, or name the factors to keep in selection.keep.",
+        f"of {quantity(strongest['effect'], response.unit, '+')} ({p_text(strongest['p'])}). With this noise "
+        f"the design sees effects from about {quantity(selection.visible_effect, response.unit)} on: widen "
+        "the ranges, add screening replicates or dummies, or name the factors to keep in selection.keep.",
     )
 
 
 def _p_values(screening: ScreeningResult, names: pd.Index) -> pd.DataFrame:
-    """Return the p values of every factor (rows) for the angle and every further response (columns)."""
-    screens = {ANGLE: screening.screen, **screening.responses}
+    """Return the p values of every factor (rows) for every response (columns), the leading one first."""
+    screens = {name: found.screen for name, found in screening.responses.items()}
     return pd.DataFrame({name: screen.table["p"].reindex(names) for name, screen in screens.items()})
 
 
 def _by_strength(p: pd.DataFrame, alpha: float) -> list[str]:
-    """Order the factors: those that move the angle, which the climb needs, then by their smallest p.
+    """Order the factors: those that move the leading response, as the climb needs, then by their smallest p.
 
-    The rows stand in the order of the effects on the angle.
+    The rows stand in the order of the effects on the leading response.
     """
 
     def order(name: str) -> tuple[bool, float]:
-        moves_angle = bool(p.loc[name, ANGLE] < alpha)
-        others = p.loc[name].drop(ANGLE)
-        return not moves_angle, 0.0 if moves_angle or others.empty else float(others.min())
+        first, *others = p.loc[name]
+        return not first < alpha, 0.0 if first < alpha or not others else min(others)
 
     return sorted(map(str, p.index), key=order)
 
@@ -105,7 +108,7 @@ def _reason(settings: SelectionSettings, name: str, kept: tuple[str, ...], p: pd
 
 
 def _noise_effect(floor: NoiseFloor, cases: int, alpha: float) -> float:
-    """Return the effect [deg] that seeds alone exceed with probability alpha (its error: 2 sd / sqrt(n))."""
+    """Return the effect that seeds alone exceed with probability alpha (its error: 2 sd / sqrt(n))."""
     return float(stats.t.isf(0.5 * alpha, floor.sample.df)) * 2.0 * floor.sd / math.sqrt(cases)
 
 
@@ -123,7 +126,7 @@ def _kept_decision(
     else:
         several = len(p.columns) > 1
         whose = " for any of the responses" if several else ""
-        first = ", those that move the angle before the others" if several else ""
+        first = f", those that move the {p.columns[0]} before the others" if several else ""
         rule = (
             f"A factor is kept when p < {settings.alpha:g} in the screening{whose}; at least "
             f"{settings.at_least}, at most {settings.at_most}, strongest first{first}."
@@ -133,17 +136,21 @@ def _kept_decision(
         outcome += " Every factor is significant."
     if settings.keep is None and len(significant) > len(kept):
         outcome += f" Of {len(significant)} significant ones the weaker stay at their middle."
-    numbers = {f"p of {name}": float(value) for name, value in p[ANGLE].items()}
-    for response in p.columns.drop(ANGLE):
-        numbers |= {f"p of {name} for {response}": float(value) for name, value in p[response].items()}
+    numbers = {
+        f"p of {name} for {response}": float(value)
+        for response in p.columns
+        for name, value in p[response].items()
+    }
     return Decision(STAGE, rule, numbers, outcome)
 
 
 def _noise_decision(
-    settings: SelectionSettings, table: pd.DataFrame, visible: float, noise: NoiseFloorResult
+    settings: SelectionSettings, table: pd.DataFrame, visible: float, floor: NoiseFloor, response: Response
 ) -> Decision:
     missed = [str(name) for name in table.index[table["visible"] & ~table["kept"]]]
-    outcome = f"Effects from {visible:.2f} deg on had a chance of {settings.power:.0%} to be seen."
+    outcome = (
+        f"Effects from {quantity(visible, response.unit)} on had a chance of {settings.power:.0%} to be seen."
+    )
     if missed:
         outcome += (
             f" {', '.join(missed)}: larger than the noise alone explains, yet not kept. The screening's "
@@ -152,6 +159,6 @@ def _noise_decision(
     return Decision(
         STAGE,
         "The noise floor tells the smallest effect that the screening could see, were noise its only error.",
-        {"noise sd [deg]": noise.floor.sd, "visible effect [deg]": visible, "power": settings.power},
+        {of("sd", response): floor.sd, of("visible effect", response): visible, "power": settings.power},
         outcome,
     )

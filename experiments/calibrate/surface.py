@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,12 +17,10 @@ from experiments.calibrate.cases import (
     measured,
     plan_cases,
     response_table,
-    scene_cases,
     simulate,
     too_many_failed,
 )
-from experiments.calibrate.responses import each_response, scenes_of
-from experiments.calibrate.results import ClimbResult, Decision, Outcome, ResponseSurface, SurfaceResult
+from experiments.calibrate.results import ClimbResult, Decision, FittedResponse, Outcome, SurfaceResult
 from experiments.calibrate.values import (
     UNLIMITED,
     fixed_values,
@@ -30,7 +29,7 @@ from experiments.calibrate.values import (
     numbered_values,
     p_text,
 )
-from experiments.studyfile.campaign import ANGLE, CampaignStudy, SurfaceSettings
+from experiments.studyfile.campaign import CampaignStudy, Response, SurfaceSettings, scenes_of
 
 STAGE = "surface"
 
@@ -40,7 +39,7 @@ ROUNDING = 1e-12
 
 @dataclass(frozen=True)
 class _Placement:
-    """Where a composite design stands and how wide it is."""
+    """Place and width of a composite design."""
 
     center: dict[str, float]
     half_range: dict[str, float]
@@ -61,36 +60,21 @@ def explore_surface(study: CampaignStudy, climb: ClimbResult, runner: Runner) ->
     StageEnd
         When too few runs are left for a quadratic surface.
     """
-    settings = study.campaign.surface
+    settings, responses = study.campaign.surface, study.target.fitted
     placement = _place(study, climb)
     design = _composite(placement.factors(kept_factors(study, climb.kept)), settings)
-    finished = simulate(runner, _plan(study, design))[0]
-    cases = scene_cases(finished)
-    full = _fit(design, cases, ANGLE)
-    reduced, reduction = _reduce(full, settings)
-    others = each_response(
-        study.target.responses, finished, lambda found, column: _fits(design, found, column, settings)
-    )
+    cases = simulate(runner, _plan(study, design))[0]
     outside = _outside_ranges(study, design)
-    decisions = (
-        *placement.decisions,
-        _design_decision(design, settings, outside, cases),
-        _full_decision(full, settings),
-        reduction,
-        *([_responses_decision(others, settings)] if others else []),
-    )
-    response = _run_means(response_table(cases, design.coded.index.tolist()))
+    decisions = [*placement.decisions, _design_decision(design, settings, outside, cases, responses)]
+    found = {}
+    for response in responses:
+        full = _fit(design, cases, response)
+        reduced, rule = _reduce(full, settings, leads=response is responses[0])
+        values = _run_means(response_table(cases, response, design.coded.index.tolist()))
+        found[response.name] = FittedResponse(values, full, reduced)
+        decisions.append(_fit_decision(response, full, reduced, rule, settings))
     return SurfaceResult(
-        cases,
-        design,
-        response,
-        placement.center,
-        placement.half_range,
-        full,
-        reduced,
-        outside,
-        decisions,
-        others,
+        found, cases, design, placement.center, placement.half_range, outside, tuple(decisions)
     )
 
 
@@ -100,12 +84,13 @@ def require_slope(result: SurfaceResult) -> None:
     Raises
     ------
     StageEnd
-        When nothing moves the angle there beyond the noise.
+        When nothing moves the leading response there beyond the noise.
     """
-    if not result.reduced.terms:
+    if not result.leading.reduced.terms:
+        name = next(iter(result.responses))
         raise StageEnd(
             Outcome.PLATEAU,
-            f"Around {listed(result.center)} no term of the surface is significant: the angle does not "
+            f"Around {listed(result.center)} no term of the surface is significant: the {name} does not "
             f"depend on {', '.join(result.center)} beyond the noise. Widen surface.half_range or add "
             "replicates.",
         )
@@ -198,43 +183,20 @@ def _composite(factors: tuple[Factor, ...], settings: SurfaceSettings) -> Design
 
 def _plan(study: CampaignStudy, design: Design) -> pd.DataFrame:
     """Lay out the runs; the centre is replicated by its own rows."""
-    settings = study.campaign
+    settings, scenes = study.campaign, scenes_of(study.target.fitted)
     at_center = (design.coded == 0.0).all(axis=1)
     replicates = {int(run): 1 if center else settings.surface.replicates for run, center in at_center.items()}
-    scenes = scenes_of(study.target.responses)
     return plan_cases(study.factors, STAGE, design.natural, replicates, settings.seeds.campaign, scenes)
 
 
-def _fit(design: Design, cases: pd.DataFrame, observable: str) -> Surface:
-    """Fit the full quadratic to an observable of the cases of its scene."""
-    used = measured(cases, observable)
+def _fit(design: Design, cases: pd.DataFrame, response: Response) -> Surface:
+    """Fit the full quadratic to a response."""
+    used = measured(cases, response)
     try:
-        return fit_surface(design.select(used["run"].tolist()), used[observable].to_numpy(dtype=np.float64))
+        values = used[response.observable].to_numpy(dtype=np.float64)
+        return fit_surface(design.select(used["run"].tolist()), values)
     except DesignError as error:
-        need = f"cannot be fitted any more ({error})"
-        raise too_many_failed(cases, STAGE, need, observable) from error
-
-
-def _fits(design: Design, cases: pd.DataFrame, observable: str, settings: SurfaceSettings) -> ResponseSurface:
-    """Fit and reduce the surface of a further response; terms that the study names are the angle's."""
-    full = _fit(design, cases, observable)
-    return ResponseSurface(full, full.reduce(settings.reduce_alpha))
-
-
-def _responses_decision(fits: dict[str, ResponseSurface], settings: SurfaceSettings) -> Decision:
-    """Say what the further responses depend on, and how well a quadratic describes them."""
-    said = []
-    for name, fit in fits.items():
-        terms = ", ".join(fit.reduced.coded_coefficients.index[1:]) or "nothing here"
-        p_lack = fit.full.anova["p"]["lack of fit"]
-        lack = ", with significant lack of fit" if p_lack < settings.lack_of_fit_alpha else ""
-        said.append(f"{name} on {terms} (predicted R2 {fit.reduced.r2_predicted:.2f}{lack})")
-    return Decision(
-        STAGE,
-        "Every further response has a surface of its own over the same design, reduced by the same rule.",
-        {f"p of the model of {name}": fit.full.anova["p"]["model"] for name, fit in fits.items()},
-        f"They depend on: {'; '.join(said)}.",
-    )
+        raise too_many_failed(cases, STAGE, f"cannot be fitted any more ({error})", response) from error
 
 
 def _run_means(response: np.ndarray) -> np.ndarray:
@@ -243,27 +205,22 @@ def _run_means(response: np.ndarray) -> np.ndarray:
     return np.where(count > 0, np.nansum(response, axis=1) / np.maximum(count, 1), np.nan)
 
 
-def _reduce(full: Surface, settings: SurfaceSettings) -> tuple[Surface, Decision]:
-    """Drop the terms that the study names, or those that backward elimination finds insignificant."""
-    present = full.coded_coefficients.index
-    if settings.drop is not None:
+def _reduce(full: Surface, settings: SurfaceSettings, leads: bool) -> tuple[Surface, str]:
+    """Drop the terms that the study names for the leading response, or those found insignificant."""
+    if leads and settings.drop is not None:
+        present = full.coded_coefficients.index
         reduced = full.drop(*[term for term in settings.drop if term in present])
-        rule = "The study names the terms to leave out."
-    else:
-        reduced = full.reduce(settings.reduce_alpha)
-        rule = (
-            f"Backward elimination: the least significant term with p above {settings.reduce_alpha:g} goes, "
-            "one by one, while no higher term needs it."
-        )
-    numbers = {f"p of {term}": full.anova["p"][term] for term in present[1:]}
-    numbers |= {"predicted R2, full": full.r2_predicted, "predicted R2, reduced": reduced.r2_predicted}
-    gone = ", ".join(reduced.dropped) if reduced.dropped else "nothing"
-    return reduced, Decision(
-        STAGE, rule, numbers, f"Left out: {gone}. Surface: {reduced.equation(digits=4)}."
+        return reduced, "the study names the terms to leave out"
+    return full.reduce(settings.reduce_alpha), (
+        f"backward elimination: the least significant term with p above {settings.reduce_alpha:g} goes, one "
+        "by one, while no higher term needs it"
     )
 
 
-def _full_decision(full: Surface, settings: SurfaceSettings) -> Decision:
+def _fit_decision(
+    response: Response, full: Surface, reduced: Surface, rule: str, settings: SurfaceSettings
+) -> Decision:
+    """Say how well a quadratic describes a response, and which of its terms matter."""
     p_model, p_lack = full.anova["p"]["model"], full.anova["p"]["lack of fit"]
     if math.isnan(p_lack):
         fit = "Lack of fit cannot be tested."
@@ -271,16 +228,18 @@ def _full_decision(full: Surface, settings: SurfaceSettings) -> Decision:
         fit = f"Lack of fit is significant ({p_text(p_lack)}): a quadratic is too simple; shrink the design."
     else:
         fit = f"No lack of fit is found ({p_text(p_lack)})."
+    numbers = {"p of the model": p_model, "p of lack of fit": p_lack}
+    numbers |= {"R2": full.r2, "adjusted R2": full.r2_adjusted}
+    numbers |= {f"p of {term}": full.anova["p"][term] for term in full.coded_coefficients.index[1:]}
+    numbers |= {"predicted R2, full": full.r2_predicted, "predicted R2, reduced": reduced.r2_predicted}
+    gone = ", ".join(reduced.dropped) if reduced.dropped else "nothing"
     return Decision(
         STAGE,
-        f"A full quadratic; lack of fit is tested against the replicates at {settings.lack_of_fit_alpha:g}.",
-        {
-            "p of the model": p_model,
-            "p of lack of fit": p_lack,
-            "R2": full.r2,
-            "adjusted R2": full.r2_adjusted,
-        },
-        f"The model has {p_text(p_model)}. {fit}",
+        "A full quadratic; lack of fit is tested against the replicates at "
+        f"{settings.lack_of_fit_alpha:g}. Then {rule}.",
+        numbers,
+        f"The model of the {response.name} has {p_text(p_model)}. {fit} Left out: {gone}. Surface: "
+        f"{reduced.equation(digits=4)}.",
     )
 
 
@@ -296,7 +255,11 @@ def _outside_ranges(study: CampaignStudy, design: Design) -> pd.DataFrame:
 
 
 def _design_decision(
-    design: Design, settings: SurfaceSettings, outside: pd.DataFrame, cases: pd.DataFrame
+    design: Design,
+    settings: SurfaceSettings,
+    outside: pd.DataFrame,
+    cases: pd.DataFrame,
+    responses: Sequence[Response],
 ) -> Decision:
     where = _outside_sentence(outside)
     return Decision(
@@ -308,7 +271,7 @@ def _design_decision(
             "alpha": float(design.coded.abs().to_numpy().max()),
             "runs outside the stated ranges": int(outside["run"].nunique()),
         },
-        f"{len(design.coded)} runs. {where} {failure_summary(cases)}".strip(),
+        f"{len(design.coded)} runs. {where} {failure_summary(cases, *responses)}".strip(),
     )
 
 

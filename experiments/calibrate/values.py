@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from doe import Factor
 
 if TYPE_CHECKING:
-    from experiments.studyfile.campaign import CampaignStudy
+    from experiments.studyfile.campaign import CampaignStudy, Response
 
 UNLIMITED = (float("-inf"), float("inf"))
 
@@ -38,9 +38,25 @@ def numbered_values(prefix: str, values: Mapping[str, float]) -> dict[str, float
     return {f"{prefix} {name}": float(value) for name, value in values.items()}
 
 
-def quantity(value: float, unit: str) -> str:
-    """Write a value of a response with its unit; ``"1"`` is not written."""
-    return f"{value:.4g}" if unit == "1" else f"{value:.4g} {unit}"
+def quantity(value: float, unit: str, sign: str = "") -> str:
+    """Write a value with its unit: angles with two decimals, others with four digits; ``"1"`` is not written.
+
+    With ``sign`` ``"+"``, a plus sign is written too.
+    """
+    number = f"{value:{sign}.2f}" if unit == "deg" else f"{value:{sign}.4g}"
+    return number if unit == "1" else f"{number} {unit}"
+
+
+def interval_text(ends: tuple[float, float], unit: str, sign: str = "") -> str:
+    """Write an interval as ``0.16 to 0.77 deg``."""
+    low, _, _ = quantity(ends[0], unit, sign).partition(" ")
+    return f"{low} to {quantity(ends[1], unit, sign)}"
+
+
+def of(what: str, response: Response) -> str:
+    """Key of a number that a decision looked at: ``sd of angle [deg]``."""
+    unit = "" if response.unit == "1" else f" [{response.unit}]"
+    return f"{what} of {response.name}{unit}"
 
 
 def kept_factors(study: CampaignStudy, kept: Iterable[str]) -> tuple[Factor, ...]:

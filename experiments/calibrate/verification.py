@@ -1,24 +1,14 @@
-"""Stage (h): fresh heaps at the chosen point against the target."""
+"""Stage (h): fresh cases at the chosen point against the target."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import pandas as pd
 
-from doe import Comparison, Sample, compare_means
-from experiments.calibrate.cases import (
-    Runner,
-    failure_summary,
-    plan_cases,
-    scene_cases,
-    simulate,
-    values_of,
-)
-from experiments.calibrate.responses import scenes_of
+from doe import Comparison, compare_means
+from experiments.calibrate.cases import Runner, failure_summary, plan_cases, simulate, values_of
 from experiments.calibrate.results import Decision, OptimumResult, TargetResult, VerificationResult
-from experiments.calibrate.values import p_text, quantity
-from experiments.studyfile.campaign import CampaignStudy, Response, VerificationSettings
+from experiments.calibrate.values import interval_text, of, p_text, quantity
+from experiments.studyfile.campaign import CampaignStudy, Response, VerificationSettings, scenes_of
 
 STAGE = "verification"
 
@@ -38,83 +28,51 @@ def verify(
     settings, responses = study.campaign.verification, study.target.responses
     point, seed = pd.DataFrame([optimum.settings], index=[1]), study.campaign.seeds.campaign
     plan = plan_cases(study.factors, STAGE, point, settings.replicates, seed, scenes_of(responses))
-    finished = simulate(runner, plan)[0]
-    cases, sample = scene_cases(finished), target.sample
-    angles = values_of(cases, STAGE)
-    margin = settings.margin if settings.margin is not None else settings.margin_sds * sample.sd
-    alpha = settings.alpha / (1 + len(responses))
-    comparison = compare_means(angles, sample, margin=margin, alpha=alpha)
-    others = {}
+    cases = simulate(runner, plan)[0]
+    alpha = settings.alpha / len(responses)
+    tests = {}
     for response in responses:
-        values = values_of(scene_cases(finished, response.scene), STAGE, response.observable)
         aim = target.responses[response.name]
-        others[response.name] = compare_means(values, aim, margin=settings.margin_sds * aim.sd, alpha=alpha)
-    decisions = [_difference(comparison, sample, cases), _equivalence(comparison, settings)]
-    if others:
-        decisions.append(_responses(responses, others))
-    verified = all(_verified(test, settings) for test in (comparison, *others.values()))
-    return VerificationResult(cases, angles, comparison, margin, verified, tuple(decisions), others)
+        margin = settings.margin if response is responses[0] else None
+        margin = settings.margin_sds * aim.sd if margin is None else margin
+        tests[response.name] = compare_means(
+            values_of(cases, STAGE, response), aim, margin=margin, alpha=alpha
+        )
+    verified = all(_verified(test, settings) for test in tests.values())
+    decisions = [_decision(response, tests[response.name], cases) for response in responses]
+    return VerificationResult(tests, cases, verified, tuple(decisions))
 
 
 def _verified(test: Comparison, settings: VerificationSettings) -> bool:
-    """Whether fresh cases show no difference and, where the study asks for it, equivalence."""
+    """Tell if fresh cases show no difference and, where the study asks for it, equivalence."""
     return not test.different and (bool(test.equivalent) or not settings.require_equivalence)
 
 
-def _responses(responses: Sequence[Response], tests: dict[str, Comparison]) -> Decision:
-    """Say how the further responses compare with their targets."""
-    said: list[str] = []
-    numbers: dict[str, float | None] = {}
-    for response in responses:
-        test, name = tests[response.name], response.name
-        found = "differs" if test.different else "does not differ"
-        aim = test.b.mean if isinstance(test.b, Sample) else test.b
-        said.append(
-            f"{name} {found} ({quantity(test.a.mean, response.unit)} against "
-            f"{quantity(aim, response.unit)}, {p_text(test.p)})"
-        )
-        numbers |= {f"p of {name}": test.p, f"p of equivalence of {name}": test.equivalence_p}
-    level = next(iter(tests.values())).alpha
+def _decision(response: Response, test: Comparison, cases: pd.DataFrame) -> Decision:
+    """Say how fresh cases compare with the target of a response."""
+    found = "A difference is found" if test.different else "No difference is found"
+    shown = "is shown" if test.equivalent else "is not shown"
+    unit, own = response.unit, cases[cases["scene"] == response.scene]
+    held_out = ", which took no part in the fit" if response.held_out else ""
+    margin, smallest = (quantity(value, unit) for value in (test.margin or 0.0, test.smallest_margin))
     return Decision(
         STAGE,
-        f"Fresh cases of every scene against the other responses' targets, each test at {level:.3g}: the "
-        "level is shared among all responses.",
-        numbers,
-        f"At the chosen point {'; '.join(said)}.",
-    )
-
-
-def _difference(comparison: Comparison, target: Sample, cases: pd.DataFrame) -> Decision:
-    low, high = comparison.interval
-    found = "A difference is found" if comparison.different else "No difference is found"
-    return Decision(
-        STAGE,
-        f"Pooled two-sample t-test of fresh heaps against the target at {comparison.alpha:g}.",
+        f"Pooled two-sample t-test of fresh cases against the target of the {response.name}{held_out}, at "
+        f"{test.alpha:.3g}, and two one-sided tests (TOST) of equivalence within {margin}.",
         {
-            "mean of the heaps [deg]": comparison.a.mean,
-            "sd of the heaps [deg]": comparison.a.sd,
-            "heaps": comparison.a.n,
-            "target [deg]": target.mean,
-            "t": comparison.t,
-            "df": comparison.df,
-            "p": comparison.p,
+            of("mean", response): test.a.mean,
+            of("sd", response): test.a.sd,
+            "cases": test.a.n,
+            of("target", response): test.a.mean - test.difference,
+            "t": test.t,
+            "df": test.df,
+            "p": test.p,
+            of("margin", response): test.margin,
+            "p of equivalence": test.equivalence_p,
+            of("smallest margin shown", response): test.smallest_margin,
         },
-        f"{found} ({p_text(comparison.p)}): {comparison.difference:+.2f} deg, {1.0 - comparison.alpha:.0%} "
-        f"interval {low:+.2f} to {high:+.2f} deg. {failure_summary(cases)}".strip(),
-    )
-
-
-def _equivalence(comparison: Comparison, settings: VerificationSettings) -> Decision:
-    source = "the study" if settings.margin is not None else f"{settings.margin_sds:g} sd of the target"
-    shown = "is shown" if comparison.equivalent else "is not shown"
-    return Decision(
-        STAGE,
-        f"Two one-sided tests (TOST) of equivalence within {comparison.margin:.2f} deg ({source}).",
-        {
-            "margin [deg]": comparison.margin,
-            "p of equivalence": comparison.equivalence_p,
-            "smallest margin shown [deg]": comparison.smallest_margin,
-        },
-        f"Equivalence {shown} ({p_text(comparison.equivalence_p)}); these heaps show it from a margin of "
-        f"{comparison.smallest_margin:.2f} deg on.",
+        f"{found} ({p_text(test.p)}): {quantity(test.difference, unit, '+')}, "
+        f"{100.0 * (1.0 - test.alpha):.3g} % interval {interval_text(test.interval, unit, '+')}. "
+        f"Equivalence {shown} ({p_text(test.equivalence_p)}); these cases show it from a margin of "
+        f"{smallest} on. {failure_summary(own, response)}".strip(),
     )

@@ -1,7 +1,7 @@
 """Running the cases of a study: each is stored as it finishes, and its heap is measured."""
 
 from experiments.cases.engines import ENGINES, Engine
-from experiments.cases.execute import measure_heap, run_cases
+from experiments.cases.execute import run_cases
 from experiments.cases.folder import open_folder, require_unused
 from experiments.cases.heap import Heap, heap_picture, simulate_heap, write_heap
 from experiments.cases.store import Store
@@ -12,7 +12,6 @@ __all__ = [
     "Heap",
     "Store",
     "heap_picture",
-    "measure_heap",
     "open_folder",
     "require_unused",
     "run_cases",

@@ -15,11 +15,12 @@ import pandas as pd
 from dem_warp import Case, CaseResult, Progress, simulate
 from experiments.cases.store import Store
 from experiments.errors import StudyError
+from experiments.measurement.observables import ANGLE
+from experiments.measurement.states import Observed, observe
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import TARGET_SCENE
-from imaging import HeapAngle, PictureError, heap_angle
 
-RESULT_COLUMNS = ("status", "reason", "angle", "angle_se", "case_key")
+RESULT_COLUMNS = ("status", "reason", ANGLE, "angle_se", "case_key")
 """Columns that `run_cases` adds, beside one for every observable of the scene."""
 
 _log = logging.getLogger(__name__)
@@ -73,52 +74,20 @@ def run_cases(
     scenes = dict(zip(keys, _scene_names(table), strict=True))
 
     def measure(key: str, result: CaseResult) -> dict[str, Any]:
-        return _outcome_of(study, result, scenes[key])
+        leaves_a_heap = study.scenes[scenes[key]].leaves_a_heap
+        return _outcome(result.status, observe(study.measurement, result, leaves_a_heap))
 
     with ThreadPoolExecutor(max_workers=workers or os.cpu_count()) as pool:
         outcomes = _simulate_missing(by_key, store, pool, measure, device, workers, progress)
         for key in by_key.keys() - outcomes.keys():
             outcomes[key] = pool.submit(lambda key: measure(key, store.load(key)), key)
         rows = [
-            outcomes[key].result() if key else _outcome("refused", reason)
+            outcomes[key].result() if key else _outcome("refused", Observed(reason=reason))
             for key, reason in zip(keys, refused, strict=True)
         ]
     results = pd.DataFrame(rows, index=table.index)
     results["case_key"] = keys
     return pd.concat([table, results], axis=1)
-
-
-def measure_heap(study: Study, result: CaseResult) -> HeapAngle:
-    """Measure the repose angle of a finished case as the study says.
-
-    Raises
-    ------
-    imaging.PictureError
-        When there is no measurable heap.
-    """
-    settings = study.measurement
-    return heap_angle(
-        result.sphere_centers,
-        result.sphere_radii,
-        azimuths=settings.azimuths,
-        fit=settings.fit,
-        pixels=settings.pixels,
-    )
-
-
-def heap_angle_or_reason(
-    study: Study, result: CaseResult, scene: str = TARGET_SCENE
-) -> tuple[HeapAngle | None, str]:
-    """Angle of a case's heap; or None, and why: the case failed, or there is no measurable heap.
-
-    A test that leaves no heap, as a hopper, has no angle and no reason.
-    """
-    if result.status != "finished" or not study.scenes[scene].leaves_a_heap:
-        return None, result.reason
-    try:
-        return measure_heap(study, result), ""
-    except PictureError as error:
-        return None, f"no angle: {error}"
 
 
 def _check_columns(table: pd.DataFrame) -> None:
@@ -190,14 +159,7 @@ def _simulate_missing(
     return outcomes
 
 
-def _outcome_of(study: Study, result: CaseResult, scene: str) -> dict[str, Any]:
-    angle, reason = heap_angle_or_reason(study, result, scene)
-    if angle is None:
-        return _outcome(result.status, reason, **result.observables)
-    return _outcome(result.status, reason, angle.mean, angle.se, **result.observables)
-
-
-def _outcome(
-    status: str, reason: str, angle: float = math.nan, angle_se: float = math.nan, **observables: float
-) -> dict[str, Any]:
-    return {"status": status, "reason": reason, "angle": angle, "angle_se": angle_se, **observables}
+def _outcome(status: str, found: Observed) -> dict[str, Any]:
+    """Columns of a case; NaN where there is no angle."""
+    error = math.nan if found.angle is None else found.angle.se
+    return {"status": status, "reason": found.reason, ANGLE: math.nan, "angle_se": error, **found.observables}

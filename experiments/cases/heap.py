@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 
 from dem_warp import CaseResult, Progress, simulate
-from experiments.cases.execute import heap_angle_or_reason
 from experiments.files import replacing, write_text
+from experiments.measurement.observables import observables_of
+from experiments.measurement.states import Observed, observe
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import TARGET_SCENE
 from imaging import HeapAngle, overlay, save_picture, snapshot
@@ -31,18 +32,27 @@ class Heap:
     """Seed of everything random in it."""
     result: CaseResult
     """Result of the case."""
-    angle: HeapAngle | None
-    """Its angle; None when the case failed, there is no measurable heap, or the test leaves none."""
-    reason: str
-    """Why the case or the measurement failed; empty when neither did."""
+    observed: Observed
+    """Measurements of it."""
     scene: str = TARGET_SCENE
     """Name of its scene."""
 
     @property
+    def angle(self) -> HeapAngle | None:
+        """Its angle; None when the case failed, there is no measurable heap, or the test leaves none."""
+        return self.observed.angle
+
+    @property
+    def reason(self) -> str:
+        """Why the case or the measurement failed; empty when neither did."""
+        return self.observed.reason
+
+    @property
     def units(self) -> dict[str, str]:
-        """Unit of every observable that the scene tells of."""
-        told = self.study.scenes[self.scene].observables
-        return {name: told[name].unit for name in self.result.observables if name in told}
+        """Unit of every observable that it gave."""
+        scene = self.study.scenes[self.scene]
+        known = observables_of(scene.observables, scene.leaves_a_heap)
+        return {name: known[name].unit for name in self.observed.observables if name in known}
 
     def to_dict(self) -> dict[str, Any]:
         """Everything but the grains as JSON-able data: angles in degrees, observables in SI."""
@@ -59,7 +69,7 @@ class Heap:
             "fit": self.study.measurement.fit,
             "angle": {"mean": angle.mean, "se": angle.se} if angle else None,
             "views": _views(angle) if angle else [],
-            "observables": self.result.observables,
+            "observables": self.observed.observables,
             "observable_units": self.units,
             "provenance": self.result.provenance,
         }
@@ -97,7 +107,8 @@ def simulate_heap(
     """
     [result] = simulate([study.case(settings, seed, scene)], device=device, workers=1, on_progress=progress)
     values = {factor.name: settings.get(factor.name, factor.center) for factor in study.factors}
-    return Heap(study, values, seed, result, *heap_angle_or_reason(study, result, scene), scene)
+    observed = observe(study.measurement, result, study.scenes[scene].leaves_a_heap)
+    return Heap(study, values, seed, result, observed, scene)
 
 
 def heap_picture(study: Study, result: CaseResult, angle: HeapAngle | None, view: int = 0) -> np.ndarray:

@@ -11,10 +11,10 @@ from dem_warp import Case, CaseResult, Progress
 from doe.discrepancy import Outcomes, Point
 from experiments.cases.key import case_key
 from experiments.discover.library import Mechanism, with_mechanisms
-from experiments.discover.observables import NAMES, VERSION
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.wave import WaveRunner
 from experiments.errors import StudyError
+from experiments.measurement.observables import NAMES, VERSION
 from experiments.studyfile import Study
 
 

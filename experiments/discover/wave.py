@@ -16,8 +16,8 @@ from dem_warp.device import resolve_device
 from dem_warp.processes import end_with_parent
 from dem_warp.simulation import batches
 from experiments.discover.devices import resolve_devices
-from experiments.discover.observables import measure
 from experiments.discover.outcome_table import Outcome, OutcomeTable
+from experiments.measurement.states import measure
 from experiments.studyfile.study import MeasurementSection
 
 WORLDS = 1024

@@ -48,7 +48,7 @@ def render_page(
     """
     companion = companion_of(study)
     labels = {section.name: section.label for section in study.factor_sections}
-    context = Context(campaign, labels, companion.published(), study.responses)
+    context = Context(campaign, labels, companion.published())
     chapters = stage_chapters(context)
     if pictures:
         chapters.append(chapter("heaps"))
@@ -62,6 +62,7 @@ def render_page(
         "calibrated": campaign.outcome is Outcome.CALIBRATED,
         "unreached": [TITLES[name] for name in STAGES if name not in campaign.stages],
         "published": context.published,
+        "leading": context.leading,
         "labels": labels,
         "facts": study_facts(study),
         "pictures": pictures,

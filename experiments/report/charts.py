@@ -11,29 +11,33 @@ import plotly.graph_objects as go
 from doe import ScreenResult
 from doe.palette import BLUE, GREEN, INK, MUTED, ORANGE, VERMILION
 from doe.plot_data import half_normal_points, pareto_points
+from experiments.calibrate.cases import measured
 from experiments.calibrate.results import ClimbResult, NoiseFloorResult, TargetResult, VerificationResult
-from experiments.report.kit.chart import ANGLE_AXIS, Chart, add_line, add_points, add_target, new_figure
+from experiments.report.kit.chart import Chart, add_line, add_points, add_target, new_figure
+from experiments.report.kit.numbers import axis_title, capital, hover, quantity
+from experiments.studyfile.campaign import Response
 
 
-def noise_floor_chart(result: NoiseFloorResult, target: TargetResult) -> Chart:
+def noise_floor_chart(result: NoiseFloorResult, target: TargetResult, response: Response) -> Chart:
     """Draw the replicates at the centre, their mean and spread, and the target."""
-    figure = new_figure("heap", ANGLE_AXIS, legend=False)
-    add_target(figure, target.sample.mean, target.sample.sd)
-    add_points(figure, result.cases["replicate"], result.cases["angle"], "heap", BLUE)
-    figure.add_hline(y=result.floor.mean, line={"color": BLUE, "dash": "dot"})
+    figure = new_figure("case", axis_title(response), legend=False)
+    add_target(figure, target.leading.mean, target.leading.sd)
+    cases = measured(result.cases, response)
+    add_points(figure, cases["replicate"], cases[response.observable], "case", BLUE)
+    figure.add_hline(y=result.leading.mean, line={"color": BLUE, "dash": "dot"})
     figure.update_xaxes(dtick=1)
-    caption = "Heaps with every factor at its middle, their mean (dotted), and the target ± 1 sd (green)."
+    caption = "Cases with every factor at its middle, their mean (dotted), and the target ± 1 sd (green)."
     return Chart("noise-chart", caption, figure)
 
 
-def pareto_chart(screen: ScreenResult, alpha: float) -> Chart:
+def pareto_chart(screen: ScreenResult, alpha: float, response: Response) -> Chart:
     """Draw |t| of every effect, largest first, with the critical values."""
     points = pareto_points(screen)[::-1]
     rises = points["effect"] >= 0.0
-    figure = new_figure("|t| of the effect")
+    figure, effect = new_figure("|t| of the effect"), hover("customdata[0]", response)
     for name, color, rows in (
-        ("raises the angle", BLUE, points[rises]),
-        ("lowers the angle", ORANGE, points[~rises]),
+        (f"raises the {response.name}", BLUE, points[rises]),
+        (f"lowers the {response.name}", ORANGE, points[~rises]),
     ):
         figure.add_bar(
             x=rows["abs_t"],
@@ -42,7 +46,7 @@ def pareto_chart(screen: ScreenResult, alpha: float) -> Chart:
             name=name,
             marker={"color": color},
             customdata=rows[["effect"]],
-            hovertemplate="%{y}: effect %{customdata[0]:.2f}°, |t| = %{x:.2f}<extra></extra>",
+            hovertemplate=f"%{{y}}: effect {effect}, |t| = %{{x:.2f}}<extra></extra>",
         )
     ends = [points.index[0], points.index[-1]]
     levels = _critical_values(screen, alpha)
@@ -59,10 +63,10 @@ def pareto_chart(screen: ScreenResult, alpha: float) -> Chart:
     )
 
 
-def half_normal_chart(screen: ScreenResult, alpha: float) -> Chart:
+def half_normal_chart(screen: ScreenResult, alpha: float, response: Response) -> Chart:
     """Draw the ordered sizes of all effects against half-normal quantiles, with the line of pure noise."""
     points = half_normal_points(screen.effects)
-    figure = new_figure("half-normal quantile", "|effect| [°]")
+    figure = new_figure("half-normal quantile", f"|effect| on {axis_title(response)}")
     top = float(points["quantile"].max()) * 1.08
     add_line(
         figure, [0.0, top], [0.0, top * float(screen.standard_error.mean())], "noise alone", MUTED, "dot"
@@ -75,47 +79,53 @@ def half_normal_chart(screen: ScreenResult, alpha: float) -> Chart:
         ("dummy column", dummy, "circle-open", MUTED),
     ):
         if rows.any():
-            _add_effects(figure, points[rows], name, symbol, color)
+            _add_effects(figure, points[rows], name, symbol, color, response)
     caption = "Half-normal plot: effects of pure noise lie along the dotted line, real ones stand above it."
     return Chart("half-normal-chart", caption, figure)
 
 
-def climb_chart(climb: ClimbResult, target: TargetResult) -> Chart:
-    """Draw the angle along the climb, the target and where the path crosses it."""
+def climb_chart(climb: ClimbResult, target: TargetResult, response: Response) -> Chart:
+    """Draw the leading response along the climb, the target and where the path crosses it."""
     path = climb.path
-    figure = new_figure("step of the climb", ANGLE_AXIS)
-    add_target(figure, target.sample.mean, target.sample.sd)
+    figure = new_figure("step of the climb", axis_title(response))
+    add_target(figure, target.leading.mean, target.leading.sd)
     add_line(figure, path.index, path["predicted"], "predicted by the screening", MUTED, "dot")
-    add_points(figure, climb.cases["run"], climb.cases["angle"], "heap", BLUE, size=7, opacity=0.6)
-    hover = "<br>".join(f"{name} = %{{customdata[{i}]:.4g}}" for i, name in enumerate(climb.kept))
+    cases = measured(climb.cases, response)
+    add_points(figure, cases["run"], cases[response.observable], "case", BLUE, size=7, opacity=0.6)
+    kept = "<br>".join(f"{name} = %{{customdata[{i}]:.4g}}" for i, name in enumerate(climb.kept))
     add_points(
         figure,
         path.index,
-        path["angle"],
+        path["mean"],
         "mean of the step",
         BLUE,
         mode="lines+markers",
         line={"color": BLUE, "width": 2},
         customdata=path[list(climb.kept)],
-        hovertemplate=f"step %{{x}}: %{{y:.2f}}°<br>{hover}<extra></extra>",
+        hovertemplate=f"step %{{x}}: {hover('y', response)}<br>{kept}<extra></extra>",
     )
     if climb.crossing_step is not None:
-        crossing = [climb.crossing_step], [target.sample.mean]
+        crossing = [climb.crossing_step], [target.leading.mean]
         add_points(figure, *crossing, "crosses the target", VERMILION, "diamond", 13)
     figure.update_xaxes(dtick=1)
-    return Chart("climb-chart", "Angle along the climb; the green band is the target ± 1 sd.", figure)
+    return Chart(
+        "climb-chart",
+        f"{capital(response.name)} along the climb; the green band is the target ± 1 sd.",
+        figure,
+    )
 
 
-def verification_chart(result: VerificationResult) -> Chart:
+def verification_chart(result: VerificationResult, response: Response) -> Chart:
     """Draw the interval of the difference from the target between the equivalence margins."""
-    comparison, margin = result.comparison, result.margin
+    comparison, margin = result.leading, result.leading.margin or 0.0
     low, high = comparison.interval
-    deviations = result.angles - (comparison.a.mean - comparison.difference)
-    figure = new_figure("heaps less target [°]")
+    values = measured(result.cases, response)[response.observable].to_numpy()
+    deviations = values - (comparison.a.mean - comparison.difference)
+    figure = new_figure(f"fresh cases less target, {axis_title(response)}")
     figure.add_vrect(x0=-margin, x1=margin, fillcolor=GREEN, opacity=0.13, line_width=0, layer="below")
     figure.add_vline(x=0.0, line={"color": GREEN, "width": 2})
-    heights = np.full(len(deviations), "heaps")
-    add_points(figure, deviations, heights, "single heap", BLUE, opacity=0.7)
+    heights = np.full(len(deviations), "cases")
+    add_points(figure, deviations, heights, "single case", BLUE, opacity=0.7)
     sides = {"array": [high - comparison.difference], "arrayminus": [comparison.difference - low]}
     add_points(
         figure,
@@ -130,7 +140,7 @@ def verification_chart(result: VerificationResult) -> Chart:
     reach = 1.2 * max(margin, abs(low), abs(high), float(np.abs(deviations).max()))
     figure.update_xaxes(range=[-reach, reach])
     figure.update_yaxes(ticks="", ticklabelstandoff=6, range=[-0.7, 1.7])
-    caption = f"Verification heaps less target; the green band is the equivalence margin of ± {margin:.2f}°."
+    caption = f"Fresh cases less target; the green band is the margin of ± {quantity(margin, response.unit)}."
     return Chart("verification-chart", caption, figure)
 
 
@@ -140,7 +150,9 @@ def _critical_values(screen: ScreenResult, alpha: float) -> dict[str, float]:
     return values | {"Bonferroni 0.05": screen.critical_t(0.05, bonferroni=True)}
 
 
-def _add_effects(figure: go.Figure, points: pd.DataFrame, name: str, symbol: str, color: str) -> None:
+def _add_effects(
+    figure: go.Figure, points: pd.DataFrame, name: str, symbol: str, color: str, response: Response
+) -> None:
     """Draw effects; those that matter carry their names, the others tell them under the pointer."""
     written: dict[str, Any] = {
         "mode": "markers+text",
@@ -155,6 +167,6 @@ def _add_effects(figure: go.Figure, points: pd.DataFrame, name: str, symbol: str
         color,
         symbol,
         text=list(points.index),
-        hovertemplate="%{text}: %{y:.2f}°<extra></extra>",
+        hovertemplate=f"%{{text}}: {hover('y', response)}<extra></extra>",
         **(written if name == "significant" else {}),
     )

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 
-from doe import JointFit, Surface
+from doe import JointFit
 from doe.palette import BLUE, GREEN, MUTED, ORANGE, PURPLE, SKY, VERMILION
 from experiments.calibrate.results import OptimumResult, SurfaceResult, TargetResult
 from experiments.report.kit.chart import Chart, add_points, new_figure
 from experiments.report.surfaces import REGION_FILL, Slice, add_contours, add_design, add_region, point_in
-from experiments.studyfile.campaign import ANGLE
+from experiments.studyfile.campaign import Response
 
 COLORS = (BLUE, ORANGE, PURPLE, SKY, MUTED)
 """Of the responses, in order."""
@@ -18,12 +19,14 @@ OPACITY = 0.20
 """Of a response's own band."""
 
 
-def joint_charts(surface: SurfaceResult, optimum: OptimumResult, target: TargetResult) -> list[Chart]:
+def joint_charts(
+    surface: SurfaceResult, optimum: OptimumResult, target: TargetResult, responses: Sequence[Response]
+) -> list[Chart]:
     """Draw the shares that are left, and for every pair of factors where each response agrees."""
     if optimum.joint is None:
         return []
     pairs = itertools.combinations(surface.design.names, 2)
-    planes = [_plane_chart(optimum.joint, x, y, surface, optimum, target) for x, y in pairs]
+    planes = [_plane_chart(optimum.joint, x, y, surface, optimum, target, responses) for x, y in pairs]
     return [_shares_chart(optimum.joint), *planes]
 
 
@@ -46,17 +49,27 @@ def _shares_chart(joint: JointFit) -> Chart:
 
 
 def _plane_chart(
-    joint: JointFit, x: str, y: str, surface: SurfaceResult, optimum: OptimumResult, target: TargetResult
+    joint: JointFit,
+    x: str,
+    y: str,
+    surface: SurfaceResult,
+    optimum: OptimumResult,
+    target: TargetResult,
+    responses: Sequence[Response],
 ) -> Chart:
-    surfaces: dict[str, Surface] = {ANGLE: surface.reduced}
-    surfaces |= {name: fit.reduced for name, fit in surface.responses.items()}
-    plane = Slice(surface.reduced, x, y, optimum.point)
+    fits = [
+        (response, surface.responses[response.name].reduced)
+        for response in responses
+        if not response.held_out
+    ]
+    plane = Slice(fits[0][1], x, y, optimum.point, fits[0][0])
     figure = new_figure(surface.design.factor(x).label, surface.design.factor(y).label)
-    for (name, fit), color in zip(surfaces.items(), itertools.cycle(COLORS)):
+    for (response, fit), color in zip(fits, itertools.cycle(COLORS)):
+        name = response.name
         level = joint.goals[name].target.mean
         add_region(figure, plane, joint.band(name), f"{name} agrees", _translucent(color))
         at_target = {"coloring": "none", "start": level, "end": level, "size": 1.0}
-        grid = Slice(fit, x, y, optimum.point).grid()
+        grid = Slice(fit, x, y, optimum.point, response).grid()
         add_contours(figure, grid, f"{name} at its target", at_target, color, 2, hoverinfo="skip")
     add_region(figure, plane, joint.region(), "all agree", REGION_FILL.replace("0.28", "0.75"))
     add_design(figure, plane, surface.design)

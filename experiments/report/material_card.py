@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from doe import Region
+from doe import Region, Sample
 from experiments.calibrate.results import Campaign, OptimumResult
 from experiments.files import replacing, write_text
 from experiments.studyfile import Study
@@ -62,7 +62,7 @@ def write_material_card(campaign: Campaign, study: Study, folder: Path) -> Path 
 
 
 def material_card(campaign: Campaign, optimum: OptimumResult, study: Study) -> dict[str, Any]:
-    """What a card says, as nested tables; clump files as the study names them."""
+    """Lay out a card as nested tables; clump files as the study names them."""
     chosen = with_factor_values(study.document, study.factor_sections, optimum.settings)
     return {
         "format": FORMAT,
@@ -75,44 +75,40 @@ def material_card(campaign: Campaign, optimum: OptimumResult, study: Study) -> d
 
 
 def _fitted(campaign: Campaign, study: Study) -> dict[str, Any]:
-    """What the values were fitted to, and how well they do."""
+    """Say what the values were fitted to, and how well they do."""
     measurement, numerics = study.measurement, study.numerics
     facts: dict[str, Any] = {
         "outcome": campaign.outcome.value,
         "reason": campaign.reason,
         "scale": study.scale,
         "test": study.document["scene"],
-        "response": f"repose angle, {measurement.fit!r} fit, mean of {measurement.azimuths} views",
+        "estimator": f"repose angle, {measurement.fit!r} fit, mean of {measurement.azimuths} views",
         "modulus_scale": numerics.modulus_scale,
         "time_step_fraction": numerics.time_step_fraction,
+        "response": {response.name: _response(campaign, response) for response in campaign.responses},
     }
-    if campaign.target is not None:
-        sample = campaign.target.sample
-        facts["target"] = {"mean": _angle(sample.mean), "sd": _angle(sample.sd), "n": sample.n}
-    if campaign.verification is not None:
-        test = campaign.verification.comparison
-        facts["heaps"] = {"mean": _angle(test.a.mean), "sd": _angle(test.a.sd), "n": test.a.n}
-        facts["heaps"] |= {"difference": _angle(test.difference), "interval": [*map(_angle, test.interval)]}
-    if study.responses:
-        facts["response"] = {response.name: _response(campaign, response) for response in study.responses}
-        facts["response-scene"] = study.document.get("response-scene", {})
+    scenes, document = {response.scene for response in campaign.responses}, study.document
+    for kind in ("response-scene", "condition"):
+        if used := {name: table for name, table in document.get(kind, {}).items() if name in scenes}:
+            facts[kind] = used
     return facts
 
 
 def _response(campaign: Campaign, response: Response) -> dict[str, Any]:
-    """What a further response was fitted to, and what fresh cases gave."""
-    facts: dict[str, Any] = {
-        "observable": response.observable,
-        "scene": response.scene,
-        "unit": response.unit,
-    }
+    """Target of a response, and what fresh cases gave."""
+    facts: dict[str, Any] = {"observable": response.observable, "scene": response.scene}
     if campaign.target is not None:
-        sample = campaign.target.responses[response.name]
-        facts |= {"mean": _short(sample.mean), "sd": _short(sample.sd), "n": sample.n}
+        facts |= _written(campaign.target.responses[response.name], response.unit)
     if campaign.verification is not None:
-        test = campaign.verification.responses[response.name]
-        facts |= {"fresh_mean": _short(test.a.mean), "fresh_sd": _short(test.a.sd), "fresh_n": test.a.n}
+        test, unit = campaign.verification.responses[response.name], response.unit
+        facts["fresh"] = _written(test.a, unit)
+        facts["fresh"] |= {"difference": _quantity(test.difference, unit)}
+        facts["fresh"] |= {"interval": [_quantity(end, unit) for end in test.interval]}
     return facts
+
+
+def _written(sample: Sample, unit: str) -> dict[str, Any]:
+    return {"mean": _quantity(sample.mean, unit), "sd": _quantity(sample.sd, unit), "n": sample.n}
 
 
 def _factors(optimum: OptimumResult, study: Study) -> dict[str, Any]:
@@ -148,5 +144,8 @@ def _short(value: float) -> float:
     return float(f"{value:.4g}")
 
 
-def _angle(value: float) -> str:
-    return f"{value:.3f} deg"
+def _quantity(value: float, unit: str) -> str | float:
+    """Write a value as a study file has it: angles with three decimals, others with four digits."""
+    if unit == "1":
+        return _short(value)
+    return f"{value:.3f} deg" if unit == "deg" else f"{value:.4g} {unit}"

@@ -13,7 +13,7 @@ import pandas as pd
 
 from dem_warp import CaseResult
 from experiments.calibrate.results import Campaign
-from experiments.cases import measure_heap
+from experiments.measurement.states import measure_heap
 from experiments.report.kit.numbers import trimmed
 from experiments.studyfile import Study
 from imaging import HeapAngle, Snapshot, overlay, snapshot
@@ -125,7 +125,7 @@ def drawn_heap(
     imaging.PictureError
         When there is no heap to measure.
     """
-    angle = measure_heap(study, result)
+    angle = measure_heap(study.measurement, result)
     if view is None:
         view = int(np.argmin([abs(seen.mean - angle.mean) for seen in angle.views]))
     picture = snapshot(

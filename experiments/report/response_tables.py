@@ -1,8 +1,8 @@
-"""The tables of a campaign on several responses: what each was to match, what it buys, what stays open."""
+"""The tables of responses: the target of each, what it buys, and what all of them leave open."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -11,55 +11,29 @@ from markupsafe import Markup
 from doe import JointFit
 from experiments.calibrate.joint import direction_text, open_directions
 from experiments.calibrate.results import Campaign
-from experiments.report.kit.numbers import term
+from experiments.report.kit.numbers import term, unit_sign
 from experiments.report.kit.table import Column, Table, make_table
-from experiments.studyfile.campaign import ANGLE, TARGET_SCENE, OptimumSettings, Response
-
-HEAP_ANGLE = Response(name=ANGLE, observable=ANGLE, unit="deg")
-"""The first response of every campaign."""
+from experiments.studyfile.campaign import TARGET_SCENE, OptimumSettings, Response
 
 
-def response_tables(campaign: Campaign, responses: Sequence[Response]) -> dict[str, Table]:
-    """Lay out what was found of several responses; empty where the angle is alone or was not fitted.
-
-    Parameters
-    ----------
-    campaign
-        What was run.
-    responses
-        The responses beside the angle.
-    """
-    if campaign.optimum is None or campaign.optimum.joint is None:
-        return {}
-    joint = campaign.optimum.joint
-    return {
-        "responses": _responses_table(campaign, joint, responses),
-        "shrinkage": _shrinkage_table(campaign, joint, responses),
-        "directions": _directions_table(joint, campaign.settings.optimum),
-        "effects": _effects_table(campaign),
-        "surfaces": _surfaces_table(campaign),
-    }
-
-
-def _responses_table(campaign: Campaign, joint: JointFit, responses: Sequence[Response]) -> Table:
-    """Lay out every response: target, noise, fit at the chosen point, fresh cases."""
-    known = {response.name: response for response in (HEAP_ANGLE, *responses)}
+def goals_table(campaign: Campaign) -> Table:
+    """Lay out every response: its target, and as far as they are known noise, fit and fresh cases."""
+    rows = {response.name: _goal(campaign, response) for response in campaign.responses}
+    table = pd.DataFrame.from_dict(rows, orient="index").rename_axis("response")
     optimum = campaign.optimum
-    table = joint.tests(optimum.point if optimum else None)
-    table["unit"] = ["" if known[name].unit == "1" else known[name].unit for name in table.index]
-    table["scene"] = [_scene_text(known[name].scene) for name in table.index]
-    if (noise := campaign.noise_floor) is not None:
-        floors = {ANGLE: noise.floor, **noise.responses}
-        table["noise"] = [floors[name].sd for name in table.index]
-    if (verification := campaign.verification) is not None:
-        tests = {ANGLE: verification.comparison, **verification.responses}
-        table["fresh"] = [tests[name].a.mean for name in table.index]
-        table["fresh_p"] = [tests[name].p for name in table.index]
+    marks: list[str] | None = None
+    if optimum is not None and optimum.joint is not None:
+        tests = optimum.joint.tests(optimum.point)
+        table = table.join(tests[["t", "p"]])
+        apart = tests.index[~tests["agrees"]]
+        marks = ["failed" if name in apart else "" for name in table.index]
     columns = [
         Column("response", "response"),
         Column("scene", "scene"),
         Column("unit", "unit"),
         Column("target", "target", "free"),
+        Column("sd", "sd", "free"),
+        Column("n", "n", "label"),
         Column("target_se", "se", "free"),
         Column("noise", "sd of one case", "free"),
         Column("fitted", "fit at the chosen point", "free"),
@@ -68,17 +42,51 @@ def _responses_table(campaign: Campaign, joint: JointFit, responses: Sequence[Re
         Column("fresh", "fresh cases", "free"),
         Column("fresh_p", "p, no difference", "p"),
     ]
-    note = (
-        "Scene: the study's own, or a further one by its name. Errors off: the difference of fit and target, "
-        "over the errors of both together."
-    )
-    marks = ["" if agrees else "failed" for agrees in table["agrees"]]
+    note = "Scene: the study's own, or a further one by its name. The first response leads the climb."
+    if "t" in table:
+        note += " Errors off: the difference of fit and target, over the errors of both together."
     return make_table("responses", table, columns, "Every response and its target.", note, marks)
 
 
-def _shrinkage_table(campaign: Campaign, joint: JointFit, responses: Sequence[Response]) -> Table:
+def _goal(campaign: Campaign, response: Response) -> dict[str, Any]:
+    """Facts about a response; what is not known yet is left out."""
+    name = response.name
+    scene = "own" if response.scene == TARGET_SCENE else response.scene
+    facts: dict[str, Any] = {
+        "scene": f"{scene}, held out" if response.held_out else scene,
+        "unit": unit_sign(response.unit),
+    }
+    if campaign.target is not None:
+        sample = campaign.target.responses[name]
+        facts |= {"target": sample.mean, "sd": sample.sd, "n": sample.n, "target_se": sample.se}
+    if campaign.noise_floor is not None and not response.held_out:
+        facts["noise"] = campaign.noise_floor.responses[name].sd
+    if campaign.optimum is not None and campaign.surface is not None and not response.held_out:
+        fit = campaign.surface.responses[name].reduced
+        facts["fitted"] = float(fit.predict(campaign.optimum.point)["mean"].iloc[0])
+    if campaign.verification is not None:
+        test = campaign.verification.responses[name]
+        facts |= {"fresh": test.a.mean, "fresh_p": test.p}
+    return facts
+
+
+def response_tables(campaign: Campaign) -> dict[str, Table]:
+    """Lay out what several responses buy together; empty where there is one, or none was fitted."""
+    if campaign.optimum is None or campaign.optimum.joint is None:
+        return {}
+    joint = campaign.optimum.joint
+    return {
+        "responses": goals_table(campaign),
+        "shrinkage": _shrinkage_table(campaign, joint),
+        "directions": _directions_table(joint, campaign.settings.optimum),
+        "effects": _effects_table(campaign),
+        "surfaces": _surfaces_table(campaign),
+    }
+
+
+def _shrinkage_table(campaign: Campaign, joint: JointFit) -> Table:
     """Lay out how the region shrinks with each response, and what each takes to simulate."""
-    scenes = {response.name: response.scene for response in (HEAP_ANGLE, *responses)}
+    scenes = {response.name: response.scene for response in campaign.responses}
     table = joint.shrinkage.copy()
     for column in ("share", "alone", "with_first"):
         table[column] *= 100.0
@@ -95,7 +103,7 @@ def _shrinkage_table(campaign: Campaign, joint: JointFit, responses: Sequence[Re
         Column("share", "compatible with all so far", "free", "%"),
         Column("ratio", "over the row above", "free"),
         Column("alone", "with it alone", "free", "%"),
-        Column("with_first", "with the angle and it", "free", "%"),
+        Column("with_first", f"with the {table.index[0]} and it", "free", "%"),
         Column("cases", "cases for it", "label"),
         Column("simulated_time", "simulated", "count", "s"),
         Column("work", "share of the work", "percent", "%"),
@@ -139,7 +147,7 @@ def _effects_table(campaign: Campaign) -> Table:
     if (result := campaign.screening) is None:
         raise ValueError("a campaign with an optimum has a screening")
     alpha = campaign.settings.selection.alpha
-    screens = {ANGLE: result.screen, **result.responses}
+    screens = {name: found.screen for name, found in result.responses.items()}
     frames = {name: screen.table[["effect", "p"]].add_prefix(f"{name} ") for name, screen in screens.items()}
     table = pd.concat(frames.values(), axis=1).rename_axis("factor")
     columns = [Column("factor", "factor")]
@@ -154,8 +162,7 @@ def _surfaces_table(campaign: Campaign) -> Table:
     """Lay out how well a quadratic describes every response."""
     if (result := campaign.surface) is None:
         raise ValueError("a campaign with an optimum has a surface")
-    fits = {ANGLE: (result.full, result.reduced)}
-    fits |= {name: (fit.full, fit.reduced) for name, fit in result.responses.items()}
+    fits = {name: (fit.full, fit.reduced) for name, fit in result.responses.items()}
     rows = {
         name: {
             "cases": float(len(full.response)),
@@ -183,7 +190,3 @@ def _surfaces_table(campaign: Campaign) -> Table:
 def _terms(names: str) -> Markup:
     """Typeset the terms of a model."""
     return Markup(", ").join(term(name) for name in names.split(", "))
-
-
-def _scene_text(scene: str) -> str:
-    return "own" if scene == TARGET_SCENE else scene

@@ -4,15 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
-from experiments.calibrate.results import Campaign
+from experiments.calibrate.results import (
+    Campaign,
+    ClimbResult,
+    NoiseFloorResult,
+    OptimumResult,
+    ScreeningResult,
+    SelectionResult,
+    SurfaceResult,
+    TargetResult,
+    VerificationResult,
+)
 from experiments.report import charts, stage_tables, surfaces
 from experiments.report.joint_charts import joint_charts
 from experiments.report.kit.chart import Chart
 from experiments.report.kit.html import Chapter
 from experiments.report.kit.table import Table
 from experiments.report.published import Published
-from experiments.report.response_tables import response_tables
+from experiments.report.response_tables import goals_table, response_tables
 from experiments.studyfile.campaign import Response
 
 TITLES = {
@@ -40,15 +51,25 @@ def chapter(name: str, tables: Mapping[str, Table] | None = None, charts: Sequen
 
 @dataclass(frozen=True)
 class Context:
-    """What the chapters draw on."""
+    """Sources of the chapters."""
 
     campaign: Campaign
     labels: Mapping[str, str]
-    """What each factor is, in words."""
+    """Meaning of each factor, in words."""
     published: Published | None
     """Published numbers of the same study, where there are some."""
-    responses: tuple[Response, ...] = ()
-    """What was to be matched beside the angle."""
+
+    @property
+    def leading(self) -> Response:
+        """The response that leads the campaign."""
+        return self.campaign.responses[0]
+
+    @property
+    def target(self) -> TargetResult:
+        """Target of a campaign that reached its first stage."""
+        if self.campaign.target is None:
+            raise ValueError("the campaign ended before its target")
+        return self.campaign.target
 
     @property
     def truth(self) -> dict[str, float] | None:
@@ -61,123 +82,108 @@ def stage_chapters(context: Context) -> list[Chapter]:
     campaign = context.campaign
     factors = stage_tables.factors_table(campaign.factors, context.labels, context.truth)
     chapters = [chapter("factors", {"levels": factors})]
-    for name in campaign.stages:
-        chapters.append(_STAGES[name](context))
+    for name, result in campaign.stages.items():
+        chapters.append(_STAGES[name](context, result))
         if name == "optimum":
             chapters += _responses(context)
     return chapters
 
 
 def failed_chapter(campaign: Campaign) -> Chapter:
-    """Build the chapter of the cases that gave no angle."""
+    """Build the chapter of the cases that failed or lack a response."""
     table = stage_tables.failed_table(campaign)
     return chapter("failed", {"cases": table} if table else {})
 
 
-def _target(context: Context) -> Chapter:
-    target = context.campaign.target
-    if target is None or target.cases is None:
-        return chapter("target")
-    caption = "The heaps whose mean is the target."
-    return chapter("target", {"heaps": stage_tables.heaps_table("target-heaps", target.cases, caption)})
+def _target(context: Context, result: TargetResult) -> Chapter:
+    campaign, tables = context.campaign, {"responses": goals_table(context.campaign)}
+    if result.cases is not None:
+        caption = "The cases whose means are the target."
+        table = stage_tables.cases_table("target-cases", result.cases, campaign.responses, caption)
+        tables["cases"] = table
+    return chapter("target", tables)
 
 
-def _noise_floor(context: Context) -> Chapter:
-    result, target = context.campaign.noise_floor, context.campaign.target
-    if result is None or target is None:
-        return chapter("noise_floor")
-    table = stage_tables.heaps_table("noise-floor", result.cases, "Replicates at the middle.")
-    return chapter("noise_floor", {"heaps": table}, [charts.noise_floor_chart(result, target)])
+def _noise_floor(context: Context, result: NoiseFloorResult) -> Chapter:
+    caption, responses = "Replicates at the middle.", context.campaign.responses
+    table = stage_tables.cases_table("noise-floor", result.cases, responses, caption)
+    chart = charts.noise_floor_chart(result, context.target, context.leading)
+    return chapter("noise_floor", {"cases": table}, [chart])
 
 
-def _screening(context: Context) -> Chapter:
-    result, alpha = context.campaign.screening, context.campaign.settings.selection.alpha
-    if result is None:
-        return chapter("screening")
+def _screening(context: Context, result: ScreeningResult) -> Chapter:
+    alpha = context.campaign.settings.selection.alpha
     published = context.published.screening if context.published else None
+    screen, response = result.leading.screen, context.leading
     tables = {
-        "design": stage_tables.screening_design_table(result),
-        "effects": stage_tables.effects_table(result, context.labels, alpha, published),
-        "anova": stage_tables.anova_table("screening-anova", result.screen.anova, "Analysis of variance."),
+        "design": stage_tables.screening_design_table(result, context.campaign.responses),
+        "effects": stage_tables.effects_table(screen, response, context.labels, alpha, published),
+        "anova": stage_tables.anova_table("screening-anova", screen.anova, "Analysis of variance."),
     }
-    drawn = [charts.pareto_chart(result.screen, alpha), charts.half_normal_chart(result.screen, alpha)]
-    return chapter("screening", tables, drawn)
+    drawn = (charts.pareto_chart, charts.half_normal_chart)
+    return chapter("screening", tables, [draw(screen, alpha, response) for draw in drawn])
 
 
-def _selection(context: Context) -> Chapter:
-    result = context.campaign.selection
-    return chapter("selection", {"reasons": stage_tables.selection_table(result)} if result else {})
+def _selection(context: Context, result: SelectionResult) -> Chapter:
+    return chapter("selection", {"reasons": stage_tables.selection_table(result, context.leading)})
 
 
-def _climb(context: Context) -> Chapter:
-    result, target = context.campaign.climb, context.campaign.target
-    if result is None or target is None:
-        return chapter("climb")
-    tables = {"path": stage_tables.climb_table(result)}
+def _climb(context: Context, result: ClimbResult) -> Chapter:
+    tables = {"path": stage_tables.climb_table(result, context.leading)}
     if context.published:
         tables["paper"] = stage_tables.paper_climb_table(context.published.climb)
-    return chapter("climb", tables, [charts.climb_chart(result, target)])
+    return chapter("climb", tables, [charts.climb_chart(result, context.target, context.leading)])
 
 
-def _surface(context: Context) -> Chapter:
-    campaign = context.campaign
-    result, target = campaign.surface, campaign.target
-    if result is None or target is None:
-        return chapter("surface")
+def _surface(context: Context, result: SurfaceResult) -> Chapter:
+    campaign, response = context.campaign, context.leading
+    fit, names = result.leading, tuple(result.design.names)
     published = context.published
-    same = published is not None and set(published.kept) == set(result.design.names)
-    names = tuple(result.design.names)
-    paper = {
-        model: published.anova(model, names) if published and same else None for model in ("full", "reduced")
-    }
+    if published is not None and set(published.kept) != set(names):
+        published = None
+    paper = {model: published.anova(model, names) if published else None for model in ("full", "reduced")}
     tables = {
-        "design": stage_tables.surface_design_table(result),
+        "design": stage_tables.surface_design_table(result, campaign.responses),
         "full": stage_tables.anova_table(
-            "anova-full", result.full.anova, "Full quadratic model.", paper["full"]
+            "anova-full", fit.full.anova, "Full quadratic model.", paper["full"]
         ),
         "reduced": stage_tables.anova_table(
-            "anova-reduced", result.reduced.anova, "Reduced model.", paper["reduced"]
+            "anova-reduced", fit.reduced.anova, "Reduced model.", paper["reduced"]
         ),
-        "quality": stage_tables.quality_table(result, published.quality if published and same else None),
-        "coefficients": stage_tables.coefficients_table(result.reduced),
+        "quality": stage_tables.quality_table(fit, published.quality if published else None),
+        "coefficients": stage_tables.coefficients_table(fit.reduced, response),
     }
     outside = stage_tables.outside_table(result)
     if outside:
         tables["outside"] = outside
-    residuals = surfaces.residual_charts(result.reduced)
-    return chapter(
-        "surface", tables, [*surfaces.surface_charts(result, campaign.optimum, target), *residuals]
-    )
+    drawn = surfaces.surface_charts(result, campaign.optimum, context.target, response)
+    return chapter("surface", tables, [*drawn, *surfaces.residual_charts(fit.reduced, response)])
 
 
-def _optimum(context: Context) -> Chapter:
-    campaign = context.campaign
-    if campaign.optimum is None or campaign.surface is None:
-        return chapter("optimum")
-    table = stage_tables.ranges_table(campaign.optimum, campaign.surface.design)
-    return chapter("optimum", {"ranges": table})
+def _optimum(context: Context, result: OptimumResult) -> Chapter:
+    return chapter("optimum", {"ranges": stage_tables.ranges_table(result)})
 
 
 def _responses(context: Context) -> list[Chapter]:
-    """Build the chapter of several responses; none where the angle is alone."""
+    """Build the chapter of several responses; none where there is one."""
     campaign = context.campaign
-    surface, optimum, target = campaign.surface, campaign.optimum, campaign.target
-    if surface is None or optimum is None or target is None or optimum.joint is None:
+    if campaign.surface is None or campaign.optimum is None or campaign.optimum.joint is None:
         return []
-    drawn = joint_charts(surface, optimum, target)
-    return [chapter("responses", response_tables(campaign, context.responses), drawn)]
+    tables = response_tables(campaign)
+    del tables["responses"]  # it stands with the target
+    drawn = joint_charts(campaign.surface, campaign.optimum, context.target, campaign.responses)
+    return [chapter("responses", tables, drawn)]
 
 
-def _verification(context: Context) -> Chapter:
-    result = context.campaign.verification
-    if result is None:
-        return chapter("verification")
-    table = stage_tables.heaps_table("verification-heaps", result.cases, "Fresh heaps at the chosen point.")
-    tests = stage_tables.tests_table(result, context.published)
-    return chapter("verification", {"heaps": table, "tests": tests}, [charts.verification_chart(result)])
+def _verification(context: Context, result: VerificationResult) -> Chapter:
+    caption, responses = "Fresh cases at the chosen point.", context.campaign.responses
+    table = stage_tables.cases_table("verification-cases", result.cases, responses, caption)
+    tests = stage_tables.tests_table(result, responses, context.published)
+    chart = charts.verification_chart(result, context.leading)
+    return chapter("verification", {"cases": table, "tests": tests}, [chart])
 
 
-_STAGES: dict[str, Callable[[Context], Chapter]] = {
+_STAGES: dict[str, Callable[[Context, Any], Chapter]] = {
     "target": _target,
     "noise_floor": _noise_floor,
     "screening": _screening,

@@ -7,19 +7,22 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pandas as pd
 
-from doe import Design, Factor, Surface, compare_means
+from doe import Design, Factor, ScreenResult, Surface, compare_means
 from experiments.calibrate.results import (
     Campaign,
     ClimbResult,
+    FittedResponse,
     OptimumResult,
     ScreeningResult,
     SelectionResult,
     SurfaceResult,
     VerificationResult,
+    failed,
 )
-from experiments.report.kit.numbers import fixed, term
+from experiments.report.kit.numbers import term, unit_sign
 from experiments.report.kit.table import Column, Table, make_table
 from experiments.report.published import QUALITY, Published
+from experiments.studyfile.campaign import Response
 
 SIGNIFICANT = 0.05
 """Rows of an analysis of variance with p below this are marked."""
@@ -33,9 +36,14 @@ QUALITY_NAMES = (
 )
 
 RUN = Column("run", "run", "label")
-ANGLE = Column("angle", "angle", "angle", "°")
 ERROR_PERCENT = Column("error_percent", "relative error", "ratio", "%")
 PAPER_TEST = (Column("paper_F", "paper, F", "ratio"), Column("paper_p", "paper, p", "p"))
+
+
+def response_column(response: Response, key: str, head: str = "") -> Column:
+    """Lay out a column of a response's values; without a head, it is the response's name."""
+    kind = "angle" if response.unit == "deg" else "free"
+    return Column(key, head or response.name, kind, unit_sign(response.unit))
 
 
 def factors_table(
@@ -66,39 +74,48 @@ def factors_table(
     return make_table("factors", frame, columns, "Factors and their levels.")
 
 
-def heaps_table(name: str, cases: pd.DataFrame, caption: str) -> Table:
-    """Lay out replicated heaps of one setting."""
-    columns = [
-        Column("replicate", "heap", "label"),
-        Column("seed", "seed", "label"),
+def cases_table(name: str, cases: pd.DataFrame, responses: Sequence[Response], caption: str) -> Table:
+    """Lay out replicated cases of one setting."""
+    shown = {response.observable: response for response in responses}
+    several = len(cases["scene"].unique()) > 1
+    facts = (
         Column("grain_count", "grains", "count"),
-        Column("fill_height_mm", "fill height", "ratio", "mm"),
+        Column("fill_height", "fill height", "free", "m"),
         Column("solid_fraction", "solid fraction", "share"),
         Column("time_to_rest", "time to rest", "ratio", "s"),
-        ANGLE,
-        Column("angle_se", "se over views", "angle", "°"),
+    )
+    columns = [
+        *([Column("scene", "scene")] if several else []),
+        Column("replicate", "case", "label"),
+        Column("seed", "seed", "label"),
+        *(column for column in facts if column.key not in shown),
+        *(response_column(response, key) for key, response in shown.items()),
+        Column("angle_se", "se of the angle over views", "angle", "°"),
         Column("status", "status"),
     ]
-    if "fill_height" in cases.columns:
-        cases = cases.assign(fill_height_mm=1e3 * cases["fill_height"])
-    return make_table(name, cases, columns, caption, marks=_failed_marks(cases["angle"]))
+    lost = cases.index.isin(failed(cases, responses).index)
+    return make_table(name, cases, columns, caption, marks=["failed" if each else "" for each in lost])
 
 
-def screening_design_table(result: ScreeningResult) -> Table:
-    """Lay out the coded design with its response."""
-    frame, angles = _with_response(result.design.coded, result.response)
+def screening_design_table(result: ScreeningResult, responses: Sequence[Response]) -> Table:
+    """Lay out the coded design with its responses."""
+    values = {name: found.measured for name, found in result.responses.items()}
+    frame, columns = _with_responses(result.design.coded, values, responses)
     coded = [Column(name, name, "coded") for name in result.design.coded.columns]
     note = f"Dummy columns, which stand for no factor: {', '.join(result.design.dummies) or 'none'}."
-    return make_table(
-        "screening-design", frame, [RUN, *coded, *angles], "Screening design (coded) and angles.", note
-    )
+    caption = "Screening design (coded) and responses."
+    return make_table("screening-design", frame, [RUN, *coded, *columns], caption, note)
 
 
 def effects_table(
-    result: ScreeningResult, labels: Mapping[str, str], alpha: float, published: pd.DataFrame | None
+    screen: ScreenResult,
+    response: Response,
+    labels: Mapping[str, str],
+    alpha: float,
+    published: pd.DataFrame | None,
 ) -> Table:
     """Lay out the tests of the effects, strongest first, the paper's F and p beside them."""
-    frame = result.screen.table.sort_values("rank")
+    frame = screen.table.sort_values("rank")
     frame.insert(0, "label", [labels.get(str(name), "") for name in frame.index])
     if published is not None:
         frame = frame.join(published[["F", "p"]].add_prefix("paper_"))
@@ -106,7 +123,7 @@ def effects_table(
         Column("rank", "rank", "label"),
         Column("factor", "factor"),
         Column("label", "parameter"),
-        Column("effect", "effect", "angle", "°"),
+        response_column(response, "effect", "effect"),
         Column("sum_sq", "sum of squares", "sum"),
         Column("percent", "share", "percent", "%"),
         Column("F", "F", "ratio"),
@@ -114,10 +131,11 @@ def effects_table(
         Column("p", "p", "p"),
         *PAPER_TEST,
     ]
-    note = f"Marked: p < {alpha:g}. The effect is the change of the mean angle from low to high."
+    note = f"Marked: p < {alpha:g}. The effect is the change of the mean {response.name} from low to high."
     if published is not None:
         note += " The paper's columns are recomputed from its printed runs."
-    return make_table("effects", frame, columns, "Effects of the factors.", note, _p_marks(frame["p"], alpha))
+    caption = f"Effects of the factors on the {response.name}."
+    return make_table("effects", frame, columns, caption, note, _p_marks(frame["p"], alpha))
 
 
 def anova_table(name: str, anova: pd.DataFrame, caption: str, published: pd.DataFrame | None = None) -> Table:
@@ -138,14 +156,14 @@ def anova_table(name: str, anova: pd.DataFrame, caption: str, published: pd.Data
     )
 
 
-def selection_table(result: SelectionResult) -> Table:
+def selection_table(result: SelectionResult, response: Response) -> Table:
     """Lay out why each factor was kept or not."""
     frame = result.table.rename_axis("factor").copy()
     frame["kept"] = np.where(frame["kept"], "kept", "left at its middle")
     frame["visible"] = np.where(frame["visible"], "yes", "no")
     columns = [
         Column("factor", "factor"),
-        Column("effect", "effect", "angle", "°"),
+        response_column(response, "effect", "effect"),
         Column("p", "p", "p"),
         *(Column(key, f"p, {key[2:]}", "p") for key in frame.columns if key.startswith("p_")),
         Column("visible", "beyond the noise floor"),
@@ -156,16 +174,16 @@ def selection_table(result: SelectionResult) -> Table:
     return make_table("selection", frame, columns, "Which factors the later stages vary.", marks=marks)
 
 
-def climb_table(result: ClimbResult) -> Table:
+def climb_table(result: ClimbResult, response: Response) -> Table:
     """Lay out the steps of the climb, the nearest to the target marked."""
     columns = [
         Column("step", "step", "label"),
         *(Column(name, name, "value") for name in result.kept),
-        Column("predicted", "predicted", "angle", "°"),
-        ANGLE,
-        Column("sd", "sd", "angle", "°"),
-        Column("n", "heaps", "label"),
-        Column("error", "angle − target", "angle", "°"),
+        response_column(response, "predicted", "predicted"),
+        response_column(response, "mean"),
+        response_column(response, "sd", "sd"),
+        Column("n", "cases", "label"),
+        response_column(response, "error", f"{response.name} − target"),
         ERROR_PERCENT,
     ]
     marks = ["chosen" if step == result.best_step else "" for step in result.path.index]
@@ -185,24 +203,25 @@ def paper_climb_table(path: pd.DataFrame) -> Table:
     columns = [
         Column("step", "step", "label"),
         *(Column(name, name, "value") for name in names),
-        ANGLE,
+        Column("angle", "angle", "angle", "°"),
         ERROR_PERCENT,
     ]
     return make_table("paper-climb", path, columns, "The paper's climb.")
 
 
-def surface_design_table(result: SurfaceResult) -> Table:
-    """Lay out the composite design with its response, natural and coded."""
+def surface_design_table(result: SurfaceResult, responses: Sequence[Response]) -> Table:
+    """Lay out the composite design with its responses, natural and coded."""
     design = result.design
     natural = design.natural.join(design.points.add_suffix("_coded"))
-    frame, angles = _with_response(natural, result.response)
+    values = {name: found.measured for name, found in result.responses.items()}
+    frame, measured = _with_responses(natural, values, responses)
     columns = [
         RUN,
         *(Column(factor.name, factor.name, "value", factor.unit) for factor in design.factors),
         *(Column(f"{name}_coded", f"{name} coded", "coded") for name in design.names),
-        *angles,
+        *measured,
     ]
-    return make_table("surface-design", frame, columns, "Composite design and angles.")
+    return make_table("surface-design", frame, columns, "Composite design and responses.")
 
 
 def outside_table(result: SurfaceResult) -> Table | None:
@@ -216,8 +235,9 @@ def outside_table(result: SurfaceResult) -> Table | None:
     return make_table("outside", result.outside, columns, "Runs outside the factors' stated ranges.")
 
 
-def coefficients_table(surface: Surface) -> Table:
+def coefficients_table(surface: Surface, response: Response) -> Table:
     """Lay out the coefficients of a surface with their standard errors."""
+    sign = unit_sign(response.unit)
     frame = pd.DataFrame(
         {
             "natural": surface.coefficients,
@@ -228,9 +248,9 @@ def coefficients_table(surface: Surface) -> Table:
     ).rename_axis("term")
     columns = [
         Column("term", "term", write=term),
-        Column("natural", "natural units", "free", "°"),
-        Column("coded", "coded", "sum", "°"),
-        Column("coded_se", "se (coded)", "sum", "°"),
+        Column("natural", "natural units", "free", sign),
+        Column("coded", "coded", "sum", sign),
+        Column("coded_se", "se (coded)", "sum", sign),
         Column("p", "p", "p"),
     ]
     return make_table(
@@ -238,7 +258,7 @@ def coefficients_table(surface: Surface) -> Table:
     )
 
 
-def quality_table(result: SurfaceResult, published: pd.DataFrame | None) -> Table:
+def quality_table(result: FittedResponse, published: pd.DataFrame | None) -> Table:
     """Lay out how well both models fit, the paper's beside them."""
     names = dict(zip(QUALITY, QUALITY_NAMES, strict=True))
     models = {"full": result.full, "reduced": result.reduced}
@@ -283,14 +303,18 @@ def ranges_table(optimum: OptimumResult, design: Design) -> Table:
     return make_table("ranges", frame, columns, "Chosen values and compatible ranges.", note)
 
 
-def tests_table(result: VerificationResult, published: Published | None) -> Table:
-    """Lay out the tests of the difference from the target, the paper's heaps beside them."""
-    tests = {"this campaign": result.comparison}
+def tests_table(
+    result: VerificationResult, responses: Sequence[Response], published: Published | None
+) -> Table:
+    """Lay out the tests of the difference from every target, the paper's heaps beside the first."""
+    tests = [(response.name, result.responses[response.name], response.unit) for response in responses]
     if published is not None:
-        tests["the paper"] = compare_means(published.heaps, published.measured, result.margin)
+        own = compare_means(published.heaps, published.measured, result.leading.margin)
+        tests.insert(1, ("the paper", own, "deg"))
     rows = [
         {
-            "heaps": name,
+            "response": name,
+            "unit": unit_sign(unit),
             "mean": test.a.mean,
             "sd": test.a.sd,
             "n": test.a.n,
@@ -300,34 +324,38 @@ def tests_table(result: VerificationResult, published: Published | None) -> Tabl
             "t": test.t,
             "df": test.df,
             "p": test.p,
+            "margin": test.margin,
             "equivalence_p": test.equivalence_p,
             "smallest_margin": test.smallest_margin,
         }
-        for name, test in tests.items()
+        for name, test, unit in tests
     ]
-    level = f"{100.0 * (1.0 - result.comparison.alpha):g} %"
+    level = f"{100.0 * (1.0 - result.leading.alpha):.3g} %"
+    kind = "angle" if {unit for _, _, unit in tests} == {"deg"} else "free"
     columns = [
-        Column("heaps", "heaps"),
-        Column("mean", "mean", "angle", "°"),
-        Column("sd", "sd", "angle", "°"),
+        Column("response", "response"),
+        Column("unit", "unit"),
+        Column("mean", "mean", kind),
+        Column("sd", "sd", kind),
         Column("n", "n", "label"),
-        Column("difference", "less target", "angle", "°"),
-        Column("low", f"{level} from", "angle", "°"),
-        Column("high", "to", "angle", "°"),
+        Column("difference", "less target", kind),
+        Column("low", f"{level} from", kind),
+        Column("high", "to", kind),
         Column("t", "t", "ratio"),
         Column("df", "df", "level"),
         Column("p", "p, no difference", "p"),
-        Column("equivalence_p", f"p, equivalent within ± {fixed(result.margin, 2)}°", "p"),
-        Column("smallest_margin", "smallest margin shown", "angle", "°"),
+        Column("margin", "margin ±", kind),
+        Column("equivalence_p", "p, equivalent within it", "p"),
+        Column("smallest_margin", "smallest margin shown", kind),
     ]
-    note = "A large p of no difference is weak evidence with few heaps; equivalence says how near is shown."
+    note = "A large p of no difference is weak evidence with few cases; equivalence says how near is shown."
     return make_table("tests", pd.DataFrame(rows), columns, "Tests of the difference from the target.", note)
 
 
 def failed_table(campaign: Campaign) -> Table | None:
-    """Lay out the cases that gave no angle; None when all did."""
-    failed = campaign.failed_cases
-    if failed.empty:
+    """Lay out the cases that failed or lack a response; None when none does."""
+    lost = campaign.failed_cases
+    if lost.empty:
         return None
     several = len(campaign.scene_costs) > 1
     columns = [
@@ -339,25 +367,24 @@ def failed_table(campaign: Campaign) -> Table | None:
         Column("status", "status"),
         Column("reason", "reason"),
     ]
-    gave = "failed, or gave no angle" if several else "gave no angle"
-    return make_table("failed", failed, columns, f"{len(failed)} of {len(campaign.cases)} cases {gave}.")
+    caption = f"{len(lost)} of {len(campaign.cases)} cases failed, or lack a response."
+    return make_table("failed", lost, columns, caption)
 
 
-def _with_response(settings: pd.DataFrame, response: np.ndarray) -> tuple[pd.DataFrame, list[Column]]:
-    """Add the response to a design's settings: one column, or one a replicate."""
-    replicates = response.reshape(len(settings), -1)
-    count = replicates.shape[1]
-    heads = {"angle" if count == 1 else f"angle_{i + 1}": i for i in range(count)}
-    frame = settings.assign(**{key: replicates[:, i] for key, i in heads.items()}).rename_axis("run")
-    columns = [
-        Column(key, "angle" if count == 1 else f"angle {i + 1}", "angle", "°") for key, i in heads.items()
-    ]
-    return frame, columns
+def _with_responses(
+    settings: pd.DataFrame, values: Mapping[str, np.ndarray], responses: Sequence[Response]
+) -> tuple[pd.DataFrame, list[Column]]:
+    """Add responses to a design's settings: one column each, or one a replicate."""
+    added: dict[str, np.ndarray] = {}
+    columns = []
+    for response in (one for one in responses if one.name in values):
+        replicates = values[response.name].reshape(len(settings), -1)
+        for i, column in enumerate(replicates.T, start=1):
+            head = response.name if replicates.shape[1] == 1 else f"{response.name} {i}"
+            added[f"response {head}"] = column
+            columns.append(response_column(response, f"response {head}", head))
+    return settings.assign(**added).rename_axis("run"), columns
 
 
 def _p_marks(p: pd.Series, alpha: float) -> list[str]:
     return ["strong" if value < alpha else "" for value in p]
-
-
-def _failed_marks(angles: pd.Series) -> list[str]:
-    return ["failed" if missing else "" for missing in angles.isna()]

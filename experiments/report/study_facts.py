@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 from dem_warp import GrainPopulation
 from experiments.studyfile import Study
 
@@ -9,25 +12,30 @@ from experiments.studyfile import Study
 def study_facts(study: Study) -> dict[str, str]:
     """Say what was simulated and measured, in the terms in which scales differ."""
     tube, numerics, measurement = study.scene.given.get("lifted-cylinder"), study.numerics, study.measurement
-    if tube is None:
-        raise ValueError("a report is about heaps of a lifted cylinder, got a study of another test")
-    grains = f"{tube.grain_count} grains" if tube.grain_count else "as many grains as fill it"
+    count = tube.grain_count if tube else study.case({}, seed=0).scene.grain_count
+    grains = f"{count} grains" if count else "as many grains as fill it"
     spheres = _sphere_counts(study.grain.population())
     softened = "real" if numerics.modulus_scale == 1.0 else f"divided by {numerics.modulus_scale:g}"
+    test = {"Test": _scene_text(study.document["scene"])}
+    if tube is not None:
+        test = {
+            "Tube": f"{1e3 * tube.diameter:g} mm wide, {1e3 * tube.height:g} mm high",
+            "Lift": f"{tube.lift_speed:g} m/s",
+        }
+    further = study.document.get("response-scene", {})
     return {
         "Scale": study.scale or "the study as written",
-        "Tube": f"{1e3 * tube.diameter:g} mm wide, {1e3 * tube.height:g} mm high",
-        "Lift": f"{tube.lift_speed:g} m/s",
+        **test,
         "Grains": f"{grains}, {spheres} each",
         "Shear modulus": softened,
         "Time step": f"{100.0 * numerics.time_step_fraction:g} % of the Rayleigh time",
         "Angle": f"“{measurement.fit}” fit, mean of {measurement.azimuths} views of a heap, both flanks",
-    } | {f"Scene “{name}”": _scene_text(study, name) for name in study.response_scenes}
+    } | {f"Scene “{name}”": _scene_text(scene) for name, scene in further.items()}
 
 
-def _scene_text(study: Study, name: str) -> str:
-    """Say what a further scene is, as the study writes it."""
-    [(kind, settings)] = study.document["response-scene"][name].items()
+def _scene_text(scene: Mapping[str, Any]) -> str:
+    """Describe a scene as the study writes it."""
+    [(kind, settings)] = scene.items()
     return ", ".join([kind, *(f"{key.replace('_', ' ')} {value}" for key, value in settings.items())])
 
 

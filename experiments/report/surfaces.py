@@ -16,7 +16,6 @@ from doe.palette import BLUE, GREEN, MUTED, PURPLE, VERMILION
 from doe.plot_data import SurfaceGrid, normal_points, surface_grid
 from experiments.calibrate.results import OptimumResult, SurfaceResult, TargetResult
 from experiments.report.kit.chart import (
-    ANGLE_AXIS,
     LANDSCAPE,
     Chart,
     add_line,
@@ -24,6 +23,8 @@ from experiments.report.kit.chart import (
     add_target,
     new_figure,
 )
+from experiments.report.kit.numbers import axis_title, hover, quantity
+from experiments.studyfile.campaign import Response
 
 REGION_FILL = "rgba(0,121,90,0.28)"
 """Translucent green of the compatible region."""
@@ -41,42 +42,47 @@ class Slice:
     y: str
     point: Mapping[str, float]
     """Natural values at which the other factors are held."""
+    response: Response
+    """What the surface is of."""
 
     def grid(self) -> SurfaceGrid:
-        """Fitted angles [deg] over a square that shows every run."""
+        """Fitted values over a square that shows every run."""
         return surface_grid(self.surface, self.x, self.y, self.point, _extent(self.surface.design))
 
     @property
     def hover(self) -> str:
-        """What plotly.js shows under the pointer."""
-        return f"{self.x} %{{x:.4g}}<br>{self.y} %{{y:.4g}}<br>%{{z:.2f}}°<extra></extra>"
+        """Text under the pointer, as plotly.js reads it."""
+        return f"{self.x} %{{x:.4g}}<br>{self.y} %{{y:.4g}}<br>{hover('z', self.response)}<extra></extra>"
 
     @property
     def held_text(self) -> str:
-        """Where the factors that are not shown are held, as a sentence."""
+        """Sentence on the values of the factors that are not shown."""
         held = [factor for factor in self.surface.design.factors if factor.name not in (self.x, self.y)]
         values = ", ".join(f"{f.name} = {self.point[f.name]:.4g} {f.unit}".rstrip() for f in held)
         return f" Held: {values} (points with other values are projected)." if values else ""
 
 
-def surface_charts(result: SurfaceResult, optimum: OptimumResult | None, target: TargetResult) -> list[Chart]:
-    """Draw the reduced surface: a curve for one factor; for more a relief, and contours for every pair.
+def surface_charts(
+    result: SurfaceResult, optimum: OptimumResult | None, target: TargetResult, response: Response
+) -> list[Chart]:
+    """Draw the leading response's reduced surface: a curve for one factor, else a relief and all contours.
 
     Factors that a chart does not show are held at the chosen point, or at the centre when there is none.
     """
     design = result.design
     if len(design.names) == 1:
-        return [_curve_chart(result, optimum, target)]
+        return [_curve_chart(result, optimum, target, response)]
     point = optimum.point if optimum else result.center
-    planes = [Slice(result.reduced, x, y, point) for x, y in itertools.combinations(design.names, 2)]
+    fit, pairs = result.leading.reduced, itertools.combinations(design.names, 2)
+    planes = [Slice(fit, x, y, point, response) for x, y in pairs]
     contours = [_contour_chart(plane, result, optimum, target) for plane in planes]
     return [_relief_chart(_strongest(planes), result, optimum, target), *contours]
 
 
-def residual_charts(surface: Surface) -> list[Chart]:
+def residual_charts(surface: Surface, response: Response) -> list[Chart]:
     """Draw the four usual checks of a fit."""
     fitted, residuals = surface.fitted, surface.studentized_residuals
-    order = np.arange(1, len(fitted) + 1)
+    order, title = np.arange(1, len(fitted) + 1), axis_title(response)
     points = normal_points(residuals)
     charts = [
         _residual_chart(
@@ -87,7 +93,7 @@ def residual_charts(surface: Surface) -> list[Chart]:
             "Normal plot: points along a line.",
         ),
         _residual_chart(
-            "fitted", "fitted angle [°]", fitted, residuals, "Against the fit: no trend, no funnel."
+            "fitted", f"fitted {title}", fitted, residuals, "Against the fit: no trend, no funnel."
         ),
         _residual_chart("order", "row of the design", order, residuals, "Against the row: no drift."),
     ]
@@ -95,10 +101,10 @@ def residual_charts(surface: Surface) -> list[Chart]:
         float(min(fitted.min(), surface.response.min())),
         float(max(fitted.max(), surface.response.max())),
     ]
-    figure = new_figure("simulated angle [°]", "fitted angle [°]", legend=False)
+    figure = new_figure(f"simulated {title}", f"fitted {title}", legend=False)
     figure.add_scatter(x=line, y=line, mode="lines", line={"color": MUTED, "dash": "dot"}, hoverinfo="skip")
     _add_runs(figure, surface.response, fitted)
-    return [*charts, Chart("residual-actual", "Fitted against simulated angles.", figure)]
+    return [*charts, Chart("residual-actual", "Fitted against simulated values.", figure)]
 
 
 def _strongest(planes: list[Slice]) -> Slice:
@@ -123,11 +129,12 @@ def _relief_chart(
         hovertemplate=plane.hover,
         name="fitted surface",
     )
-    measured = result.full.design.natural
+    full = result.leading.full
+    measured = full.design.natural
     if len(measured.columns) == 2:
-        _add_points_3d(figure, plane, measured, result.full.response, "heaps", BLUE)
+        _add_points_3d(figure, plane, measured, full.response, "cases", BLUE)
         if optimum is not None:
-            _add_target_curve(figure, plane, optimum, target.sample.mean)
+            _add_target_curve(figure, plane, optimum, target.leading.mean)
     if optimum is not None:
         chosen = pd.DataFrame([optimum.point])
         _add_points_3d(figure, plane, chosen, [optimum.prediction["mean"]], "optimum", VERMILION, "diamond")
@@ -136,42 +143,58 @@ def _relief_chart(
         scene={
             "xaxis": axis | {"title": {"text": grid.x_factor.label}},
             "yaxis": axis | {"title": {"text": grid.y_factor.label}},
-            "zaxis": axis | {"title": {"text": "angle [°]"}},
+            "zaxis": axis | {"title": {"text": axis_title(plane.response)}},
             "camera": {"eye": {"x": -1.75, "y": -1.9, "z": 1.0}, "center": {"x": 0.0, "y": 0.0, "z": -0.12}},
             "dragmode": "turntable",
         },
         margin={"l": 0, "r": 0, "t": 36, "b": 0},
     )
-    caption = f"Fitted repose angle; drag to turn it.{plane.held_text}"
+    caption = f"Fitted {plane.response.name}; drag to turn it.{plane.held_text}"
     return Chart("surface-relief", caption, figure, height="tall")
 
 
 def _contour_chart(
     plane: Slice, result: SurfaceResult, optimum: OptimumResult | None, target: TargetResult
 ) -> Chart:
-    grid, level = plane.grid(), target.sample.mean
+    grid, level = plane.grid(), target.leading.mean
     figure = new_figure(grid.x_factor.label, grid.y_factor.label)
     if optimum is not None:
         add_region(figure, plane, optimum.region, "compatible region", REGION_FILL)
     lines = {"coloring": "none", "showlabels": True, "labelfont": {"size": 11, "color": MUTED}}
-    add_contours(figure, grid, "fitted angle", lines, "#9aa3af", 1, ncontours=12, hovertemplate=plane.hover)
+    add_contours(
+        figure,
+        grid,
+        f"fitted {plane.response.name}",
+        lines,
+        "#9aa3af",
+        1,
+        ncontours=12,
+        hovertemplate=plane.hover,
+    )
     at_target = {"coloring": "none", "start": level, "end": level, "size": 1.0}
-    add_contours(figure, grid, f"target {level:.2f}°", at_target, GREEN, 3, hoverinfo="skip")
+    add_contours(
+        figure, grid, f"target {quantity(level, plane.response.unit)}", at_target, GREEN, 3, hoverinfo="skip"
+    )
     add_design(figure, plane, result.design)
     if target.truth is not None:
         add_points(figure, *point_in(plane, target.truth), "hidden truth", PURPLE, "star", 16)
     if optimum is not None:
         add_points(figure, *point_in(plane, optimum.point), "optimum", VERMILION, "diamond", 13)
-    caption = "Fitted angle, target curve and compatible region (green); the dotted box is coded −1 to +1."
+    caption = (
+        f"Fitted {plane.response.name}, target curve and compatible region (green); the dotted box is coded "
+        "−1 to +1."
+    )
     return Chart(f"contour-{plane.x}-{plane.y}", caption + plane.held_text, figure, height="tall")
 
 
-def _curve_chart(result: SurfaceResult, optimum: OptimumResult | None, target: TargetResult) -> Chart:
+def _curve_chart(
+    result: SurfaceResult, optimum: OptimumResult | None, target: TargetResult, response: Response
+) -> Chart:
     (factor,) = result.design.factors
     x = factor.to_natural(np.linspace(-1.0, 1.0, CURVE_POINTS) * _extent(result.design))
-    fit = result.reduced.predict(pd.DataFrame({factor.name: x}))
-    figure = new_figure(factor.label, ANGLE_AXIS)
-    add_target(figure, target.sample.mean, target.sample.se)
+    fit = result.leading.reduced.predict(pd.DataFrame({factor.name: x}))
+    figure = new_figure(factor.label, axis_title(response))
+    add_target(figure, target.leading.mean, target.leading.se)
     around = np.r_[fit["confidence_low"], fit["confidence_high"][::-1]]
     shade = {"fill": "toself", "fillcolor": "rgba(0,114,178,0.15)", "hoverinfo": "skip"}
     figure.add_scatter(
@@ -183,9 +206,10 @@ def _curve_chart(result: SurfaceResult, optimum: OptimumResult | None, target: T
         **shade,
     )
     add_line(figure, x, fit["mean"], "fit", BLUE)
-    add_points(figure, result.full.design.natural[factor.name], result.full.response, "heap", BLUE, size=8)
+    full = result.leading.full
+    add_points(figure, full.design.natural[factor.name], full.response, "case", BLUE, size=8)
     if target.truth is not None:
-        hidden = [target.truth[factor.name]], [target.sample.mean]
+        hidden = [target.truth[factor.name]], [target.leading.mean]
         add_points(figure, *hidden, "hidden truth", PURPLE, "star", 16)
     if optimum is not None:
         chosen = [optimum.point[factor.name]], [optimum.prediction["mean"]]
@@ -277,7 +301,7 @@ def _residual_chart(name: str, x_title: str, x: Any, y: pd.Series, caption: str)
 def _add_runs(figure: go.Figure, x: Any, y: pd.Series) -> None:
     labels = [f"run {run}" for run in y.index]
     add_points(
-        figure, x, y, "run", BLUE, text=labels, hovertemplate="%{text}: %{x:.2f}, %{y:.2f}<extra></extra>"
+        figure, x, y, "run", BLUE, text=labels, hovertemplate="%{text}: %{x:.4g}, %{y:.2f}<extra></extra>"
     )
 
 

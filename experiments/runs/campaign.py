@@ -20,8 +20,9 @@ from experiments.calibrate.campaign import StageHook
 from experiments.calibrate.checks import check_study
 from experiments.calibrate.export import jsonable
 from experiments.cases import Engine, Store, open_folder, run_cases
-from experiments.errors import StudyError
+from experiments.errors import InputError, StudyError
 from experiments.files import write_text
+from experiments.measurement.target import with_measurements
 from experiments.report import heap_pictures, write_report
 from experiments.report.companion import Replay, companion_of
 from experiments.report.kit.markdown import WALL_TIMES
@@ -185,8 +186,8 @@ def found_by(campaign: Campaign | None, replay: Replay | None) -> dict[str, Any]
     return found | ({"paper": jsonable(replay.tables())} if replay else {})
 
 
-def check_runs(study: Study, campaign: bool = True, paper: bool = False) -> None:
-    """Check that what is wanted can be run, before a folder is made.
+def check_runs(study: Study, campaign: bool = True, paper: bool = False) -> Study:
+    """Check that what is wanted can be run, before a folder is made, and take the target's measurements.
 
     Parameters
     ----------
@@ -197,26 +198,33 @@ def check_runs(study: Study, campaign: bool = True, paper: bool = False) -> None
     paper
         Whether published runs are to be simulated.
 
+    Returns
+    -------
+    Study
+        The study to run: pictures or a file of its target are numbers now.
+
     Raises
     ------
-    StudyError
-        When the study has no factors, its decisions do not fit them, or it has no published runs.
+    InputError
+        When the study has no factors, its decisions do not fit them, it has no published runs, or the
+        pictures or the file of its target cannot be used.
     """
     if not companion_of(study).planned_runs(1) and paper:
         raise _no_published_runs(study)
     if not campaign:
-        return
-    if not study.scene.leaves_a_heap:
-        rule = "a calibration measures heaps, so its test must be [scene.lifted-cylinder]"
-        raise StudyError(rule, "another", f"{study.file}: scene")
+        return study
     if not study.factors:
         raise StudyError("a calibration needs at least one [[factor]]", "none", str(study.file))
+    study, notes = with_measurements(study)
+    for note in notes:
+        _log.warning("The measurements: %s", note)
     try:
         check_study(study)
-    except StudyError:
+    except InputError:
         raise
     except ValueError as error:
         raise StudyError("the decisions must fit the factors", str(error), str(study.file)) from error
+    return study
 
 
 def _no_published_runs(study: Study) -> StudyError:

@@ -15,12 +15,12 @@ from dem_warp.provenance import engine_fingerprint
 from dem_warp.version import source_commit
 from doe.discrepancy import Bank, Discovery, Fit, Measured, Outcomes, Point, drive
 from experiments.cases import open_folder, require_unused
-from experiments.discover.data.file import read_measured
 from experiments.discover.engine import EngineSimulator
 from experiments.discover.maker import maker_of_today
-from experiments.discover.observables import OBSERVABLES, PHOTOGRAPHED
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.search import Search
+from experiments.measurement.measured_file import read_measured
+from experiments.measurement.observables import OBSERVABLES, PHOTOGRAPHED
 from experiments.report import HeapPicture
 from experiments.report.companion import companion_of
 from experiments.report.discovery import Terms, write_discovery

@@ -8,7 +8,8 @@ at its high level.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Literal, Protocol
 
 from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
@@ -16,7 +17,7 @@ from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
 from experiments.studyfile.schema import Dimension, Section, nested_error
 
 if TYPE_CHECKING:
-    from doe import Factor
+    from doe import Factor, Sample
 
 
 def _in_natural_units(values: object, info: ValidationInfo) -> object:
@@ -174,9 +175,9 @@ class VerificationSettings(Section):
     replicates: int = Field(default=5, ge=2)
     """Fresh cases at the chosen point."""
     margin: Annotated[float, BeforeValidator(_in_degrees)] | None = Field(default=None, gt=0.0)
-    """Equivalence margin [deg]; None: ``margin_sds`` standard deviations of the target."""
+    """Equivalence margin of the leading response, an angle [deg]; None: by ``margin_sds``."""
     margin_sds: float = Field(default=2.0, gt=0.0)
-    """Margin in standard deviations of the target when ``margin`` is None."""
+    """Margin in standard deviations of the target; of the leading response when ``margin`` is None."""
     alpha: float = Field(default=0.05, gt=0.0, lt=1.0)
     """Level of the t-test and of each one-sided test."""
     require_equivalence: bool = False
@@ -196,59 +197,94 @@ class CampaignSettings(Section):
     verification: VerificationSettings = VerificationSettings()
 
 
-ANGLE = "angle"
-"""Name of the first response of every campaign, the repose angle, and its column in a table of cases."""
-
 TARGET_SCENE = "target"
-"""Name of the scene whose heaps have the angle."""
+"""Name of the study's own scene."""
 
 
-class Response(Section):
-    """A number beside the angle that the cases must match."""
+@dataclass(frozen=True)
+class Response:
+    """A number that the cases must match.
+
+    Attributes
+    ----------
+    name : str
+        What it is called; other than every other response.
+    observable : str
+        Column of the cases that holds it.
+    unit : str
+        Its unit; ``"1"``: a plain number.
+    scene : str
+        Name of the scene that measures it.
+    measured : Sample or None
+        Measurements of the physical test, in its unit; None where a twin study simulates them.
+    held_out : bool
+        Whether it takes no part in any fit, and only judges the chosen point.
+    """
 
     name: str
-    """Name, other than the angle, and than every other response."""
     observable: str
-    """Column of the cases that holds it."""
     unit: str = "1"
-    """Its unit; ``"1"``: a plain number."""
     scene: str = TARGET_SCENE
-    """Name of the scene that measures it."""
+    measured: Sample | None = None
+    held_out: bool = False
 
 
-class MeasuredResponse(Response):
-    """A response and what the physical test gave of it, in its unit."""
+@dataclass(frozen=True)
+class Twin:
+    """Hidden settings that the target is simulated with; the campaign does not see them.
 
-    mean: float
-    """Mean of the measurements."""
-    sd: float = Field(gt=0.0)
-    """Standard deviation of one measurement."""
-    n: int = Field(ge=2)
-    """Measurements."""
+    Attributes
+    ----------
+    truth : dict of float
+        Values by factor; a factor that is not named is at its middle.
+    replicates : int
+        Cases of the target in every scene.
+    """
 
-
-class MeasuredTarget(Section):
-    """Result of the physical tests."""
-
-    mean: float = Field(gt=0.0, lt=90.0)
-    """Mean repose angle [deg]."""
-    sd: float = Field(gt=0.0)
-    """Standard deviation of one measurement [deg]."""
-    n: int = Field(ge=2)
-    """Measurements."""
-    responses: tuple[MeasuredResponse, ...] = ()
-    """Further responses."""
+    truth: Mapping[str, float]
+    replicates: int = 5
 
 
-class TwinTarget(Section):
-    """A target that is simulated with settings that the campaign does not see."""
+@dataclass(frozen=True)
+class Target:
+    """Responses that the cases must match; the climb follows the first.
 
-    truth: FactorValues = Field(min_length=1)
-    """Hidden factor values; the factors not named are at their middle."""
-    replicates: int = Field(default=5, ge=2)
-    """Cases of the target in every scene."""
-    responses: tuple[Response, ...] = ()
-    """Further responses."""
+    Attributes
+    ----------
+    responses : tuple of Response
+        The first takes part in the fit; each has its measurements, or none has.
+    twin : Twin or None
+        Settings that a twin study takes the measurements from; None where they were made.
+    """
+
+    responses: tuple[Response, ...]
+    twin: Twin | None = None
+
+    def __post_init__(self) -> None:
+        names = [response.name for response in self.responses]
+        if not names or len(set(names)) < len(names):
+            raise ValueError(f"Target.responses: at least one, each of a name of its own (received {names})")
+        if self.leading.held_out:
+            raise ValueError(f"Target.responses: the first is not held out (received {names[0]})")
+        for response in self.responses:
+            if (response.measured is None) != (self.twin is not None):
+                rule = "has its measurements, unless a twin study simulates them"
+                raise ValueError(f"response {response.name}: {rule} (received {response.measured})")
+
+    @property
+    def leading(self) -> Response:
+        """The first response, which the climb follows."""
+        return self.responses[0]
+
+    @property
+    def fitted(self) -> tuple[Response, ...]:
+        """Responses that take part in the fit."""
+        return tuple(response for response in self.responses if not response.held_out)
+
+
+def scenes_of(responses: Iterable[Response]) -> tuple[str, ...]:
+    """Names of the scenes that measure responses, in the order of use."""
+    return tuple(dict.fromkeys(response.scene for response in responses))
 
 
 class CampaignStudy(Protocol):
@@ -263,8 +299,8 @@ class CampaignStudy(Protocol):
         """The decisions."""
 
     @property
-    def target(self) -> MeasuredTarget | TwinTarget:
-        """Target of the heaps, and of the cases of further scenes."""
+    def target(self) -> Target:
+        """Responses that the cases must match."""
 
     @property
     def limits(self) -> Mapping[str, tuple[float, float]]:

@@ -86,7 +86,8 @@ def under_condition(
     fixed
         Names of the factors that have nothing left to vary.
     """
-    kept = {key: value for key, value in document.items() if key not in ("condition", "target", "campaign")}
+    left_out = ("condition", "target", "response", "campaign")
+    kept = {key: value for key, value in document.items() if key not in left_out}
     merged = merge(kept, condition.changes)
     factors = []
     for factor in merged.get("factor", []):

@@ -12,8 +12,6 @@ from dem_warp.scenes.poured_scene import PouredScene
 from dem_warp.scenes.scene import Observable
 from experiments.studyfile.generated import EngineSection, LibrarySection, library_section
 
-_ANGLE = {"angle": Observable("deg", "repose angle of the heap, as [measurement] says")}
-
 
 class TestSection(EngineSection):
     """``[scene.NAME]``: parameters of a test."""
@@ -47,11 +45,6 @@ class SceneSection(LibrarySection):
     def observables(self) -> Mapping[str, Observable]:
         """Observables of the test."""
         return self.kind.observables
-
-    @property
-    def measures(self) -> Mapping[str, Observable]:
-        """Observables of the test, and the repose angle of its heap where it leaves one."""
-        return {**(_ANGLE if self.leaves_a_heap else {}), **self.observables}
 
     def scene(self, wall: Material) -> PouredScene:
         """Build the engine's scene, its walls of a material."""

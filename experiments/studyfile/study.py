@@ -21,9 +21,7 @@ from experiments.errors import StudyError
 from experiments.studyfile.campaign import (
     TARGET_SCENE,
     CampaignSettings,
-    MeasuredTarget,
-    Response,
-    TwinTarget,
+    Target,
 )
 from experiments.studyfile.card import with_material
 from experiments.studyfile.conditions import BASE, Condition, ConditionSections, under_condition
@@ -41,7 +39,7 @@ from experiments.studyfile.scene_sections import SceneSection
 from experiments.studyfile.schema import Section, nearest_name, validated
 from experiments.studyfile.sections import Physics, Scene
 from experiments.studyfile.setters import changed
-from experiments.studyfile.target_section import ResponseSection, TargetSection, build_responses
+from experiments.studyfile.target_section import ResponseSection, TargetSection, build_target
 from experiments.studyfile.toml_files import read_toml
 from imaging import FITS
 
@@ -97,6 +95,7 @@ class Study(Physics):
     _places: Places = PrivateAttr(default_factory=lambda: Places(BUCKWHEAT, {}))
     _fixed: frozenset[str] = PrivateAttr(default=frozenset())
     _under: dict[str, Study] = PrivateAttr(default_factory=dict)
+    _target: Target | None = PrivateAttr(default=None)
 
     @property
     def file(self) -> Path:
@@ -114,34 +113,28 @@ class Study(Physics):
         return copy.deepcopy(self._document)
 
     @property
-    def target(self) -> MeasuredTarget | TwinTarget:
-        """Target that the heaps must match.
+    def target(self) -> Target:
+        """Responses that the cases must match.
 
         Raises
         ------
         StudyError
-            When the study has no ``[target]``.
+            When the study has none, or they are still to be measured.
         """
-        if self.target_section is None:
-            raise StudyError("a calibration needs a [target] section", "none", str(self.file))
-        return self.target_section.target(self.responses)
+        if self._target is None and self.target_section is not None:
+            rule = (
+                "names pictures or a file: measurement.target.with_measurements takes the numbers from them"
+            )
+            raise StudyError(rule, "no numbers", f"{self.file}: target")
+        if self._target is None:
+            raise StudyError("a calibration needs a [target] or a [[response]]", "none", str(self.file))
+        return self._target
 
     @property
     def scenes(self) -> dict[str, SceneSection]:
-        """Every scene by its name, the study's own first."""
-        return {TARGET_SCENE: self.scene, **self.response_scenes}
-
-    @cached_property
-    def responses(self) -> tuple[Response, ...]:
-        """Responses to be matched beside the angle.
-
-        Raises
-        ------
-        StudyError
-            When two have one name, there is no such scene or observable, or a measurement is wrong.
-        """
-        measured = self.target_section is not None and self.target_section.twin is None
-        return build_responses(self.response_sections, self.scenes, measured, self._places)
+        """Every scene by its name: the study's own, further ones, those of its conditions."""
+        tests = {name: self.under(name).scene for name in self.condition_sections}
+        return {TARGET_SCENE: self.scene, **self.response_scenes, **tests}
 
     @cached_property
     def factors(self) -> tuple[Factor, ...]:
@@ -220,13 +213,15 @@ class Study(Physics):
         seed
             Seed of everything random in the case.
         scene
-            Name of the scene.
+            Name of the scene, or of the condition.
 
         Raises
         ------
         StudyError
             When there is no such factor or scene, or a value leaves what is physical.
         """
+        if scene in self.condition_sections:
+            return self.under(scene).case(settings, seed)
         if scene not in self.scenes:
             rule = f"must name a scene of the study, {nearest_name(scene, list(self.scenes))}"
             raise StudyError(rule, scene, str(self.file))
@@ -294,12 +289,16 @@ def _build(document: dict[str, Any], places: Places) -> Study:
     middle = with_factor_values(document, sections, {}) | {"factor": sections}
     study = validated(Study, middle, places, natural_value=partial(natural_value, sections))
     study._document, study._places = document, places
-    if TARGET_SCENE in study.response_scenes:
-        rule = f"a further scene has a name of its own: {TARGET_SCENE!r} is the study's own"
-        raise StudyError(rule, TARGET_SCENE, places.of(("response-scene", TARGET_SCENE)))
-    study.responses  # noqa: B018  (a wrong response is an error now, not when a campaign begins)
     for name in study.condition_sections:
         study.under(name)
+    for name in study.response_scenes:
+        if name == TARGET_SCENE or name in study.condition_sections:
+            rule = f"a further scene has a name of its own: {name!r} is the study's own, or a condition"
+            raise StudyError(rule, name, places.of(("response-scene", name)))
+    held_out = [condition.name for condition in study.conditions if condition.held_out]
+    study._target = build_target(
+        study.target_section, study.response_sections, study.scenes, held_out, places
+    )
     return study
 
 

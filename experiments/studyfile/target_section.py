@@ -2,30 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from dem_warp.scenes.scene import Observable
+from doe import Sample
 from experiments.errors import StudyError
-from experiments.studyfile.campaign import (
-    ANGLE,
-    TARGET_SCENE,
-    FactorValues,
-    MeasuredResponse,
-    MeasuredTarget,
-    Response,
-    TwinTarget,
-)
-from experiments.studyfile.places import Places
+from experiments.measurement.observables import ANGLE, DIMENSIONS, Observable, observables_of
+from experiments.studyfile.campaign import TARGET_SCENE, FactorValues, Response, Target, Twin
+from experiments.studyfile.places import KeyPath, Places
 from experiments.studyfile.scene_sections import SceneSection
-from experiments.studyfile.schema import Angle, RawQuantity, Section, nearest_name
+from experiments.studyfile.schema import RawQuantity, Section, nearest_name
 
 MEASUREMENTS = ("mean", "sd", "n")
-"""What a section tells of the physical test."""
+"""Keys that tell of the physical test."""
 
-DIMENSIONS = {"1": "", "deg": "angle", "m": "length", "s": "time", "kg": "mass", "kg/s": "mass flow"}
-"""Dimension of an observable's unit, a key of ``units.UNITS``."""
+SOURCES = ("pictures", "file")
+"""Keys of ``[target]`` that name where the measurements are taken from."""
 
 
 class TwinSection(Section):
@@ -37,42 +31,16 @@ class TwinSection(Section):
     """Cases of the target in every scene."""
 
 
-class TargetSection(Section):
-    """``[target]``: the repose angle to be matched; with a twin, the measured values are for reading only."""
-
-    mean: Angle | None = Field(default=None, gt=0.0, lt=90.0)
-    """Mean of the measurements."""
-    sd: Angle | None = Field(default=None, gt=0.0)
-    """Standard deviation of one measurement."""
-    n: int | None = Field(default=None, ge=2)
-    """Number of measurements."""
-    twin: TwinSection | None = None
-    """The target comes from cases simulated with settings that the campaign does not see."""
-
-    @model_validator(mode="after")
-    def _complete(self) -> TargetSection:
-        missing = [name for name in MEASUREMENTS if getattr(self, name) is None]
-        if self.twin is None and missing:
-            raise ValueError(f"needs mean, sd and n of the measured angle; missing: {', '.join(missing)}")
-        return self
-
-    def target(self, responses: Sequence[Response]) -> MeasuredTarget | TwinTarget:
-        """Build the target of the campaign."""
-        if self.twin is not None:
-            return TwinTarget(**dict(self.twin), responses=tuple(responses))
-        measured = {name: getattr(self, name) for name in MEASUREMENTS}
-        return MeasuredTarget.model_validate({**measured, "responses": responses})
-
-
 class ResponseSection(Section):
-    """``[[response]]``: one more number to be matched, beside the angle."""
+    """``[[response]]``: a number to be matched, beside the ``[target]`` or instead of it."""
 
     observable: str
-    """What is measured: an observable of the scene, or ``"angle"`` of a further scene that leaves a heap."""
+    """Observable of the scene, as ``"solid_fraction"``; ``"angle"`` of a scene that leaves a heap."""
     name: str | None = Field(default=None, pattern=r"^[A-Za-z_]\w*$")
-    """What it is called; left out: as the observable."""
+    """Name in tables; left out: as the observable."""
     scene: str = TARGET_SCENE
-    """Name of the ``[response-scene.NAME]`` that measures it; left out: the study's own scene."""
+    """Name of the ``[response-scene.NAME]`` or ``[condition.NAME]`` that measures it; left out: the study's
+    own scene."""
     mean: RawQuantity | None = None
     """Mean of the measurements."""
     sd: RawQuantity | None = None
@@ -85,87 +53,150 @@ class ResponseSection(Section):
         """Its name."""
         return self.name or self.observable
 
-    def response(self, observable: Observable, measured: bool) -> Response:
+    def response(self, unit: str, measured: bool, path: KeyPath, places: Places) -> Response:
         """Build the response of the campaign.
 
         Parameters
         ----------
-        observable
-            What the scene says of it.
+        unit
+            Unit of the observable.
         measured
             Whether it comes with its measurements; a twin study simulates them.
+        path, places
+            Where it stands.
 
         Raises
         ------
-        ValueError
+        StudyError
             When a measurement is missing, or is no quantity of the observable's dimension.
         """
-        facts = {
-            "name": self.title,
-            "observable": self.observable,
-            "unit": observable.unit,
-            "scene": self.scene,
-        }
-        dimension = DIMENSIONS[observable.unit]
-        given = {name: getattr(self, name) for name in MEASUREMENTS}
-        values = {
-            name: value.to_base(dimension)
-            for name, value in given.items()
-            if name != "n" and value is not None
-        }
-        if "sd" in values and not values["sd"] > 0.0:
-            raise ValueError(f"sd must be positive, not {self.sd}")
-        if not measured:
-            return Response.model_validate(facts)
-        if missing := [name for name, value in given.items() if value is None]:
-            raise ValueError(f"needs mean, sd and n of what was measured; missing: {', '.join(missing)}")
-        return MeasuredResponse.model_validate(facts | values | {"n": self.n})
+        values = {name: self._value(name, unit, path, places) for name in ("mean", "sd")}
+        sample = None
+        if measured:
+            if missing := [name for name in MEASUREMENTS if getattr(self, name) is None]:
+                rule = f"needs mean, sd and n of what was measured; missing: {', '.join(missing)}"
+                raise StudyError(rule, self.title, places.of(path))
+            sample = Sample(values["mean"], values["sd"], int(self.n or 0))
+        return Response(self.title, self.observable, unit, self.scene, sample)
+
+    def _value(self, name: str, unit: str, path: KeyPath, places: Places) -> float:
+        """Convert a measurement; NaN where it was left out."""
+        quantity = getattr(self, name)
+        if quantity is None:
+            return float("nan")
+        place = places.of((*path, name))
+        try:
+            value = quantity.to_base(DIMENSIONS[unit])
+        except ValueError as error:
+            raise StudyError(str(error), str(quantity), place) from None
+        if name == "sd" and not value > 0.0:
+            raise StudyError("must be positive", str(quantity), place)
+        if name == "mean" and unit == "deg" and not 0.0 < value < 90.0:
+            raise StudyError("must be an angle between 0 and 90 deg", str(quantity), place)
+        return float(value)
 
 
-def build_responses(
-    sections: Sequence[ResponseSection],
+class TargetSection(ResponseSection):
+    """``[target]``: the first number to be matched, the repose angle where nothing else is named.
+
+    With a twin, the measured values are for reading only.
+    """
+
+    observable: str = ANGLE
+    """Observable of the scene."""
+    fit: str | None = None
+    """Part of the flank that the measured angles were fitted to; left out: as ``[measurement]`` says."""
+    pictures: str | None = None
+    """Photographs of the heaps, instead of numbers: a folder, or a pattern as ``"photos/*.jpg"``."""
+    file: str | None = None
+    """File of measured heaps, instead of numbers: all that it tells is to be matched."""
+    note: str = ""
+    """Where the measurements come from, in words."""
+    twin: TwinSection | None = None
+    """The target comes from cases simulated with settings that the campaign does not see."""
+
+
+def build_target(
+    target: TargetSection | None,
+    responses: Sequence[ResponseSection],
     scenes: Mapping[str, SceneSection],
-    measured: bool,
+    held_out: Collection[str],
     places: Places,
-) -> tuple[Response, ...]:
-    """Build the responses beside the angle.
+) -> Target | None:
+    """Build the responses that a campaign must match.
 
     Parameters
     ----------
-    sections
+    target, responses
         As written, in order.
     scenes
         Scenes by name, the study's own as ``TARGET_SCENE``.
-    measured
-        Whether they come with their measurements; a twin study simulates them.
+    held_out
+        Names of those whose measurements take no part in any fit.
     places
         Where they stand.
+
+    Returns
+    -------
+    Target or None
+        None where nothing is to be matched, or its measurements have not been taken yet.
 
     Raises
     ------
     StudyError
         When two have one name, there is no such scene or observable, or a measurement is wrong.
     """
-    responses: list[Response] = []
-    taken = {ANGLE}
-    for index, section in enumerate(sections):
-        path = ("response", index)
-        if section.title in taken:
-            rule = f"each response has a name of its own, other than {ANGLE!r}; set name"
-            raise StudyError(rule, section.title, places.of(path))
-        if section.scene not in scenes:
-            rule = f"must name a [response-scene.NAME], {nearest_name(section.scene, list(scenes))}"
-            raise StudyError(rule, section.scene, places.of((*path, "scene")))
-        known = scenes[section.scene].measures
-        if section.observable not in known:
-            rule = f"must be what the scene measures, {nearest_name(section.observable, list(known))}"
-            raise StudyError(rule, section.observable, places.of((*path, "observable")))
-        if (section.scene, section.observable) == (TARGET_SCENE, ANGLE):
-            rule = "the angle of the study's own scene is the [target], not a further response"
-            raise StudyError(rule, section.observable, places.of((*path, "observable")))
-        try:
-            responses.append(section.response(known[section.observable], measured))
-        except ValueError as error:
-            raise StudyError(str(error), section.title, places.of(path)) from None
-        taken.add(section.title)
-    return tuple(responses)
+    sections: list[tuple[KeyPath, ResponseSection]] = [(("target",), target)] if target else []
+    sections += [(("response", index), section) for index, section in enumerate(responses)]
+    twin = target.twin if target else None
+    waiting = _source(target, places) if target else None
+    built: list[Response] = []
+    for path, section in sections:
+        _check_name(section, built, path, places)
+        unit = _observable(section, scenes, path, places).unit
+        measured = twin is None and not (waiting and section is target)
+        response = section.response(unit, measured, path, places)
+        built.append(replace(response, held_out=section.scene in held_out))
+    if waiting or not built:
+        return None
+    if built[0].held_out:
+        rule = "leads the climb, so it must not be measured under a held-out condition"
+        raise StudyError(rule, built[0].scene, places.of((*sections[0][0], "scene")))
+    return Target(tuple(built), Twin(twin.truth, twin.replicates) if twin else None)
+
+
+def _source(target: TargetSection, places: Places) -> str | None:
+    """Key that names where the measurements are to be taken from; None where the section gives them."""
+    given = [name for name in SOURCES if getattr(target, name) is not None]
+    numbers = [name for name in MEASUREMENTS if getattr(target, name) is not None]
+    if target.twin is not None:
+        return None
+    if given and (beside := [*given[1:], *numbers]):
+        rule = "takes pictures, a file, or mean, sd and n; one of them"
+        raise StudyError(rule, f"{given[0]} and {', '.join(beside)}", places.of(("target", given[0])))
+    return given[0] if given else None
+
+
+def _check_name(section: ResponseSection, others: Sequence[Response], path: KeyPath, places: Places) -> None:
+    names = [other.name for other in others]
+    if section.title in names:
+        rule = f"each response has a name of its own, other than {', '.join(map(repr, names))}; set name"
+        raise StudyError(rule, section.title, places.of(path))
+    if (section.scene, section.observable) in [(other.scene, other.observable) for other in others]:
+        rule = "is to be matched already: one response for each observable of a scene"
+        raise StudyError(rule, section.observable, places.of((*path, "observable")))
+
+
+def _observable(
+    section: ResponseSection, scenes: Mapping[str, SceneSection], path: KeyPath, places: Places
+) -> Observable:
+    if section.scene not in scenes:
+        known_scenes = nearest_name(section.scene, list(scenes))
+        rule = f"must name a [response-scene.NAME] or a [condition.NAME], {known_scenes}"
+        raise StudyError(rule, section.scene, places.of((*path, "scene")))
+    scene = scenes[section.scene]
+    known = observables_of(scene.observables, scene.leaves_a_heap)
+    if section.observable not in known:
+        rule = f"must be what the scene measures, {nearest_name(section.observable, list(known))}"
+        raise StudyError(rule, section.observable, places.of((*path, "observable")))
+    return known[section.observable]

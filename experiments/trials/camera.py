@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.discover.observables import OBSERVABLES, PHOTOGRAPHED
+from experiments.measurement.observables import OBSERVABLES, PHOTOGRAPHED
 
 SCALE_ERROR = 0.002
 """Relative standard deviation of the scale, one for all pictures of a trial: a millimetre on half a metre."""

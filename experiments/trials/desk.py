@@ -24,10 +24,10 @@ from doe.discrepancy import (
 )
 from doe.errors import RuleError
 from experiments.calibrate.export import jsonable
-from experiments.discover.data.file import read_measured
-from experiments.discover.observables import PHOTOGRAPHED
 from experiments.errors import InputError
 from experiments.files import write_text
+from experiments.measurement.measured_file import read_measured
+from experiments.measurement.observables import PHOTOGRAPHED
 from experiments.studyfile import Study
 from experiments.trials.findings import (
     PHOTOGRAPHS,

@@ -23,8 +23,8 @@ import typer
 
 from doe.discrepancy import Emulator, Settings, analyse, drive, fit_emulator
 from doe.factors import Factor
-from experiments.discover.observables import NAMES, PHOTOGRAPHED
 from experiments.discover.search import Search
+from experiments.measurement.observables import NAMES, PHOTOGRAPHED
 from experiments.studyfile import load_study
 from experiments.trials.declaration import declared_effects, with_names
 from experiments.trials.drawing import Declared, Plan, draw

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from doe.discrepancy import Outcomes, Point
-from experiments.discover.observables import OBSERVABLES
 from experiments.files import replacing
+from experiments.measurement.observables import OBSERVABLES
 from experiments.trials.camera import Camera
 from experiments.trials.truth import Label
 

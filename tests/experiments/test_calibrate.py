@@ -2,19 +2,20 @@
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from doe import Factor
+from doe import Factor, Sample
 from experiments.calibrate import (
     CampaignSettings,
     ClimbEnd,
-    MeasuredTarget,
     Outcome,
-    TwinTarget,
+    Response,
+    Target,
+    Twin,
     calibrate,
 )
 from experiments.calibrate.results import STAGES
@@ -31,12 +32,22 @@ FACTORS = (
 )
 Angle = Callable[[Mapping[str, float]], float]
 
+ANGLE = Response("angle", "angle", "deg")
+
+
+def measured(mean: float, sd: float, n: int = 5) -> Target:
+    """Target of one measured angle."""
+    return Target((replace(ANGLE, measured=Sample(mean, sd, n)),))
+
+
+def hidden(**truth: float) -> Target:
+    """Target of the angle of cases with hidden settings."""
+    return Target((ANGLE,), Twin(truth))
+
 
 @dataclass(frozen=True)
 class AnalyticStudy:
-    target: MeasuredTarget | TwinTarget = field(
-        default_factory=lambda: MeasuredTarget(mean=26.0, sd=0.4, n=5)
-    )
+    target: Target = field(default_factory=lambda: measured(26.0, 0.4))
     campaign: CampaignSettings = field(default_factory=CampaignSettings)
     factors: tuple[Factor, ...] = FACTORS
     limits: Mapping[str, tuple[float, float]] = field(
@@ -100,7 +111,7 @@ def test_the_whole_chain_finds_a_known_contour() -> None:
 
 def test_contour_and_region_belong_to_the_reduced_surface() -> None:
     campaign = calibrate(AnalyticStudy(), AnalyticHeaps(two_frictions))
-    optimum, fit = campaign.optimum, campaign.surface.reduced
+    optimum, fit = campaign.optimum, campaign.surface.leading.reduced
     assert fit.predict(optimum.point)["mean"].iloc[0] == pytest.approx(26.0, abs=1e-9)
     np.testing.assert_allclose(fit.predict(optimum.contour)["mean"], 26.0, atol=1e-9)
     assert 0.0 < optimum.region.fraction < 1.0
@@ -117,12 +128,12 @@ def test_same_seeds_give_the_same_campaign_and_other_seeds_another() -> None:
     other_study = AnalyticStudy(campaign=settings(seeds={"campaign": 11}))
     other = calibrate(other_study, AnalyticHeaps(two_frictions)).to_dict()
     assert first == again
-    assert first["noise_floor"]["floor"]["mean"] != other["noise_floor"]["floor"]["mean"]
+    assert first["noise_floor"]["responses"] != other["noise_floor"]["responses"]
 
 
 def test_every_case_has_its_own_seed_and_a_batch_holds_a_whole_stage() -> None:
     heaps = AnalyticHeaps(two_frictions)
-    study = AnalyticStudy(target=TwinTarget(truth={"E": 0.5, "F": 0.4}))
+    study = AnalyticStudy(target=hidden(E=0.5, F=0.4))
     campaign = calibrate(study, heaps)
     assert campaign.cases["seed"].is_unique
     assert [sorted(set(table["stage"])) for table in heaps.tables] == [
@@ -148,7 +159,7 @@ def test_a_twin_recovers_its_hidden_truth_in_the_compatible_region() -> None:
     inside = []
     for seed in range(10, 34, 2):
         seeds = {"campaign": seed, "target": seed + 1}
-        study = AnalyticStudy(target=TwinTarget(truth=truth), campaign=settings(seeds=seeds))
+        study = AnalyticStudy(target=hidden(**truth), campaign=settings(seeds=seeds))
         campaign = calibrate(study, AnalyticHeaps(two_frictions))
         assert campaign.target.truth["A"] == pytest.approx(0.29)
         inside.append(campaign.optimum is not None and campaign.optimum.truth.compatible is True)
@@ -161,7 +172,7 @@ def test_a_truth_that_is_not_where_the_angle_says_is_called_incompatible() -> No
         # The target heaps stand 1.5 deg higher than the same settings do later: a model error of 5 noise sd.
         return two_frictions(row) + (1.5 if row["stage"] == "target" else 0.0)
 
-    study = AnalyticStudy(target=TwinTarget(truth={"E": 0.46, "F": 0.38}))
+    study = AnalyticStudy(target=hidden(E=0.46, F=0.38))
     check = calibrate(study, AnalyticHeaps(shifted)).optimum.truth
     assert check.inside_design
     assert check.compatible is False
@@ -171,7 +182,7 @@ def test_a_truth_that_is_not_where_the_angle_says_is_called_incompatible() -> No
 
 def test_a_truth_beyond_the_design_is_neither_compatible_nor_not() -> None:
     # On the same contour near F = 0.42, but E lies four half-ranges of the design away.
-    study = AnalyticStudy(target=TwinTarget(truth={"E": 0.74, "F": 0.30}))
+    study = AnalyticStudy(target=hidden(E=0.74, F=0.30))
     check = calibrate(study, AnalyticHeaps(two_frictions)).optimum.truth
     assert not check.inside_design
     assert check.compatible is None
@@ -179,7 +190,7 @@ def test_a_truth_beyond_the_design_is_neither_compatible_nor_not() -> None:
 
 def test_a_fixed_point_is_taken_even_where_the_surface_misses_the_target() -> None:
     fixed = settings(surface={"center": {"E": 0.36, "F": 0.22}}, optimum={"point": {"E": 0.38, "F": 0.25}})
-    study = AnalyticStudy(target=TwinTarget(truth={"E": 0.5, "F": 0.45}), campaign=fixed)
+    study = AnalyticStudy(target=hidden(E=0.5, F=0.45), campaign=fixed)
     campaign = calibrate(study, AnalyticHeaps(two_frictions))
     assert campaign.optimum.point == {"E": 0.38, "F": 0.25}
     assert campaign.optimum.contour.empty
@@ -198,7 +209,7 @@ def test_no_significant_factor() -> None:
     assert "keep" in campaign.reason
     # Two-sided test of 12 heaps: effects of a few standard errors 2 sd / sqrt(12) can be seen.
     assert (
-        1.0 < campaign.selection.visible_effect / (2.0 * campaign.noise_floor.floor.sd / np.sqrt(12)) < 10.0
+        1.0 < campaign.selection.visible_effect / (2.0 * campaign.noise_floor.leading.sd / np.sqrt(12)) < 10.0
     )
 
 
@@ -213,7 +224,7 @@ def test_all_factors_significant_keeps_the_strongest_and_says_so() -> None:
 
 
 def test_a_climb_that_never_reaches_the_target() -> None:
-    study = AnalyticStudy(target=MeasuredTarget(mean=60.0, sd=0.5, n=5))
+    study = AnalyticStudy(target=measured(60.0, 0.5))
     heaps = AnalyticHeaps(lambda row: 24.0 + 3.0 * coded(row, "E") + 3.0 * coded(row, "F"))
     campaign = calibrate(study, heaps)
     assert campaign.outcome is Outcome.TARGET_NOT_REACHED
@@ -225,7 +236,7 @@ def test_a_climb_that_never_reaches_the_target() -> None:
 
 
 def test_a_target_below_the_first_step_extends_the_climb_downward() -> None:
-    study = AnalyticStudy(target=MeasuredTarget(mean=16.5, sd=0.5, n=5))
+    study = AnalyticStudy(target=measured(16.5, 0.5))
     heaps = AnalyticHeaps(lambda row: 24.0 + 3.0 * coded(row, "E") + 3.0 * coded(row, "F"))
     campaign = calibrate(study, heaps)
     assert campaign.climb.path.index.min() < 1
@@ -236,9 +247,7 @@ def test_a_target_below_the_first_step_extends_the_climb_downward() -> None:
 
 
 def test_a_climb_that_meets_a_hard_limit_stays_inside_it() -> None:
-    study = AnalyticStudy(
-        target=MeasuredTarget(mean=8.0, sd=0.5, n=5), campaign=settings(climb={"reach": 3.0})
-    )
+    study = AnalyticStudy(target=measured(8.0, 0.5), campaign=settings(climb={"reach": 3.0}))
     heaps = AnalyticHeaps(lambda row: 24.0 + 3.0 * coded(row, "E") + 5.0 * coded(row, "F"))
     campaign = calibrate(study, heaps)
     assert campaign.climb.path["F"].min() == 0.0
@@ -258,9 +267,7 @@ def test_a_climb_that_turns_is_a_plateau() -> None:
     heaps = AnalyticHeaps(
         lambda row: 24.0 + 4.0 * coded(row, "F") - 4.0 * max(coded(row, "F") - 0.2, 0.0) ** 2 * 5
     )
-    study = AnalyticStudy(
-        campaign=settings(selection={"keep": ["F"]}), target=MeasuredTarget(mean=30.0, sd=0.4, n=5)
-    )
+    study = AnalyticStudy(campaign=settings(selection={"keep": ["F"]}), target=measured(30.0, 0.4))
     campaign = calibrate(study, heaps)
     assert campaign.outcome is Outcome.PLATEAU
     assert campaign.climb.end is ClimbEnd.TURNED
@@ -285,7 +292,7 @@ def test_heaps_that_change_at_the_optimum_are_not_verified() -> None:
     heaps = AnalyticHeaps(lambda row: two_frictions(row) + (2.0 if row["stage"] == "verification" else 0.0))
     campaign = calibrate(AnalyticStudy(), heaps)
     assert campaign.outcome is Outcome.NOT_VERIFIED
-    assert campaign.verification.comparison.different
+    assert campaign.verification.leading.different
     assert not campaign.verification.verified
 
 
@@ -293,7 +300,7 @@ def test_equivalence_can_be_required() -> None:
     demand = {"require_equivalence": True, "margin": 0.05}
     campaign = calibrate(AnalyticStudy(campaign=settings(verification=demand)), AnalyticHeaps(two_frictions))
     assert campaign.outcome is Outcome.NOT_VERIFIED
-    assert not campaign.verification.comparison.different
+    assert not campaign.verification.leading.different
 
 
 @pytest.mark.parametrize("names", [("F",), ("E", "F", "G")])
@@ -312,7 +319,7 @@ def test_one_and_three_kept_factors(names: tuple[str, ...]) -> None:
 @pytest.mark.parametrize("stage", ["target", "noise_floor", "screening", "climb", "surface", "verification"])
 def test_a_stage_whose_cases_all_fail_ends_the_campaign(stage: str) -> None:
     heaps = AnalyticHeaps(two_frictions, fails=lambda row: row["stage"] == stage)
-    campaign = calibrate(AnalyticStudy(target=TwinTarget(truth={"E": 0.5, "F": 0.42})), heaps)
+    campaign = calibrate(AnalyticStudy(target=hidden(E=0.5, F=0.42)), heaps)
     assert campaign.outcome is Outcome.TOO_MANY_FAILED_RUNS
     assert stage not in campaign.stages
     assert "diverged" in campaign.reason
@@ -333,10 +340,10 @@ def test_a_few_failed_cases_are_stated_and_do_not_stop_the_campaign() -> None:
     campaign = calibrate(AnalyticStudy(), heaps)
     assert campaign.outcome is Outcome.CALIBRATED
     assert len(campaign.failed_cases) == len(lost)
-    assert np.isnan(campaign.screening.response[2, 0])
+    assert np.isnan(campaign.screening.leading.measured[2, 0])
     assert campaign.climb.path.loc[2, "n"] == 1
-    assert np.isnan(campaign.surface.response[0])
-    assert len(campaign.surface.full.response) == 12
+    assert np.isnan(campaign.surface.leading.measured[0])
+    assert len(campaign.surface.leading.full.response) == 12
     stated = [d.stage for d in campaign.decisions if "cases failed (1 diverged)" in d.outcome]
     assert stated == ["noise_floor", "screening", "climb", "surface", "verification"]
 
@@ -344,7 +351,7 @@ def test_a_few_failed_cases_are_stated_and_do_not_stop_the_campaign() -> None:
 def test_points_stay_inside_hard_limits_and_leave_stated_ranges_openly() -> None:
     study = AnalyticStudy(
         campaign=settings(surface={"center": {"E": 0.46, "F": 0.05}, "half_range": {"E": 0.15, "F": 0.08}}),
-        target=MeasuredTarget(mean=15.0, sd=0.5, n=5),
+        target=measured(15.0, 0.5),
     )
     campaign = calibrate(study, AnalyticHeaps(two_frictions))
     surface = campaign.surface
@@ -365,18 +372,18 @@ def test_points_stay_inside_hard_limits_and_leave_stated_ranges_openly() -> None
 def test_results_are_plain_finite_json_and_tables() -> None:
     stages: list[str] = []
     campaign = calibrate(
-        AnalyticStudy(target=TwinTarget(truth={"E": 0.5, "F": 0.42})),
+        AnalyticStudy(target=hidden(E=0.5, F=0.42)),
         AnalyticHeaps(two_frictions, fails=lambda row: row["stage"] == "climb" and row["run"] == 1),
         on_stage=lambda name, result: stages.append(name),
     )
     text = json.dumps(campaign.to_dict(), allow_nan=False)
     assert json.loads(text)["outcome"] == campaign.outcome.value
-    assert json.loads(text)["climb"]["path"][0]["angle"] is None
+    assert json.loads(text)["climb"]["path"][0]["mean"] is None
     assert stages == list(STAGES)
     tables = campaign.tables()
     assert len(tables["cases"]) == len(campaign.cases)
     assert len(tables["decisions"]) == len(campaign.decisions)
-    assert list(tables["surface_anova_full"]["source"])[:1] == ["model"]
+    assert list(tables["surface_anova_full"].iloc[:, 1])[:1] == ["model"]
 
 
 @pytest.mark.parametrize(

@@ -7,8 +7,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from doe import Design, Factor, noise_floor
-from experiments.calibrate import CampaignSettings, ClimbEnd, MeasuredTarget
+from doe import Design, Factor, Sample, noise_floor
+from experiments.calibrate import CampaignSettings, ClimbEnd, Response, Target
 from experiments.calibrate.climb import climb, require_crossing
 from experiments.calibrate.optimum import find_optimum
 from experiments.calibrate.results import (
@@ -22,7 +22,7 @@ from experiments.calibrate.results import (
 from experiments.calibrate.screening import analyse_screening
 from experiments.calibrate.selection import select_factors
 from experiments.calibrate.surface import explore_surface
-from experiments.calibrate.target import measured_target
+from experiments.calibrate.target import settle_target
 from experiments.calibrate.verification import verify
 from experiments.studies.buckwheat.paper import factors, published
 
@@ -37,11 +37,14 @@ PAPER_DECISIONS = CampaignSettings.model_validate(
 )
 
 
+MEASURED = Target((Response("angle", "angle", "deg", measured=Sample(30.148, 0.518, 5)),))
+
+
 @dataclass(frozen=True)
 class PaperStudy:
     campaign: CampaignSettings = PAPER_DECISIONS
     factors: tuple[Factor, ...] = field(default_factory=lambda: tuple(factors()))
-    target: MeasuredTarget = field(default_factory=lambda: MeasuredTarget(mean=30.148, sd=0.518, n=5))
+    target: Target = MEASURED
     limits: dict[str, tuple[float, float]] = field(
         default_factory=lambda: dict.fromkeys("ABCDEFGH", (0.0, math.inf))
     )
@@ -85,7 +88,7 @@ def study() -> PaperStudy:
 
 @pytest.fixture(scope="module")
 def target(study: PaperStudy) -> TargetResult:
-    return measured_target(study.target)
+    return settle_target(study)
 
 
 @pytest.fixture(scope="module")
@@ -93,20 +96,21 @@ def noise() -> NoiseFloorResult:
     """The paper has no noise floor; the centre of its composite design has five replicates."""
     runs = published("central_composite")
     center = runs[(runs["E_coded"] == 0) & (runs["F_coded"] == 0)]
-    return NoiseFloorResult(pd.DataFrame(), noise_floor(center[ANGLE].to_numpy(dtype=float)), ())
+    return NoiseFloorResult({"angle": noise_floor(center[ANGLE].to_numpy(dtype=float))}, pd.DataFrame(), ())
 
 
 @pytest.fixture(scope="module")
 def screening(study: PaperStudy) -> ScreeningResult:
     table = published("plackett_burman")
     design = Design.from_table(table.drop(columns=ANGLE), study.factors)
-    rows = {"run": table.index, "replicate": 1, "status": "finished", "angle": table[ANGLE]}
-    return analyse_screening(design, pd.DataFrame(rows).reset_index(drop=True))
+    rows = {"scene": "target", "run": table.index, "replicate": 1, "status": "finished"}
+    cases = pd.DataFrame(rows | {"angle": table[ANGLE]}).reset_index(drop=True)
+    return analyse_screening(design, cases, study.target.fitted)
 
 
 @pytest.fixture(scope="module")
 def selection(study: PaperStudy, screening: ScreeningResult, noise: NoiseFloorResult) -> SelectionResult:
-    return select_factors(study.campaign.selection, screening, noise)
+    return select_factors(study.campaign.selection, screening, noise, study.target.leading)
 
 
 @pytest.fixture(scope="module")
@@ -117,7 +121,7 @@ def path(
     noise: NoiseFloorResult,
     target: TargetResult,
 ) -> ClimbResult:
-    return climb(study, screening.screen, selection.kept, noise.floor, target.sample, climb_runner)
+    return climb(study, screening, selection.kept, noise, target, climb_runner)
 
 
 @pytest.fixture(scope="module")
@@ -148,7 +152,7 @@ def test_the_climb_is_the_printed_one_and_its_fourth_step_is_nearest(
     assert path.best == pytest.approx({"E": 0.48, "F": 0.45})
     # Table 5 prints 1.26 for the fourth step; its own angles give 1.27.
     assert path.path["error_percent"].round(2).to_list() == [68.99, 35.69, 6.80, 1.27, 4.82, 9.74]
-    require_crossing(study, path, target.sample)
+    require_crossing(study, path, target)
 
 
 def test_the_crossing_is_interpolated_between_the_fourth_and_fifth_step(path: ClimbResult) -> None:
@@ -169,9 +173,9 @@ def test_the_composite_design_is_the_printed_one(surface: SurfaceResult) -> None
 def test_the_surfaces_are_the_published_ones(surface: SurfaceResult) -> None:
     published_terms = {"intercept": 60.799227, "E": -108.920994, "F": -46.957648, "E^2": 72.085852}
     for term, value in published_terms.items():
-        assert surface.reduced.coefficients[term] == pytest.approx(value, rel=1e-6)
-    assert surface.full.anova["p"]["lack of fit"] == pytest.approx(0.573992, rel=1e-5)
-    assert surface.reduced.dropped == ("F^2",)
+        assert surface.leading.reduced.coefficients[term] == pytest.approx(value, rel=1e-6)
+    assert surface.leading.full.anova["p"]["lack of fit"] == pytest.approx(0.573992, rel=1e-5)
+    assert surface.leading.reduced.dropped == ("F^2",)
 
 
 def test_the_optimum_is_the_contours_point_nearest_to_the_centre(
@@ -193,8 +197,8 @@ def test_the_verification_is_the_printed_t_test(
     study: PaperStudy, surface: SurfaceResult, target: TargetResult
 ) -> None:
     result = verify(study, find_optimum(study, surface, target), target, verification_runner)
-    assert result.comparison.p == pytest.approx(0.768591, rel=1e-5)
-    assert result.margin == pytest.approx(2.0 * 0.518)
+    assert result.leading.p == pytest.approx(0.768591, rel=1e-5)
+    assert result.leading.margin == pytest.approx(2.0 * 0.518)
     assert result.verified
     # Three heaps of standard deviation 1.16 show nothing within about a degree.
-    assert result.comparison.equivalent is False
+    assert result.leading.equivalent is False

@@ -1,13 +1,14 @@
 """Rules of single stages: seeds, tables of cases, and how a design is fitted into hard limits."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
 
 from doe import Design, Factor
-from experiments.calibrate import TwinTarget, calibrate, case_seed
+from experiments.calibrate import CampaignSettings, Response, Target, Twin, calibrate, case_seed
 from experiments.calibrate.cases import plan_cases, response_table
 from experiments.calibrate.climb import _Line
 from experiments.calibrate.results import STAGES
@@ -16,6 +17,8 @@ from experiments.calibrate.surface import fit_inside
 from experiments.calibrate.target import plan_target
 from experiments.studyfile import load_study
 from experiments.studyfile.campaign import ScreeningSettings, SeedSettings
+
+ANGLE = Response("angle", "angle", "deg")
 
 
 def factors(count: int) -> list[Factor]:
@@ -27,8 +30,8 @@ def slope_of(factor: Factor) -> tuple[Design, pd.DataFrame]:
     design = screening_design([factor], ScreeningSettings())
     noise = np.linspace(-0.1, 0.1, len(design.coded)) ** 2
     angle = 20.0 + 3.0 * design.coded[factor.name] + noise
-    cases = {"run": design.coded.index, "replicate": 1, "status": "finished", "angle": angle}
-    return design, pd.DataFrame(cases).reset_index(drop=True)
+    cases = {"scene": "target", "run": design.coded.index, "replicate": 1, "status": "finished"}
+    return design, pd.DataFrame(cases | {"angle": angle}).reset_index(drop=True)
 
 
 def test_seeds_are_pinned() -> None:
@@ -60,6 +63,7 @@ def test_a_plan_holds_every_factor_and_its_replicates() -> None:
 def test_a_response_has_a_place_for_every_case_and_nothing_where_it_failed() -> None:
     cases = pd.DataFrame(
         {
+            "scene": "target",
             "run": [1, 1, 2, 2, 3, 3],
             "replicate": [1, 2] * 3,
             "status": ["finished", "diverged", "finished", "finished", "diverged", "diverged"],
@@ -67,7 +71,7 @@ def test_a_response_has_a_place_for_every_case_and_nothing_where_it_failed() -> 
         }
     )
     expected = [[20.0, np.nan], [21.0, 22.0], [np.nan, np.nan]]
-    np.testing.assert_array_equal(response_table(cases, [1, 2, 3]), expected)
+    np.testing.assert_array_equal(response_table(cases, ANGLE, [1, 2, 3]), expected)
 
 
 @pytest.mark.parametrize(
@@ -81,19 +85,23 @@ def test_a_screening_has_as_few_runs_as_leave_the_dummies(count: int, chosen: di
 def test_a_screening_without_dummies_and_replicates_uses_lenths_error() -> None:
     design = screening_design(factors(7), ScreeningSettings(runs=8))
     angle = 20.0 + 3.0 * design.coded["x0"] + np.linspace(0.0, 0.1, 8) ** 2
-    cases = pd.DataFrame({"run": design.coded.index, "replicate": 1, "status": "finished", "angle": angle})
-    result = analyse_screening(design, cases.reset_index(drop=True))
-    assert result.screen.error_rule == "lenth"
-    assert result.screen.table["rank"].idxmin() == "x0"
+    facts = {"scene": "target", "run": design.coded.index, "replicate": 1, "status": "finished"}
+    cases = pd.DataFrame(facts | {"angle": angle})
+    result = analyse_screening(design, cases.reset_index(drop=True), [ANGLE])
+    assert result.leading.screen.error_rule == "lenth"
+    assert result.leading.screen.table["rank"].idxmin() == "x0"
     assert "Lenth" in result.decisions[0].rule
 
 
 def test_a_twins_target_does_not_depend_on_the_campaigns_seed() -> None:
-    twin = TwinTarget(truth={"x0": 0.3})
-    first, other, moved = (
-        plan_target(factors(2), twin, SeedSettings(campaign=campaign, target=target))["seed"].tolist()
-        for campaign, target in ((1, 2), (3, 2), (1, 4))
-    )
+    def seeds(campaign: int, target: int) -> list[int]:
+        settings = CampaignSettings(seeds=SeedSettings(campaign=campaign, target=target))
+        aim = Target((ANGLE,), Twin({"x0": 0.3}))
+        return plan_target(SimpleNamespace(factors=factors(2), campaign=settings, target=aim))[
+            "seed"
+        ].tolist()
+
+    first, other, moved = seeds(1, 2), seeds(3, 2), seeds(1, 4)
     assert first == other
     assert not set(first) & set(moved)
 
@@ -102,9 +110,9 @@ def test_a_climb_clipped_at_zero_is_not_rounded_below_it() -> None:
     # With these levels, coding zero and back gives -5.6e-17.
     factor = Factor("F", 0.2, 0.6)
     assert factor.to_natural(factor.to_coded(0.0)) < 0.0
-    screening = analyse_screening(*slope_of(factor))
+    screening = analyse_screening(*slope_of(factor), [ANGLE])
     start, step = {"F": 0.1}, {"F": 0.2}
-    line = _Line(screening.screen, ("F",), start, step, {"F": (0.0, 1.0)})
+    line = _Line(screening.leading.screen, ("F",), start, step, {"F": (0.0, 1.0)})
     assert line.walk(start, 2, descend=True)["F"].tolist() == pytest.approx([0.1, 0.0])
     assert line.walk(start, 2, descend=True)["F"].min() == 0.0
 
@@ -142,4 +150,4 @@ def test_the_buckwheat_study_runs_through_all_stages(scale: str) -> None:
     campaign = calibrate(study, heaps)
     assert list(campaign.stages) == list(STAGES)
     assert {"E", "F"} <= set(campaign.selection.kept)
-    assert (campaign.optimum.truth is None) == (not isinstance(study.target, TwinTarget))
+    assert (campaign.optimum.truth is None) == (study.target.twin is None)

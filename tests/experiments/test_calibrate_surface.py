@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from doe import Factor, Sample
-from experiments.calibrate import CampaignSettings, ClimbEnd, MeasuredTarget, Outcome
+from experiments.calibrate import CampaignSettings, ClimbEnd, Outcome, Response, Target
 from experiments.calibrate.cases import StageEnd
 from experiments.calibrate.optimum import find_optimum
 from experiments.calibrate.results import ClimbResult, SurfaceResult, TargetResult
@@ -20,12 +20,14 @@ HALF_RANGE = 0.4
 NOISE = 0.01
 """Standard deviation of a heap [deg]; every slope and offset below is far larger."""
 
+MEASURED = Target((Response("angle", "angle", "deg", measured=Sample(20.0, NOISE, 5)),))
+
 
 @dataclass(frozen=True)
 class PlaneStudy:
     campaign: CampaignSettings = field(default_factory=CampaignSettings)
     factors: tuple[Factor, ...] = (Factor("E", 0.0, 2.0), Factor("F", 0.0, 2.0))
-    target: MeasuredTarget = field(default_factory=lambda: MeasuredTarget(mean=20.0, sd=NOISE, n=5))
+    target: Target = MEASURED
     limits: dict[str, tuple[float, float]] = field(
         default_factory=lambda: dict.fromkeys("EF", (-math.inf, math.inf))
     )
@@ -48,7 +50,7 @@ def explored(slope: float, step: float = 0.1, campaign: CampaignSettings | None 
 
 
 def aim(mean: float, truth: dict[str, float] | None = None) -> TargetResult:
-    return TargetResult(Sample(mean, NOISE, 5), truth, None, ())
+    return TargetResult({"angle": Sample(mean, NOISE, 5)}, truth, None, ())
 
 
 def at_coded(e: float, f: float) -> dict[str, float]:
@@ -119,7 +121,7 @@ def test_a_region_of_higher_confidence_is_wider() -> None:
 def test_a_surface_without_slope_is_a_plateau() -> None:
     strict = CampaignSettings.model_validate({"surface": {"reduce_alpha": 1e-6}})
     surface = explored(0.0, campaign=strict)
-    assert surface.reduced.terms == ()
+    assert surface.leading.reduced.terms == ()
     with pytest.raises(StageEnd) as end:
         require_slope(surface)
     assert end.value.outcome is Outcome.PLATEAU

@@ -134,9 +134,10 @@ outlet = "20 mm"
 
 
 def of_a_hopper(write_study: WriteStudy) -> Path:
-    """Write a study of a hopper."""
+    """Write a study of a hopper, whose target is no angle."""
+    angle = '[target]\nmean = "30 deg"\nsd = "0.5 deg"\nn = 5\n'
     tube = '[scene.lifted-cylinder]\ndiameter = "28 mm"\nheight = "28 mm"\ngrain_count = 30\n'
-    return write_study((tube, HOPPER))
+    return write_study((tube, HOPPER), (angle, ""))
 
 
 def test_another_test_than_a_heap_gives_what_it_measures(write_study: WriteStudy) -> None:
@@ -158,12 +159,12 @@ def test_only_the_papers_study_follows_the_paper(write_study: WriteStudy, option
     assert "only a study whose companion has published runs" in " ".join(err.split())
 
 
-def test_only_heaps_can_be_calibrated(write_study: WriteStudy) -> None:
+def test_an_angle_that_no_heap_has_cannot_be_calibrated(write_study: WriteStudy) -> None:
     path = of_a_hopper(write_study)
+    path.write_text(path.read_text("utf-8") + '[target]\nmean = "30 deg"\nsd = "0.5 deg"\nn = 5\n', "utf-8")
     code, _, err = dem_warp("calibrate", path, "--device", "cpu", "--out", "results")
     assert (code, Path("results").exists()) == (2, False)
-    assert "[scene.lifted-cylinder]" in err
-    assert f"{path}: scene" in err
+    assert "target.observable: must be what the scene measures" in err
 
 
 def test_a_used_folder_is_refused(write_study: WriteStudy) -> None:

@@ -184,7 +184,7 @@ def test_a_plate_without_grains_has_no_angle_and_says_why(
     monkeypatch.setattr(engine, "cone", lambda *_: empty)
     [row] = run_cases(small_study, table_of([0.3]), Store(tmp_path)).to_dict("records")
     assert (row["status"], np.isnan(row["angle"])) == ("finished", True)
-    assert row["reason"].startswith("no angle: ")
+    assert row["reason"].startswith("no heap: ")
 
 
 def test_a_damaged_case_is_named_and_simulated_again(

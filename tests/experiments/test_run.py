@@ -17,6 +17,7 @@ from dem_warp import Case, CaseResult
 from experiments.calibrate import Campaign, Outcome
 from experiments.calibrate.campaign import StageHook
 from experiments.cases import execute
+from experiments.measurement.states import Observed
 from experiments.runs import campaign as run
 from experiments.runs.campaign import Desk
 from experiments.studyfile import Study, load_study
@@ -50,7 +51,9 @@ def engine(cone: Callable[..., CaseResult], monkeypatch: pytest.MonkeyPatch) -> 
     engine = Engine(cone())
     monkeypatch.setattr(execute, "simulate", engine)
     monkeypatch.setattr(
-        execute, "measure_heap", lambda _, result: SimpleNamespace(mean=result.observables["truth"], se=0.1)
+        execute,
+        "observe",
+        lambda _, result, __: Observed({"angle": result.observables["truth"]}, SimpleNamespace(se=0.1)),
     )
     monkeypatch.setattr(run, "heap_pictures", lambda *_: [])
     return engine

@@ -13,12 +13,13 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
-from dem_warp import CaseResult, Hopper
+from dem_warp import CaseResult, Drum, Hopper
 from experiments.calibrate import Outcome
 from experiments.cases import Store, execute, run_cases
 from experiments.cli import app
+from experiments.measurement.states import Observed
 from experiments.runs import campaign as run
-from experiments.runs.campaign import Desk
+from experiments.runs.campaign import Desk, check_runs
 from experiments.studyfile import Study, load_study
 
 BIN = """
@@ -82,7 +83,9 @@ class Engine:
             self.count += 1
             friction, noise = case.grain_grain.static_friction, math.sin(12.9898 * case.seed)
             seen = {"grain_count": 30.0, "simulated_time": 1.5}
-            if isinstance(case.scene, Hopper):
+            if isinstance(case.scene, Drum):
+                seen["dynamic_angle"] = 15.0 + 50.0 * friction + 0.5 * noise
+            elif isinstance(case.scene, Hopper):
                 seen["discharge_time"] = 0.5 + 0.4 * friction + 0.01 * noise
             else:
                 seen |= {"truth": 15.0 + 30.0 * friction + 0.5 * noise}
@@ -90,15 +93,52 @@ class Engine:
             on_result(index, replace(self.heap, observables=seen))
 
 
+def observe(_: object, result: CaseResult, leaves_a_heap: bool) -> Observed:
+    """Take the angle that the stand-in engine tells of."""
+    seen = result.observables
+    heap = {"angle": seen["truth"]} if leaves_a_heap else {}
+    return Observed(seen | heap, SimpleNamespace(se=0.1) if heap else None)
+
+
 @pytest.fixture
 def engine(cone: Callable[..., CaseResult], monkeypatch: pytest.MonkeyPatch) -> Engine:
     engine = Engine(cone())
     monkeypatch.setattr(execute, "simulate", engine)
-    monkeypatch.setattr(
-        execute, "measure_heap", lambda _, result: SimpleNamespace(mean=result.observables["truth"], se=0.1)
-    )
+    monkeypatch.setattr(execute, "observe", observe)
     monkeypatch.setattr(run, "heap_pictures", lambda *_: [])
     return engine
+
+
+DRUM = """
+[scene.drum]
+diameter = "60 mm"
+length = "20 mm"
+rotation_rate = "30 1/min"
+grain_count = 30
+
+[[response]]
+observable = "dynamic_angle"
+mean = "40 deg"
+sd = "1 deg"
+n = 5
+"""
+
+
+@pytest.mark.usefixtures("engine")
+def test_a_drums_angle_may_be_the_only_target(write_study: Callable[..., Path], tmp_path: Path) -> None:
+    heap = (
+        '[scene.lifted-cylinder]\ndiameter = "28 mm"\nheight = "28 mm"\ngrain_count = 30\n',
+        '[target]\nmean = "30 deg"\nsd = "0.5 deg"\nn = 5\n',
+    )
+    study = load_study(write_study(*((text, "") for text in heap), add=DRUM))
+    check_runs(study)
+    found = run.run_campaign(Desk.open(study, tmp_path / "out"))
+    assert found.outcome is Outcome.CALIBRATED
+    assert [response.name for response in found.responses] == ["dynamic_angle"]
+    # The stand-in engine turns 15 + 50 x friction: the target lies at 0.5, known to a fifth of a degree.
+    assert found.optimum.point["E"] == pytest.approx(0.5, abs=0.05)
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "dynamic_angle 40.000°" in page
 
 
 def test_an_interrupted_campaign_of_two_scenes_goes_on_to_the_same_end(

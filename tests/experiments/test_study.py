@@ -10,9 +10,10 @@ from pathlib import Path
 import pytest
 
 from dem_warp.parameters import UNITS as ENGINE_UNITS
+from doe import Sample
 from experiments.errors import StudyError
 from experiments.studyfile import BUCKWHEAT, load_study, study_scales, write_template
-from experiments.studyfile.campaign import MeasuredTarget, TwinTarget
+from experiments.studyfile.campaign import Response, Target
 from experiments.studyfile.units import UNITS, Quantity, dimension_of_unit
 
 WriteStudy = Callable[..., Path]
@@ -65,7 +66,8 @@ def test_every_unit_of_a_parameter_of_the_engine_can_be_written() -> None:
 def test_the_paper_study_is_the_papers() -> None:
     study = load_study()
     assert {f.name: (f.low, f.high, f.unit) for f in study.factors} == PAPER_FACTORS
-    assert study.target == MeasuredTarget(mean=30.148, sd=0.518, n=5)
+    angle = Response("angle", "angle", "deg", measured=Sample(30.148, 0.518, 5))
+    assert study.target == Target((angle,))
     assert study.companion == "buckwheat"
     case = study.case({}, seed=3)
     assert (case.scene.diameter, case.scene.height, case.scene.lift_speed) == (0.035, 0.110, 0.05)
@@ -217,8 +219,8 @@ def test_factor_values_are_in_the_factors_unit() -> None:
 def test_bench_is_a_twin_and_leaves_the_paper_alone() -> None:
     assert study_scales() == ("paper", "soft", "bench")
     bench, paper = load_study(scale="bench"), load_study(scale="paper")
-    assert isinstance(bench.target, TwinTarget)
-    assert isinstance(paper.target, MeasuredTarget)
+    assert bench.target.twin is not None
+    assert paper.target.twin is None
     assert bench.scene.lifted_cylinder.grain_count == 400
     assert paper.scene.lifted_cylinder.grain_count is None
     assert bench.note != paper.note

@@ -10,11 +10,13 @@ import pandas as pd
 import pytest
 
 from dem_warp import DrawDown, Drum, Hopper, LiftedCylinder
+from doe import Sample
 from experiments.cases import Store, execute, run_cases
 from experiments.errors import StudyError
+from experiments.measurement.observables import DIMENSIONS
+from experiments.measurement.states import Observed
 from experiments.studyfile import BUCKWHEAT, load_study
-from experiments.studyfile.campaign import MeasuredResponse, MeasuredTarget, Response, TwinTarget
-from experiments.studyfile.target_section import DIMENSIONS
+from experiments.studyfile.campaign import Response, Target, Twin
 from experiments.studyfile.units import UNITS
 
 WriteStudy = Callable[..., Path]
@@ -57,29 +59,21 @@ TWIN = "[target.twin]\ntruth = { E = 0.3 }\n"
 
 def test_responses_are_read_in_si_with_their_scenes(write_study: WriteStudy) -> None:
     study = load_study(write_study(add=RESPONSES))
-    assert study.target == MeasuredTarget(
-        mean=30.0,
-        sd=0.5,
-        n=5,
-        responses=(
-            MeasuredResponse(
-                name="solid_fraction", observable="solid_fraction", unit="1", mean=0.55, sd=0.01, n=4
-            ),
-            MeasuredResponse(
-                name="outflow", observable="flow_rate", unit="kg/s", scene="bin", mean=0.012, sd=0.0004, n=5
-            ),
-            MeasuredResponse(
-                name="short_angle", observable="angle", unit="deg", scene="short", mean=25.0, sd=0.6, n=5
-            ),
-        ),
+    assert study.target == Target(
+        (
+            Response("angle", "angle", "deg", measured=Sample(30.0, 0.5, 5)),
+            Response("solid_fraction", "solid_fraction", measured=Sample(0.55, 0.01, 4)),
+            Response("outflow", "flow_rate", "kg/s", "bin", Sample(0.012, 0.0004, 5)),
+            Response("short_angle", "angle", "deg", "short", Sample(25.0, 0.6, 5)),
+        )
     )
     assert list(study.scenes) == ["target", "bin", "short"]
 
 
 def test_a_twin_needs_no_measurements_of_its_responses(write_study: WriteStudy) -> None:
     path = write_study(add=f'{TWIN}[[response]]\nobservable = "fill_height"\n')
-    response = Response(name="fill_height", observable="fill_height", unit="m")
-    assert load_study(path).target == TwinTarget(truth={"E": 0.3}, responses=(response,))
+    responses = (Response("angle", "angle", "deg"), Response("fill_height", "fill_height", "m"))
+    assert load_study(path).target == Target(responses, Twin({"E": 0.3}))
 
 
 def test_a_case_of_a_further_scene_has_the_same_grains_and_contacts(write_study: WriteStudy) -> None:
@@ -109,7 +103,11 @@ def test_a_table_is_simulated_each_row_in_its_scene(
             on_result(index, cone())
 
     monkeypatch.setattr(execute, "simulate", engine)
-    monkeypatch.setattr(execute, "measure_heap", lambda *_: SimpleNamespace(mean=25.0, se=0.1))
+    monkeypatch.setattr(
+        execute,
+        "observe",
+        lambda _, result, heap: Observed({"angle": 25.0}, SimpleNamespace(se=0.1)) if heap else Observed(),
+    )
     study = load_study(write_study(add=RESPONSES))
     table = pd.DataFrame({"seed": [1, 2, 3], "scene": ["target", "bin", "short"]})
     found = run_cases(study, table, Store(tmp_path))
@@ -124,15 +122,15 @@ def test_a_table_is_simulated_each_row_in_its_scene(
     [
         ('observable = "flow_rate"', 'observable = "flow"', "response[2].observable", "the scene measures"),
         ('scene = "bin"', 'scene = "bim"', "response[2].scene", "did you mean 'bin'?"),
-        ('mean = "12 g/s"', 'mean = "12 g"', "response[2]", "unit of mass flow"),
+        ('mean = "12 g/s"', 'mean = "12 g"', "response[2].mean", "unit of mass flow"),
         ('mean = "12 g/s"\n', "", "response[2]", "missing: mean"),
-        ("sd = 0.01", "sd = 0.0", "response[1]", "sd must be positive"),
+        ("sd = 0.01", "sd = 0.0", "response[1].sd", "must be positive"),
         ("n = 4", "n = 1", "response[1].n", "greater than or equal to 2"),
         ("mean = 0.55", "meen = 0.55", "response[1].meen", "did you mean 'mean'?"),
         ('name = "outflow"', 'name = "out flow"', "response[2].name", "pattern"),
         ('name = "outflow"', 'name = "solid_fraction"', "response[2]", "a name of its own"),
         ('name = "short_angle"\n', "", "response[3]", "a name of its own, other than 'angle'"),
-        ('"solid_fraction"', '"angle"\nname = "a"', "response[1].observable", "is the [target]"),
+        ('"solid_fraction"', '"angle"\nname = "a"', "response[1].observable", "to be matched already"),
         ('outlet = "20 mm"', 'outlet = "50 mm"', "response-scene.bin.hopper", "below the diameter"),
     ],
 )  # fmt: skip
@@ -156,8 +154,8 @@ def test_a_further_scene_has_a_name_of_its_own(write_study: WriteStudy) -> None:
 @pytest.mark.parametrize("scale", [None, "paper", "bench"])
 def test_the_study_from_a_curve_to_a_point_hides_the_same_truth_at_every_scale(scale: str | None) -> None:
     study = load_study(BUCKWHEAT.with_name("curve_to_point.toml"), scale)
-    assert [response.scene for response in study.responses] == ["target", "bin"]
-    assert study.target.truth == {"E": 0.42, "F": 0.27, "G": 0.05}
+    assert [response.scene for response in study.target.responses] == ["target", "target", "bin"]
+    assert study.target.twin.truth == {"E": 0.42, "F": 0.27, "G": 0.05}
     assert isinstance(study.case({}, seed=1, scene="bin").scene, Hopper)
     assert {f.name for f in study.factors} == set("EFGH")
 

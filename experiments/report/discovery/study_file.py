@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from doe import Sample
 from doe.discrepancy import Candidate, Data, Discovery, Fit, Interval, Verdict
 from experiments.discover.library import Mechanism, with_mechanisms
 from experiments.files import replacing, write_text
+from experiments.measurement.target import Replicated, target_tables
 from experiments.report.discovery.terms import Terms
 from experiments.report.discovery.verdict import tied
 from experiments.studyfile import Study
@@ -20,12 +22,10 @@ from experiments.studyfile.toml_files import toml_text
 
 HEAD = """\
 # Written by dem-warp discover: {name}, with {title} added as a factor that ranges over its 90 % interval.
+# All that was measured more than once is to be matched; held-out conditions only judge.
 # Run it with  dem-warp calibrate {file}
 
 """
-
-ANGLE = "flank_angle"
-"""Observable that a calibration takes as its target."""
 
 DIGITS = 4
 """Significant digits of the ends of a range."""
@@ -70,7 +70,8 @@ def write_study_files(found: Discovery, study: Study, terms: Terms, folder: Path
 def extended_document(study: Study, added: Mapping[Mechanism, Interval], data: Data) -> dict[str, Any]:
     """Add mechanisms to a study's document, each as a factor that ranges over its interval.
 
-    A study without a target takes the measured repose angle of its first training condition for one.
+    Every observable that was measured more than once under a condition is to be matched; what was measured
+    under a held-out condition only judges.
 
     Parameters
     ----------
@@ -79,12 +80,12 @@ def extended_document(study: Study, added: Mapping[Mechanism, Interval], data: D
     added
         Mechanisms with their sizes.
     data
-        What was measured.
+        Means that the analysis used.
     """
     ranges = {mechanism.name: _range(mechanism, size) for mechanism, size in added.items()}
     document = with_mechanisms(study, list(added), ranges).document
-    if "target" not in document and (target := _target(data)):
-        document["target"] = target
+    if tables := target_tables(study, _replicated(data)):
+        document = {key: value for key, value in document.items() if key != "response"} | tables
     return document
 
 
@@ -103,16 +104,13 @@ def _range(mechanism: Mechanism, size: Interval) -> tuple[float, float]:
     return (low, high) if low < high else (mechanism.null, mechanism.maximum)
 
 
-def _target(data: Data) -> dict[str, Any]:
-    """The measured angle of the first training condition that has one, as a study's target."""
-    if ANGLE not in data.observables:
-        return {}
-    column = data.observables.index(ANGLE)
-    for row, held_out in enumerate(data.held_out):
-        mean, se, count = (
-            table[row, column] for table in (data.means, data.standard_errors, data.replicates)
-        )
-        if not held_out and count >= 2 and np.isfinite(se) and se > 0.0:
-            sd = float(se) * float(np.sqrt(count))
-            return {"mean": f"{mean:.3f} deg", "sd": f"{sd:.3f} deg", "n": int(count)}
-    return {}
+def _replicated(data: Data) -> Iterator[Replicated]:
+    """Every mean of more than one measurement, with the scatter that the analysis gave it."""
+    for row, condition in enumerate(data.conditions):
+        for column, observable in enumerate(data.observables):
+            mean, se, count = (
+                table[row, column] for table in (data.means, data.standard_errors, data.replicates)
+            )
+            if count >= 2 and np.isfinite(se) and se > 0.0:
+                mean, sd = (float(f"{value:.6g}") for value in (mean, se * np.sqrt(count)))
+                yield Replicated(condition, observable, Sample(mean, sd, int(count)))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from doe.discrepancy import Interval
 from experiments.discover.library import Mechanism
-from experiments.discover.observables import Observable
+from experiments.measurement.observables import Observable
 from experiments.report.kit.numbers import MISSING, enumeration, fixed, trimmed
 from experiments.studyfile.factor_section import FactorSection
 

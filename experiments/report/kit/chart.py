@@ -12,8 +12,6 @@ from doe.palette import GREEN, GRID, INK, MUTED
 LANDSCAPE = "YlGnBu_r"
 """Colour scale of a response: even steps of lightness, also in grey print."""
 
-ANGLE_AXIS = "repose angle [°]"
-
 
 @dataclass(frozen=True)
 class Chart:

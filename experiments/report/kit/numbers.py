@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup, escape
 
+from experiments.studyfile.campaign import Response
+
 MISSING = "–"
 """What stands where a table has no number."""
 
@@ -51,6 +53,30 @@ def trimmed(value: float | None, digits: int = 6) -> str:
     if not point or "e" in decimals:
         return text
     return f"{whole}.{decimals}".rstrip("0").rstrip(".")
+
+
+def unit_sign(unit: str) -> str:
+    """Write the unit of a response as tables and axes have it; nothing for plain numbers."""
+    return {"deg": "°", "1": ""}.get(unit, unit)
+
+
+def quantity(value: float | None, unit: str, decimals: int = 2) -> str:
+    """Write a response with its unit: angles with so many decimals, others with four digits."""
+    if unit == "deg":
+        return f"{fixed(value, decimals)}°"
+    return f"{significant(value)} {unit_sign(unit)}".rstrip()
+
+
+def axis_title(response: Response) -> str:
+    """Title of the axis of a response."""
+    sign, name = unit_sign(response.unit), response.name.replace("_", " ")
+    return f"{name} [{sign}]" if sign else name
+
+
+def hover(key: str, response: Response) -> str:
+    """Format a value of a response under the pointer, as plotly.js reads it."""
+    digits, gap = (".2f", "") if response.unit == "deg" else (".4g", " ")
+    return f"%{{{key}:{digits}}}{gap}{unit_sign(response.unit)}".rstrip()
 
 
 def p_value(value: float | None) -> str:
@@ -163,6 +189,13 @@ def capital(text: str) -> str:
 def interval(ends: Iterable[float], decimals: int = 2) -> str:
     """Write an interval as "[low, high]"."""
     return f"[{', '.join(fixed(end, decimals) for end in ends)}]"
+
+
+def span(ends: Iterable[float], unit: str) -> str:
+    """Write an interval of a response as "[low, high]" with its unit."""
+    numbers = [quantity(end, unit).removesuffix(unit_sign(unit)).strip() for end in ends]
+    sign = unit_sign(unit)
+    return f"[{', '.join(numbers)}]{'' if sign in ('', '°') else ' '}{sign}"
 
 
 def term(name: str) -> Markup:

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from dem_warp import Case, CaseResult, simulate
-from experiments.cases import Store, measure_heap
+from experiments.cases import Store
+from experiments.measurement.states import measure_heap
 from experiments.studyfile import Study
 from imaging import PictureError
 
@@ -51,6 +52,6 @@ def _angle(study: Study, result: CaseResult) -> float:
     if result.status != "finished":
         return np.nan
     try:
-        return measure_heap(study, result).mean
+        return measure_heap(study.measurement, result).mean
     except PictureError:
         return np.nan

@@ -12,9 +12,9 @@ from typer.testing import CliRunner
 from experiments import api
 from experiments.cli import app
 from experiments.discover import devices
-from experiments.discover.observables import PHOTOGRAPHED
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.wave import WaveRunner
+from experiments.measurement.observables import PHOTOGRAPHED
 from experiments.report.discovery import Terms
 from experiments.runs.campaign import check_runs
 from experiments.runs.search import OUTCOMES, Job, SearchResult, run_search

@@ -13,9 +13,10 @@ from doe.discrepancy import Point
 from experiments.discover import wave
 from experiments.discover.engine import EngineSimulator
 from experiments.discover.library import library_for
-from experiments.discover.observables import NAMES, measure
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.errors import StoreError
+from experiments.measurement.observables import NAMES
+from experiments.measurement.states import measure
 from experiments.studyfile import Study, load_study
 
 CONDITIONS = """

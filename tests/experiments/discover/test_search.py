@@ -13,9 +13,9 @@ from doe.discrepancy import Measured, Outcomes, Point, Verdict, drive, load_bank
 from doe.errors import RuleError
 from experiments.discover.library import FORMER_NAMES
 from experiments.discover.maker import maker_of_today
-from experiments.discover.observables import NAMES, OBSERVABLES
 from experiments.discover.search import Search
 from experiments.errors import InputError, StudyError
+from experiments.measurement.observables import NAMES, OBSERVABLES
 from experiments.report.discovery import Terms, verdict_line, write_discovery
 from experiments.studyfile import Study, load_study
 

@@ -10,8 +10,8 @@ from experiments.report.surfaces import surface_charts
 
 
 def test_the_pareto_chart_holds_every_effect_and_the_critical_values(campaign: Campaign) -> None:
-    screen = campaign.screening.screen
-    traces = pareto_chart(screen, 0.10).figure.data
+    screen = campaign.screening.leading.screen
+    traces = pareto_chart(screen, 0.10, campaign.responses[0]).figure.data
     bars = {
         name: size
         for trace in traces
@@ -25,7 +25,7 @@ def test_the_pareto_chart_holds_every_effect_and_the_critical_values(campaign: C
 
 
 def test_the_half_normal_chart_holds_dummies_too(campaign: Campaign) -> None:
-    traces = half_normal_chart(campaign.screening.screen, 0.10).figure.data
+    traces = half_normal_chart(campaign.screening.leading.screen, 0.10, campaign.responses[0]).figure.data
     drawn = sum(len(trace.text) for trace in traces if trace.text is not None)
     assert drawn == campaign.screening.design.coded.shape[1] == 11
 
@@ -33,7 +33,9 @@ def test_the_half_normal_chart_holds_dummies_too(campaign: Campaign) -> None:
 def test_the_drawn_region_is_the_compatible_region(campaign: Campaign) -> None:
     chart = next(
         chart
-        for chart in surface_charts(campaign.surface, campaign.optimum, campaign.target)
+        for chart in surface_charts(
+            campaign.surface, campaign.optimum, campaign.target, campaign.responses[0]
+        )
         if chart.name == "contour-E-F"
     )
     [cells] = [trace for trace in chart.figure.data if trace.type == "heatmap"]

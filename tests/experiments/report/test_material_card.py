@@ -61,8 +61,13 @@ def test_a_factor_and_the_studys_own_values_come_before_the_card(card: Path, tmp
 
 def test_a_card_tells_what_was_fitted_and_what_is_as_good(card: Path, campaign: Campaign) -> None:
     facts = tomllib.loads(card.read_text(encoding="utf-8"))
-    optimum, target = campaign.optimum, campaign.target.sample
-    assert facts["fitted"]["target"] == {"mean": "30.148 deg", "sd": "0.518 deg", "n": 5}
+    angle = facts["fitted"]["response"]["angle"]
+    optimum, target = campaign.optimum, campaign.target.leading
+    assert {key: angle[key] for key in ("mean", "sd", "n")} == {
+        "mean": "30.148 deg",
+        "sd": "0.518 deg",
+        "n": 5,
+    }
     assert facts["fitted"]["outcome"] == campaign.outcome.value
     assert facts["compatible"]["factors"] == ["E", "F"]
     for name in ("E", "F"):
@@ -74,7 +79,7 @@ def test_a_card_tells_what_was_fitted_and_what_is_as_good(card: Path, campaign: 
     points = np.array(facts["compatible"]["points"])
     assert 30 < len(points) <= 60
     # Each is compatible: the fit and the target agree within both errors, here within 4 of them together.
-    fitted = campaign.surface.reduced.predict(pd.DataFrame(points, columns=["E", "F"]))
+    fitted = campaign.surface.leading.reduced.predict(pd.DataFrame(points, columns=["E", "F"]))
     error = np.hypot(fitted["se"], Sample(target.mean, target.sd, target.n).se)
     assert (np.abs(fitted["mean"] - target.mean) < 4.0 * error).all()
 

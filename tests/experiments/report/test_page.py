@@ -36,7 +36,7 @@ def test_the_page_needs_no_network(campaign: Campaign, study: Study, page, read_
 
 
 def test_every_number_of_the_tables_is_the_results_own(campaign: Campaign, page) -> None:
-    screen, surface = campaign.screening.screen, campaign.surface
+    screen, surface = campaign.screening.leading.screen, campaign.surface
     effects = screen.table.sort_values("rank")
     published = paper.screening().table.loc[effects.index, ["F", "p"]]
     columns = ["rank", "effect", "sum_sq", "percent", "F", "t", "p"]
@@ -44,21 +44,21 @@ def test_every_number_of_the_tables_is_the_results_own(campaign: Campaign, page)
         "effects": np.column_stack([effects[columns], published]),
         "screening-anova": screen.anova.to_numpy(),
         "screening-design": np.column_stack(
-            [campaign.screening.design.coded.reset_index(), campaign.screening.response]
+            [campaign.screening.design.coded.reset_index(), campaign.screening.leading.measured]
         ),
         "climb": campaign.climb.path.reset_index().to_numpy(),
-        "anova-full": np.column_stack([surface.full.anova, paper.surface().anova[["F", "p"]]]),
+        "anova-full": np.column_stack([surface.leading.full.anova, paper.surface().anova[["F", "p"]]]),
         "surface-design": np.column_stack(
-            [surface.design.natural.reset_index(), surface.design.points, surface.response]
+            [surface.design.natural.reset_index(), surface.design.points, surface.leading.measured]
         ),
         "ranges": np.column_stack([list(campaign.optimum.point.values()), campaign.optimum.region.ranges]),
     }
     for name, values in expected.items():
         # Written by repr and read back: the same bits.
         np.testing.assert_array_equal(page.values(name), values.astype(np.float64), err_msg=name)
-    coded = surface.reduced.coded_coefficients
+    coded = surface.leading.reduced.coded_coefficients
     np.testing.assert_array_equal(
-        page.values("coefficients")[:, 1], coded[surface.reduced.coefficients.index]
+        page.values("coefficients")[:, 1], coded[surface.leading.reduced.coefficients.index]
     )
 
 
@@ -95,13 +95,13 @@ def test_marked_rows_are_the_significant_ones(campaign: Campaign, study: Study) 
     text = render_page(campaign, study)
     table = text[text.index('<table id="table-anova-full">') :]
     table = table[: table.index("</table>")]
-    assert table.count('<tr class="strong">') == int((campaign.surface.full.anova["p"] < 0.05).sum())
+    assert table.count('<tr class="strong">') == int((campaign.surface.leading.full.anova["p"] < 0.05).sum())
 
 
 def test_the_summary_says_what_was_found(campaign: Campaign, page) -> None:
     assert campaign.outcome is Outcome.CALIBRATED
     assert "Calibrated." in page.text
-    assert "One repose angle does not pin down E and F" in page.text
+    assert "The angle alone does not pin down E and F" in page.text
     assert "35 mm wide, 110 mm high" in page.text
     for decision in campaign.decisions:
         assert prose(decision.rule) in page.text
@@ -118,7 +118,7 @@ def test_only_the_papers_study_shows_the_papers_numbers(
         assert any(head.startswith("paper, ") for heads in shown.heads.values() for head in heads) is expected
         assert ("The paper kept E and F" in shown.text) is expected
     assert len(page.rows("misprints")) == len(paper.misprints())
-    assert [row[0][0] for row in page.rows("tests")] == ["this campaign", "the paper"]
+    assert [row[0][0] for row in page.rows("tests")] == ["angle", "the paper"]
 
 
 def test_the_facts_name_the_spheres_of_every_shape(write_study: Callable[..., Path]) -> None:

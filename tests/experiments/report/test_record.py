@@ -80,7 +80,7 @@ def test_a_page_shows_the_numbers_of_its_cases(tmp_path: Path, campaign: Campaig
     assert [row[0] for row in numbers_of(page, "Every run")].count("Table 6") == 13
     assert "In all 6 heaps in 45 s." in page
     # The campaign's own screening stands beside.
-    effect = campaign.screening.screen.table["effect"]["F"]
+    effect = campaign.screening.leading.screen.table["effect"]["F"]
     assert f"{effect:.2f}" in next(row for row in numbers_of(page, "Screening") if "F" in row[0])
     assert f"Outcome: {campaign.outcome.value}. {campaign.reason}" in page
 
@@ -136,7 +136,7 @@ def test_a_report_shows_the_papers_runs_beside_the_campaign(
     values = page.values("replay-runs")
     np.testing.assert_array_equal(values[:, 9:11], runs[["published", "angle"]].to_numpy())
     effects = page.values("replay-effects")
-    np.testing.assert_array_equal(effects[:, 7], campaign.screening.screen.table["effect"].to_numpy())
+    np.testing.assert_array_equal(effects[:, 7], campaign.screening.leading.screen.table["effect"].to_numpy())
     assert len(page.charts["replay-chart"]["data"]) == 5
 
 

@@ -9,8 +9,8 @@ from types import SimpleNamespace
 
 import pytest
 from experiments.discover.discovery import Interval
-
 from experiments.discover.observables import OBSERVABLES
+
 from experiments.discover.search import Search
 from experiments.errors import StudyError
 from experiments.report.companion import STUDIES, companion_of

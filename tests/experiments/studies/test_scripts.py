@@ -13,6 +13,7 @@ import pytest
 
 from dem_warp import Case, CaseResult
 from experiments.cases import execute
+from experiments.measurement.states import Observed
 from experiments.studies.buckwheat import climb, screening, surface, verification
 
 TARGET = 30.148
@@ -37,11 +38,11 @@ def _plane_engine(cone: Callable[..., CaseResult], monkeypatch: pytest.MonkeyPat
             on_result(index, result)
         return results
 
-    def measure(_: object, result: CaseResult) -> SimpleNamespace:
-        return SimpleNamespace(mean=result.observables["truth"], se=0.1)
+    def observe(_: object, result: CaseResult, __: bool) -> Observed:
+        return Observed({"angle": result.observables["truth"]}, SimpleNamespace(se=0.1))
 
     monkeypatch.setattr(execute, "simulate", simulate)
-    monkeypatch.setattr(execute, "measure_heap", measure)
+    monkeypatch.setattr(execute, "observe", observe)
 
 
 def test_screening_keeps_the_two_that_matter(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -15,12 +15,13 @@ from dem_warp import Case, CaseResult
 from dem_warp.clumps import ClumpShape
 from experiments.cases import Store, execute
 from experiments.errors import InputError, StoreError
+from experiments.measurement.states import Observed
 from experiments.studies.buckwheat import clumps
 from experiments.studies.buckwheat.replay.replay import Replay
 from experiments.studies.buckwheat.sensitivity import __main__ as sensitivities
 from experiments.studies.buckwheat.sensitivity.sensitivities import Sensitivities
 from experiments.studies.buckwheat.sensitivity.variants import BASE, chosen_variants, variants
-from experiments.studyfile import Study
+from experiments.studyfile.study import MeasurementSection
 
 FREE = {"base", "fit-middle", "fit-lower", "fit-upper", "two-views"}
 """Variants that need no heaps but the base's."""
@@ -124,12 +125,12 @@ def batches(cone: Callable[..., CaseResult], monkeypatch: pytest.MonkeyPatch) ->
             on_result(index, replace(heap, observables={"truth": 50.0 * case.grain_wall.static_friction}))
         return []
 
-    def measure(study: Study, result: CaseResult) -> SimpleNamespace:
-        lower = 2.0 if study.measurement.fit == "middle" else 0.0
-        return SimpleNamespace(mean=result.observables["truth"] - lower, se=0.1)
+    def observe(settings: MeasurementSection, result: CaseResult, _: bool) -> Observed:
+        lower = 2.0 if settings.fit == "middle" else 0.0
+        return Observed({"angle": result.observables["truth"] - lower}, SimpleNamespace(se=0.1))
 
     monkeypatch.setattr(execute, "simulate", simulate)
-    monkeypatch.setattr(execute, "measure_heap", measure)
+    monkeypatch.setattr(execute, "observe", observe)
     return sizes
 
 

@@ -198,7 +198,7 @@ def test_a_strong_trial_ends_in_one_way() -> None:
 def test_the_kept_record_scores_as_its_page_says(tmp_path: Path) -> None:
     # The sixth; the fifth was declared before the rules had `finish_points`, so its hash is another.
     shutil.copytree(KEPT, tmp_path / "sixth")
-    page = write_page(tmp_path / "sixth")
+    page = write_trials_page(tmp_path / "sixth")
     assert page.read_text(encoding="utf-8") == (KEPT / "README.md").read_text(encoding="utf-8")
 
 

@@ -24,8 +24,8 @@ from doe.discrepancy import (
 )
 from doe.discrepancy.contest.power import CODED_SIZES
 from doe.factors import Factor
-from experiments.discover.observables import OBSERVABLES, PHOTOGRAPHED
 from experiments.errors import InputError
+from experiments.measurement.observables import OBSERVABLES, PHOTOGRAPHED
 from experiments.trials.camera import Camera
 from experiments.trials.declaration import (
     Declaration,

@@ -8,9 +8,9 @@ import pytest
 from doe.discrepancy import Discovery, Measured, Settings, Verdict, fit_emulator
 from experiments.discover.engine import EngineSimulator
 from experiments.discover.library import library_for
-from experiments.discover.observables import NAMES
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.search import Search
+from experiments.measurement.observables import NAMES
 from experiments.studyfile import load_study
 from experiments.trials.declaration import Declaration
 from experiments.trials.desk import Desk, read_data

@@ -19,6 +19,7 @@ import pandas as pd
 import typer
 
 from doe.discrepancy import Candidate, Discovery, Emulator, Fit, Interval, Settings
+from experiments.calibrate.export import jsonable
 from experiments.files import write_text
 from experiments.report.kit.markdown import markdown_page, markdown_table
 from experiments.report.kit.numbers import fixed, interval

@@ -153,7 +153,7 @@ def campaign_facts(campaign: Campaign) -> dict[str, Any]:
     """Keep of a campaign what a record shows: outcome, reason, effects of its screening."""
     facts: dict[str, Any] = {"outcome": campaign.outcome.value, "reason": campaign.reason}
     if campaign.screening is not None:
-        effects = campaign.screening.screen.table[["effect", "p", "rank"]]
+        effects = campaign.screening.leading.screen.table[["effect", "p", "rank"]]
         facts["effects"] = {str(name): dict(row) for name, row in effects.iterrows()}
     return facts
 

@@ -149,7 +149,7 @@ def _findings(campaign: Campaign, study: Study, folder: Path) -> list[str]:
             "Each panel is a cut through the point of the smallest chi². The hidden truth may lie in the "
             "compatible region and yet beside it in a cut.",
         ]
-    tables = response_tables(campaign, study.responses)
+    tables = response_tables(campaign)
     return [
         prose(outcome),
         *picture,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -12,12 +13,15 @@ import pandas as pd
 import pytest
 
 from doe.discrepancy import Discovery, Interval, Settings, Verdict
+from experiments.calibrate.checks import check_study
 from experiments.calibrate.export import jsonable
+from experiments.calibrate.noise_floor import plan_noise_floor
 from experiments.discover.library import library_for
-from experiments.discover.observables import OBSERVABLES
+from experiments.measurement.observables import BY_NAME, OBSERVABLES
 from experiments.report.discovery import Terms, write_discovery
 from experiments.runs.campaign import check_runs
 from experiments.studyfile import Study, load_study
+from experiments.studyfile.campaign import TARGET_SCENE
 
 Discovered = Callable[[Verdict], Discovery]
 
@@ -79,10 +83,37 @@ def test_the_study_with_the_mechanism_loads_and_can_be_calibrated(
     at = {factor.name: factor.center for factor in trial.factors}
     case = study.case(at | {"contact_adhesion": added.low}, seed=1)
     assert case.mechanisms
-    target = study.target.model_dump()
-    column = found.data.observables.index("flank_angle")
-    assert target["mean"] == pytest.approx(found.data.means[0, column], abs=5e-4)
-    assert target["n"] == 5
+    assert study.target.leading.observable == "angle"
+
+
+def test_all_that_was_measured_is_to_be_matched_under_its_condition(
+    trial: Study, trial_terms: Terms, discovered: Discovered, tmp_path: Path
+) -> None:
+    found = found_on(trial, discovered, Verdict.NAMED)
+    write_discovery(found, trial, trial_terms, Settings(), tmp_path)
+    study = load_study(tmp_path / "study-with-contact_cohesion.toml")
+    data, responses = found.data, study.target.responses
+    handed_on = {(response.scene, response.observable): response for response in responses}
+    assert len(handed_on) == len(responses) == np.isfinite(data.means).sum()
+    for (row, condition), (column, name) in product(enumerate(data.conditions), enumerate(data.observables)):
+        if not np.isfinite(data.means[row, column]):
+            continue
+        # The first condition is the test as it is.
+        scene = TARGET_SCENE if condition == "base" else condition
+        response = handed_on[scene, BY_NAME[name].column]
+        # Written with six digits.
+        assert response.measured.mean == pytest.approx(data.means[row, column], rel=1e-5)
+        assert response.measured.se == pytest.approx(data.standard_errors[row, column], rel=1e-5)
+        assert response.held_out == data.held_out[row]
+    # A campaign on it simulates what takes part in the fit, each under its condition.
+    check_study(study)
+    plan = plan_noise_floor(study)
+    fitted = {name for name, held_out in zip(data.conditions, data.held_out, strict=True) if not held_out}
+    assert set(plan["scene"]) == (fitted - {"base"}) | {TARGET_SCENE}
+    settings = {factor.name: factor.center for factor in study.factors}
+    faster = study.case(settings, seed=1, scene="fast")
+    assert faster.scene.lift_speed == 0.25
+    assert faster.mechanisms == study.case(settings, seed=1).mechanisms
 
 
 def test_a_tie_gives_a_study_for_each(

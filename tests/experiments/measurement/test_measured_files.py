@@ -12,11 +12,11 @@ from typer.testing import CliRunner
 
 from doe.discrepancy import Measured
 from experiments.cli import app
-from experiments.discover.data.file import read_measured
-from experiments.discover.data.notes import SUSPICION
-from experiments.discover.data.readings import CLOGGED
-from experiments.discover.observables import NAMES
 from experiments.errors import InputError
+from experiments.measurement.measured_file import read_measured
+from experiments.measurement.notes import SUSPICION
+from experiments.measurement.observables import NAMES
+from experiments.measurement.readings import CLOGGED
 from experiments.studyfile import Study, load_study
 from imaging import save_picture
 from imaging.synthetic import Camera, DrawnHeap, draw

@@ -1,27 +1,18 @@
-"""What a measured value can be: no heap is larger than its grains allow, no time longer than the test.
+"""Limits of measured values: no heap is larger than its grains allow, no time longer than the test.
 
 Wrong units move a value by factors of ten and more, so that wide limits find them.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from dem_warp import LiftedCylinder
 from experiments.errors import StudyError
+from experiments.measurement.observables import OBSERVABLES, Observable
 from experiments.studyfile import Study
-
-SHARES = {
-    "concavity": (-1.0, 1.0),
-    "asymmetry": (-1.0, 1.0),
-    "rolled_fraction": (0.0, 1.0),
-    "wall_drag": (-1.0, 1.0),
-}
-"""Ends of the ratios, by their definitions."""
-
-RISING = (("r50", "r90"), ("t75", "t55"), ("centre_height", "height"))
-"""Of two observables of one heap, the first is always the smaller."""
 
 PATIENCE = 10.0
 """Time that a heap is given after the tube is gone [s]."""
@@ -29,7 +20,7 @@ PATIENCE = 10.0
 
 @dataclass(frozen=True)
 class SizeOfTest:
-    """How large and how long a lifted-cylinder test is.
+    """Size and duration of a lifted-cylinder test.
 
     Attributes
     ----------
@@ -45,10 +36,10 @@ class SizeOfTest:
     length: float
     time: float
 
-    def limits(self, observable: str, unit: str) -> tuple[float, float]:
+    def limits(self, observable: Observable) -> tuple[float, float]:
         """Smallest and largest value that an observable can have, in its unit (deg, m, s or 1)."""
         by_unit = {"deg": (0.0, 90.0), "m": (self.grain, self.length), "s": (0.0, self.time)}
-        return by_unit[unit] if unit in by_unit else SHARES[observable]
+        return observable.limits or by_unit.get(observable.unit, (-math.inf, math.inf))
 
 
 def size_of_test(study: Study) -> SizeOfTest:
@@ -69,6 +60,7 @@ def size_of_test(study: Study) -> SizeOfTest:
 
 def inversions(heap: Mapping[str, float]) -> Iterable[tuple[str, str]]:
     """Pairs of observables of one heap that are the wrong way round."""
-    for small, large in RISING:
-        if small in heap and large in heap and not heap[small] <= heap[large]:
-            yield small, large
+    for small in OBSERVABLES:
+        large = small.never_above
+        if small.name in heap and large in heap and not heap[small.name] <= heap[large]:
+            yield small.name, large

@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dem_warp import CaseResult
-from experiments.discover.observables import NAMES, OBSERVABLES, PHOTOGRAPHED, measure
+from dem_warp import CaseResult, Drum, LiftedCylinder
+from experiments.measurement.observables import BY_NAME, NAMES, OBSERVABLES, PHOTOGRAPHED, observables_of
+from experiments.measurement.states import measure, observe
 from experiments.studyfile.study import MeasurementSection
 
 BALANCE = {name: 0.1 * index for index, name in enumerate(NAMES) if name not in PHOTOGRAPHED}
@@ -66,6 +67,26 @@ def test_a_surface_that_stays_high_takes_until_the_heap_rests(cone: Cone) -> Non
     del high.observables["t55"]
     found = dict(zip(NAMES, measure(SETTINGS, high)[0], strict=True))
     assert (found["t55"], found["t75"]) == (2.0, BALANCE["t75"])
+
+
+def test_a_campaign_is_given_the_same_values_as_a_search(cone: Cone) -> None:
+    high = heap(cone)
+    del high.observables["t75"]
+    searched = dict(zip(NAMES, measure(SETTINGS, high)[0], strict=True))
+    observed = observe(SETTINGS, high).observables
+    assert {each.name: observed[each.column] for each in OBSERVABLES} == searched
+    assert observed["t75"] == high.observables["time_to_rest"]
+
+
+def test_observables_of_a_scene_have_one_definition_each() -> None:
+    told = LiftedCylinder.observables
+    known = observables_of(told, leaves_a_heap=True)
+    assert set(known) == set(told) | {each.column for each in OBSERVABLES}
+    for name, (unit, meaning) in told.items():
+        assert known[name].unit == unit
+        assert known[name].definition.startswith(meaning)
+    assert BY_NAME["angle"] is BY_NAME["flank_angle"]
+    assert "dynamic_angle" in observables_of(Drum.observables, leaves_a_heap=False)
 
 
 def test_a_failed_case_has_a_reason_and_no_numbers(cone: Cone) -> None:

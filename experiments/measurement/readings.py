@@ -1,4 +1,4 @@
-"""What one row of a file of measured heaps says."""
+"""Readings of one row of a file of measured heaps."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from experiments.discover.data.plausible import SizeOfTest
-from experiments.discover.data.table import Row
-from experiments.discover.observables import OBSERVABLES, Observable, photographed
 from experiments.errors import Problem
+from experiments.measurement.observables import BY_NAME, DIMENSIONS, OBSERVABLES, Observable, View
+from experiments.measurement.pictures import require_same_fit
+from experiments.measurement.plausible import SizeOfTest
+from experiments.measurement.table import Row
 from experiments.studyfile.schema import nearest_name
 from experiments.studyfile.units import Quantity
 from imaging import find_outline, measure, read_picture
@@ -19,11 +20,6 @@ CLOGGED = "the tube clogged"
 """Reason of a replicate that left no heap because the grains stayed in the tube."""
 CLOGGED_ROW = "clogged"
 """Stands for an observable where the tube held its grains."""
-
-BY_NAME = {observable.name: observable for observable in OBSERVABLES}
-"""Observables by name."""
-
-_DIMENSIONS = {"deg": "angle", "m": "length", "s": "time", "1": ""}
 
 
 @dataclass(frozen=True)
@@ -57,7 +53,7 @@ def readings_of(row: Row, size: SizeOfTest, fit: str) -> Iterator[Reading]:
     Parameters
     ----------
     row
-        Of the columns observable, value, unit, picture and pixel.
+        Of the columns observable, value, unit, fit, picture and pixel.
     size
         Of the test, which bounds the values.
     fit
@@ -81,18 +77,20 @@ def readings_of(row: Row, size: SizeOfTest, fit: str) -> Iterator[Reading]:
     elif row["value"]:
         if not name:
             raise row.error("must say what the value is of", "observable")
+        if row["fit"]:
+            require_same_fit(row["fit"], fit, f"{row.file}:{row.line}: fit")
         yield _written(row, BY_NAME[name], size)
     elif row["picture"]:
         yield from _seen(row, size, fit)
 
 
 def _written(row: Row, observable: Observable, size: SizeOfTest) -> Reading:
-    """What a row gives as a number."""
+    """Take the value that a row gives as a number."""
     quantity = _quantity(row)
     if not quantity.unit and observable.unit != "1":
         quantity = replace(quantity, unit=observable.unit)
     try:
-        value = quantity.to_base(_DIMENSIONS[observable.unit])
+        value = quantity.to_base(DIMENSIONS[observable.unit])
     except ValueError as error:
         doubt = Problem(f"{observable.name} {error}", str(quantity), _place(row))
         return Reading(row, observable.name, np.nan, doubt=doubt)
@@ -120,10 +118,12 @@ def _seen(row: Row, size: SizeOfTest, fit: str) -> Iterator[Reading]:
     if name and pixel is None and BY_NAME[name].unit == "m":
         raise row.error("a length in a picture needs the size of its pixels, as 0.1 mm", "pixel")
     outline = find_outline(read_picture(path), meters_per_pixel=pixel, place=str(path))
-    for shown, value in photographed([measure(outline, fit, str(path))]).items():
-        observable = BY_NAME[shown]
-        if shown == name or (not name and (observable.unit != "m" or pixel)):
-            yield Reading(row, shown, value, row["picture"], _doubt(row, observable, value, size))
+    views = [View.of(measure(outline, fit, str(path)))]
+    for observable in OBSERVABLES:
+        wanted = observable is BY_NAME[name] if name else observable.unit != "m" or pixel
+        if wanted and observable.by_photograph:
+            value = observable.in_pictures(views)
+            yield Reading(row, observable.name, value, row["picture"], _doubt(row, observable, value, size))
 
 
 def _pixel(row: Row) -> float | None:
@@ -139,8 +139,8 @@ def _pixel(row: Row) -> float | None:
 
 
 def _doubt(row: Row, observable: Observable, value: float, size: SizeOfTest) -> Problem | None:
-    """Why a value cannot be one of this test, if it cannot."""
-    low, high = size.limits(observable.name, observable.unit)
+    """Say why a value cannot be one of this test, if it cannot."""
+    low, high = size.limits(observable)
     if low <= value <= high:
         return None
     unit = "" if observable.unit == "1" else f" {observable.unit}"

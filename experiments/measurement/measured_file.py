@@ -1,8 +1,9 @@
 """The file of measured heaps: a tidy CSV, a row a measurement.
 
 Columns, in any order: ``condition`` (of the study), ``replicate`` (a label; one heap), ``observable``,
-``value``, ``unit`` (left out: the observable's own), ``picture`` (a photograph, relative to the file) and
-``pixel`` (the size of one of its pixels at the heap, as ``0.1 mm``). A row with a picture and no value is
+``value``, ``unit`` (left out: the observable's own), ``picture`` (a photograph, relative to the file),
+``pixel`` (the size of one of its pixels at the heap, as ``0.1 mm``) and ``fit`` (part of the flank that an
+angle was fitted to, where it is written). A row with a picture and no value is
 measured on the picture; without an observable, all that the picture shows. Several pictures of one heap are
 views of it: their mean counts. The observable ``clogged`` says that the tube held its grains, so that there
 is no heap. A row without value and picture says that nothing was measured.
@@ -21,17 +22,17 @@ from pathlib import Path
 import numpy as np
 
 from doe.discrepancy import Measured
-from experiments.discover.data.notes import data_notes
-from experiments.discover.data.plausible import SizeOfTest, inversions, size_of_test
-from experiments.discover.data.readings import CLOGGED, CLOGGED_ROW, Reading, readings_of
-from experiments.discover.data.table import Row, read_rows
-from experiments.discover.observables import NAMES
 from experiments.errors import InputError, Problem
+from experiments.measurement.notes import data_notes
+from experiments.measurement.observables import NAMES
+from experiments.measurement.plausible import SizeOfTest, inversions, size_of_test
+from experiments.measurement.readings import CLOGGED, CLOGGED_ROW, Reading, readings_of
+from experiments.measurement.table import Row, read_rows
 from experiments.studyfile import Condition, Study
 from experiments.studyfile.schema import nearest_name
 from imaging import PictureError
 
-COLUMNS = ("condition", "replicate", "observable", "value", "unit", "picture", "pixel")
+COLUMNS = ("condition", "replicate", "observable", "value", "unit", "picture", "pixel", "fit")
 """Columns of the file."""
 NEEDED = COLUMNS[:3]
 """Those that it must have."""
@@ -65,7 +66,7 @@ def read_measured(path: Path, study: Study) -> Measured:
 
 @dataclass
 class _Found:
-    """What the rows of a file say: heaps by condition and replicate, and what is wrong, each with its row."""
+    """Contents of a file: heaps by condition and replicate, and what is wrong, each with its row."""
 
     heaps: dict[tuple[str, str], list[Reading]] = field(default_factory=dict)
     doubts: list[tuple[int, Problem]] = field(default_factory=list)

@@ -9,11 +9,11 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from experiments.discover.data.file import COLUMNS
-from experiments.discover.data.readings import CLOGGED_ROW
-from experiments.discover.observables import OBSERVABLES
 from experiments.errors import InputError
 from experiments.files import write_text
+from experiments.measurement.measured_file import COLUMNS
+from experiments.measurement.observables import OBSERVABLES
+from experiments.measurement.readings import CLOGGED_ROW
 from experiments.studyfile import Condition, Study
 
 REPLICATES = 5
@@ -25,6 +25,7 @@ LABORATORY_UNITS = {"m": "mm"}
 _HEAD = """\
 Heaps measured for the study {study}: a row a measurement. Fill in what was measured, then
     dem-warp discover {study} {file}
+or name it in the study, as the file of its [target], and calibrate.
 A row without a value is not measured; whole rows may be left out or added, with other units too. A value
 that this test cannot give, of a wrong unit most often, is set aside, and the report says so.
 
@@ -39,7 +40,8 @@ observable: what was measured, or {clogged} (without a value) where the tube hel
 picture: instead of a value, a photograph of the heap from the side, level with the plate, x of the study to
 the right; its file relative to this one. pixel: the size of one of its pixels at the heap, as 0.08 mm;
 lengths need it. A row with a picture and no observable gives all that the picture shows; several pictures of
-one heap count with their mean."""
+one heap count with their mean. fit: part of the flank that a written angle was fitted to, which must be the
+study's; left out, it is taken to be that."""
 
 
 def write_measured_template(study: Study, folder: Path | None = None) -> Path:

@@ -1,4 +1,4 @@
-"""What a reader must know about measured data: what is missing, scarce, the same, or contradicts the rest.
+"""Notes for the reader of measured data: what is missing, scarce, the same, or contradicts the rest.
 
 None of this changes a value. Whether the model is wrong is another question; these are about the data alone.
 """

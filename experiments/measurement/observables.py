@@ -1,0 +1,229 @@
+"""The registry of observables: numbers that a test yields, and how a picture or a simulated state gives them.
+
+One angle is never enough: retuned friction imitates almost anything in it. To add an observable of the lifted
+cylinder, add its entry to `OBSERVABLES`; any other number that a scene tells of belongs to it by that alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import partial
+
+import numpy as np
+
+from dem_warp import LiftedCylinder
+from dem_warp.scenes.scene import Observable as Told
+from imaging import HeapAngle, HeapShape, ReposeAngle, heap_shape
+
+ANGLE = "angle"
+"""Spelling of the repose angle in study files and tables of cases."""
+
+DIMENSIONS = {"1": "", "deg": "angle", "m": "length", "s": "time", "kg": "mass", "kg/s": "mass flow"}
+"""Dimension of each unit that an observable may have, as quantities know it."""
+
+
+class Instrument(StrEnum):
+    """Instrument that an observable is measured with."""
+
+    PHOTOGRAPH = "photograph"
+    """One picture of the heap from the side, with a scale."""
+    BALANCE = "balance"
+    """A balance that the tube hangs on, or under what lies on a part of the plate."""
+    RULER = "ruler"
+    """A ruler along the tube."""
+    FILM = "film"
+    """A film of the lift through a clear tube."""
+    SCAN = "scan"
+    """The heap's surface from all sides."""
+
+
+@dataclass(frozen=True)
+class View:
+    """One picture of a heap, measured."""
+
+    angle: ReposeAngle
+    shape: HeapShape
+
+    @classmethod
+    def of(cls, angle: ReposeAngle) -> View:
+        """Measure the shape of the outline that an angle was fitted on."""
+        return cls(angle, heap_shape(angle.outline))
+
+
+@dataclass(frozen=True)
+class Observable:
+    """One number that a test yields.
+
+    Attributes
+    ----------
+    name : str
+        A column of every table.
+    title : str
+        A few words for it.
+    unit : str
+        A key of `DIMENSIONS`.
+    definition : str
+        How exactly it is measured.
+    instrument : Instrument or None
+        What it takes to measure it in the laboratory; None where no file of measured heaps has it.
+    seen : callable or None
+        Gives it from one measured picture; None where no photograph shows it.
+    directed : bool
+        Whether it counts along x of the study: several views then show a part of it each.
+    stands_in : str
+        Observable of the scene that stands for it where the scene does not give it.
+    limits : (float, float) or None
+        Ends of a ratio, by its definition; those of other units follow from the size of the test.
+    never_above : str
+        Observable of the same heap that is the larger of the two.
+    alias : str
+        Spelling in study files and tables of cases, where it is another.
+    """
+
+    name: str
+    title: str
+    unit: str
+    definition: str
+    instrument: Instrument | None = None
+    seen: Callable[[View], float] | None = None
+    directed: bool = False
+    stands_in: str = ""
+    limits: tuple[float, float] | None = None
+    never_above: str = ""
+    alias: str = ""
+
+    @property
+    def by_photograph(self) -> bool:
+        """Whether a photograph of the heap shows it."""
+        return self.seen is not None
+
+    @property
+    def column(self) -> str:
+        """Spelling in study files and tables of cases."""
+        return self.alias or self.name
+
+    def in_pictures(self, views: Sequence[View]) -> float:
+        """Mean over pictures of one heap."""
+        if self.seen is None:
+            raise ValueError(f"no photograph shows {self.name}")
+        return float(np.mean([self.seen(view) for view in views]))
+
+    def in_heap(self, heap: HeapAngle, views: Sequence[View]) -> float:
+        """Value of a simulated heap, from views all around it.
+
+        A heap that leans by A towards a direction leans in a view by A times the cosine of the angle between
+        the two; the amplitude along x is fitted to all views by least squares.
+        """
+        if not self.directed or self.seen is None:
+            return self.in_pictures(views)
+        parts = np.array([self.seen(view) for view in views])
+        terms = np.column_stack([np.cos(heap.azimuths), np.sin(heap.azimuths)])
+        return float(np.linalg.lstsq(terms, parts, rcond=None)[0][0])
+
+
+_photographed = partial(Observable, instrument=Instrument.PHOTOGRAPH)
+
+
+def _told(name: str, title: str, instrument: Instrument, rule: str = "", **facts: object) -> Observable:
+    """Build an observable that the lifted cylinder tells of, with the scene's unit and definition."""
+    unit, meaning = LiftedCylinder.observables[name]
+    return Observable(name, title, unit, meaning + rule, instrument, **facts)  # type: ignore[arg-type]
+
+
+_UNTIL_REST = "; until the heap rests, where it stays higher"
+
+OBSERVABLES = (
+    _photographed(
+        "flank_angle",
+        "repose angle",
+        "deg",
+        "mean angle of the lines fitted to both flanks of the outline, as the study's measurement says",
+        seen=lambda view: view.angle.mean,
+        alias=ANGLE,
+    ),
+    _photographed(
+        "concavity",
+        "concavity of the flanks",
+        "1",
+        "1 - 2 area / (width x height) of the outline: 0 for straight flanks, positive for hollow ones",
+        seen=lambda view: view.shape.concavity,
+        limits=(-1.0, 1.0),
+    ),
+    _photographed(
+        "height",
+        "height of the heap",
+        "m",
+        "of the outline's highest point",
+        seen=lambda view: view.shape.height,
+    ),
+    _photographed(
+        "r50",
+        "radius of half the heap",
+        "m",
+        "radius about the apex that holds 50 % of the volume of the outline turned about it",
+        seen=lambda view: view.shape.r50,
+        never_above="r90",
+    ),
+    _photographed(
+        "r90",
+        "radius of nine tenths of the heap",
+        "m",
+        "radius about the apex that holds 90 % of the volume of the outline turned about it",
+        seen=lambda view: view.shape.r90,
+    ),
+    _photographed(
+        "asymmetry",
+        "lean of the heap",
+        "1",
+        "(area right of the apex - area left of it) / area of the outline, x of the study to the right",
+        seen=lambda view: view.shape.asymmetry,
+        directed=True,
+        limits=(-1.0, 1.0),
+    ),
+    _told("rolled_fraction", "grains that rolled off", Instrument.BALANCE, limits=(0.0, 1.0)),
+    _told("fill_height", "height of the filling", Instrument.RULER),
+    _told("wall_drag", "weight on the tube", Instrument.BALANCE, limits=(-1.0, 1.0)),
+    _told(
+        "t75",
+        "time to three quarters",
+        Instrument.FILM,
+        _UNTIL_REST,
+        stands_in="time_to_rest",
+        never_above="t55",
+    ),
+    _told("t55", "time to 55 %", Instrument.FILM, _UNTIL_REST, stands_in="time_to_rest"),
+    _told("centre_height", "height of the centre of mass", Instrument.SCAN, never_above="height"),
+)
+"""Observables of the lifted cylinder that a laboratory can measure, in the order of every table."""
+
+NAMES = tuple(observable.name for observable in OBSERVABLES)
+"""Their names."""
+
+PHOTOGRAPHED = tuple(observable.name for observable in OBSERVABLES if observable.by_photograph)
+"""Names of those that a photograph shows."""
+
+BY_NAME = {name: each for each in OBSERVABLES for name in (each.name, each.column)}
+"""The same by name and by alias."""
+
+VERSION = 2
+"""Of the definitions; values measured by other ones are measured again."""
+
+
+def observables_of(told: Mapping[str, Told], leaves_a_heap: bool) -> dict[str, Observable]:
+    """Collect the observables of a scene by their columns in a table of cases.
+
+    Parameters
+    ----------
+    told
+        What the engine's scene tells of.
+    leaves_a_heap
+        Whether the scene ends in a heap, which pictures show.
+    """
+    heap = {each.column: each for each in OBSERVABLES} if leaves_a_heap else {}
+    rest = {
+        name: Observable(name, name.replace("_", " "), unit, meaning)
+        for name, (unit, meaning) in told.items()
+    }
+    return heap | {name: each for name, each in rest.items() if name not in heap}

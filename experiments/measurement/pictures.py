@@ -1,0 +1,96 @@
+"""Photographs of heaps: angles measured as the simulated ones are, and refused where they were not."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from glob import glob
+from pathlib import Path
+
+from experiments.errors import InputError, Problem
+from imaging import FitSettings, PictureError, ReposeAngle, compare, measure_photograph
+
+SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp")
+"""Endings of the pictures that are looked for in a folder."""
+
+
+@dataclass(frozen=True)
+class _Stated:
+    """Angle of which no more is known than how it was measured, an `imaging.Angle`."""
+
+    fit: FitSettings
+    mean: float = math.nan
+    se: float = math.nan
+    dof: float = math.nan
+
+
+def require_same_fit(fit: str, own: str, place: str) -> None:
+    """Refuse measured angles that were fitted to another part of the flank than simulated ones.
+
+    Parameters
+    ----------
+    fit
+        Name of the fit of the measured angles.
+    own
+        Name of the fit of the study.
+    place
+        Where the first stands.
+
+    Raises
+    ------
+    InputError
+        When the two do not compare, or there is no such fit.
+    """
+    try:
+        compare(*(_Stated(FitSettings.of(name)) for name in (fit, own)))
+    except PictureError as error:
+        raise InputError(f"measured and simulated angles must compare: {error}", fit, place) from None
+
+
+def find_pictures(pattern: str, folder: Path, place: str) -> list[Path]:
+    """Find the pictures that a pattern or a folder names.
+
+    Parameters
+    ----------
+    pattern
+        A folder, a file, or a pattern as ``photos/*.jpg``.
+    folder
+        Folder that it is relative to.
+    place
+        Where it stands, for error messages.
+
+    Raises
+    ------
+    InputError
+        When there are fewer than two.
+    """
+    named = folder / pattern
+    if named.is_dir():
+        found = sorted(path for path in named.iterdir() if path.suffix.lower() in SUFFIXES)
+    else:
+        found = sorted(map(Path, glob(str(named))))
+    if len(found) < 2:
+        rule = f"must name at least two pictures of heaps (looked for {named})"
+        raise InputError(rule, f"{pattern}: {len(found)} found", place)
+    return found
+
+
+def measure_pictures(paths: Sequence[Path], fit: str) -> list[ReposeAngle]:
+    """Measure the repose angle of the heap in each picture.
+
+    Raises
+    ------
+    InputError
+        With every picture that shows no measurable heap.
+    """
+    angles, problems = [], []
+    for path in paths:
+        try:
+            angles.append(measure_photograph(path, fit))
+        except PictureError as error:
+            problems.append(Problem("must show a heap that can be measured", str(error), str(path)))
+    if problems:
+        first, *more = problems
+        raise InputError(first.rule, first.value, first.place, tuple(more))
+    return angles

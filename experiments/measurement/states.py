@@ -1,0 +1,101 @@
+"""Observables of simulated states: what a case that has ended gives of its test."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from dem_warp import CaseResult
+from experiments.measurement.observables import NAMES, OBSERVABLES, View
+from experiments.studyfile.study import MeasurementSection
+from imaging import HeapAngle, PictureError, heap_angle
+
+
+@dataclass(frozen=True)
+class Observed:
+    """Measurements of one case.
+
+    Attributes
+    ----------
+    observables : dict of float
+        Observables by their columns, in their units; what could not be measured is left out.
+    angle : HeapAngle or None
+        The repose angle with its views; None without a measurable heap.
+    reason : str
+        Why the case failed or its heap cannot be measured; empty when neither did.
+    """
+
+    observables: Mapping[str, float] = field(default_factory=dict)
+    angle: HeapAngle | None = None
+    reason: str = ""
+
+
+def measure_heap(settings: MeasurementSection, result: CaseResult) -> HeapAngle:
+    """Measure the repose angle of a finished case as a study says.
+
+    Raises
+    ------
+    imaging.PictureError
+        When there is no measurable heap.
+    """
+    return heap_angle(
+        result.sphere_centers,
+        result.sphere_radii,
+        azimuths=settings.azimuths,
+        fit=settings.fit,
+        pixels=settings.pixels,
+    )
+
+
+def observe(settings: MeasurementSection, result: CaseResult, leaves_a_heap: bool = True) -> Observed:
+    """Measure a case.
+
+    Parameters
+    ----------
+    settings
+        How pictures are taken and read.
+    result
+        How the case ended.
+    leaves_a_heap
+        Whether its scene ends in a heap; of another, what the scene tells of is all.
+    """
+    told = result.observables
+    if result.status != "finished" or not leaves_a_heap:
+        return Observed(told, reason=result.reason)
+    told = {
+        each.name: told[each.stands_in]
+        for each in OBSERVABLES
+        if each.stands_in in told and each.name not in told
+    } | told
+    try:
+        heap = measure_heap(settings, result)
+    except PictureError as error:
+        return Observed(told, reason=f"no heap: {error}")
+    views = [View.of(view) for view in heap.views]
+    seen = {each.column: each.in_heap(heap, views) for each in OBSERVABLES if each.by_photograph}
+    return Observed(seen | told, heap)
+
+
+def measure(settings: MeasurementSection, result: CaseResult) -> tuple[np.ndarray, str]:
+    """Measure all `OBSERVABLES` of a heap, or none.
+
+    Parameters
+    ----------
+    settings
+        How pictures are taken and read.
+    result
+        How the case ended.
+
+    Returns
+    -------
+    values : (observables,) array
+        In their units; NaN, all of them, for a case that has none.
+    reason : str
+        Why a case has none: it failed, or its heap cannot be measured; else empty.
+    """
+    found = observe(settings, result)
+    if found.angle is None:
+        return np.full(len(NAMES), np.nan), found.reason
+    return np.array([found.observables[each.column] for each in OBSERVABLES]), ""

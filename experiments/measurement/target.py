@@ -1,0 +1,149 @@
+"""Measurements as the target of a study: from photographs, from a file of measured heaps, from a search."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from doe import Sample
+from experiments.errors import InputError
+from experiments.measurement.measured_file import read_measured
+from experiments.measurement.observables import ANGLE, BY_NAME
+from experiments.measurement.pictures import find_pictures, measure_pictures, require_same_fit
+from experiments.studyfile import Study
+from experiments.studyfile.campaign import TARGET_SCENE
+
+
+@dataclass(frozen=True)
+class Replicated:
+    """An observable that was measured several times under a condition.
+
+    Attributes
+    ----------
+    condition, observable : str
+    sample : Sample
+        In the unit of the observable.
+    """
+
+    condition: str
+    observable: str
+    sample: Sample
+
+
+def with_measurements(study: Study) -> tuple[Study, tuple[str, ...]]:
+    """Take the numbers of a target from its pictures or its file.
+
+    Parameters
+    ----------
+    study
+        Whose ``[target]`` may name them.
+
+    Returns
+    -------
+    study
+        The same study with mean, sd and n in their stead; as it was where it gives them itself.
+    notes
+        What a reader must know about the measurements.
+
+    Raises
+    ------
+    InputError
+        When a picture or the file cannot be used, or angles were measured otherwise than the study says.
+    """
+    section, place = study.target_section, f"{study.file}: target"
+    if section is None or section.twin is not None:
+        return study, ()
+    if section.fit is not None:
+        require_same_fit(section.fit, study.measurement.fit, f"{place}.fit")
+    if section.pictures is not None:
+        if section.observable != ANGLE or section.scene != TARGET_SCENE:
+            raise InputError("photographs give the angle of the study's own scene", section.title, place)
+        paths = find_pictures(section.pictures, study.file.parent, f"{place}.pictures")
+        sample = Sample.of([angle.mean for angle in measure_pictures(paths, study.measurement.fit)])
+        note = f"{len(paths)} pictures: {', '.join(path.name for path in paths)}"
+        return _given(study, [Replicated(TARGET_SCENE, ANGLE, sample)], note), ()
+    if section.file is not None:
+        measured = read_measured(study.file.parent / section.file, study)
+        found, notes = [], list(measured.notes)
+        for condition in measured.conditions:
+            for name, column in zip(measured.observables, measured.values[condition].T, strict=True):
+                values = column[np.isfinite(column)]
+                if len(values) > 1 and np.ptp(values) > 0.0:
+                    found.append(Replicated(condition, name, Sample.of(values)))
+                elif len(values):
+                    notes.append(f"{condition}: {name} shows no scatter, so that it is not to be matched")
+        return _given(study, found, f"file {section.file}"), tuple(notes)
+    return study, ()
+
+
+def target_tables(study: Study, measured: Iterable[Replicated]) -> dict[str, Any]:
+    """Write measurements as ``[target]`` and ``[[response]]`` tables of a study.
+
+    The angle of the first condition that takes part in the fit leads, or else its first observable.
+
+    Parameters
+    ----------
+    study
+        Whose conditions were measured.
+    measured
+        What was measured of them.
+
+    Returns
+    -------
+    dict
+        Empty where nothing was measured that can take part in a fit.
+    """
+    held_out = {condition.name for condition in study.conditions if condition.held_out}
+    order = [TARGET_SCENE, *(condition.name for condition in study.conditions)]
+    ranked = sorted(
+        measured,
+        key=lambda one: (one.condition in held_out, order.index(one.condition), _column(one) != ANGLE),
+    )
+    if not ranked or ranked[0].condition in held_out:
+        return {}
+    first, *others = [_table(study, one) for one in ranked]
+    return {"target": first} | ({"response": others} if others else {})
+
+
+def _given(study: Study, measured: list[Replicated], note: str) -> Study:
+    """Put measurements in place of where they come from; the responses of the study stay."""
+    document = study.document
+    tables = target_tables(study, measured)
+    if not tables:
+        rule = "needs an observable with two values or more under a condition that is not held out"
+        raise InputError(rule, note, f"{study.file}: target")
+    responses = [*tables.get("response", []), *document.get("response", [])]
+    document |= {"target": tables["target"] | {"note": note}}
+    return study.with_document(document | ({"response": responses} if responses else {}))
+
+
+def _table(study: Study, one: Replicated) -> dict[str, Any]:
+    """Write one as the table of a response: numbers that read back as the same floats."""
+    unit, column = BY_NAME[one.observable].unit, _column(one)
+    quantities = {
+        key: value if unit == "1" else f"{value!r} {unit}"
+        for key, value in (("mean", float(one.sample.mean)), ("sd", float(one.sample.sd)))
+    }
+    own = one.condition == TARGET_SCENE or not _changes(study, one.condition)
+    if own:
+        return {"observable": column, **quantities, "n": one.sample.n}
+    name = f"{column}_{one.condition}".replace("-", "_")
+    return {
+        "name": name,
+        "observable": column,
+        "scene": one.condition,
+        **quantities,
+        "n": one.sample.n,
+    }
+
+
+def _changes(study: Study, condition: str) -> bool:
+    """Tell if a condition differs from the study as it is written."""
+    return any(one.changes for one in study.conditions if one.name == condition)
+
+
+def _column(one: Replicated) -> str:
+    return BY_NAME[one.observable].column

@@ -1,0 +1,149 @@
+"""Targets taken from photographs and from files of measured heaps, and what is said of wrong ones."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from experiments.commands.run import check_runs
+
+from doe import Sample
+from experiments.errors import InputError
+from experiments.measurement.target import with_measurements
+from experiments.studyfile import Study, load_study
+from imaging import measure_photograph, save_picture
+from imaging.synthetic import Camera, DrawnHeap, draw
+
+WriteStudy = Callable[..., Path]
+
+NUMBERS = 'mean = "30 deg"\nsd = "0.5 deg"\nn = 5\n'
+
+CONDITIONS = """
+[condition.base]
+
+[condition.fast]
+scene.lifted-cylinder.lift_speed = "0.25 m/s"
+
+[condition.wide]
+held_out = true
+scene.lifted-cylinder.diameter = "40 mm"
+"""
+
+MEASURED = """condition,replicate,observable,value,unit
+base,1,angle,24.5,deg
+base,2,flank_angle,25.5,deg
+base,1,t75,400,ms
+base,2,t75,420,ms
+base,1,height,12,mm
+fast,1,angle,21,deg
+fast,2,angle,23,deg
+wide,1,angle,19,deg
+wide,2,angle,20,deg
+"""
+
+
+@pytest.fixture
+def from_source(write_study: WriteStudy) -> Callable[..., Study]:
+    """Load the small study with a target that is to be measured."""
+    return lambda source, add="": load_study(write_study((NUMBERS, f"{source}\n"), add=add))
+
+
+@pytest.fixture
+def photographs(tmp_path: Path) -> list[Path]:
+    """Three drawn heaps in a folder beside the study."""
+    (tmp_path / "photos").mkdir()
+    paths = [tmp_path / "photos" / f"heap-{number}.png" for number in range(3)]
+    for path, slope in zip(paths, (27.0, 29.0, 31.0), strict=True):
+        save_picture(path, draw(DrawnHeap(slope, slope), Camera(noise=0)))
+    return paths
+
+
+@pytest.mark.parametrize("pattern", ["photos", "photos/*.png"])
+def test_photographs_become_mean_sd_and_n(from_source, photographs: list[Path], pattern: str) -> None:
+    study, notes = with_measurements(from_source(f'pictures = "{pattern}"'))
+    angles = [measure_photograph(path, "flank").mean for path in photographs]
+    assert study.target.leading.measured == Sample.of(angles)
+    # Drawn truth: 0.3 degrees is the promise for drawn heaps of 400 pixels.
+    assert study.target.leading.measured.mean == pytest.approx(29.0, abs=0.3)
+    assert notes == ()
+    assert "heap-0.png" in study.target_section.note
+    # What is kept with the results says the numbers, so that other pictures are another study.
+    assert set(study.document["target"]) == {"observable", "mean", "sd", "n", "note"}
+
+
+def test_pictures_are_measured_with_the_fit_of_the_study(write_study: WriteStudy, photographs) -> None:
+    middle = ("[measurement]\n", '[measurement]\nfit = "middle"\n')
+    path = write_study((NUMBERS, 'pictures = "photos"\n'), middle)
+    study, _ = with_measurements(load_study(path))
+    expected = Sample.of([measure_photograph(photograph, "middle").mean for photograph in photographs])
+    assert study.target.leading.measured == expected
+
+
+def test_every_picture_without_a_heap_is_named(from_source, photographs: list[Path]) -> None:
+    for path in photographs[:2]:
+        save_picture(path, np.full((300, 500, 3), 200, np.uint8))
+    with pytest.raises(InputError) as error:
+        check_runs(from_source('pictures = "photos"'))
+    assert [problem.place for problem in error.value.problems] == [str(path) for path in photographs[:2]]
+    assert "contrast" in error.value.value
+
+
+def test_a_file_of_heaps_becomes_a_response_for_each_observable(from_source, tmp_path: Path) -> None:
+    (tmp_path / "measured.csv").write_text(MEASURED, encoding="utf-8")
+    study, notes = with_measurements(from_source('file = "measured.csv"', CONDITIONS))
+    found = {response.name: response for response in study.target.responses}
+    assert list(found) == ["angle", "t75", "angle_fast", "angle_wide"]
+    assert found["angle"].measured == Sample.of([24.5, 25.5])
+    assert found["t75"].measured == Sample.of([0.4, 0.42])
+    assert (found["angle_fast"].scene, found["angle_wide"].held_out) == ("fast", True)
+    assert [response.name for response in study.target.fitted] == ["angle", "t75", "angle_fast"]
+    # One height shows no scatter.
+    assert any("height shows no scatter" in note for note in notes)
+    assert study.case({}, seed=1, scene="fast").scene.lift_speed == 0.25
+
+
+def test_a_file_measured_under_held_out_conditions_alone_leads_nowhere(from_source, tmp_path: Path) -> None:
+    rows = [line for line in MEASURED.splitlines() if line.startswith(("condition", "wide"))]
+    (tmp_path / "measured.csv").write_text("\n".join(rows), encoding="utf-8")
+    with pytest.raises(InputError, match="not held out"):
+        with_measurements(from_source('file = "measured.csv"', CONDITIONS))
+
+
+@pytest.mark.parametrize(
+    ("source", "place", "rule"),
+    [
+        (f'{NUMBERS}fit = "middle"', "target.fit", "measured with the same fit"),
+        (f'{NUMBERS}fit = "midle"', "target.fit", "the fit is one of"),
+        ('pictures = "photos"', "target.pictures", "at least two pictures"),
+        ('file = "none.csv"', "none.csv", "readable CSV file"),
+    ],
+)
+def test_measurements_that_cannot_be_used_are_refused(
+    from_source, source: str, place: str, rule: str
+) -> None:
+    with pytest.raises(InputError) as error:
+        check_runs(from_source(source))
+    assert rule in error.value.rule
+    assert error.value.place.endswith(place)
+
+
+def test_angles_of_a_file_say_how_they_were_fitted(from_source, tmp_path: Path) -> None:
+    rows = "condition,replicate,observable,value,fit\nbase,1,angle,25,flank\nbase,2,angle,26,middle\n"
+    (tmp_path / "measured.csv").write_text(rows, encoding="utf-8")
+    with pytest.raises(InputError, match="measured with the same fit") as error:
+        with_measurements(from_source('file = "measured.csv"'))
+    assert error.value.place.endswith("measured.csv:3: fit")
+
+
+@pytest.mark.parametrize("source", [f'{NUMBERS}pictures = "a"', 'pictures = "a"\nfile = "b.csv"'])
+def test_a_target_has_one_source(from_source, source: str) -> None:
+    with pytest.raises(InputError, match="one of them"):
+        from_source(source)
+
+
+def test_numbers_must_be_taken_before_a_target_is_read(from_source) -> None:
+    study = from_source('pictures = "photos"')
+    with pytest.raises(InputError, match="with_measurements"):
+        study.target  # noqa: B018
