@@ -19,8 +19,8 @@ _PROPERTIES: dict[type, tuple[str, ...]] = {
     Sample: ("mean", "sd", "n", "se"),
     NoiseFloor: ("confidence", "mean_interval", "sd_interval"),
     Comparison: (
-        "a", "b", "method", "difference", "se", "df", "t", "p", "interval", "alpha", "margin", "equivalence_p",
-        "equivalent", "smallest_margin",
+        "a", "b", "method", "difference", "se", "df", "t", "p", "interval", "alpha", "margin",
+        "equivalence_p", "equivalent", "smallest_margin",
     ),
     Design: ("factors", "dummies", "coded", "natural"),
     ScreenResult: ("table", "anova", "error_rule", "error_df", "error_ms", "effects"),

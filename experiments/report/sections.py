@@ -4,8 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
-from experiments.calibrate.results import Campaign
+from experiments.calibrate.results import (
+    Campaign,
+    ClimbResult,
+    NoiseFloorResult,
+    OptimumResult,
+    ScreeningResult,
+    SelectionResult,
+    SurfaceResult,
+    TargetResult,
+    VerificationResult,
+)
 from experiments.report import charts, stage_tables, surfaces
 from experiments.report.joint_charts import joint_charts
 from experiments.report.published import Published
@@ -55,11 +66,11 @@ class Section:
 
 @dataclass(frozen=True)
 class Context:
-    """What the sections draw on."""
+    """Sources of the sections."""
 
     campaign: Campaign
     labels: Mapping[str, str]
-    """What each factor is, in words."""
+    """Meaning of each factor, in words."""
     published: Published | None
     """The paper's numbers, where the study is the paper's."""
 
@@ -67,6 +78,13 @@ class Context:
     def leading(self) -> Response:
         """The response that leads the campaign."""
         return self.campaign.responses[0]
+
+    @property
+    def target(self) -> TargetResult:
+        """Target of a campaign that reached its first stage."""
+        if self.campaign.target is None:
+            raise ValueError("the campaign ended before its target")
+        return self.campaign.target
 
     @property
     def truth(self) -> dict[str, float] | None:
@@ -79,8 +97,8 @@ def stage_sections(context: Context) -> list[Section]:
     campaign = context.campaign
     factors = stage_tables.factors_table(campaign.factors, context.labels, context.truth)
     sections = [Section("factors", {"levels": factors})]
-    for name in campaign.stages:
-        sections.append(_STAGES[name](context))
+    for name, result in campaign.stages.items():
+        sections.append(_STAGES[name](context, result))
         if name == "optimum":
             sections += _responses(context)
     return sections
@@ -107,31 +125,24 @@ def paper_sections(published: Published | None) -> list[Section]:
     return [Section("paper", {"misprints": stage_tables.misprints_table(published)})]
 
 
-def _target(context: Context) -> Section:
-    campaign = context.campaign
-    tables = {"responses": goals_table(campaign)}
-    if campaign.target is not None and campaign.target.cases is not None:
+def _target(context: Context, result: TargetResult) -> Section:
+    campaign, tables = context.campaign, {"responses": goals_table(context.campaign)}
+    if result.cases is not None:
         caption = "The cases whose means are the target."
-        cases = campaign.target.cases
-        tables["cases"] = stage_tables.cases_table("target-cases", cases, campaign.responses, caption)
+        table = stage_tables.cases_table("target-cases", result.cases, campaign.responses, caption)
+        tables["cases"] = table
     return Section("target", tables)
 
 
-def _noise_floor(context: Context) -> Section:
-    campaign = context.campaign
-    result, target = campaign.noise_floor, campaign.target
-    if result is None or target is None:
-        return Section("noise_floor")
-    caption = "Replicates at the middle."
-    table = stage_tables.cases_table("noise-floor", result.cases, campaign.responses, caption)
-    chart = charts.noise_floor_chart(result, target, context.leading)
+def _noise_floor(context: Context, result: NoiseFloorResult) -> Section:
+    caption, responses = "Replicates at the middle.", context.campaign.responses
+    table = stage_tables.cases_table("noise-floor", result.cases, responses, caption)
+    chart = charts.noise_floor_chart(result, context.target, context.leading)
     return Section("noise_floor", {"cases": table}, [chart])
 
 
-def _screening(context: Context) -> Section:
-    result, alpha = context.campaign.screening, context.campaign.settings.selection.alpha
-    if result is None:
-        return Section("screening")
+def _screening(context: Context, result: ScreeningResult) -> Section:
+    alpha = context.campaign.settings.selection.alpha
     published = context.published.screening if context.published else None
     screen, response = result.leading.screen, context.leading
     tables = {
@@ -139,40 +150,28 @@ def _screening(context: Context) -> Section:
         "effects": stage_tables.effects_table(screen, response, context.labels, alpha, published),
         "anova": stage_tables.anova_table("screening-anova", screen.anova, "Analysis of variance."),
     }
-    drawn = [
-        charts.pareto_chart(screen, alpha, response),
-        charts.half_normal_chart(screen, alpha, response),
-    ]
-    return Section("screening", tables, drawn)
+    drawn = (charts.pareto_chart, charts.half_normal_chart)
+    return Section("screening", tables, [draw(screen, alpha, response) for draw in drawn])
 
 
-def _selection(context: Context) -> Section:
-    result = context.campaign.selection
-    tables = {"reasons": stage_tables.selection_table(result, context.leading)} if result else {}
-    return Section("selection", tables)
+def _selection(context: Context, result: SelectionResult) -> Section:
+    return Section("selection", {"reasons": stage_tables.selection_table(result, context.leading)})
 
 
-def _climb(context: Context) -> Section:
-    result, target = context.campaign.climb, context.campaign.target
-    if result is None or target is None:
-        return Section("climb")
+def _climb(context: Context, result: ClimbResult) -> Section:
     tables = {"path": stage_tables.climb_table(result, context.leading)}
     if context.published:
         tables["paper"] = stage_tables.paper_climb_table(context.published.climb)
-    return Section("climb", tables, [charts.climb_chart(result, target, context.leading)])
+    return Section("climb", tables, [charts.climb_chart(result, context.target, context.leading)])
 
 
-def _surface(context: Context) -> Section:
+def _surface(context: Context, result: SurfaceResult) -> Section:
     campaign, response = context.campaign, context.leading
-    result, target = campaign.surface, campaign.target
-    if result is None or target is None:
-        return Section("surface")
-    published, fit = context.published, result.leading
-    same = published is not None and set(published.kept) == set(result.design.names)
-    names = tuple(result.design.names)
-    paper = {
-        model: published.anova(model, names) if published and same else None for model in ("full", "reduced")
-    }
+    fit, names = result.leading, tuple(result.design.names)
+    published = context.published
+    if published is not None and set(published.kept) != set(names):
+        published = None
+    paper = {model: published.anova(model, names) if published else None for model in ("full", "reduced")}
     tables = {
         "design": stage_tables.surface_design_table(result, campaign.responses),
         "full": stage_tables.anova_table(
@@ -181,48 +180,40 @@ def _surface(context: Context) -> Section:
         "reduced": stage_tables.anova_table(
             "anova-reduced", fit.reduced.anova, "Reduced model.", paper["reduced"]
         ),
-        "quality": stage_tables.quality_table(fit, published.quality if published and same else None),
+        "quality": stage_tables.quality_table(fit, published.quality if published else None),
         "coefficients": stage_tables.coefficients_table(fit.reduced, response),
     }
     outside = stage_tables.outside_table(result)
     if outside:
         tables["outside"] = outside
-    drawn = surfaces.surface_charts(result, campaign.optimum, target, response)
+    drawn = surfaces.surface_charts(result, campaign.optimum, context.target, response)
     return Section("surface", tables, [*drawn, *surfaces.residual_charts(fit.reduced, response)])
 
 
-def _optimum(context: Context) -> Section:
-    campaign = context.campaign
-    if campaign.optimum is None or campaign.surface is None:
-        return Section("optimum")
-    table = stage_tables.ranges_table(campaign.optimum, campaign.surface.design)
-    return Section("optimum", {"ranges": table})
+def _optimum(context: Context, result: OptimumResult) -> Section:
+    return Section("optimum", {"ranges": stage_tables.ranges_table(result)})
 
 
 def _responses(context: Context) -> list[Section]:
     """Build the section of several responses; none where there is one."""
     campaign = context.campaign
-    surface, optimum, target = campaign.surface, campaign.optimum, campaign.target
-    if surface is None or optimum is None or target is None or optimum.joint is None:
+    if campaign.surface is None or campaign.optimum is None or campaign.optimum.joint is None:
         return []
     tables = response_tables(campaign)
     del tables["responses"]  # it stands with the target
-    return [Section("responses", tables, joint_charts(surface, optimum, target, campaign.responses))]
+    drawn = joint_charts(campaign.surface, campaign.optimum, context.target, campaign.responses)
+    return [Section("responses", tables, drawn)]
 
 
-def _verification(context: Context) -> Section:
-    campaign = context.campaign
-    result, responses = campaign.verification, campaign.responses
-    if result is None:
-        return Section("verification")
-    caption = "Fresh cases at the chosen point."
+def _verification(context: Context, result: VerificationResult) -> Section:
+    caption, responses = "Fresh cases at the chosen point.", context.campaign.responses
     table = stage_tables.cases_table("verification-cases", result.cases, responses, caption)
     tests = stage_tables.tests_table(result, responses, context.published)
     chart = charts.verification_chart(result, context.leading)
     return Section("verification", {"cases": table, "tests": tests}, [chart])
 
 
-_STAGES: dict[str, Callable[[Context], Section]] = {
+_STAGES: dict[str, Callable[[Context, Any], Section]] = {
     "target": _target,
     "noise_floor": _noise_floor,
     "screening": _screening,
