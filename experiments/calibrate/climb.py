@@ -32,9 +32,9 @@ from experiments.calibrate.results import (
 from experiments.calibrate.values import (
     fixed_values,
     kept_factors,
+    key_of,
     listed,
     numbered_values,
-    of,
     quantity,
     reach_limits,
 )
@@ -48,7 +48,7 @@ LEAST_STEPS = 2
 
 @dataclass(frozen=True)
 class _Line:
-    """Where a climb starts and how it moves."""
+    """Start and moves of a climb."""
 
     screen: ScreenResult
     kept: tuple[str, ...]
@@ -287,8 +287,8 @@ def _end_decision(
     place: float | None,
     best: int,
 ) -> Decision:
-    numbers = {of(f"step {step}, mean", response): mean for step, mean in path["mean"].items()}
-    numbers |= {of("target", response): target.mean, "nearest step": best}
+    numbers = {key_of(f"step {step}, mean", response): mean for step, mean in path["mean"].items()}
+    numbers |= {key_of("target", response): target.mean, "nearest step": best}
     if crossing is not None:
         numbers |= {"crossing step": place} | numbered_values("crossing", crossing)
         outcome = f"The path crosses the target at {listed(crossing)} (step {place:.2f}, interpolated)."

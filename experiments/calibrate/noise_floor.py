@@ -7,7 +7,7 @@ import pandas as pd
 from doe import noise_floor
 from experiments.calibrate.cases import failure_summary, middle, plan_cases, values_of
 from experiments.calibrate.results import Decision, NoiseFloorResult
-from experiments.calibrate.values import interval_text, of, quantity
+from experiments.calibrate.values import interval_text, key_of, quantity
 from experiments.studyfile.campaign import CampaignStudy, scenes_of
 
 STAGE = "noise_floor"
@@ -35,10 +35,10 @@ def analyse_noise_floor(study: CampaignStudy, cases: pd.DataFrame) -> NoiseFloor
     numbers: dict[str, float] = {"confidence": confidence}
     said = []
     for response, floor in zip(responses, floors.values(), strict=True):
-        numbers |= {of("mean", response): floor.mean, of("sd", response): floor.sd}
+        numbers |= {key_of("mean", response): floor.mean, key_of("sd", response): floor.sd}
         numbers |= {f"n of {response.name}": floor.sample.n}
         numbers |= dict(
-            zip((of("sd low", response), of("sd high", response)), floor.sd_interval, strict=True)
+            zip((key_of("sd low", response), key_of("sd high", response)), floor.sd_interval, strict=True)
         )
         said.append(
             f"{response.name} by {quantity(floor.sd, response.unit)} ({confidence:.0%} interval "

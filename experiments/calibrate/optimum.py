@@ -22,9 +22,9 @@ from experiments.calibrate.results import (
 from experiments.calibrate.values import (
     fixed_values,
     interval_text,
+    key_of,
     listed,
     numbered_values,
-    of,
     quantity,
 )
 from experiments.studyfile.campaign import CampaignStudy, OptimumSettings, Response
@@ -60,8 +60,8 @@ def find_optimum(study: CampaignStudy, surface: SurfaceResult, target: TargetRes
             rule,
             numbered_values("chosen", point)
             | {
-                of("prediction", response): prediction["mean"],
-                of("se of the fit", response): prediction["se"],
+                key_of("prediction", response): prediction["mean"],
+                key_of("se of the fit", response): prediction["se"],
             },
             f"Chosen: {listed(point)}; the surface of the {response.name} predicts "
             f"{quantity(prediction['mean'], response.unit)} ({interval_text(likely, response.unit)}).",
@@ -197,7 +197,7 @@ def _truth_decision(truth: TruthCheck, target: float, response: Response) -> Dec
         "A twin study: the hidden settings are looked up in the compatible region.",
         numbered_values("hidden", truth.values)
         | {"distance to the contour, coded": truth.distance}
-        | {of("prediction at the truth", response): truth.predicted, of("target", response): target},
+        | {key_of("prediction at the truth", response): truth.predicted, key_of("target", response): target},
         f"{verdict} {_distance(truth.distance)}; the surface predicts "
         f"{quantity(truth.predicted, response.unit)} there, the target is {quantity(target, response.unit)}.",
     )

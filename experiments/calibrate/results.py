@@ -28,7 +28,7 @@ Found = TypeVar("Found")
 
 
 class Outcome(StrEnum):
-    """How a campaign ended."""
+    """Ending of a campaign."""
 
     CALIBRATED = "calibrated"
     NOT_VERIFIED = "not-verified"
@@ -40,7 +40,7 @@ class Outcome(StrEnum):
 
 
 class ClimbEnd(StrEnum):
-    """How a climb ended."""
+    """Ending of a climb."""
 
     CROSSED = "crossed"
     TURNED = "turned"
@@ -68,7 +68,7 @@ class Decision:
     numbers: dict[str, Any]
     """The numbers that the rule looked at (unit in the key)."""
     outcome: str
-    """What was decided, as a sentence."""
+    """The decision, as a sentence."""
 
 
 class _Tabled:
@@ -242,9 +242,9 @@ class TruthCheck:
     values: dict[str, float]
     """Hidden value of every kept factor, natural unit."""
     inside_design: bool
-    """Whether the composite design reaches so far."""
+    """True where the composite design reaches so far."""
     compatible: bool | None
-    """Whether the truth lies in the compatible region; None outside the design, where nothing can be said."""
+    """True where the truth lies in the compatible region; None outside the design: nothing can be said."""
     distance: float | None
     """Coded distance from the truth to the target contour; None when there is no contour."""
     predicted: float
@@ -266,7 +266,7 @@ class OptimumResult(_Tabled):
     contour: pd.DataFrame
     """Points of the leading response's target contour in that box: a column a kept factor (index: piece)."""
     region: Region
-    """Where the fit and the target agree within their uncertainties, for all responses."""
+    """Settings at which the fit and the target agree within their uncertainties, for all responses."""
     unidentified: tuple[str, ...]
     """Kept factors that the target does not pin down."""
     truth: TruthCheck | None

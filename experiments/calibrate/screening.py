@@ -16,7 +16,7 @@ from experiments.calibrate.cases import (
     too_many_failed,
 )
 from experiments.calibrate.results import Decision, Screened, ScreeningResult
-from experiments.calibrate.values import of, p_text, quantity
+from experiments.calibrate.values import key_of, p_text, quantity
 from experiments.studyfile.campaign import CampaignStudy, Response, ScreeningSettings, scenes_of
 
 STAGE = "screening"
@@ -97,7 +97,7 @@ def _decision(
             "runs": len(design.coded),
             "dummy columns": len(design.dummies),
             "error df": result.error_df,
-            of("error sd", response): result.error_ms**0.5,
+            key_of("error sd", response): result.error_ms**0.5,
             "critical |t| at 0.10": result.critical_t(0.10),
             "critical |t| at 0.05": result.critical_t(0.05),
             "critical |t| at 0.05, Bonferroni": result.critical_t(0.05, bonferroni=True),

@@ -16,7 +16,7 @@ from experiments.calibrate.results import (
     ScreeningResult,
     SelectionResult,
 )
-from experiments.calibrate.values import of, p_text, quantity
+from experiments.calibrate.values import key_of, p_text, quantity
 from experiments.studyfile.campaign import Response, SelectionSettings
 
 STAGE = "selection"
@@ -148,6 +148,7 @@ def _noise_decision(
     settings: SelectionSettings, table: pd.DataFrame, visible: float, floor: NoiseFloor, response: Response
 ) -> Decision:
     missed = [str(name) for name in table.index[table["visible"] & ~table["kept"]]]
+    numbers = {key_of("sd", response): floor.sd, key_of("visible effect", response): visible}
     outcome = (
         f"Effects from {quantity(visible, response.unit)} on had a chance of {settings.power:.0%} to be seen."
     )
@@ -159,6 +160,6 @@ def _noise_decision(
     return Decision(
         STAGE,
         "The noise floor tells the smallest effect that the screening could see, were noise its only error.",
-        {of("sd", response): floor.sd, of("visible effect", response): visible, "power": settings.power},
+        numbers | {"power": settings.power},
         outcome,
     )

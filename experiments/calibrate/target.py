@@ -7,7 +7,7 @@ import pandas as pd
 from doe import Sample
 from experiments.calibrate.cases import failure_summary, middle, plan_cases, values_of
 from experiments.calibrate.results import Decision, TargetResult
-from experiments.calibrate.values import numbered_values, of, quantity
+from experiments.calibrate.values import key_of, numbered_values, quantity
 from experiments.studyfile.campaign import CampaignStudy, Response, scenes_of
 
 STAGE = "target"
@@ -36,7 +36,7 @@ def settle_target(study: CampaignStudy, cases: pd.DataFrame | None = None) -> Ta
     numbers: dict[str, float] = {}
     for response, sample in zip(target.responses, samples.values(), strict=True):
         for what in ("mean", "sd", "se"):
-            numbers[of(what, response)] = getattr(sample, what)
+            numbers[key_of(what, response)] = getattr(sample, what)
         numbers[f"n of {response.name}"] = sample.n
     aims = [
         f"{r.name} {quantity(samples[r.name].mean, r.unit)}, known to {quantity(samples[r.name].se, r.unit)}"

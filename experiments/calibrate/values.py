@@ -53,7 +53,7 @@ def interval_text(ends: tuple[float, float], unit: str, sign: str = "") -> str:
     return f"{low} to {quantity(ends[1], unit, sign)}"
 
 
-def of(what: str, response: Response) -> str:
+def key_of(what: str, response: Response) -> str:
     """Key of a number that a decision looked at: ``sd of angle [deg]``."""
     unit = "" if response.unit == "1" else f" [{response.unit}]"
     return f"{what} of {response.name}{unit}"

@@ -7,7 +7,7 @@ import pandas as pd
 from doe import Comparison, compare_means
 from experiments.calibrate.cases import Runner, failure_summary, plan_cases, simulate, values_of
 from experiments.calibrate.results import Decision, OptimumResult, TargetResult, VerificationResult
-from experiments.calibrate.values import interval_text, of, p_text, quantity
+from experiments.calibrate.values import interval_text, key_of, p_text, quantity
 from experiments.studyfile.campaign import CampaignStudy, Response, VerificationSettings, scenes_of
 
 STAGE = "verification"
@@ -60,16 +60,16 @@ def _decision(response: Response, test: Comparison, cases: pd.DataFrame) -> Deci
         f"Pooled two-sample t-test of fresh cases against the target of the {response.name}{held_out}, at "
         f"{test.alpha:.3g}, and two one-sided tests (TOST) of equivalence within {margin}.",
         {
-            of("mean", response): test.a.mean,
-            of("sd", response): test.a.sd,
+            key_of("mean", response): test.a.mean,
+            key_of("sd", response): test.a.sd,
             "cases": test.a.n,
-            of("target", response): test.a.mean - test.difference,
+            key_of("target", response): test.a.mean - test.difference,
             "t": test.t,
             "df": test.df,
             "p": test.p,
-            of("margin", response): test.margin,
+            key_of("margin", response): test.margin,
             "p of equivalence": test.equivalence_p,
-            of("smallest margin shown", response): test.smallest_margin,
+            key_of("smallest margin shown", response): test.smallest_margin,
         },
         f"{found} ({p_text(test.p)}): {quantity(test.difference, unit, '+')}, "
         f"{100.0 * (1.0 - test.alpha):.3g} % interval {interval_text(test.interval, unit, '+')}. "

@@ -72,7 +72,7 @@ class _Found:
     doubts: list[tuple[int, Problem]] = field(default_factory=list)
     """Values of wrong units, which are set aside."""
     problems: list[tuple[int, Problem]] = field(default_factory=list)
-    """What cannot be read."""
+    """Rows that cannot be read."""
     notes: list[str] = field(default_factory=list)
     empty: int = 0
 

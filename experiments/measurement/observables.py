@@ -96,7 +96,7 @@ class Observable:
 
     @property
     def by_photograph(self) -> bool:
-        """Whether a photograph of the heap shows it."""
+        """True where a photograph of the heap shows it."""
         return self.seen is not None
 
     @property

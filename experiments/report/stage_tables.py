@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pandas as pd
 
-from doe import Design, Factor, ScreenResult, Surface, compare_means
+from doe import Factor, ScreenResult, Surface, compare_means
 from experiments.calibrate.results import (
     Campaign,
     ClimbResult,
@@ -277,14 +277,15 @@ def quality_table(result: FittedResponse, published: pd.DataFrame | None) -> Tab
     return make_table("quality", frame, columns, "Quality of the fits.")
 
 
-def ranges_table(optimum: OptimumResult, design: Design) -> Table:
+def ranges_table(optimum: OptimumResult) -> Table:
     """Lay out the chosen point with the values that are as good."""
     ranges = optimum.region.ranges
     frame = pd.DataFrame({"chosen": optimum.point, "low": ranges["low"], "high": ranges["high"]}).rename_axis(
         "factor"
     )
-    frame = frame.loc[design.names]
-    frame["unit"] = [factor.unit for factor in design.factors]
+    factors = optimum.region.factors
+    frame = frame.loc[[factor.name for factor in factors]]
+    frame["unit"] = [factor.unit for factor in factors]
     frame["pinned"] = ["no" if name in optimum.unidentified else "yes" for name in frame.index]
     if optimum.truth is not None:
         frame["truth"] = pd.Series(optimum.truth.values)

@@ -43,7 +43,7 @@ class Slice:
     point: Mapping[str, float]
     """Natural values at which the other factors are held."""
     response: Response
-    """What the surface is of."""
+    """Response that the surface is of."""
 
     def grid(self) -> SurfaceGrid:
         """Fitted values over a square that shows every run."""

@@ -111,7 +111,7 @@ class TargetSection(ResponseSection):
     file: str | None = None
     """File of measured heaps, instead of numbers: all that it tells is to be matched."""
     note: str = ""
-    """Where the measurements come from, in words."""
+    """Source of the measurements, in words."""
     twin: TwinSection | None = None
     """The target comes from cases simulated with settings that the campaign does not see."""
 

@@ -14,7 +14,7 @@ from markupsafe import Markup, escape
 from experiments.studyfile.campaign import Response
 
 MISSING = "–"
-"""What stands where a table has no number."""
+"""Sign for a number that a table lacks."""
 
 SMALLEST_P = 1e-4
 """p values below this are only said to be smaller."""
@@ -142,7 +142,7 @@ KINDS: Mapping[str, Callable[[list[float | None]], list[str]]] = MappingProxyTyp
         "measured": _per_value(measured),
     }
 )
-"""How a column of numbers is written, by the kind of quantity."""
+"""Writers of a column of numbers, by the kind of quantity."""
 
 
 def plain(value: Any) -> str:
