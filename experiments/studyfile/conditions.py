@@ -35,20 +35,20 @@ BASE = Condition("base")
 
 
 class ConditionSection(Section):
-    """``[condition.NAME]``: what is known to be different under a condition."""
+    """``[condition.NAME]``: the known differences of a test."""
 
     held_out: bool = False
     """It takes no part in any fit, and only judges."""
     grain: dict[str, Any] | None = None
-    """Of the grains, as their moisture."""
+    """Values of the grains that differ, as their size."""
     wall: dict[str, Any] | None = None
-    """Of the walls."""
+    """Values of the walls that differ."""
     contact: dict[str, Any] | None = None
-    """Of a pair of surfaces."""
+    """Values of a pair of surfaces that differ."""
     scene: dict[str, Any] | None = None
-    """Of the test."""
+    """Values of the test that differ."""
     mechanism: dict[str, Any] | None = None
-    """Of a physical effect beside those of the base law."""
+    """Values of a physical effect beside those of the base law."""
 
     def condition(self, name: str) -> Condition:
         """Build the condition."""
