@@ -85,8 +85,8 @@ class GrainSection(MaterialSection, ShapeSection):
     size_mean: Number = Field(default=1.0, gt=0.0)
     """Mean size, as a multiple of the shape."""
     size_mean_of: Literal["sizes", "masses"] = "sizes"
-    """Mean of the sizes, as a ruler gives it, or size of a grain of mean mass, as a balance does: then a wider
-    spread leaves the mass of a number of grains as it is."""
+    """Mean of the sizes, as a ruler gives it, or size of a grain of mean mass, as a balance does: then a
+    wider spread leaves the mass of a number of grains as it is."""
     size_sd: Number = Field(default=0.05, ge=0.0)
     """Standard deviation of the size."""
     elongation: Number = Field(default=0.0, ge=0.0)
