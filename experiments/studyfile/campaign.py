@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, Protocol
 
 from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
 
-from experiments.studyfile.schema import Dimension, Section, nested_error
+from experiments.studyfile.schema import Angle, Section, nested_error
 
 if TYPE_CHECKING:
     from doe import Factor, Sample
@@ -22,22 +22,18 @@ if TYPE_CHECKING:
 
 def _in_natural_units(values: object, info: ValidationInfo) -> object:
     """Turn quantities of a study file into natural units; plain numbers of a program are so already."""
-    if not (info.context and isinstance(values, Mapping)):
+    natural_value = (info.context or {}).get("natural_value")
+    if natural_value is None or not isinstance(values, Mapping):
         return values
     natural, errors = {}, []
     for name, value in values.items():
         try:
-            natural[name] = info.context["natural_value"](name, value)
+            natural[name] = natural_value(name, value)
         except ValueError as error:
             errors.append({"type": "value_error", "loc": (name,), "msg": str(error)})
     if errors:
         raise nested_error(errors)
     return natural
-
-
-def _in_degrees(value: object, info: ValidationInfo) -> object:
-    """Turn an angle of a study file into degrees; a plain number of a program is so already."""
-    return Dimension("angle").to_base(value) if info.context else value
 
 
 FactorValues = Annotated[dict[str, float], BeforeValidator(_in_natural_units)]
@@ -74,9 +70,9 @@ class ScreeningSettings(Section):
     design: str = "plackett-burman"
     """Name of the design; packages from outside add further ones."""
     runs: int | None = Field(default=None, ge=4, multiple_of=4)
-    """Runs of the design; None: the fewest that leave ``dummies`` columns free."""
+    """Runs of the design; left out: the fewest that leave ``dummies`` columns free."""
     dummies: int = Field(default=3, ge=0)
-    """Dummy columns wanted when ``runs`` is None: each is one degree of freedom of the error."""
+    """Dummy columns wanted when ``runs`` is left out: each is one degree of freedom of the error."""
     replicates: int = Field(default=1, ge=1)
     """Cases of each run."""
 
@@ -85,7 +81,7 @@ class SelectionSettings(Section):
     """Stage (c): which factors are kept."""
 
     keep: tuple[str, ...] | None = Field(default=None, min_length=1)
-    """Names of the factors to keep; None: by the rule below."""
+    """Names of the factors to keep; left out: by the rule below."""
     alpha: float = Field(default=0.10, gt=0.0, lt=1.0)
     """A factor is kept when its p value is below this."""
     at_least: int = Field(default=0, ge=0)
@@ -110,9 +106,9 @@ class ClimbSettings(Section):
     steps: int = Field(default=6, ge=2)
     """Points of the first batch."""
     start: FactorValues | None = None
-    """First point; None: the low end of the line through the centre along the effects."""
+    """First point; left out: the low end of the line through the centre along the effects."""
     step: FactorValues | None = None
-    """Move per step; None: along the effects, so that ``steps`` points span the stated range."""
+    """Move per step; left out: along the effects, so that ``steps`` points span the stated range."""
     extensions: int = Field(default=1, ge=0)
     """Further batches of up to ``steps`` points when the target was not crossed."""
     reach: float = Field(default=2.0, ge=1.0)
@@ -138,9 +134,9 @@ class SurfaceSettings(Section):
     center_rule: Literal["crossing", "smallest-error"] = "crossing"
     """Centre where the climb crosses the target (interpolated), or at its step nearest to the target."""
     center: FactorValues | None = None
-    """Centre of the design; None: by ``center_rule``."""
+    """Centre of the design; left out: by ``center_rule``."""
     half_range: FactorValues | None = None
-    """Coded unit of each factor; None: one climb step, at least ``half_range_least``."""
+    """Coded unit of each factor; left out: one climb step, at least ``half_range_least``."""
     half_range_least: float = Field(default=0.4, gt=0.0)
     """Least half-range as a fraction of the factor's screening half-range (a step along a weak factor is
     too short to fit a slope)."""
@@ -151,7 +147,7 @@ class SurfaceSettings(Section):
     replicates: int = Field(default=1, ge=1)
     """Cases of each factorial and axial run."""
     drop: tuple[str, ...] | None = None
-    """Terms to leave out of the reduced surface ("F^2", "E:F"); None: backward elimination."""
+    """Terms to leave out of the reduced surface ("F^2", "E:F"); left out: backward elimination."""
     reduce_alpha: float = Field(default=0.05, gt=0.0, lt=1.0)
     """Backward elimination drops a term whose p value is above this."""
     lack_of_fit_alpha: float = Field(default=0.05, gt=0.0, lt=1.0)
@@ -162,7 +158,7 @@ class OptimumSettings(Section):
     """Stage (g): the chosen point and the compatible region."""
 
     point: FactorValues | None = None
-    """The chosen point; None: the point of the target contour nearest to the design centre (coded units)."""
+    """The chosen point; left out: the point of the target contour nearest to the centre (coded units)."""
     confidence: float = Field(default=0.95, gt=0.0, lt=1.0)
     """Level of the compatible region."""
     unidentified_span: float = Field(default=0.5, gt=0.0, le=1.0)
@@ -174,10 +170,10 @@ class VerificationSettings(Section):
 
     replicates: int = Field(default=5, ge=2)
     """Fresh cases at the chosen point."""
-    margin: Annotated[float, BeforeValidator(_in_degrees)] | None = Field(default=None, gt=0.0)
-    """Equivalence margin of the leading response, an angle [deg]; None: by ``margin_sds``."""
+    margin: Angle | None = Field(default=None, gt=0.0)
+    """Equivalence margin of the leading response, an angle; left out: by ``margin_sds``."""
     margin_sds: float = Field(default=2.0, gt=0.0)
-    """Margin in standard deviations of the target; of the leading response when ``margin`` is None."""
+    """Margin in standard deviations of the target; of the leading response when ``margin`` is left out."""
     alpha: float = Field(default=0.05, gt=0.0, lt=1.0)
     """Level of the t-test and of each one-sided test."""
     require_equivalence: bool = False

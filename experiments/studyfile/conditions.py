@@ -8,61 +8,57 @@ factor varies it under that condition.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from typing import Annotated, Any
 
-from pydantic import AfterValidator
+from pydantic import AfterValidator, PrivateAttr
 
 from experiments.studyfile.factor_section import merge
 from experiments.studyfile.places import value_at
 from experiments.studyfile.schema import Section
 
 
-@dataclass(frozen=True)
-class Condition:
-    """One way to test the grain."""
-
-    name: str
-    """Name in files and tables."""
-    changes: Mapping[str, Any] = field(default_factory=dict)
-    """Sections of the study that differ under it, as written; none: the study as it is."""
-    held_out: bool = False
-    """It takes no part in any fit, and only judges."""
-
-
-BASE = Condition("base")
-"""The one condition of a study that has none of its own."""
-
-
-class ConditionSection(Section):
-    """``[condition.NAME]``: what is known to be different under a condition."""
+class Condition(Section):
+    """``[condition.NAME]``: one way to test the grain, by its known differences from the study as it is."""
 
     held_out: bool = False
     """It takes no part in any fit, and only judges."""
     grain: dict[str, Any] | None = None
-    """Of the grains, as their moisture."""
+    """Values of the grains that differ, as their size."""
     wall: dict[str, Any] | None = None
-    """Of the walls."""
+    """Values of the walls that differ."""
     contact: dict[str, Any] | None = None
-    """Of a pair of surfaces."""
+    """Values of a pair of surfaces that differ."""
     scene: dict[str, Any] | None = None
-    """Of the test."""
+    """Values of the test that differ."""
     mechanism: dict[str, Any] | None = None
-    """Of a physical effect beside those of the base law."""
+    """Values of a physical effect beside those of the base law."""
 
-    def condition(self, name: str) -> Condition:
-        """Build the condition."""
-        return Condition(name, self.model_dump(exclude={"held_out"}, exclude_none=True), self.held_out)
+    _name: str = PrivateAttr(default="base")
+
+    @property
+    def name(self) -> str:
+        """Name in files and tables."""
+        return self._name
+
+    @property
+    def changes(self) -> dict[str, Any]:
+        """Sections of the study that differ under it, as written; none: the study as it is."""
+        return self.model_dump(exclude={"held_out"}, exclude_none=True)
 
 
-def _with_plain_names(sections: dict[str, ConditionSection]) -> dict[str, ConditionSection]:
-    for name in sections:
+BASE = Condition()
+"""The one condition of a study that has none of its own."""
+
+
+def _named(conditions: dict[str, Condition]) -> dict[str, Condition]:
+    for name, condition in conditions.items():
         if not name or not all(character.isalnum() or character in "_-" for character in name):
             raise ValueError(f"a condition's name has letters, digits, - and _ only, not {name!r}")
-    return sections
+        condition._name = name
+    return conditions
 
 
-ConditionSections = Annotated[dict[str, ConditionSection], AfterValidator(_with_plain_names)]
+Conditions = Annotated[dict[str, Condition], AfterValidator(_named)]
 """Conditions by name, in the order of the file."""
 
 

@@ -173,13 +173,13 @@ def with_factor_values(
     settings
         Values by factor name, natural units.
     """
-    values: dict[str, Any] = {}
+    written = dict(document)
     for section in sections:
         value = settings.get(section.name, section.factor().center)
-        written = str(Quantity(value, section.unit)) if section.unit else value
         for path in section.paths:
-            values = merge(values, nested(path, written))
-    return merge(document, values)
+            text = str(Quantity(value, section.unit)) if section.unit else value
+            written = merge(written, nested(path, text))
+    return written
 
 
 def check_one_home(document: Mapping[str, Any], sections: Iterable[FactorSection], places: Places) -> None:

@@ -8,7 +8,14 @@ from dataclasses import dataclass
 from typing import Annotated, Any, TypeVar, get_args, get_origin
 
 from annotated_types import Ge, Gt, Le, Lt
-from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, PlainValidator, ValidationError
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    GetCoreSchemaHandler,
+    PlainValidator,
+    ValidationError,
+    ValidationInfo,
+)
 from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
@@ -57,8 +64,12 @@ class Dimension:
         """Size of a unit in the base unit of the dimension."""
         return unit_size(unit or self.plain, self.name)
 
+    def read(self, value: object, info: ValidationInfo) -> object:
+        """Read a quantity of a file; a program, which has no context, may give a number in the base unit."""
+        return self.to_base(value) if info.context or not isinstance(value, float) else value
+
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.no_info_before_validator_function(self.to_base, handler(source))
+        return core_schema.with_info_before_validator_function(self.read, handler(source))
 
 
 Number = Annotated[float, Dimension("")]
@@ -84,15 +95,15 @@ class Generated:
     section: Callable[[], type[Section]]
     """Builds the section."""
 
-    def read(self, value: object) -> Section:
+    def read(self, value: object, info: ValidationInfo) -> Section:
         """Validate the section."""
         try:
-            return self.section().model_validate(value)
+            return self.section().model_validate(value, context=info.context)
         except ValidationError as error:
             raise nested_error(error.errors()) from None
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.no_info_plain_validator_function(self.read)
+        return core_schema.with_info_plain_validator_function(self.read)
 
 
 def steps(model: type[BaseModel], path: KeyPath) -> list[tuple[str, FieldInfo]]:
@@ -120,13 +131,13 @@ def field_at(model: type[BaseModel], path: KeyPath) -> FieldInfo | None:
 
 def dimension_of(field: FieldInfo) -> Dimension | None:
     """Find the dimension of a quantity's field, be it optional or not; None for any other field."""
-    return next((mark for mark in _marks(field) if isinstance(mark, Dimension)), None)
+    return next((mark for mark in marks_of(field) if isinstance(mark, Dimension)), None)
 
 
 def bounds(field: FieldInfo) -> tuple[float, float]:
     """Lower and upper bound of a number field in the base unit, infinite where there is none."""
     lower, upper = float("-inf"), float("inf")
-    for mark in _marks(field):
+    for mark in marks_of(field):
         if isinstance(mark, (Ge, Gt)):
             lower = float(mark.ge if isinstance(mark, Ge) else mark.gt)  # type: ignore[arg-type]
         elif isinstance(mark, (Le, Lt)):
@@ -141,14 +152,14 @@ def fields_of(section: type[BaseModel]) -> dict[str, tuple[str, FieldInfo]]:
 
 def section_of(field: FieldInfo) -> type[BaseModel] | None:
     """Return the section that a field holds, also when it is optional or one of several."""
-    for mark in _marks(field):
+    for mark in marks_of(field):
         if isinstance(mark, Generated):
             return mark.section()
     kinds = (field.annotation, *get_args(field.annotation))
     return next((kind for kind in kinds if isinstance(kind, type) and issubclass(kind, BaseModel)), None)
 
 
-def _marks(field: FieldInfo) -> Iterator[Any]:
+def marks_of(field: FieldInfo) -> Iterator[Any]:
     """Marks of a field's type, or of what it holds where it is optional or holds several."""
     yield from field.metadata
     for kind in get_args(field.annotation):

@@ -24,8 +24,7 @@ from experiments.studyfile.campaign import (
     Target,
 )
 from experiments.studyfile.card import with_material
-from experiments.studyfile.conditions import BASE, Condition, ConditionSections, under_condition
-from experiments.studyfile.discover_section import DiscoverSection
+from experiments.studyfile.conditions import BASE, Condition, Conditions, under_condition
 from experiments.studyfile.factor_section import (
     FactorSection,
     FactorTable,
@@ -65,6 +64,15 @@ class MeasurementSection(Section):
         return fit
 
 
+class DiscoverSection(Section):
+    """``[discover]``: the search for a missing effect; every part may be left out."""
+
+    mechanisms: tuple[str, ...] | None = Field(default=None, min_length=1)
+    """Names of the effects that are looked for; left out: all of the library that the study can have."""
+    settings: dict[str, int | float] = Field(default={})
+    """Numbers of runs and levels that differ from the defaults, by name."""
+
+
 class Study(Physics):
     """Everything that a person configures; built by `load_study`."""
 
@@ -84,7 +92,7 @@ class Study(Physics):
     """Further scenes, by the names that responses call them by."""
     factor_sections: tuple[FactorSection, ...] = Field(default=(), alias="factor")
     """The factors as written, in order."""
-    condition_sections: ConditionSections = Field(default={}, alias="condition")
+    condition_sections: Conditions = Field(default={}, alias="condition")
     """The conditions as written."""
     campaign: CampaignSettings = CampaignSettings()
     """Every decision of the campaign."""
@@ -149,7 +157,7 @@ class Study(Physics):
     @cached_property
     def conditions(self) -> tuple[Condition, ...]:
         """Conditions of the tests, in the order of the file; none written: the test as it is."""
-        return tuple(section.condition(name) for name, section in self.condition_sections.items()) or (BASE,)
+        return tuple(self.condition_sections.values()) or (BASE,)
 
     def under(self, condition: str) -> Study:
         """Study of the test under one condition; it takes settings of all factors of this one.

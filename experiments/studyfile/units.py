@@ -79,10 +79,6 @@ class Quantity:
         inverse = round(1.0 / size) if size < 1.0 else 1
         return self.number / inverse if math.isclose(inverse * size, 1.0) else self.number * size
 
-    def to_unit(self, unit: str, dimension: str) -> float:
-        """Express in another unit of the same dimension."""
-        return self.number if unit == self.unit else self.to_base(dimension) / unit_size(unit, dimension)
-
 
 def dimension_of_unit(unit: str) -> str:
     """Name the dimension of an SI unit, as a parameter or an observable of the engine has it.

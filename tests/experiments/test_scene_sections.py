@@ -64,6 +64,10 @@ high = "20 mm"
     bin_ = OTHER_TESTS[Hopper].replace('outlet = "18 mm"\n', "")
     study = load_study(write_study((TUBE, bin_), ANGLE, add=factor))
     assert study.case({"W": 13.0}, seed=1).scene.outlet == 0.013
+    with pytest.raises(StudyError, match=r"Hopper.outlet: must be below .* \(received \{'W': 41.0\}\)"):
+        study.case({"W": 41.0}, seed=1)
+    with pytest.raises(StudyError, match=r"small.toml:\d+: scene.hopper.outlet: must be finite"):
+        study.case({"W": math.nan}, seed=1)
 
 
 @pytest.mark.parametrize(

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from dem_warp.laws.capillary import CapillaryBridge
 from dem_warp.laws.elastic_plastic_rolling import ElasticPlasticRolling
 from dem_warp.laws.jkr import JKR
+from dem_warp.laws.rate_weakening import RateWeakening
+from dem_warp.laws.wall_adhesion import WallAdhesion
 from experiments.errors import StudyError
 from experiments.studyfile import load_study
 
@@ -38,6 +42,26 @@ def test_a_mechanism_can_be_a_factor(write_study: WriteStudy) -> None:
     assert study.case({"E": 0.5}, seed=1).mechanisms == (ElasticPlasticRolling(rolling_stiffness=0.5),)
 
 
+def test_parameters_of_mechanisms_have_units_and_plain_numbers_are_si(write_study: WriteStudy) -> None:
+    bridge = """
+[mechanism.capillary_bridge]
+surface_tension = "72 mN/m"
+bridge_volume = "20 ul"
+contact_angle = "30 deg"
+[mechanism.rate_weakening]
+weakening = 0.3
+weakening_speed = "10 cm/s"
+[mechanism.wall_adhesion]
+wall_adhesion_energy_density = 50.0
+"""
+    wall, water, weakening = load_study(write_study(add=bridge)).case({}, seed=1).mechanisms
+    assert wall == WallAdhesion(wall_adhesion_energy_density=50.0)
+    assert water == CapillaryBridge(
+        surface_tension=0.072, bridge_volume=2e-8, contact_angle=math.radians(30.0)
+    )
+    assert weakening == RateWeakening(weakening=0.3, weakening_speed=0.1)
+
+
 @pytest.mark.parametrize(
     ("wrong", "rule"),
     [
@@ -47,6 +71,10 @@ def test_a_mechanism_can_be_a_factor(write_study: WriteStudy) -> None:
         (
             "[mechanism.kinetic_friction]\nfriction_drop = 1.5",
             r"friction_drop: must be less than 1 \(received 1.5\)",
+        ),
+        (
+            '[mechanism.jkr]\nwork_of_adhesion = "0.1 J"',
+            r"small.toml:\d+: mechanism.jkr.work_of_adhesion: needs a unit of surface energy \(J/m\^2",
         ),
         (
             "[mechanism.jkr]\nwork_of_adhesion = 0.1\n[mechanism.hysteretic_spring]\nplasticity = 0.3",
