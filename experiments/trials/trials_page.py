@@ -194,5 +194,5 @@ def _draw_confusion(counts: pd.DataFrame, path: Path) -> None:
 
 
 def _mechanisms(names: Iterable[str]) -> int:
-    """How many of a confusion's labels, which come first, name a mechanism."""
+    """Number of a confusion's labels, which come first, that name a mechanism."""
     return sum(name not in OTHERS for name in names)
