@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import os
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+
+from experiments.errors import InputError
 
 
 @contextmanager
@@ -31,6 +34,25 @@ def replacing(path: Path) -> Iterator[Path]:
         temporary.replace(path)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def existing(path: Path) -> Path:
+    """Return the path of a file that must be there.
+
+    Raises
+    ------
+    InputError
+        When there is no such file.
+    """
+    if not path.is_file():
+        raise InputError("a folder to gather from must hold what it is named for", "no such file", str(path))
+    return path
+
+
+def copy_file(source: Path, target: Path) -> None:
+    """Copy an `existing` file, whole or not at all."""
+    with replacing(target) as temporary:
+        shutil.copyfile(existing(source), temporary)
 
 
 def write_text(path: Path, text: str) -> None:

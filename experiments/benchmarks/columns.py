@@ -159,7 +159,7 @@ def _state(batch: Batch, world: int, view: WorldView) -> dict[str, np.ndarray]:
 
 
 def _elapsed(batch: Batch, world: int, view: WorldView) -> dict[str, float]:
-    """How far a column is in each phase, in the parts of which MOMENTS speaks."""
+    """Progress of a column in each phase, in the parts of which MOMENTS speaks."""
     course, setup, scene = batch.controllers[world].course, batch.setups[world], batch.cases[world].scene
     rain = float(setup.grains.release_steps.max()) * setup.time_step
     lifting = course.phase == "lift"

@@ -24,7 +24,7 @@ FAR = 10.0
 
 @dataclass(frozen=True)
 class View:
-    """What a picture shows: to either side of the z axis, and from a height to another [m]."""
+    """Part of the world in a picture: to either side of the z axis, and from a height to another [m]."""
 
     half_width: float
     bottom: float
@@ -100,7 +100,7 @@ def wall_section(wall: Wall, moved: np.ndarray) -> list[np.ndarray]:
 
 
 def _cut_triangles(triangles: np.ndarray) -> list[np.ndarray]:
-    """Where triangles, (m, 3, 3), pass through y = 0."""
+    """Lines in which triangles, (m, 3, 3), pass through y = 0."""
     lines = []
     for corners in triangles:
         crossings = [

@@ -1,4 +1,4 @@
-"""What a grain costs: time of a step and memory, against the grains of a world and the number of worlds.
+"""Cost of a grain: time of a step and memory, against the grains of a world and the number of worlds.
 
 The scene is a settled bed of reference clumps, some 20 mm deep in a tube as wide as they need; they fall from
 a lattice and are timed at rest. Worlds are copies of one bed. The shear modulus is a hundredth of the

@@ -1,4 +1,4 @@
-"""How fast columns of grains are simulated while filling, settled and lifting, beside what the memory allows.
+"""Speed of columns of grains while filling, settled and lifting, beside what the memory allows.
 
 A sphere-step is one sphere of a grain moved on by one step. Grains of the rain that have yet to be released
 are moved on too, but meet nobody: `of free grains` leaves them out. The columns are simulated once and kept

@@ -1,4 +1,4 @@
-"""Where the time of settled columns goes: one step, and one rebuild of all neighbour lists, kernel by kernel.
+"""Time of settled columns by kernel: one step, and one rebuild of all neighbour lists.
 
     python -m experiments.benchmarks.kernel_times --scale paper --device cuda --worlds 12
 

@@ -1,4 +1,4 @@
-"""What a step must move through memory at the least, and how fast the device's memory is.
+"""Least traffic of a step through memory, and the speed of the device's memory.
 
 The floor counts every array that a step works on once in and once out, a grain's own part of it: poses,
 speeds, spheres and properties of the grains, the near entries of their lists, the histories of what touches.

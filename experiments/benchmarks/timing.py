@@ -1,4 +1,4 @@
-"""How long steps take: worlds are started at a moment, run in, and timed over a few stretches."""
+"""Wall time of steps: worlds are started at a moment, run in, and timed over a few stretches."""
 
 import math
 import time

@@ -1,7 +1,8 @@
-"""Contacts of a case, and the terms that another code has for them."""
+"""Contacts of a case, and their translation into the terms of another code."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -72,16 +73,32 @@ class Term:
     """One number in the words of another code."""
 
     name: str
-    """What it is called there."""
+    """Its name there."""
     value: float
     unit: str
     """SI; "1" for a number without one."""
     formula: str
-    """How it follows from the case."""
+    """Its formula in the terms of the case."""
     source: str
-    """Where that code defines it."""
+    """Document that defines it."""
 
 
 def values(terms: tuple[Term, ...]) -> dict[str, float]:
     """Values of terms by their names."""
     return {term.name: term.value for term in terms}
+
+
+@dataclass(frozen=True)
+class Exporter:
+    """Translation of materials and contacts into the terms of another code."""
+
+    code: str
+    """Its name."""
+    laws: str
+    """Names of its laws that the terms are for."""
+    differs: str
+    """Differences between those laws and ours."""
+    material_terms: Callable[[Material], tuple[Term, ...]]
+    """Terms of one material; empty where all belong to contacts."""
+    contact_terms: Callable[[Contact], tuple[Term, ...]]
+    """Terms of one contact."""

@@ -8,8 +8,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from dem_warp import Material
-from experiments.export.contact import Contact, Term, values
-from experiments.export.exporter import Exporter
+from experiments.export.contact import Contact, Exporter, Term, values
 
 TSUJI = (4.8218, -18.022, 27.467, -22.348, 11.087, -4.2783, 1.2728)
 """Polynomial of the restitution that LAMMPS makes the coefficient of Tsuji's damping from."""

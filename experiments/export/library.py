@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from experiments.export.exporter import Exporter
+from experiments.export.contact import Exporter
 from experiments.export.lammps import LAMMPS
 from experiments.export.liggghts import LIGGGHTS
 from experiments.export.yade import YADE

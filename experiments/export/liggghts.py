@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from dem_warp import Material
-from experiments.export.contact import Contact, Term
-from experiments.export.exporter import Exporter
+from experiments.export.contact import Contact, Exporter, Term
 
 LAWS = "hertz tangential history rolling_friction cdt"
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 
 from dem_warp import Material
-from experiments.export.contact import Contact, Term
-from experiments.export.exporter import Exporter
+from experiments.export.contact import Contact, Exporter, Term
 
 _MATERIAL = "Yade documentation, FrictMat"
 _PHYSICS = "Yade documentation, Ip2_FrictMat_FrictMat_MindlinPhys"

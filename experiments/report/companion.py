@@ -50,25 +50,9 @@ class Replay(Protocol):
         provenance: Mapping[str, Any],
         campaign: Campaign | None,
     ) -> Path:
-        """Write the page on the runs into a folder of its own.
+        """Write the page on the runs into a folder, a campaign of our own beside; return the page.
 
-        Parameters
-        ----------
-        folder
-            Folder of the page and its files.
-        study
-            The study that was run.
-        load
-            Finds the result of a case by its ``case_key``, as ``Store.load`` does.
-        provenance
-            What made the numbers, by name.
-        campaign
-            A campaign of our own, to be set beside.
-
-        Returns
-        -------
-        Path
-            The page.
+        `load` finds the result of a case by its ``case_key``, as ``Store.load`` does.
         """
 
 

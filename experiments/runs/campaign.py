@@ -43,7 +43,7 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Desk:
-    """Where and how cases are run: a study, its folder, the device."""
+    """Place and means of running cases: a study, its folder, the device."""
 
     study: Study
     folder: Path
@@ -233,7 +233,7 @@ def _no_published_runs(study: Study) -> StudyError:
 
 
 def _provenance(desk: Desk, replay: Replay) -> dict[str, Any]:
-    """What made the published runs: commit, day, machine, scale, wall times."""
+    """Provenance of the published runs: commit, day, machine, scale, wall times."""
     return {
         "scale": desk.study.scale,
         "fit": desk.study.measurement.fit,
@@ -249,6 +249,6 @@ def _source_and_day() -> dict[str, Any]:
 
 
 def _engine(desk: Desk, cases: pd.DataFrame) -> dict[str, Any]:
-    """What simulated the first of some cases: device, precision, versions."""
+    """Provenance of the first of some cases: device, precision, versions."""
     key = cases["case_key"].iloc[0]
     return desk.store.load(key).provenance if desk.store.has(key) else {}

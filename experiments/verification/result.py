@@ -94,7 +94,7 @@ def detection_row(problem: str, case: str, quantity: str, least: float, simulate
 
 
 def _worst(errors: np.ndarray) -> tuple[np.intp, ...]:
-    """Where the largest error stands; one that is not a number is worse than any."""
+    """Index of the largest error; one that is not a number is worse than any."""
     return np.unravel_index(int(np.argmax(np.where(np.isnan(errors), np.inf, errors))), errors.shape)
 
 

@@ -1,4 +1,4 @@
-"""What all comparisons with another code share: what it is to run, how it is found, what comes back."""
+"""Common part of all comparisons with another code: its plan, its program, its result."""
 
 import os
 import shutil
@@ -20,7 +20,7 @@ MARGIN = 0.01
 
 @dataclass(frozen=True)
 class Plan:
-    """What a peer runs.
+    """Plan of a peer's run.
 
     Attributes
     ----------
@@ -38,7 +38,7 @@ class Plan:
 
 @dataclass(frozen=True, eq=False)
 class PeerRun:
-    """What a peer did with a column.
+    """Result of a peer's run of a column.
 
     Attributes
     ----------

@@ -32,9 +32,9 @@ class Chapter:
     charts: Sequence[Chart] | Mapping[str, Sequence[Chart]] = ()
     """Charts in the order of the page, or by the names that its template uses."""
     text: str = ""
-    """What stands above charts and tables, where the template is the common one."""
+    """Paragraph above charts and tables, where the template is the common one."""
     template: str = TEMPLATE
-    """What fills it."""
+    """Template that fills it."""
 
 
 def render_page(

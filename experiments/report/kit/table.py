@@ -22,7 +22,7 @@ class Column:
     key: str
     """Column of the DataFrame."""
     head: str | Markup
-    """What stands above it."""
+    """Text above it."""
     kind: str = "text"
     """"text", or one of ``numbers.KINDS``."""
     unit: str = ""

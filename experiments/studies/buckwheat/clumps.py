@@ -28,13 +28,13 @@ CORNER_RADIUS = EDGE / math.sqrt(3.0)
 
 @dataclass(frozen=True)
 class Recipe:
-    """How a clump is made: a solid, filled with spheres, which are scaled into the measured size."""
+    """Recipe of a clump: a solid, filled with spheres, which are scaled into the measured size."""
 
     spheres: int
     face: float
     """From the axis to the middle of a base edge, over that of a flat face: below 1 the edges are keels."""
     protrusion: float = 0.3e-3
-    """How far a sphere may pass the solid's surface [m]."""
+    """Largest distance that a sphere may pass the solid's surface by [m]."""
 
     def solid(self) -> trimesh.Trimesh:
         """A pyramid of the measured size whose three faces are bent inward or outward [m]."""

@@ -56,7 +56,7 @@ class PaperReplay(Replay):
 
 
 class BuckwheatCompanion(Companion):
-    """What the paper printed, and what follows from it."""
+    """Numbers that the paper printed, and what follows from them."""
 
     def published(self) -> Published:
         """The paper's own results, recomputed from its printed runs."""

@@ -32,15 +32,15 @@ class Misprint:
     """One statement of the paper that its own numbers contradict."""
 
     place: str
-    """Where it stands: table, equation or part of the text."""
+    """Its place: table, equation or part of the text."""
     item: str
     """Row and column, or what is spoken of."""
     printed: str
-    """What is printed there."""
+    """Text as printed there."""
     recomputed: str
-    """What follows from the paper's own numbers."""
+    """Value that follows from the paper's own numbers."""
     reason: str
-    """Why the print is wrong."""
+    """Reason why the print is wrong."""
 
 
 def printed(name: str) -> pd.DataFrame:

@@ -1,4 +1,4 @@
-"""Where grains touch, found anew from their poses: every pair of spheres, every sphere and wall."""
+"""Contacts of grains, found anew from their poses: every pair of spheres, every sphere and wall."""
 
 from dataclasses import dataclass
 

@@ -100,7 +100,7 @@ class _Contact:
         return np.array([y[1], -normal / self.impact.effective_mass, force, *arms, self.slip(y)])
 
     def spring_limit_rate(self, y: np.ndarray) -> float:
-        """How fast the displacement grows at which the spring reaches the limit [m/s]."""
+        """Rate at which the displacement grows at which the spring reaches the limit [m/s]."""
         h = 1e-6 * self.impact.duration
         ahead = y + h * self.rates(0.0, y, 0.0)
         behind = y - h * self.rates(0.0, y, 0.0)

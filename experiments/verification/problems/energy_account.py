@@ -50,7 +50,7 @@ class Snapshot:
 
 @dataclass(frozen=True)
 class Moment:
-    """What the law does at one step; arrays by contact, but for the last.
+    """Forces and powers of the law at one step; arrays by contact, but for the last.
 
     Attributes
     ----------

@@ -37,7 +37,7 @@ Half the skin of the neighbour lists needs no statistics: it gives the same bits
 
 @dataclass(frozen=True)
 class Trial:
-    """Which heaps are compared, and how many of each kind."""
+    """Scale of the heaps that are compared, and their number of each kind."""
 
     scale: str
     replicates: int

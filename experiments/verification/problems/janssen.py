@@ -66,7 +66,7 @@ tan(phi) = {FRICTION} being the friction of sphere on sphere."""
 
 @dataclass(frozen=True)
 class Loads:
-    """What the boundaries of a column carry.
+    """Loads on the boundaries of a column.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What an impact does along the plane: kicks to speed and spin, against the law's own equation."""
+"""Impacts along the plane: kicks to speed and spin, against the law's own equation."""
 
 import math
 from collections.abc import Sequence

@@ -124,7 +124,7 @@ def _production(what: str, impacts: Sequence[Impact]) -> str:
 def _theory_rows(
     case: str, got: Rebound, theory: Rebound, tolerance: float | None, inside: np.ndarray = SLIPS > 0.0
 ) -> list[Row]:
-    """How far impacts lie from the theory of micro-slip."""
+    """Distance of impacts from the theory of micro-slip."""
     before = SLIPS[inside]
     slip, impulse = (values[..., inside] for values in got)
     slip_wanted, impulse_wanted = (values[inside] for values in theory)
@@ -180,7 +180,7 @@ def _plots(ratio: float, got: np.ndarray, ring: np.ndarray) -> tuple[Plot, ...]:
 
 
 def _laws_plot(ratio: float, ring: np.ndarray) -> Plot:
-    """How far every law is from theory, where some contact sticks."""
+    """Distance of every law from theory, where some contact sticks."""
     dense = np.linspace(0.05, 6.5, 130)
     theory = rebound_slip(ratio, dense)[0]
     inside = dense[-1] > SLIPS

@@ -21,7 +21,7 @@ from experiments.verification.result import (
 )
 
 PHASES = (0.0, 0.25, 0.5, 0.75)
-"""Where within a step the surfaces meet; what is seen of an impact depends on it, and the worst counts."""
+"""Parts of a step at which the surfaces meet; what is seen of an impact depends on it: the worst counts."""
 
 HERTZ = "Hertz: Johnson (1985), section 11.4"
 QUANTITIES = ("largest overlap [m]", "largest force [N]", "duration [s]", "speed after [m/s]")

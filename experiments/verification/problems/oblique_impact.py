@@ -75,7 +75,7 @@ def oblique_impact(device: str) -> Result:
 def _angle_curves(
     impacts: Sequence[Impact], got: np.ndarray, want: np.ndarray
 ) -> list[tuple[str, np.ndarray, np.ndarray]]:
-    """What the paper's figures for test 4 show: name, simulated and the law's."""
+    """Quantities of the paper's figures for test 4: name, simulated and the law's."""
     size = np.array([friction_speed(i) for i in impacts])
     before = np.array([i.tangential_speed for i in impacts])
     after_normal = np.array([i.restitution * i.normal_speed for i in impacts])

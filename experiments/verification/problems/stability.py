@@ -45,12 +45,12 @@ def corners(study: Study) -> list[Case]:
 
 
 def ended_in_order(result: CaseResult) -> bool:
-    """Whether a case finished, or was flagged with the advice to take."""
+    """True if a case finished, or was flagged with the advice to take."""
     return result.status == "finished" or ADVICE in result.reason
 
 
 def outcome(result: CaseResult) -> str:
-    """How a case ended, in a few words."""
+    """End of a case, in a few words."""
     if result.status == "finished":
         return f"finished after {result.observables['simulated_time']:.2f} s"
     return f"{result.status}: {result.reason}"

@@ -144,7 +144,7 @@ def test_the_model_of_the_physical_test_is_the_surface_of_table_6() -> None:
 
 
 def effect(cases: pd.DataFrame) -> pd.Series:
-    """What an effect adds [deg]: most where the plate is rough, nothing like a shift of all angles."""
+    """Share of an effect [deg]: most where the plate is rough, nothing like a shift of all angles."""
     return 8.0 * (cases["F"] - 0.1) * (cases["E"] > 0.4)
 
 
@@ -168,7 +168,7 @@ def incomplete() -> tuple[Replay, Sensitivities]:
 
 @pytest.fixture(scope="module")
 def found(incomplete) -> Discovery:
-    """What the tables say of those runs."""
+    """Findings of the tables on those runs."""
     return concluded(published_heaps(), tables_emulator(*incomplete), RULES)
 
 

@@ -13,14 +13,12 @@ Without a folder it writes the page again from the tables of the record. The rec
 from __future__ import annotations
 
 import json
-import shutil
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from experiments.errors import InputError
-from experiments.files import replacing, write_text
+from experiments.files import copy_file, write_text
 from experiments.report.material_card import CARD
 from experiments.runs.campaign import RECORD
 from experiments.studies.buckwheat import paper
@@ -51,13 +49,13 @@ def gather_paper(source: Path, record: Path, commit: str | None = None) -> None:
         Commit that made them, where the machine that did had no repository.
     """
     for name in (RUNS, PROVENANCE):
-        _copy(source / RECORD / name, record / name)
+        copy_file(source / RECORD / name, record / name)
     for name in (CAMPAIGN, HEAPS):
         if (source / RECORD / name).is_file():
-            _copy(source / RECORD / name, record / name)
+            copy_file(source / RECORD / name, record / name)
     # The card of the campaign beside, with its clumps.
     for path in source.glob(f"{Path(CARD).stem}*"):
-        _copy(path, record / path.name)
+        copy_file(path, record / path.name)
     if commit:
         made_by = json.loads((record / PROVENANCE).read_text(encoding="utf-8"))
         write_text(record / PROVENANCE, json.dumps(made_by | {"commit": commit}, indent=1) + "\n")
@@ -65,24 +63,15 @@ def gather_paper(source: Path, record: Path, commit: str | None = None) -> None:
 
 def gather_scale(name: str, source: Path, record: Path) -> None:
     """Take over the paper's runs at a smaller scale."""
-    _copy(source / RECORD / RUNS, record / f"runs-{name}.csv")
+    copy_file(source / RECORD / RUNS, record / f"runs-{name}.csv")
 
 
 def gather_sensitivities(source: Path, record: Path) -> None:
     """Take over the angles of every variant that was simulated."""
-    _copy(source / SETTINGS, record / SENSITIVITIES / SETTINGS)
+    copy_file(source / SETTINGS, record / SENSITIVITIES / SETTINGS)
     for name in variants():
         if (source / f"{name}.csv").is_file():
-            _copy(source / f"{name}.csv", record / SENSITIVITIES / f"{name}.csv")
-
-
-def _copy(source: Path, target: Path) -> None:
-    if not source.is_file():
-        raise InputError(
-            "a folder to gather from must hold what it is named for", "no such file", str(source)
-        )
-    with replacing(target) as temporary:
-        shutil.copyfile(source, temporary)
+            copy_file(source / f"{name}.csv", record / SENSITIVITIES / f"{name}.csv")
 
 
 def main(

@@ -10,7 +10,6 @@ Without a folder it writes the page again from the cases of the record, which li
 from __future__ import annotations
 
 import json
-import shutil
 from pathlib import Path
 from typing import Annotated
 
@@ -21,7 +20,7 @@ import typer
 from doe.joint_plots import joint_plot
 from experiments.calibrate import Campaign, calibrate
 from experiments.errors import InputError
-from experiments.files import replacing, write_text
+from experiments.files import copy_file, existing, write_text
 from experiments.report.kit.figure import save_figure
 from experiments.report.kit.markdown import (
     WALL_TIMES,
@@ -99,15 +98,11 @@ def gather(scale: str, source: Path, record: Path, commit: str | None = None) ->
     InputError
         When the folder holds no finished campaign.
     """
-    cases, results = source / "tables" / CASES, source / "results.json"
-    for path in (cases, results, source / WALL_TIMES_FILE):
-        if not path.is_file():
-            raise InputError("a folder to gather from must hold a campaign", "no such file", str(path))
-    with replacing(record / scale / CASES) as temporary:
-        shutil.copyfile(cases, temporary)
+    results, times = existing(source / "results.json"), existing(source / WALL_TIMES_FILE)
+    copy_file(source / "tables" / CASES, record / scale / CASES)
     made_by = json.loads(results.read_text(encoding="utf-8"))["provenance"]
     facts = made_by | ({"commit": commit} if commit else {})
-    facts[WALL_TIMES] = pd.read_csv(source / WALL_TIMES_FILE).to_dict("records")
+    facts[WALL_TIMES] = pd.read_csv(times).to_dict("records")
     write_text(record / scale / PROVENANCE, json.dumps(facts, indent=1) + "\n")
 
 

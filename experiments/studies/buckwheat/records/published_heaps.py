@@ -46,7 +46,7 @@ CENTRE = "composite-2"
 """The setting in the middle of Table 6, next to the published optimum."""
 
 READING = 5.0
-"""How far another way to read an outline may move all angles [deg], as lines through parts of a flank do."""
+"""Largest move of all angles by another way to read an outline [deg], as lines through parts of a flank."""
 
 LEFT_OUT = ("base", "estimator")
 """Groups of variants that are no physical effect; how a picture is read is calibrated."""

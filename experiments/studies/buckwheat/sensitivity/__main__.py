@@ -27,7 +27,7 @@ COLUMNS = (
     "stage", "run", "replicate", "published", "seed", "status", "reason", "angle", "angle_se", "grain_count",
     "solid_fraction", "grains_lost", "simulated_time",
 )  # fmt: skip
-"""What is kept of a case."""
+"""Columns that are kept of a case."""
 
 
 def run_variant(

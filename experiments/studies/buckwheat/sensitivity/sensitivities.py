@@ -26,7 +26,7 @@ class Sensitivities:
     replays: dict[str, Replay]
     """By variant; each with enough angles for its analysis."""
     settings: dict[str, Any]
-    """How they were simulated: scale, modulus_scale, replicates."""
+    """Settings of the simulations: scale, modulus_scale, replicates."""
     spoilt: tuple[str, ...] = ()
     """Variants of which too few cases gave an angle."""
 
@@ -111,6 +111,6 @@ class Sensitivities:
 
 
 def _is_usable(replay: Replay) -> bool:
-    """Whether every table has runs to compare, and the screening its effects."""
+    """True if every table has runs to compare, and the screening its effects."""
     runs = replay.runs.dropna(subset=["angle"])["stage"].value_counts()
     return "screening" in replay.analysed and all(runs.get(stage, 0) >= LEAST_RUNS for stage in DESIGNS)

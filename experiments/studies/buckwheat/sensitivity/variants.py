@@ -29,13 +29,13 @@ class Variant(Section):
 
     name: str
     group: str
-    """What is varied, in words."""
+    """Property that is varied, in words."""
     title: str
-    """What it is varied to, in words."""
+    """Its new value, in words."""
     candidate: bool = True
-    """Whether it is as plausible as the base; False: a check of the numerics."""
+    """True for a variant as plausible as the base, False for a check of the numerics."""
     study: dict[str, Any] = Field(default_factory=dict)
-    """What is merged over the study file."""
+    """Changes merged over the study file."""
     settings: dict[str, float] = Field(default_factory=dict)
     """Factors that have one value in all runs, in natural units."""
 
