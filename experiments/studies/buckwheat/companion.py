@@ -38,7 +38,7 @@ class PaperReplay(Replay):
 
     def chapters(self, campaign: Campaign) -> list[Chapter]:
         """Chapter on every run beside its published angle, and on both analyses."""
-        effects = campaign.screening.screen.table if campaign.screening else None
+        effects = campaign.screening.leading.screen.table if campaign.screening else None
         tables, title = replay_tables(self, effects), "The paper's runs, simulated again"
         return [Chapter("replay", title, tables, [replay_chart(self)], REPLAY)]
 

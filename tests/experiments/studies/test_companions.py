@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import pytest
 from experiments.discover.discovery import Interval
-from experiments.discover.observables import OBSERVABLES
+from experiments.measurement.observables import OBSERVABLES
 
 from experiments.discover.search import Search
 from experiments.errors import StudyError
