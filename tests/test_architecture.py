@@ -261,7 +261,12 @@ def test_no_file_names_a_place_of_one_machine() -> None:
     place = re.compile(r"(?<![\w.$}])/(?:home|Users|root|work|opt|mnt|srv)/\w")
     kinds = {".py", ".toml", ".md", ".cff", ".txt", ".csv", ".j2", ".css", ".js", ".html", ".json", ".yml"}
     top = [path for path in ROOT.iterdir() if path.is_file()]
-    below = [path for f in (*PACKAGES, "tests", ".ci") for path in (ROOT / f).rglob("*") if path.is_file()]
+    below = [
+        path
+        for f in (*PACKAGES, "tests", ".ci", ".github", "requirements")
+        for path in (ROOT / f).rglob("*")
+        if path.is_file()
+    ]
     texts = [path for path in top + below if path.suffix in kinds or path.parent.name == ".ci"]
     named = [
         f"{path.relative_to(ROOT)}:{number}"

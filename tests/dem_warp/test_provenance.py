@@ -6,6 +6,7 @@ from importlib import import_module
 from pathlib import Path
 
 import pytest
+import warp as wp
 
 import dem_warp
 from dem_warp import provenance
@@ -90,6 +91,11 @@ def test_the_name_of_a_file_counts(outside: Path) -> None:
     before = engine_fingerprint(glue)
     shutil.move(outside / "numbers.py", outside / "figures.py")
     assert engine_fingerprint(glue) != before
+
+
+def test_a_result_says_which_version_and_commit_made_it() -> None:
+    made_by = provenance.provenance(wp.get_device("cpu"), "mixed")
+    assert (made_by["dem-warp"], made_by["commit"]) == (dem_warp.__version__, source_commit())
 
 
 def test_a_checkout_knows_its_commit() -> None:

@@ -14,9 +14,11 @@ import pandas as pd
 import pytest
 
 from dem_warp import Case, CaseResult
+from experiments import api
 from experiments.calibrate import Campaign, Outcome
 from experiments.calibrate.campaign import StageHook
 from experiments.cases import execute
+from experiments.errors import InputError
 from experiments.measurement.states import Observed
 from experiments.runs import campaign as run
 from experiments.runs.campaign import Desk
@@ -122,6 +124,23 @@ def test_an_interrupted_campaign_goes_on_and_repeats_nothing(
     assert same_findings(resumed, whole)
     assert len(engine.seeds) == total
     assert len(set(engine.seeds)) == total
+
+
+@pytest.mark.usefixtures("_without_report", "engine")
+def test_a_script_may_hand_over_a_study_or_its_file(write_study: Callable[..., Path], tmp_path: Path) -> None:
+    path = write_study(add="[campaign.noise_floor]\nreplicates = 5\n")
+    by_file = api.calibrate(str(path), tmp_path / "file", device="cpu")
+    by_study = api.calibrate(load_study(path), tmp_path / "study", device="cpu")
+    assert by_file.campaign is not None
+    assert by_study.campaign is not None
+    assert same_findings(by_file.campaign, by_study.campaign)
+    for wrong, rule in (
+        ({"scale": "stiff"}, "is loaded at the scale None"),
+        ({"engine": "none"}, "engine: must be"),
+    ):
+        with pytest.raises(InputError, match=rule):
+            api.calibrate(load_study(path), tmp_path / "wrong", device="cpu", **wrong)
+    assert not (tmp_path / "wrong").exists()
 
 
 @pytest.mark.usefixtures("_without_report")

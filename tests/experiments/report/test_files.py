@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+import dem_warp
 from dem_warp import CaseResult
 from experiments.calibrate import Campaign
 from experiments.report import heap_pictures, render_page, write_report
@@ -26,7 +27,8 @@ def test_files_hold_the_same_numbers(campaign: Campaign, study: Study, tmp_path:
     assert results["campaign"]["outcome"] == "calibrated"
     assert results["campaign"]["optimum"]["point"] == campaign.optimum.point
     assert results["provenance"]["device"] == "cpu"
-    assert results["provenance"]["versions"]["numpy"] == np.__version__
+    versions = results["provenance"]["versions"]
+    assert (versions["numpy"], versions["dem-warp"]) == (np.__version__, dem_warp.__version__)
     files = {path.stem: path for path in (tmp_path / "out" / "tables").iterdir()}
     assert set(files) == set(campaign.tables())
     effects = pd.read_csv(files["screening_effects"], index_col="factor")
