@@ -9,10 +9,10 @@ from types import SimpleNamespace
 
 import pytest
 from experiments.discover.discovery import Interval
-from experiments.measurement.observables import OBSERVABLES
 
 from experiments.discover.search import Search
 from experiments.errors import StudyError
+from experiments.measurement.observables import OBSERVABLES
 from experiments.report.companion import STUDIES, companion_of
 from experiments.report.discovery.terms import Terms
 from experiments.report.kit.markdown import markdown_table
