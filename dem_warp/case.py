@@ -42,29 +42,19 @@ class Numerics:
 
 @dataclass(frozen=True)
 class Case(Generic[SceneT]):
-    """One scene with one set of parameters and one seed.
-
-    Attributes
-    ----------
-    scene : Scene
-        Such as LiftedCylinder.
-    grains : GrainPopulation
-    grain_grain, grain_wall : Interaction
-    seed : int
-        Of sizes, orientations and places of the grains.
-    numerics : Numerics
-    mechanisms : tuple of Mechanism
-        Physical effects beside those of the base contact law. One at its null changes no result, but may
-        change the last bits: its code is compiled in.
-    """
+    """One scene with one set of parameters and one seed."""
 
     scene: SceneT
+    """Physical test, such as LiftedCylinder."""
     grains: GrainPopulation
     grain_grain: Interaction
     grain_wall: Interaction
     seed: int = 0
+    """Seed of sizes, orientations and places of the grains."""
     numerics: Numerics = field(default_factory=Numerics)
     mechanisms: tuple[Mechanism, ...] = ()
+    """Physical effects beside those of the base contact law. One at its null changes no result, but may
+    change the last bits: its code is compiled in."""
 
     def __post_init__(self) -> None:
         _require(0 <= self.seed < 2**63, "Case.seed", "must be an integer from 0 to 2^63 - 1", self.seed)

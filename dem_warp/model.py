@@ -24,31 +24,21 @@ AT_ONCE = 0
 
 @dataclass(frozen=True)
 class ContactCoefficients:
-    """Coefficients of the contact law for one pair of surfaces.
-
-    Attributes
-    ----------
-    modulus, shear_modulus : float
-        Effective E* and G* [Pa].
-    damping : float
-        2 sqrt(5/6) |beta|, with beta = ln e / sqrt(ln^2 e + pi^2).
-    static_friction, rolling_friction : float
-    clamp_attraction : bool
-        Whether the damping is kept from attracting at the end of an impact.
-    mechanisms : tuple of Mechanism
-        What the contact has beside the base law.
-    tangential_damping : bool
-        Whether the tangential spring is damped.
-    """
+    """Coefficients of the contact law for one pair of surfaces."""
 
     modulus: float
     shear_modulus: float
+    """Effective E* and G* [Pa]."""
     damping: float
+    """2 sqrt(5/6) |beta|, with beta = ln e / sqrt(ln^2 e + pi^2)."""
     static_friction: float
     rolling_friction: float
     clamp_attraction: bool = False
+    """Keeps the damping from attracting at the end of an impact."""
     mechanisms: tuple[Mechanism, ...] = ()
+    """Mechanisms beside the base law."""
     tangential_damping: bool = True
+    """Damps the tangential spring."""
 
     def __post_init__(self) -> None:
         names = [mechanism.name for mechanism in self.mechanisms]
@@ -97,30 +87,21 @@ def _nulls() -> dict[str, float]:
 
 @dataclass(frozen=True, eq=False)
 class Grains:
-    """Grains of one world at the start.
-
-    Attributes
-    ----------
-    positions, orientations : (n, 3) and (n, 4) arrays
-        Poses [m], quaternions x y z w.
-    velocities, spins : (n, 3) arrays
-        [m/s] and [rad/s], both in the world's frame.
-    sizes, densities : (n,) arrays
-        Scale of the shape [1] and density [kg/m3].
-    shapes : (n,) int array
-        Index into the world's shapes.
-    release_steps : (n,) int array
-        A grain keeps its velocity, and feels nothing, before this step.
-    """
+    """Grains of one world at the start."""
 
     positions: np.ndarray
     orientations: np.ndarray
+    """Poses [m], quaternions x y z w, shape (n, 3) and (n, 4)."""
     velocities: np.ndarray
     spins: np.ndarray
+    """[m/s] and [rad/s], both in the world's frame, shape (n, 3)."""
     sizes: np.ndarray
     densities: np.ndarray
+    """Scale of the shape [1] and density [kg/m3], shape (n,)."""
     shapes: np.ndarray
+    """Index into the world's shapes, shape (n,)."""
     release_steps: np.ndarray
+    """A grain keeps its velocity, and feels nothing, before this step, shape (n,)."""
 
     def __post_init__(self) -> None:
         n = len(self.positions)
@@ -146,47 +127,31 @@ class Grains:
 
 @dataclass(frozen=True, eq=False)
 class WorldSetup:
-    """One world before its first step.
-
-    Attributes
-    ----------
-    grains : Grains
-    shapes : tuple of ClumpShape
-        The shapes that the grains' `shapes` index.
-    contacts : tuple of ContactCoefficients
-        Grain against grain first, then one for each kind of wall surface.
-    walls : tuple of (Wall, int)
-        Each wall with the index into `contacts` that holds for it.
-    time_step : float
-        [s]
-    skin : float
-        Pairs of spheres nearer than this are listed as neighbours [m].
-    speed_limit : float
-        A world with a faster grain has diverged [m/s].
-    domain : (lower, upper)
-        Corners of the box that grains may be in [m].
-    gravity : 3 floats
-        [m/s2]
-    air_drag : float
-        Rate at which the air takes a grain's velocity, whatever its size [1/s].
-    rolling_holds : bool
-        Whether rolling resistance stops a spin at most, and never reverses it.
-    weighed : int, optional
-        Number of the wall whose impulse is summed up in every step (`Solver.impulses`).
-    """
+    """One world before its first step."""
 
     grains: Grains
     shapes: tuple[ClumpShape, ...]
+    """The shapes that the grains' `shapes` index."""
     contacts: tuple[ContactCoefficients, ...]
+    """Grain against grain first, then one for each kind of wall surface."""
     walls: tuple[tuple[Wall, int], ...]
+    """Each wall with the index into `contacts` that holds for it."""
     time_step: float
+    """[s]."""
     skin: float
+    """Pairs of spheres nearer than this are listed as neighbours [m]."""
     speed_limit: float
+    """A world with a faster grain has diverged [m/s]."""
     domain: tuple[tuple[float, float, float], tuple[float, float, float]]
+    """Corners of the box that grains may be in [m]."""
     gravity: tuple[float, float, float] = (0.0, 0.0, -GRAVITY)
+    """[m/s2]."""
     air_drag: float = 0.0
+    """Rate at which the air takes a grain's velocity, whatever its size [1/s]."""
     rolling_holds: bool = True
+    """Lets rolling resistance stop a spin at most, and never reverse it."""
     weighed: int | None = None
+    """Number of the wall whose impulse is summed up in every step (`Solver.impulses`)."""
 
     def __post_init__(self) -> None:
         for name in ("time_step", "skin", "speed_limit"):

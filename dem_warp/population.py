@@ -28,13 +28,6 @@ _SIZES, _SHAPES = 0, 2
 class ShapeMixture:
     """Several shapes, each with its part of the grains.
 
-    Attributes
-    ----------
-    shapes : tuple of ClumpShape
-    fractions : tuple of float
-        Part of the number of grains that has each shape; 0 or more, together 1. The shape of every grain is
-        drawn by itself, so that the counts of a world are multinomial.
-
     Raises
     ------
     ValueError
@@ -43,6 +36,8 @@ class ShapeMixture:
 
     shapes: tuple[ClumpShape, ...]
     fractions: tuple[float, ...]
+    """Part of the number of grains that has each shape; 0 or more, together 1. The shape of every grain
+    is drawn by itself, so that the counts of a world are multinomial."""
 
     def __post_init__(self) -> None:
         if not self.shapes:
@@ -66,20 +61,13 @@ class ShapeMixture:
 
 @dataclass(frozen=True, eq=False)
 class DrawnGrains:
-    """Grains drawn from a population, before they have a place.
-
-    Attributes
-    ----------
-    clumps : tuple of ClumpShape
-    shapes : (n,) int array
-        Index of each grain's shape into `clumps`.
-    sizes : (n,) array
-        Scale of the shape.
-    """
+    """Grains drawn from a population, before they have a place."""
 
     clumps: tuple[ClumpShape, ...]
     shapes: np.ndarray
+    """Index of each grain's shape into `clumps`, shape (n,)."""
     sizes: np.ndarray
+    """Scale of the shape, shape (n,)."""
 
     @property
     def count(self) -> int:
@@ -114,14 +102,6 @@ def size_of_mean_mass(size: float, size_sd: float) -> float:
 class GrainPopulation:
     """Grains of one material whose sizes, and shapes where there are several, vary.
 
-    Attributes
-    ----------
-    shape : ClumpShape or ShapeMixture
-    material : Material
-    size_mean, size_sd : float
-        Of the normal distribution of the factor that scales a grain's shape, the same for every shape;
-        truncated at +-3 standard deviations.
-
     Raises
     ------
     ValueError
@@ -132,6 +112,8 @@ class GrainPopulation:
     material: Material
     size_mean: float = 1.0
     size_sd: float = 0.05
+    """Of the normal distribution of the factor that scales a grain's shape, the same for every shape;
+    truncated at +-3 standard deviations."""
 
     def __post_init__(self) -> None:
         if not self.size_mean > 0:

@@ -10,64 +10,44 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Progress:
-    """Progress of a simulation.
-
-    Attributes
-    ----------
-    done, total : int
-        Cases.
-    fraction : float
-        Of all work, 0 to 1.
-    phase_counts : dict
-        Cases that have not ended, by phase.
-    seconds : float
-        Wall time so far [s].
-    """
+    """Progress of a simulation."""
 
     done: int
     total: int
+    """Cases."""
     fraction: float
+    """Share of all work, 0 to 1."""
     phase_counts: dict[str, int]
+    """Cases that have not ended, by phase."""
     seconds: float
+    """Wall time so far [s]."""
 
 
 @dataclass(frozen=True, eq=False)
 class CaseResult:
-    """End of one case.
-
-    Attributes
-    ----------
-    status : str
-        "finished", "diverged", "overflow", or "failed".
-    reason : str
-        What happened, and what helps; empty when finished.
-    positions, orientations : (n, 3) and (n, 4) arrays
-        Poses of the grains left [m], quaternions x y z w.
-    sizes : (n,) array
-    shapes : (n,) int array
-        Index of each grain's shape into `clumps`.
-    clumps : (shapes, S, 4) array
-        Local centre and radius of each sphere of each shape [m]; a shape of fewer than S spheres is filled up
-        with radii of 0, which are no spheres.
-    observables : dict of float
-        Those of the scene, in the units that it says. Beside them `rebuilds` of the neighbour lists, and
-        `late_rebuilds`: 1 when a grain may have outrun its list.
-    phases : list of dict
-        Name, time [s] and steps of each phase.
-    provenance : dict
-        Versions, device and precision.
-    """
+    """End of one case."""
 
     status: str
+    """"finished", "diverged", "overflow", or "failed"."""
     reason: str
+    """Cause of the end, and a remedy; empty when finished."""
     positions: np.ndarray
     orientations: np.ndarray
+    """Poses of the grains left [m], quaternions x y z w, shape (n, 3) and (n, 4)."""
     sizes: np.ndarray
+    """Scale of each grain's shape, shape (n,)."""
     shapes: np.ndarray
+    """Index of each grain's shape into `clumps`, shape (n,)."""
     clumps: np.ndarray
+    """Local centre and radius of each sphere of each shape [m]; a shape of fewer than S spheres is filled
+    up with radii of 0, which are no spheres, shape (shapes, S, 4)."""
     observables: dict[str, float] = field(default_factory=dict)
+    """Those of the scene, in the units that it says. Beside them `rebuilds` of the neighbour lists, and
+    `late_rebuilds`: 1 when a grain may have outrun its list."""
     phases: list[dict[str, Any]] = field(default_factory=list)
+    """Name, time [s] and steps of each phase."""
     provenance: dict[str, Any] = field(default_factory=dict)
+    """Versions, device and precision."""
 
     @cached_property
     def sphere_centers(self) -> np.ndarray:

@@ -18,26 +18,19 @@ SAMPLE = 200
 
 @dataclass(frozen=True, eq=False)
 class TriangleTable:
-    """Triangles of one mesh.
-
-    Attributes
-    ----------
-    corners : (m, 3, 3) array
-        From the mesh's point [m], each triangle's in the order of the vertices' numbers: so two triangles
-        have an edge that they share the same way around.
-    normals : (m, 3) array
-        Unit vectors.
-    first, count : (m,) int arrays
-        Where in `beside` a triangle's neighbours are, and how many.
-    beside : (k,) int array
-        8 times a neighbour's number, plus bits 1, 2 and 4 for the own corners that it shares.
-    """
+    """Triangles of one mesh."""
 
     corners: np.ndarray
+    """From the mesh's point [m], each triangle's in the order of the vertices' numbers: so two triangles
+    have an edge that they share the same way around, shape (m, 3, 3)."""
     normals: np.ndarray
+    """Unit vectors, shape (m, 3)."""
     first: np.ndarray
     count: np.ndarray
+    """First place in `beside` of a triangle's neighbours, and their number, shape (m,)."""
     beside: np.ndarray
+    """8 times a neighbour's number, plus bits 1, 2 and 4 for the own corners that it shares, shape
+    (k,)."""
 
     @classmethod
     def of(cls, mesh: Mesh) -> "TriangleTable":

@@ -7,40 +7,28 @@ import numpy as np
 
 @dataclass(frozen=True)
 class WorldView:
-    """View of one world that a scene has between two chunks; arrays are by grain slot.
-
-    Attributes
-    ----------
-    step : int
-        Steps done.
-    time : float
-        [s]
-    alive : (n,) bool array
-    released : (n,) bool array
-        Grains that move freely.
-    positions, velocities : (n, 3) arrays
-        [m], [m/s]
-    masses : (n,) array
-        [kg]
-    impulse : float
-        What the grains have given to the weighed wall since the first step [N s]; see `Solver.impulses`.
-    rms_speed, fastest : float
-        Root mean square, and largest, speed of the living grains [m/s]; 0 where none lives.
-    highest : float
-        Height of the highest centre of a living grain [m]; minus infinity where none lives.
-    """
+    """View of one world that a scene has between two chunks; arrays are by grain slot."""
 
     step: int
+    """Steps done."""
     time: float
+    """[s]."""
     alive: np.ndarray
     released: np.ndarray
+    """Grains that move freely."""
     positions: np.ndarray
     velocities: np.ndarray
+    """[m], [m/s], shape (n, 3)."""
     masses: np.ndarray
+    """[kg], shape (n,)."""
     impulse: float
+    """Impulse that the grains have given to the weighed wall since the first step [N s]; see
+    `Solver.impulses`."""
     rms_speed: float
     fastest: float
+    """Root mean square, and largest, speed of the living grains [m/s]; 0 where none lives."""
     highest: float
+    """Height of the highest centre of a living grain [m]; minus infinity where none lives."""
 
 
 def overviews(

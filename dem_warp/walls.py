@@ -23,27 +23,18 @@ THINNEST = 1.0e-9
 
 @dataclass(frozen=True)
 class Motion:
-    """Rigid motion of a wall, which starts from wherever the wall then stands.
-
-    Attributes
-    ----------
-    velocity : 3 floats
-        Of the wall's own `point` [m/s].
-    spin : 3 floats
-        Rotation about that point [rad/s].
-    amplitude : 3 floats
-        Of a vibration amplitude * sin(2 pi frequency t) on top, t from the start of the motion [m].
-    frequency : float
-        [Hz]
-    duration : float
-        After this time the wall stays where it then is [s]; by default the motion has no end.
-    """
+    """Rigid motion of a wall, which starts from wherever the wall then stands."""
 
     velocity: Vector = (0.0, 0.0, 0.0)
+    """Velocity of the wall's own `point` [m/s]."""
     spin: Vector = (0.0, 0.0, 0.0)
+    """Rotation about that point [rad/s]."""
     amplitude: Vector = (0.0, 0.0, 0.0)
+    """Of a vibration amplitude * sin(2 pi frequency t) on top, t from the start of the motion [m]."""
     frequency: float = 0.0
+    """Frequency of the vibration [Hz]."""
     duration: float = math.inf
+    """After this time the wall stays where it then is [s]; by default the motion has no end."""
 
     def __post_init__(self) -> None:
         for name in ("velocity", "spin", "amplitude"):
@@ -60,18 +51,12 @@ class Motion:
 
 @dataclass(frozen=True)
 class Plane:
-    """Infinite plane; grains stand on the side its normal points to.
-
-    Attributes
-    ----------
-    point : 3 floats
-        A point of the plane [m].
-    normal : 3 floats
-        Its direction; scaled to unit length on the device.
-    """
+    """Infinite plane; grains stand on the side its normal points to."""
 
     point: Vector = (0.0, 0.0, 0.0)
+    """A point of the plane [m]."""
     normal: Vector = (0.0, 0.0, 1.0)
+    """Direction of the normal; scaled to unit length on the device."""
 
     kind = PLANE
     triangle_count = 0
@@ -89,21 +74,14 @@ class Plane:
 
 @dataclass(frozen=True)
 class Disc:
-    """Thin round plate, touched from both sides and at its rim, with a round hole if one is asked for.
-
-    Attributes
-    ----------
-    point : 3 floats
-        Its centre [m].
-    normal : 3 floats
-    radius, inner_radius : float
-        Of the plate and of the hole in its middle [m].
-    """
+    """Thin round plate, touched from both sides and at its rim, with a round hole if one is asked for."""
 
     point: Vector
+    """Its centre [m]."""
     normal: Vector
     radius: float
     inner_radius: float = 0.0
+    """Radii of the plate and of the hole in its middle [m]."""
 
     kind = CONE
     triangle_count = 0
@@ -136,22 +114,15 @@ class Disc:
 
 @dataclass(frozen=True)
 class Cylinder:
-    """Open, infinitely thin cylinder surface, touched from inside, from outside and at both rims.
-
-    Attributes
-    ----------
-    point : 3 floats
-        Centre of its lower rim [m].
-    direction : 3 floats
-        Its axis, from the lower rim to the upper.
-    radius, length : float
-        [m]
-    """
+    """Open, infinitely thin cylinder surface, touched from inside, from outside and at both rims."""
 
     point: Vector
+    """Centre of its lower rim [m]."""
     radius: float
     length: float
+    """[m]."""
     direction: Vector = (0.0, 0.0, 1.0)
+    """Direction of the axis, from the lower rim to the upper."""
 
     kind = CYLINDER
     triangle_count = 0
@@ -182,24 +153,17 @@ class Cone:
 
     A sphere meets it in its nearest point only. So a sphere too large for the narrow end, which in truth
     touches all around, is held from one side at a time.
-
-    Attributes
-    ----------
-    point : 3 floats
-        Centre of its lower rim [m].
-    radius, upper_radius : float
-        Of the lower rim and of the upper; one of them may be 0, a tip [m].
-    length : float
-        Along the axis [m].
-    direction : 3 floats
-        Its axis, from the lower rim to the upper.
     """
 
     point: Vector
+    """Centre of its lower rim [m]."""
     radius: float
     upper_radius: float
+    """Radii of the lower rim and of the upper; one of them may be 0, a tip [m]."""
     length: float
+    """Height along the axis [m]."""
     direction: Vector = (0.0, 0.0, 1.0)
+    """Direction of the axis, from the lower rim to the upper."""
 
     kind = CONE
     triangle_count = 0
@@ -230,20 +194,14 @@ class Mesh:
 
     Triangles are joined where they share vertices of equal coordinates. A contact is counted once wherever
     the surface comes nearest to a sphere, so in a concave corner there are several.
-
-    Attributes
-    ----------
-    vertices : (n, 3) array
-        [m], read-only.
-    faces : (m, 3) int array
-        Three vertices of each triangle, either way around, read-only.
-    point : 3 floats
-        What the mesh turns about [m].
     """
 
     vertices: np.ndarray
+    """[m], read-only, shape (n, 3)."""
     faces: np.ndarray
+    """Three vertices of each triangle, either way around, read-only, shape (m, 3)."""
     point: Vector = (0.0, 0.0, 0.0)
+    """Point that the mesh turns about [m]."""
 
     kind = MESH
     axis = (0.0, 0.0, 1.0)

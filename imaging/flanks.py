@@ -22,24 +22,17 @@ TOE_ROUNDS = 10
 
 @dataclass(frozen=True)
 class FitSettings:
-    """Part of a flank that the line is fitted to: angles with different settings are not comparable.
-
-    Attributes
-    ----------
-    name : str
-        Name in reports.
-    lower, upper : float
-        Part of the heap's height that the fit covers, 0 to 1.
-    toe : float
-        A flank begins where its line is this many times higher than the outline is rough (root mean square
-        about the line). Lower down lie single grains that rolled away, and gaps between them that the plate
-        cuts off. On a smooth flank this leaves nothing out.
-    """
+    """Part of a flank that the line is fitted to: angles with different settings are not comparable."""
 
     name: str
+    """Name in reports."""
     lower: float
     upper: float
+    """Part of the heap's height that the fit covers, 0 to 1."""
     toe: float = 1.0
+    """A flank begins where its line is this many times higher than the outline is rough (root mean square
+    about the line). Lower down lie single grains that rolled away, and gaps between them that the plate
+    cuts off. On a smooth flank this leaves nothing out."""
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.lower < self.upper <= 1.0:
@@ -71,30 +64,21 @@ FITS = {
 
 @dataclass(frozen=True)
 class FlankLine:
-    """Line fitted to one flank: height = `intercept` + `slope` * position, in pixels of the outline.
-
-    Attributes
-    ----------
-    angle, se : float
-        atan |slope| and its standard error [degrees].
-    slope, intercept : float
-    start, stop : float
-        Positions between which the line was fitted [pixels].
-    dof : float
-        Independent pieces of outline less the line's two parameters: the outline of grains is correlated
-        over about a grain, so this is far less than the number of columns.
-    rms : float
-        Root mean square of the outline about the line [pixels].
-    """
+    """Line fitted to one flank: height = `intercept` + `slope` * position, in pixels of the outline."""
 
     angle: float
     se: float
+    """Atan |slope| and its standard error [degrees]."""
     slope: float
     intercept: float
     start: float
     stop: float
+    """Positions between which the line was fitted [pixels]."""
     dof: float
+    """Independent pieces of outline less the line's two parameters: the outline of grains is correlated
+    over about a grain, so this is far less than the number of columns."""
     rms: float
+    """Root mean square of the outline about the line [pixels]."""
 
     def from_position(self, start: float) -> FlankLine:
         """The same line, positions counted from another one."""

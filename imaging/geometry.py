@@ -25,18 +25,12 @@ FIELD_OF_VIEW = 2.0
 
 @dataclass(frozen=True)
 class Spheres:
-    """Spheres of one heap, checked.
-
-    Attributes
-    ----------
-    centers : (n, 3) array
-        Centres [m]; z is up and the plate is z = 0.
-    radii : (n,) array
-        Radii [m].
-    """
+    """Spheres of one heap, checked."""
 
     centers: FloatArray
+    """Centres [m]; z is up and the plate is z = 0, shape (n, 3)."""
     radii: FloatArray
+    """Radii [m], shape (n,)."""
 
     def __post_init__(self) -> None:
         if self.centers.ndim != 2 or self.centers.shape[1] != 3 or len(self.centers) == 0:
@@ -69,25 +63,17 @@ class Spheres:
 
 @dataclass(frozen=True)
 class Frame:
-    """The part of space that pictures of one heap show: the same for every azimuth.
-
-    Attributes
-    ----------
-    axis : (float, float)
-        x and y of the heap's middle [m].
-    half_width, height : float
-        What the picture shows to either side of the axis and above the plate [m].
-    below : float
-        What it shows below the plate [m].
-    meters_per_pixel : float
-        Scale.
-    """
+    """The part of space that pictures of one heap show: the same for every azimuth."""
 
     axis: tuple[float, float]
+    """X and y of the heap's middle [m]."""
     half_width: float
     height: float
+    """Reach of the picture to either side of the axis and above the plate [m]."""
     below: float
+    """Reach below the plate [m]."""
     meters_per_pixel: float
+    """Scale."""
 
     @classmethod
     def around(cls, spheres: Spheres, pixels: int, margin: float = 0.08) -> Frame:

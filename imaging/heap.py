@@ -21,30 +21,20 @@ LEAST_DOF = 3.0
 
 @dataclass(frozen=True)
 class HeapAngle:
-    """Repose angle of one simulated heap, from several azimuths.
-
-    Attributes
-    ----------
-    mean, se : float
-        Mean over the views and its standard error [degrees], as an estimate of what these grains give: the
-        scatter between heaps of the same grains, other seeds, that this heap's own roughness lets expect.
-    dof : float
-        Degrees of freedom of `se`.
-    views : tuple of ReposeAngle
-        One for each measured azimuth.
-    azimuths : tuple of float
-        Their directions [rad].
-    rejections : tuple of str
-        Why other azimuths could not be measured; empty as a rule.
-    fit : FitSettings
-    """
+    """Repose angle of one simulated heap, from several azimuths."""
 
     mean: float
     se: float
+    """Mean over the views and its standard error [degrees], as an estimate of what these grains give: the
+    scatter between heaps of the same grains, other seeds, that this heap's own roughness lets expect."""
     dof: float
+    """Degrees of freedom of `se`."""
     views: tuple[ReposeAngle, ...]
+    """One for each measured azimuth."""
     azimuths: tuple[float, ...]
+    """Their directions [rad]."""
     rejections: tuple[str, ...]
+    """Reasons that other azimuths could not be measured; empty as a rule."""
     fit: FitSettings
 
     def interval(self, level: float = 0.95) -> tuple[float, float]:

@@ -22,24 +22,16 @@ PLATE_EDGE_COLOR = (120, 116, 112)
 
 @dataclass(frozen=True)
 class Snapshot:
-    """A picture of a heap, with its scale.
-
-    Attributes
-    ----------
-    image : (rows, columns) or (rows, columns, 3) uint8 array
-        Grey or blue-green-red.
-    meters_per_pixel : float
-        Scale.
-    ground_row : float
-        Row of the plate's surface; whole numbers are the middles of pixels.
-    azimuth : float
-        Direction of the camera [rad]: at 0 the picture's right is +x and the camera looks along +y.
-    """
+    """A picture of a heap, with its scale."""
 
     image: Picture
+    """Grey or blue-green-red."""
     meters_per_pixel: float
+    """Scale."""
     ground_row: float
+    """Row of the plate's surface; whole numbers are the middles of pixels."""
     azimuth: float
+    """Direction of the camera [rad]: at 0 the picture's right is +x and the camera looks along +y."""
 
 
 def silhouette(

@@ -18,21 +18,14 @@ from imaging.silhouette import Outline, find_outline
 
 @dataclass(frozen=True)
 class ReposeAngle:
-    """Repose angle of one picture.
-
-    Attributes
-    ----------
-    left_line, right_line : FlankLine
-    fit : FitSettings
-        What the lines were fitted to.
-    outline : Outline
-        What they were fitted on.
-    """
+    """Repose angle of one picture."""
 
     left_line: FlankLine
     right_line: FlankLine
     fit: FitSettings
+    """Outline that the lines were fitted to."""
     outline: Outline
+    """Setting that they were fitted with."""
 
     @property
     def left(self) -> float:

@@ -13,30 +13,21 @@ from imaging.silhouette import Outline
 
 @dataclass(frozen=True)
 class HeapShape:
-    """Shape of an outline; lengths are in the outline's pixels, or in metres where its scale is known.
-
-    Attributes
-    ----------
-    height : float
-        Greatest height.
-    width : float
-        From end to end on the plate.
-    r50, r90 : float
-        Radius that holds 50 and 90 % of the volume of the outline turned about the apex (the mean of both
-        flanks).
-    concavity : float
-        1 - area / (width * height / 2): 0 for straight flanks, positive for hollow, negative for bulging
-        ones.
-    asymmetry : float
-        (area right of the apex - area left of it) / area, -1 to 1.
-    """
+    """Shape of an outline; lengths are in the outline's pixels, or in metres where its scale is known."""
 
     height: float
+    """Greatest height."""
     width: float
+    """Width from end to end on the plate."""
     r50: float
     r90: float
+    """Radius that holds 50 and 90 % of the volume of the outline turned about the apex (the mean of both
+    flanks)."""
     concavity: float
+    """1 - area / (width * height / 2): 0 for straight flanks, positive for hollow, negative for bulging
+    ones."""
     asymmetry: float
+    """(area right of the apex - area left of it) / area, -1 to 1."""
 
 
 def heap_shape(outline: Outline) -> HeapShape:

@@ -29,25 +29,17 @@ PLATE_CLEARANCE = 0.25
 
 @dataclass(frozen=True)
 class Outline:
-    """Height of a heap over its plate, from one picture.
-
-    Attributes
-    ----------
-    position : (n,) array
-        Distance along the plate [pixels], increasing; 0 is where the plate line meets the picture's left
-        border.
-    height : (n,) array
-        Height over the plate line [pixels], positive.
-    plate : PlateLine
-        Where the plate lies in the picture.
-    meters_per_pixel : float or None
-        Scale, where it is known.
-    """
+    """Height of a heap over its plate, from one picture."""
 
     position: FloatArray
+    """Distance along the plate [pixels], increasing; 0 is where the plate line meets the picture's left
+    border, shape (n,)."""
     height: FloatArray
+    """Height over the plate line [pixels], positive, shape (n,)."""
     plate: PlateLine
+    """Plate line in the picture."""
     meters_per_pixel: float | None = None
+    """Scale, where it is known."""
 
     def in_part(self, left: int, top: int) -> Outline:
         """The same outline in a part of the picture that begins at this column and row."""

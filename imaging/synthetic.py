@@ -25,28 +25,20 @@ Color = tuple[int, int, int]
 
 @dataclass(frozen=True)
 class DrawnHeap:
-    """A heap in profile, in pixels: its left end is the origin, x to the right, y up.
-
-    Attributes
-    ----------
-    left, right : float
-        Angles of the flanks [degrees].
-    width : float
-        From end to end on the plate.
-    rounding : float
-        Share of each flank, at the apex, that a smooth cap replaces; the flanks below it keep their angles.
-    grain : float
-        Diameter of the grains that cover the flanks; 0 draws a smooth heap.
-    seed : int
-        Of the grains' places.
-    """
+    """A heap in profile, in pixels: its left end is the origin, x to the right, y up."""
 
     left: float
     right: float
+    """Angles of the flanks [degrees]."""
     width: float = 400.0
+    """Width from end to end on the plate."""
     rounding: float = 0.0
+    """Share of each flank, at the apex, that a smooth cap replaces; the flanks below it keep their
+    angles."""
     grain: float = 0.0
+    """Diameter of the grains that cover the flanks; 0 draws a smooth heap."""
     seed: int = 0
+    """Seed of the grains' places."""
 
     def __post_init__(self) -> None:
         for name, angle in (("left", self.left), ("right", self.right)):
@@ -98,38 +90,26 @@ class DrawnHeap:
 
 @dataclass(frozen=True)
 class Camera:
-    """Faults that a drawn photograph adds to a heap.
-
-    Attributes
-    ----------
-    heap, background : (int, int, int)
-        Colours, blue-green-red.
-    plate : (int, int, int), optional
-        Colour of the plate, which reaches from border to border; without it the heap stands on nothing
-        visible.
-    texture : float
-        Relative standard deviation of the heap's lightness from grain to grain.
-    light : float
-        Relative change of the light from the left to the right border.
-    noise : float
-        Standard deviation of the pixels' noise, of 255.
-    tilt : float
-        Of the camera [degrees]; positive lets the plate fall to the right.
-    margin : float
-        Free space to either side of the heap and above it, in heap widths; below zero crops the heap.
-    seed : int
-        Of noise and texture.
-    """
+    """Faults that a drawn photograph adds to a heap."""
 
     heap: Color = (45, 70, 95)
     background: Color = (235, 235, 235)
+    """Colours, blue-green-red."""
     plate: Color | None = None
+    """Colour of the plate, which reaches from border to border; without it the heap stands on nothing
+    visible."""
     texture: float = 0.0
+    """Relative standard deviation of the heap's lightness from grain to grain."""
     light: float = 0.0
+    """Relative change of the light from the left to the right border."""
     noise: float = 0.0
+    """Standard deviation of the pixels' noise, of 255."""
     tilt: float = 0.0
+    """Roll of the camera [degrees]; positive lets the plate fall to the right."""
     margin: float = 0.15
+    """Free space to either side of the heap and above it, in heap widths; below zero crops the heap."""
     seed: int = 0
+    """Seed of noise and texture."""
 
 
 def draw(heap: DrawnHeap, camera: Camera | None = None) -> Picture:

@@ -60,16 +60,10 @@ REST = Motion()
 
 @dataclass(frozen=True, eq=False)
 class Moment:
-    """A column from a moment on.
-
-    Attributes
-    ----------
-    setup : WorldSetup
-        Its living grains, and its tube where it then is.
-    tube_motion : Motion
-    """
+    """A column from a moment on."""
 
     setup: WorldSetup
+    """Its living grains, and its tube where it then is."""
     tube_motion: Motion = REST
 
 

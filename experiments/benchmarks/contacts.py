@@ -22,18 +22,12 @@ def placed_centers(
 
 @dataclass(frozen=True)
 class ContactCounts:
-    """Touching pairs of one world.
-
-    Attributes
-    ----------
-    grain_pairs : int
-        Pairs of spheres of different grains.
-    wall_pairs : int
-        Spheres that touch a wall, once for each wall.
-    """
+    """Touching pairs of one world."""
 
     grain_pairs: int
+    """Pairs of spheres of different grains."""
     wall_pairs: int
+    """Spheres that touch a wall, once for each wall."""
 
     def entries(self, mutual: bool) -> int:
         """Entries of the grains' lists: each pair stands in both lists if they are mutual, else in one."""

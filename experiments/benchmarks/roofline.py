@@ -42,20 +42,14 @@ def copy_bandwidth(device: str) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Traffic:
-    """Least memory traffic of one step of a batch.
-
-    Attributes
-    ----------
-    list_length, touching : float
-        Near entries of the neighbour lists, and how many of them touch, by grain; a grain that waits to be
-        released has none.
-    table : DataFrame
-        Array, bytes of an element, elements a grain, and how often each is moved: 2 for in and out.
-    """
+    """Least memory traffic of one step of a batch."""
 
     list_length: float
     touching: float
+    """Near entries of the neighbour lists, and how many of them touch, by grain; a grain that waits to be
+    released has none."""
     table: pd.DataFrame
+    """Array, bytes of an element, elements a grain, and how often each is moved: 2 for in and out."""
 
     @property
     def bytes_per_grain(self) -> float:

@@ -21,24 +21,16 @@ STRETCHES = 3
 
 @dataclass(frozen=True)
 class Timing:
-    """Speed of a batch.
-
-    Attributes
-    ----------
-    steps : int
-        Of one stretch.
-    seconds : tuple of float
-        Wall time of each stretch [s].
-    free_spheres : float
-        Mean number of spheres, in all worlds together, whose grain has been released and feels forces.
-    rebuilds : float
-        Of the neighbour lists, a world and step.
-    """
+    """Speed of a batch."""
 
     steps: int
+    """Steps of one stretch."""
     seconds: tuple[float, ...]
+    """Wall time of each stretch [s]."""
     free_spheres: float
+    """Mean number of spheres, in all worlds together, whose grain has been released and feels forces."""
     rebuilds: float
+    """Rebuilds of the neighbour lists, a world and step."""
 
     @property
     def step_seconds(self) -> float:

@@ -14,17 +14,6 @@ from dem_warp.model import ContactCoefficients
 class Contact:
     """Two surfaces that touch.
 
-    Attributes
-    ----------
-    first, second : Material
-        Their materials.
-    surface : Interaction
-        Properties of the pair.
-    coefficients : ContactCoefficients
-        What the contact law makes of them.
-    radius, mass : float
-        Reduced ones [m], [kg], for codes whose resistance to rolling asks for them.
-
     Raises
     ------
     ValueError
@@ -33,10 +22,14 @@ class Contact:
 
     first: Material
     second: Material
+    """Their materials."""
     surface: Interaction
+    """Properties of the pair."""
     coefficients: ContactCoefficients
+    """Coefficients of the contact law."""
     radius: float
     mass: float
+    """Reduced ones [m], [kg], for codes whose resistance to rolling asks for them."""
 
     def __post_init__(self) -> None:
         if names := [mechanism.name for mechanism in self.coefficients.mechanisms]:

@@ -54,45 +54,30 @@ class View:
 
 @dataclass(frozen=True)
 class Observable:
-    """One number that a test yields.
-
-    Attributes
-    ----------
-    name : str
-        A column of every table.
-    title : str
-        A few words for it.
-    unit : str
-        A key of `DIMENSIONS`.
-    definition : str
-        How exactly it is measured.
-    instrument : Instrument or None
-        What it takes to measure it in the laboratory; None where no file of measured heaps has it.
-    seen : callable or None
-        Gives it from one measured picture; None where no photograph shows it.
-    directed : bool
-        Whether it counts along x of the study: several views then show a part of it each.
-    stands_in : str
-        Observable of the scene that stands for it where the scene does not give it.
-    limits : (float, float) or None
-        Ends of a ratio, by its definition; those of other units follow from the size of the test.
-    never_above : str
-        Observable of the same heap that is the larger of the two.
-    alias : str
-        Spelling in study files and tables of cases, where it is another.
-    """
+    """One number that a test yields."""
 
     name: str
+    """A column of every table."""
     title: str
+    """A few words for it."""
     unit: str
+    """A key of `DIMENSIONS`."""
     definition: str
+    """Exact rule of the measurement."""
     instrument: Instrument | None = None
+    """Instrument that the laboratory needs; None where no file of measured heaps has it."""
     seen: Callable[[View], float] | None = None
+    """Gives it from one measured picture; None where no photograph shows it."""
     directed: bool = False
+    """Counts along x of the study: several views then show a part of it each."""
     stands_in: str = ""
+    """Observable of the scene that stands for it where the scene does not give it."""
     limits: tuple[float, float] | None = None
+    """Ends of a ratio, by its definition; those of other units follow from the size of the test."""
     never_above: str = ""
+    """Observable of the same heap that is the larger of the two."""
     alias: str = ""
+    """Spelling in study files and tables of cases, where it is another."""
 
     @property
     def by_photograph(self) -> bool:

@@ -20,21 +20,14 @@ PATIENCE = 10.0
 
 @dataclass(frozen=True)
 class SizeOfTest:
-    """Size and duration of a lifted-cylinder test.
-
-    Attributes
-    ----------
-    grain : float
-        Radius of the smallest sphere of a grain [m]: no heap is lower.
-    length : float
-        Radius of the flattest heap that the grains of the tube can make [m].
-    time : float
-        From the start of the lift until long after its end [s].
-    """
+    """Size and duration of a lifted-cylinder test."""
 
     grain: float
+    """Radius of the smallest sphere of a grain [m]: no heap is lower."""
     length: float
+    """Radius of the flattest heap that the grains of the tube can make [m]."""
     time: float
+    """Time from the start of the lift until long after its end [s]."""
 
     def limits(self, observable: Observable) -> tuple[float, float]:
         """Smallest and largest value that an observable can have, in its unit (deg, m, s or 1)."""

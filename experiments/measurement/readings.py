@@ -24,27 +24,18 @@ CLOGGED_ROW = "clogged"
 
 @dataclass(frozen=True)
 class Reading:
-    """One value of one heap.
-
-    Attributes
-    ----------
-    row : Row
-        Where it stands.
-    observable : str
-        Its name, or `CLOGGED_ROW`.
-    value : float
-        In the unit of the observable; NaN without a heap, and where its unit is of another kind.
-    picture : str
-        The picture that it was measured on, empty if none.
-    doubt : Problem or None
-        Why its unit, or the size of the picture's pixels, cannot be right.
-    """
+    """One value of one heap."""
 
     row: Row
+    """Place in the file."""
     observable: str
+    """Its name, or `CLOGGED_ROW`."""
     value: float
+    """Value in the unit of the observable; NaN without a heap, and where its unit is of another kind."""
     picture: str = ""
+    """The picture that it was measured on, empty if none."""
     doubt: Problem | None = None
+    """Reason that its unit, or the size of the picture's pixels, cannot be right."""
 
 
 def readings_of(row: Row, size: SizeOfTest, fit: str) -> Iterator[Reading]:

@@ -15,21 +15,14 @@ from imaging import HeapAngle, PictureError, heap_angle
 
 @dataclass(frozen=True)
 class Observed:
-    """Measurements of one case.
-
-    Attributes
-    ----------
-    observables : dict of float
-        Observables by their columns, in their units; what could not be measured is left out.
-    angle : HeapAngle or None
-        The repose angle with its views; None without a measurable heap.
-    reason : str
-        Why the case failed or its heap cannot be measured; empty when neither did.
-    """
+    """Measurements of one case."""
 
     observables: Mapping[str, float] = field(default_factory=dict)
+    """Observables by their columns, in their units; what could not be measured is left out."""
     angle: HeapAngle | None = None
+    """The repose angle with its views; None without a measurable heap."""
     reason: str = ""
+    """Reason that the case failed or that its heap cannot be measured; empty when neither did."""
 
 
 def measure_heap(settings: MeasurementSection, result: CaseResult) -> HeapAngle:

@@ -19,18 +19,12 @@ from experiments.studyfile.campaign import TARGET_SCENE
 
 @dataclass(frozen=True)
 class Replicated:
-    """An observable that was measured several times under a condition.
-
-    Attributes
-    ----------
-    condition, observable : str
-    sample : Sample
-        In the unit of the observable.
-    """
+    """An observable that was measured several times under a condition."""
 
     condition: str
     observable: str
     sample: Sample
+    """Measurements, in the unit of the observable."""
 
 
 def with_measurements(study: Study) -> tuple[Study, tuple[str, ...]]:

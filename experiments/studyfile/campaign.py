@@ -199,62 +199,40 @@ TARGET_SCENE = "target"
 
 @dataclass(frozen=True)
 class Response:
-    """A number that the cases must match.
-
-    Attributes
-    ----------
-    name : str
-        What it is called; other than every other response.
-    observable : str
-        Column of the cases that holds it.
-    unit : str
-        Its unit; ``"1"``: a plain number.
-    scene : str
-        Name of the scene that measures it.
-    measured : Sample or None
-        Measurements of the physical test, in its unit; None where a twin study simulates them.
-    held_out : bool
-        Whether it takes no part in any fit, and only judges the chosen point.
-    """
+    """A number that the cases must match."""
 
     name: str
+    """Name, other than that of every other response."""
     observable: str
+    """Column of the cases that holds it."""
     unit: str = "1"
+    """Its unit; ``"1"``: a plain number."""
     scene: str = TARGET_SCENE
+    """Name of the scene that measures it."""
     measured: Sample | None = None
+    """Measurements of the physical test, in its unit; None where a twin study simulates them."""
     held_out: bool = False
+    """Takes no part in any fit; only judges the chosen point."""
 
 
 @dataclass(frozen=True)
 class Twin:
-    """Hidden settings that the target is simulated with; the campaign does not see them.
-
-    Attributes
-    ----------
-    truth : dict of float
-        Values by factor; a factor that is not named is at its middle.
-    replicates : int
-        Cases of the target in every scene.
-    """
+    """Hidden settings that the target is simulated with; the campaign does not see them."""
 
     truth: Mapping[str, float]
+    """Values by factor; a factor that is not named is at its middle."""
     replicates: int = 5
+    """Cases of the target in every scene."""
 
 
 @dataclass(frozen=True)
 class Target:
-    """Responses that the cases must match; the climb follows the first.
-
-    Attributes
-    ----------
-    responses : tuple of Response
-        The first takes part in the fit; each has its measurements, or none has.
-    twin : Twin or None
-        Settings that a twin study takes the measurements from; None where they were made.
-    """
+    """Responses that the cases must match; the climb follows the first."""
 
     responses: tuple[Response, ...]
+    """The first takes part in the fit; each has its measurements, or none has."""
     twin: Twin | None = None
+    """Settings that a twin study takes the measurements from; None where they were made."""
 
     def __post_init__(self) -> None:
         names = [response.name for response in self.responses]

@@ -10,29 +10,20 @@ from numpy.typing import ArrayLike
 
 @dataclass(frozen=True)
 class Row:
-    """One number against its reference.
-
-    Attributes
-    ----------
-    problem, case, quantity : str
-        What was simulated, with which settings, and what was looked at (with its unit).
-    reference : str
-        Where the expected value comes from.
-    expected, simulated : float
-    error : float
-        Relative to the expected value, or in the quantity's unit where `relative` is false.
-    tolerance : float or None
-        Largest error that passes; None where the number is only stated.
-    """
+    """One number against its reference."""
 
     problem: str
     case: str
     quantity: str
+    """Simulated test, its settings, and the quantity (with its unit)."""
     reference: str
+    """Source of the expected value."""
     expected: float
     simulated: float
     error: float
+    """Relative to the expected value, or in the quantity's unit where `relative` is false."""
     tolerance: float | None
+    """Largest error that passes; None where the number is only stated."""
     relative: bool = True
 
     @property

@@ -38,23 +38,15 @@ quantity. A row passes when its error is within its tolerance; a row that is onl
 
 @dataclass(frozen=True)
 class StoredResult:
-    """A problem's result as its folder keeps it, its plots drawn already.
-
-    Attributes
-    ----------
-    title, text : str
-    machine : str
-        Machine that it ran on, in words.
-    rows : tuple of Row
-    pictures : tuple of (str, str)
-        Stem of each picture's files, and its title.
-    """
+    """A problem's result as its folder keeps it, its plots drawn already."""
 
     title: str
     text: str
     machine: str
+    """Machine that it ran on, in words."""
     rows: tuple[Row, ...]
     pictures: tuple[tuple[str, str], ...]
+    """Stem of each picture's files, and its title."""
 
     @classmethod
     def read(cls, path: Path) -> "StoredResult":

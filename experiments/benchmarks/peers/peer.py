@@ -20,45 +20,30 @@ MARGIN = 0.01
 
 @dataclass(frozen=True)
 class Plan:
-    """Plan of a peer's run.
-
-    Attributes
-    ----------
-    skins : tuple of float
-        Neighbour skins to time, one after another on the same state [m].
-    run_in, steps, stretches : int
-        Steps before the first stretch, steps of a stretch, and stretches a skin.
-    """
+    """Plan of a peer's run."""
 
     skins: tuple[float, ...]
+    """Neighbour skins to time, one after another on the same state [m]."""
     run_in: int
     steps: int
     stretches: int
+    """Steps before the first stretch, steps of a stretch, and stretches a skin."""
 
 
 @dataclass(frozen=True, eq=False)
 class PeerRun:
-    """Result of a peer's run of a column.
-
-    Attributes
-    ----------
-    version : str
-        Its name with it.
-    timings : dict
-        Times of the stretches, by skin [m].
-    kinetic_energy : float
-        Of the translation, at the end [J].
-    contacts : ContactCounts
-        At the end.
-    placement_error : float
-        Largest distance of a sphere from where it was to be at the start [m].
-    """
+    """Result of a peer's run of a column."""
 
     version: str
+    """Its name with it."""
     timings: Mapping[float, Timing]
+    """Times of the stretches, by skin [m]."""
     kinetic_energy: float
+    """Kinetic energy of the translation, at the end [J]."""
     contacts: ContactCounts
+    """Touching pairs at the end."""
     placement_error: float
+    """Largest distance of a sphere from where it was to be at the start [m]."""
 
 
 Simulate = Callable[[str, Path, Case[LiftedCylinder], Moment, Plan], PeerRun]
@@ -66,20 +51,14 @@ Simulate = Callable[[str, Path, Case[LiftedCylinder], Moment, Plan], PeerRun]
 
 @dataclass(frozen=True)
 class Peer:
-    """Another code.
-
-    Attributes
-    ----------
-    program, package : str
-        Executable on the PATH, and the Debian package that has it.
-    simulate : callable
-        Runs a settled column of grains of one shape: takes the executable, the folder for its files, the
-        case, the moment and the plan.
-    """
+    """Another code."""
 
     program: str
     package: str
+    """Executable on the PATH, and the Debian package that has it."""
     simulate: Simulate
+    """Runs a settled column of grains of one shape: takes the executable, the folder for its files, the
+    case, the moment and the plan."""
 
     def locate(self) -> str:
         """Return the path of the executable.

@@ -72,18 +72,12 @@ def hopper_case(outlet: float, friction: float, seed: int) -> Case:
 
 @dataclass(frozen=True)
 class Flow:
-    """Steady flow out of one hopper.
-
-    Attributes
-    ----------
-    outlet : float
-        In sphere diameters.
-    rate : float
-        Mass over bulk density, root of gravity and diameter of the spheres to the power of 2.5.
-    """
+    """Steady flow out of one hopper."""
 
     outlet: float
+    """Opening, in sphere diameters."""
     rate: float
+    """Mass over bulk density, root of gravity and diameter of the spheres to the power of 2.5."""
 
     @classmethod
     def of(cls, outlet: float, result: CaseResult) -> "Flow":

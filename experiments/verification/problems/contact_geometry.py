@@ -11,30 +11,21 @@ from dem_warp.walls import Cylinder, Plane
 
 @dataclass(frozen=True)
 class Touching:
-    """Contacts of one moment; arrays by contact.
-
-    Attributes
-    ----------
-    candidate : int array
-        Number of the pair among all that may ever touch.
-    first, second : int arrays
-        Grains; a wall is the number after the last grain.
-    normal : (n, 3) array
-        From the second to the first.
-    overlap, radius, mass : arrays
-        Overlap [m], effective radius [m] and effective mass [kg].
-    levers : (2, n, 3) array
-        From both grains' centres to the contact [m].
-    """
+    """Contacts of one moment; arrays by contact."""
 
     candidate: np.ndarray
+    """Number of the pair among all that may ever touch."""
     first: np.ndarray
     second: np.ndarray
+    """Grains; a wall is the number after the last grain."""
     normal: np.ndarray
+    """From the second to the first, shape (n, 3)."""
     overlap: np.ndarray
     radius: np.ndarray
     mass: np.ndarray
+    """Overlap [m], effective radius [m] and effective mass [kg]."""
     levers: np.ndarray
+    """From both grains' centres to the contact [m], shape (2, n, 3)."""
 
 
 class ContactFinder:

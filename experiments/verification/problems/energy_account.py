@@ -50,35 +50,27 @@ class Snapshot:
 
 @dataclass(frozen=True)
 class Moment:
-    """Forces and powers of the law at one step; arrays by contact, but for the last.
-
-    Attributes
-    ----------
-    touching : Touching
-    stiffness : array
-        Of the tangential springs [N/m].
-    unturned, turned, displacement, slipped : (n, 3) arrays
-        Tangential displacement [m] before it was turned into the contact's plane, after, at the end of the
-        step, and the part of it that slid away.
-    spring, normal_spring, normal_damping, tangential_damping : (n, 3) arrays
-        Forces on the first grain [N].
-    forces, torques, rolling : (grains, 3) arrays
-        Of all contacts on each grain [N], [N m], and the torque of its rolling resistance [N m].
-    """
+    """Forces and powers of the law at one step; arrays by contact, but for the last."""
 
     touching: Touching
     stiffness: np.ndarray
+    """Stiffness of the tangential springs [N/m]."""
     unturned: np.ndarray
     turned: np.ndarray
     displacement: np.ndarray
     slipped: np.ndarray
+    """Tangential displacement [m] before it was turned into the contact's plane, after, at the end of the
+    step, and the part of it that slid away, shape (n, 3)."""
     spring: np.ndarray
     normal_spring: np.ndarray
     normal_damping: np.ndarray
     tangential_damping: np.ndarray
+    """Forces on the first grain [N], shape (n, 3)."""
     forces: np.ndarray
     torques: np.ndarray
     rolling: np.ndarray
+    """Of all contacts on each grain [N], [N m], and the torque of its rolling resistance [N m], shape
+    (grains, 3)."""
 
 
 class EnergyAccount:

@@ -116,26 +116,18 @@ def _mass(material: Material, radius: float) -> float:
 
 @dataclass(frozen=True)
 class Course:
-    """One impact as simulated, step by step.
-
-    Attributes
-    ----------
-    impact : Impact
-    time_step : float
-        [s]
-    overlap, force, separation : arrays
-        Overlap [m], normal force [N] between two states, and speed of separation [m/s].
-    velocities, spins : (steps + 1, bodies, 3) arrays
-        [m/s], [rad/s]
-    """
+    """One impact as simulated, step by step."""
 
     impact: Impact
     time_step: float
+    """[s]."""
     overlap: np.ndarray
     force: np.ndarray
     separation: np.ndarray
+    """Overlap [m], normal force [N] between two states, and speed of separation [m/s]."""
     velocities: np.ndarray
     spins: np.ndarray
+    """[m/s], [rad/s], shape (steps + 1, bodies, 3)."""
 
     @property
     def duration(self) -> float:

@@ -66,30 +66,22 @@ tan(phi) = {FRICTION} being the friction of sphere on sphere."""
 
 @dataclass(frozen=True)
 class Loads:
-    """Loads on the boundaries of a column.
-
-    Attributes
-    ----------
-    diameter, height, weight : float
-        Of the column [m], [N]; the height is twice that of its centre of mass.
-    path : (samples,) array
-        That the tube has come [m].
-    floor, wall : (samples,) arrays
-        Vertical load on the floor and horizontal load on the wall [N].
-    depth, vertical, horizontal : arrays
-        Depth below the top [m], and there the mean vertical stress, and the horizontal one at the wall [Pa];
-        by slices, means over the second half of the path.
-    """
+    """Loads on the boundaries of a column."""
 
     diameter: float
     height: float
     weight: float
+    """Of the column [m], [N]; the height is twice that of its centre of mass."""
     path: np.ndarray
+    """That the tube has come [m], shape (samples,)."""
     floor: np.ndarray
     wall: np.ndarray
+    """Vertical load on the floor and horizontal load on the wall [N], shape (samples,)."""
     depth: np.ndarray
     vertical: np.ndarray
     horizontal: np.ndarray
+    """Depth below the top [m], and there the mean vertical stress, and the horizontal one at the wall
+    [Pa]; by slices, means over the second half of the path."""
 
     @property
     def mobilised(self) -> np.ndarray:

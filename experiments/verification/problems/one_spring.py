@@ -15,24 +15,17 @@ STEPS = 4000
 
 @dataclass(frozen=True)
 class OneSpring:
-    """A tangential law of one spring.
-
-    Attributes
-    ----------
-    name, source : str
-        What it is, and where from.
-    stiffness : float
-        Over the no-slip stiffness 8 G* a of a contact radius a.
-    growing, shrinking : float
-        Power of the contact radius with which a force goes that no motion changes, while the radius grows and
-        while it shrinks. 1 keeps the displacement, 0 the force.
-    """
+    """A tangential law of one spring."""
 
     name: str
     source: str
+    """Description and source."""
     stiffness: float
+    """Over the no-slip stiffness 8 G* a of a contact radius a."""
     growing: float
     shrinking: float
+    """Power of the contact radius with which a force goes that no motion changes, while the radius grows
+    and while it shrinks. 1 keeps the displacement, 0 the force."""
 
 
 BASE = OneSpring("one spring", "EDEM; this simulator", 1.0, 1.0, 1.0)
