@@ -154,7 +154,7 @@ def test_another_test_than_a_heap_gives_what_it_measures(write_study: WriteStudy
 def test_only_the_papers_study_follows_the_paper(write_study: WriteStudy, option: str) -> None:
     code, _, err = dem_warp("calibrate", write_study(), option, "--device", "cpu", "--out", "results")
     assert (code, Path("results").exists()) == (2, False)
-    assert "only the paper's own study has its runs" in " ".join(err.split())
+    assert "only a study whose companion has published runs" in " ".join(err.split())
 
 
 def test_only_heaps_can_be_calibrated(write_study: WriteStudy) -> None:
