@@ -31,10 +31,16 @@ def checked_number(name: str, value: Any, above: float = -math.inf, least: float
     if not isinstance(value, numbers.Real) or isinstance(value, bool | np.bool_):
         raise DesignError(f"{name} must be a number, received {value!r}")
     if not math.isfinite(value) or not value > above or not value >= least:
-        rules = ["positive"] if above == 0.0 else [f"above {above:g}"] if math.isfinite(above) else []
-        rules += ["not negative"] if least == 0.0 else [f"at least {least:g}"] if math.isfinite(least) else []
-        raise DesignError(f"{name} must be {' and '.join([*rules, 'finite'])}, received {value}")
+        raise DesignError(f"{name} must be {_range(above, least)}, received {value}")
     return float(value)
+
+
+def _range(above: float, least: float) -> str:
+    if math.isfinite(above):
+        return "positive and finite" if above == 0.0 else f"finite and above {above:g}"
+    if math.isfinite(least):
+        return "finite and not negative" if least == 0.0 else f"finite and at least {least:g}"
+    return "finite"
 
 
 def checked_level(value: Any, name: str = "alpha") -> float:
