@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from doe.errors import DesignError
 from doe.factors import Factor, checked_factors, coded_points, natural_points
+from doe.labels import aligned
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +49,8 @@ class Design:
             odd = coded.index[~(coded[name].isin([-1.0, 1.0]) | center)]
             if len(odd):
                 raise DesignError(
-                    f"a dummy holds only -1 and +1 (0 at the center): column {name!r} holds {coded.loc[odd[0], name]} "
+                    f"a dummy holds only -1 and +1 (0 at the center): column {name!r} holds "
+                    f"{coded.loc[odd[0], name]} "
                     f"in run {odd[0]}"
                 )
         object.__setattr__(self, "factors", factors)
@@ -171,14 +173,15 @@ def observations(design: Design, response: ArrayLike) -> tuple[pd.DataFrame, pd.
     ----------
     design : Design
     response : array-like, shape (runs,) or (runs, replicates)
-        In the design's row order (labels of a Series are not looked at).
+        A Series or DataFrame is read by its labels, which are the design's runs in any order; an array by its
+        position, in the design's row order. Columns of a DataFrame are replicates and are numbered.
 
     Raises
     ------
     DesignError
-        Another shape, or a value that is not finite (with its run and replicate).
+        Other labels, another shape, or a value that is not finite (with its run and replicate).
     """
-    values = np.asarray(response, dtype=np.float64)
+    values = aligned("a response", response, design.coded.index)
     runs = len(design.coded)
     if values.ndim not in (1, 2) or values.shape[0] != runs or values.size == 0:
         raise DesignError(f"a response has shape ({runs},) or ({runs}, replicates), received {values.shape}")

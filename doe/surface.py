@@ -12,6 +12,7 @@ from statsmodels.regression.linear_model import RegressionResults
 
 from doe import contour, optimum, region
 from doe.anova import ErrorTerm, anova_table, block_columns, block_sum, least_squares, pure_error
+from doe.checks import checked_level, real_array
 from doe.compare import Sample
 from doe.design import Design, observations
 from doe.errors import DesignError
@@ -46,6 +47,8 @@ class Surface:
     terms: tuple[Term, ...]
     dropped: tuple[str, ...] = ()
     """Terms that were taken out, in that order."""
+    selected_from: "Surface | None" = None
+    """The model from which ``reduce`` chose these terms by the data; None where nothing was chosen so."""
 
     def __post_init__(self) -> None:
         if len(self.points) <= len(self.terms) + 1:
@@ -54,6 +57,11 @@ class Surface:
                 f"intercept, {', '.join(map(term_name, self.terms))}"
             )
         self.fit  # noqa: B018  (columns that cannot be told apart are an error now, not at the first use)
+
+    @property
+    def unselected(self) -> "Surface":
+        """The model before the data chose terms, this one where they chose none: its intervals hold."""
+        return self if self.selected_from is None else self.selected_from
 
     @cached_property
     def fit(self) -> RegressionResults:
@@ -170,7 +178,11 @@ class Surface:
         return float((self.fitted.max() - self.fitted.min()) / np.sqrt(mean_variance))
 
     def drop(self, *names: str) -> "Surface":
-        """Return the refit without these terms; raise DesignError when one is part of a term that stays."""
+        """Return the refit without these terms; raise DesignError when one is part of a term that stays.
+
+        The refit's intervals take it as given that the terms are zero: name them before the data are seen.
+        To leave out what the data do not show, use ``reduce``.
+        """
         out = [find_term(name, self.terms) for name in names]
         kept = tuple(term for term in self.terms if term not in out)
         for term in out:
@@ -186,25 +198,42 @@ class Surface:
         """Return the model after hierarchical backward elimination.
 
         Again and again the least significant term goes, among those with p above alpha that are part of no
-        other.
+        other. The coefficients, means and contours are those of the terms that stay. Standard errors,
+        intervals and regions are those of the model before: they know that the data chose the terms, and hold
+        their level (those of the terms that stay cover .77 to .93 instead of .95). The p values of the terms
+        that stay do not know it.
         """
+        checked_level(alpha)
         surface = self
         while True:
             p = surface.anova["p"]
             free = [t for t in surface.terms if not any(contains(other, t) for other in surface.terms)]
             weakest = max(free, key=lambda term: p[term_name(term)], default=None)
             if weakest is None or not p[term_name(weakest)] > alpha:
-                return surface
+                return self if surface is self else replace(surface, selected_from=self.unselected)
             surface = surface.drop(term_name(weakest))
 
     def evaluate(self, coded: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return fitted mean and its standard error at coded points, shape (points, factors)."""
-        table = pd.DataFrame(np.atleast_2d(np.asarray(coded, dtype=np.float64)), columns=self.design.names)
-        matrix = model_matrix(table, self.terms).to_numpy()
+        """Return fitted mean and its standard error at coded points, shape (points, factors).
+
+        After ``reduce`` the standard error is that of the model before (see ``unselected``).
+        """
+        points = np.atleast_2d(real_array("coded points", coded))
+        if points.ndim != 2 or points.shape[1] != len(self.design.names):
+            raise DesignError(
+                f"coded points have shape (points, {len(self.design.names)}), received {points.shape}"
+            )
+        table = pd.DataFrame(points, columns=self.design.names)
+        return self._mean(table), self.unselected._standard_error(table)
+
+    def _mean(self, coded: pd.DataFrame) -> NDArray[np.float64]:
+        return model_matrix(coded, self.terms).to_numpy() @ self.coded_coefficients.to_numpy()
+
+    def _standard_error(self, coded: pd.DataFrame) -> NDArray[np.float64]:
+        matrix = model_matrix(coded, self.terms).to_numpy()
         count = matrix.shape[1]
         covariance = self.fit.cov_params().to_numpy()[:count, :count]
-        variance = np.einsum("ij,jk,ik->i", matrix, covariance, matrix)
-        return matrix @ self.coded_coefficients.to_numpy(), np.sqrt(np.maximum(variance, 0.0))
+        return np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", matrix, covariance, matrix), 0.0))
 
     def predict(
         self, points: pd.DataFrame | Mapping[str, float], alpha: float = 0.05, coded: bool = False
@@ -222,19 +251,44 @@ class Surface:
         -------
         DataFrame, index of ``points``
             mean, se (of the mean), confidence_low, confidence_high (of the mean), prediction_low,
-            prediction_high (of one further observation).
+            prediction_high (of one further observation). After ``reduce`` the mean is that of the terms that
+            stayed; se and intervals are those of the model before, about its own mean.
+
+        Raises
+        ------
+        DesignError
+            A factor without value, a value that is no finite number, a level outside 0 to 1.
         """
+        level = checked_level(alpha)
         table = points if isinstance(points, pd.DataFrame) else pd.DataFrame([dict(points)])
+        inside = self._coded_table(table, coded)
+        honest = self.unselected
+        center, se = honest.evaluate(inside)
+        t = stats.t.isf(0.5 * level, honest.residual_df)
+        single = np.sqrt(se**2 + honest.residual_ms)
+        columns = {"mean": self._mean(inside), "se": se}
+        columns |= {"confidence_low": center - t * se, "confidence_high": center + t * se}
+        columns |= {"prediction_low": center - t * single, "prediction_high": center + t * single}
+        return pd.DataFrame(columns, index=table.index)
+
+    def _coded_table(self, table: pd.DataFrame, coded: bool) -> pd.DataFrame:
+        """Return the coded settings of points; raise DesignError when one is missing or not finite."""
         missing = [name for name in self.design.names if name not in table.columns]
         if missing:
             raise DesignError(f"no value for factor {missing[0]!r}; the points have {list(table.columns)}")
-        inside = table[self.design.names] if coded else coded_points(self.design.factors, table)
-        mean, se = self.evaluate(inside)
-        t = stats.t.isf(0.5 * alpha, self.residual_df)
-        single = np.sqrt(se**2 + self.residual_ms)
-        columns = {"mean": mean, "se": se, "confidence_low": mean - t * se, "confidence_high": mean + t * se}
-        columns |= {"prediction_low": mean - t * single, "prediction_high": mean + t * single}
-        return pd.DataFrame(columns, index=table.index)
+        numbers = {
+            name: real_array(f"the points' values of factor {name!r}", table[name])
+            for name in self.design.names
+        }
+        for name, values in numbers.items():
+            bad = np.flatnonzero(~np.isfinite(values))
+            if bad.size:
+                raise DesignError(
+                    f"a point's settings must be finite: {name!r} is {values[bad[0]]} in row "
+                    f"{table.index[bad[0]]!r}"
+                )
+        inside = pd.DataFrame(numbers, index=table.index)
+        return inside if coded else coded_points(self.design.factors, inside)
 
     def contour(self, target: float, extent: float = 1.0, resolution: int | None = None) -> pd.DataFrame:
         """Return points of the target contour, natural units (see ``doe.contour.contour``)."""
@@ -259,6 +313,13 @@ class Surface:
     ) -> region.Region:
         """Return the settings that the target does not contradict (see ``doe.region.compatible_region``)."""
         return region.compatible_region(self, target, target_se, target_df, alpha, extent, resolution)
+
+    def agrees(
+        self, point: Mapping[str, float], target: Sample, alpha: float = 0.05, coded: bool = False
+    ) -> bool:
+        """Whether a target does not contradict one setting: the rule of ``compatible_region`` there."""
+        inside = self._coded_table(pd.DataFrame([dict(point)]), coded)
+        return region.agrees(self, inside.to_numpy(), target, alpha)
 
     def band(
         self, target: float, half_width: float, extent: float = 1.0, resolution: int | None = None

@@ -65,9 +65,7 @@ def parsed_terms(written: Iterable[str], names: Sequence[str]) -> tuple[Term, ..
         for place in range(len(term)):
             part = term[:place] + term[place + 1 :]
             if part and part not in terms:
-                raise DesignError(
-                    f"the model is hierarchical: {term_name(term)} needs {term_name(part)}, which is not in it"
-                )
+                raise DesignError(f"the model is hierarchical: {term_name(term)} needs {term_name(part)} too")
     return tuple(sorted(terms, key=lambda term: (len(term), len(set(term)) == 1)))
 
 

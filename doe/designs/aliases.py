@@ -1,4 +1,4 @@
-"""Aliases of a two-level design: which effects it cannot tell apart, its defining words and its resolution."""
+"""Aliases of a two-level design: which effects it cannot tell apart, its words and resolution."""
 
 import itertools
 from collections.abc import Iterator
@@ -34,12 +34,12 @@ class AliasStructure:
 
     @property
     def resolution(self) -> float:
-        """Resolution: the length of the shortest word, plus what a partial one leaves (Deng and Tang 1999)."""
+        """Length of the shortest word, plus what a partial one leaves (Deng and Tang 1999)."""
         return self.word_length + (1.0 - self.share) if np.isfinite(self.word_length) else np.inf
 
     @property
     def resolution_text(self) -> str:
-        """Resolution in Roman numerals: ``IV``; ``full`` without aliases, ``III, partly`` for partial ones."""
+        """Resolution in Roman numerals: ``IV``; ``full`` without aliases, ``III, partly``."""
         if not np.isfinite(self.word_length):
             return "full"
         roman = ROMAN[int(self.word_length)]

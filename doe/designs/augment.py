@@ -30,11 +30,10 @@ def join(*designs: Design, blocks: Sequence | None = None) -> Design:
         raise DesignError(f"blocks: a different label for each of {len(designs)} designs, received {labels}")
     for design in designs[1:]:
         if design.names != first.names or [f.unit for f in design.factors] != [f.unit for f in first.factors]:
-            raise DesignError(
-                f"designs of the same factors are joined: {', '.join(first.names)} and {', '.join(design.names)}"
-            )
+            raise DesignError(f"designs of the same factors are joined: {first.names} and {design.names}")
     dummies = [name for name in first.dummies if all(name in design.dummies for design in designs)]
-    tables, blocked = [], []
+    tables: list[pd.DataFrame] = []
+    blocked: list = []
     for label, design in zip(labels, designs, strict=True):
         tables.append(_recoded(design, first)[[*first.names, *dummies]])
         own = design.blocks
@@ -76,12 +75,14 @@ def add_center(design: Design, count: int) -> Design:
     numeric_factors(design.factors, "a center")
     if count < 1:
         raise DesignError(f"count is the number of center runs and at least 1, received {count}")
-    labels = [None] if design.blocks is None else list(dict.fromkeys(design.blocks))
-    center = pd.DataFrame(0.0, index=range(count * len(labels)), columns=design.coded.columns)
+    labels = (
+        []
+        if design.blocks is None
+        else [label for label in dict.fromkeys(design.blocks) for _ in range(count)]
+    )
+    center = pd.DataFrame(0.0, index=range(len(labels) or count), columns=design.coded.columns)
     table = numbered(pd.concat([design.coded, center], ignore_index=True))
-    blocks = None
-    if design.blocks is not None:
-        blocks = pd.Series([*design.blocks, *np.repeat(labels, count)], index=table.index)
+    blocks = None if design.blocks is None else pd.Series([*design.blocks, *labels], index=table.index)
     return replace(design, coded=table, blocks=blocks)
 
 

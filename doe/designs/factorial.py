@@ -21,8 +21,8 @@ CATALOGUE: dict[int, dict[int, tuple[int, ...]]] = {
     4: {3: (3,)},
     8: {4: (7,), 5: (3, 5), 6: (3, 5, 6), 7: (3, 5, 6, 7)},
     16: {
-        5: (15,), 6: (7, 11), 7: (7, 11, 13), 8: (7, 11, 13, 14), 9: (3, 5, 9, 14, 15), 10: (3, 5, 6, 9, 14, 15),
-        11: (3, 5, 6, 9, 10, 13, 14), 12: (3, 5, 6, 9, 10, 13, 14, 15), 13: (3, 5, 6, 7, 9, 10, 11, 12, 13),
+        5: (15,), 6: (7, 11), 7: (7, 11, 13), 8: (7, 11, 13, 14), 9: (3, 5, 9, 14, 15),
+        10: (3, 5, 6, 9, 14, 15), 11: (3, 5, 6, 9, 10, 13, 14), 12: (3, 5, 6, 9, 10, 13, 14, 15), 13: (3, 5, 6, 7, 9, 10, 11, 12, 13),
         14: (3, 5, 6, 7, 9, 10, 11, 12, 13, 14), 15: (3, 5, 6, 7, 9, 10, 11, 12, 13, 14, 15),
     },
     32: {
@@ -39,8 +39,8 @@ CATALOGUE: dict[int, dict[int, tuple[int, ...]]] = {
     128: {8: (127,), 9: (31, 103), 10: (31, 103, 43), 11: (31, 103, 43, 85), 12: (31, 103, 43, 85, 121)},
 }  # fmt: skip
 """Generators of the fractions of least aberration by runs and factors: the bits of a number name the basic
-factors whose product the further factor is, 7 = 4 + 2 + 1 = A:B:C (Chen, Sun and Wu, Int. Stat. Rev. 61, 1993,
-p. 131; 64 and 128 runs: Block and Mee, J. Qual. Technol. 37, 2005, p. 312)."""
+factors whose product the further factor is, 7 = 4 + 2 + 1 = A:B:C (Chen, Sun and Wu, Int. Stat. Rev. 61,
+1993, p. 131; 64 and 128 runs: Block and Mee, J. Qual. Technol. 37, 2005, p. 312)."""
 
 
 def full_factorial(

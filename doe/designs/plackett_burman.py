@@ -78,7 +78,7 @@ def _notes(runs: int, factor_count: int, worst: float) -> tuple[str, ...]:
         )
         if runs & (runs - 1) == 0 or (factor_count < runs // 2 and constructible(runs // 2)):
             notes.append(
-                f"{other} has resolution IV in the same {runs} runs: no interaction of two factors falls onto "
-                "a factor"
+                f"{other} has resolution IV in the same {runs} runs: no interaction of two factors falls "
+                "onto a factor"
             )
     return tuple(notes)

@@ -1,4 +1,4 @@
-"""Space-filling designs for simulations: Latin hypercubes and Sobol points (both from ``scipy.stats.qmc``)."""
+"""Space-filling designs for simulations: Latin hypercubes and Sobol points (``scipy.stats.qmc``)."""
 
 from collections.abc import Iterable
 from typing import Literal
