@@ -86,7 +86,8 @@ def hadamard_candidates(order: int) -> list[Matrix]:
     The two constructions from the squares of a finite field of q elements, with q a prime or the square of
     one (Paley, J. Math. Phys. 12, 1933), in orders q + 1 and 2 (q + 1), and doubling of the matrix of half
     the order (Sylvester 1867). The first column is that of the intercept. A doubled matrix and Paley's
-    second have two halves of columns that differ in sign in half of the runs. Interactions within the second half fall
+    second have two halves of columns that differ in sign in half of the runs. Interactions within the second
+    half fall
     onto the first, so that it comes first, and the column that tells the halves apart comes last: it holds
     n/2 - 1 interactions wholly or nearly so.
     """
