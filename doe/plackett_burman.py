@@ -53,8 +53,8 @@ def plackett_burman(factors: Iterable[Factor], runs: int | None = None, seed: in
         raise DesignError(f"{len(factors)} factors need at least {len(factors) + 1} runs, received {runs}")
     matrix = screening_matrix(runs)
     names = [factor.name for factor in factors]
-    dummies = [f"dummy{number}" for number in range(1, runs - len(factors))]
-    return Design(factors, numbered(pd.DataFrame(matrix, columns=names + dummies)), seed)
+    dummies = tuple(f"dummy{number}" for number in range(1, runs - len(factors)))
+    return Design(factors, numbered(pd.DataFrame(matrix, columns=[*names, *dummies])), seed, dummies)
 
 
 def screening_matrix(runs: int) -> NDArray[np.floating]:

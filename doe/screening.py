@@ -9,7 +9,15 @@ from numpy.typing import ArrayLike
 from scipy import stats
 from statsmodels.regression.linear_model import RegressionResults
 
-from doe.anova import ErrorTerm, anova_table, least_squares, partial_sums, pure_error
+from doe.anova import (
+    ErrorTerm,
+    anova_table,
+    block_columns,
+    block_sum,
+    least_squares,
+    partial_sums,
+    pure_error,
+)
 from doe.design import Design, observations
 from doe.errors import DesignError
 from doe.terms import Term, find_term, model_matrix, model_terms, natural_coefficients, term_name
@@ -44,19 +52,24 @@ class ScreenResult:
     @property
     def standard_error(self) -> pd.Series:
         """Standard error of each factor's effect."""
-        variances = np.diag(self.fit.normalized_cov_params)[1:]
+        variances = np.diag(self.fit.normalized_cov_params)[1 : len(self.design.names) + 1]
         return pd.Series(2.0 * np.sqrt(self.error_ms * variances), index=self.design.names)
 
     @property
     def coded_coefficients(self) -> pd.Series:
         """Intercept and half effects: the first-order model in coded units."""
-        return self.fit.params.copy()
+        return self.fit.params.iloc[: len(self.design.names) + 1].copy()
+
+    @property
+    def blocks(self) -> pd.Series | None:
+        """Block of every observation; None without blocks."""
+        return None if self.design.blocks is None else self.design.blocks.loc[self.response.index]
 
     @property
     def coefficients(self) -> pd.Series:
         """The first-order model in natural units."""
         terms: list[Term] = [(), *model_terms(self.design.names, "first-order")]
-        coded = dict(zip(terms, self.fit.params, strict=True))
+        coded = dict(zip(terms, self.coded_coefficients, strict=True))
         natural = natural_coefficients(coded, self.design.factors)
         return pd.Series({term_name(term): value for term, value in natural.items()})
 
@@ -68,8 +81,8 @@ class ScreenResult:
     @cached_property
     def table(self) -> pd.DataFrame:
         """Tests by factor: effect, sum_sq, F, t, p, percent (of the total sum of squares), rank."""
-        sums = partial_sums(self.fit).iloc[1:]
-        effect = 2.0 * self.fit.params.iloc[1:]
+        sums = partial_sums(self.fit)[self.design.names]
+        effect = 2.0 * self.fit.params[self.design.names]
         t = effect / self.standard_error
         table = pd.DataFrame(
             {
@@ -87,7 +100,7 @@ class ScreenResult:
     @cached_property
     def anova(self) -> pd.DataFrame:
         """Analysis of variance by source; model and factors are tested against the chosen error."""
-        return anova_table(self.fit, self.pure_error, self.error)
+        return anova_table(self.fit, self.pure_error, self.error, block_sum(self.response, self.blocks))
 
     def critical_t(self, alpha: float = 0.05, bonferroni: bool = False) -> float:
         """Return the absolute t above which an effect is significant at a two-sided level.
@@ -126,8 +139,10 @@ def screen(design: Design, response: ArrayLike, error: str = "pooled") -> Screen
     if error not in ERRORS:
         raise DesignError(f"error is one of {', '.join(ERRORS)}, received {error!r}")
     coded, values = observations(design, response)
-    fit = least_squares(model_matrix(coded, model_terms(design.names, "first-order")), values)
-    replicates = pure_error(coded, values)
+    blocks = None if design.blocks is None else design.blocks.loc[values.index]
+    columns = model_matrix(coded, model_terms(design.names, "first-order"))
+    fit = least_squares(pd.concat([columns, block_columns(blocks, columns.index)], axis=1), values)
+    replicates = pure_error(coded, values, blocks)
     chosen = _error_term(design, values, fit, replicates, error)
     return ScreenResult(design, values, fit, replicates, chosen, error)
 
@@ -174,12 +189,15 @@ def _error_term(
 def _all_effects(design: Design, response: pd.Series) -> pd.Series:
     """Return effects of factors and dummies; of the factors alone when too few runs are left for more."""
     coded = design.coded.loc[response.index]
+    blocks = None if design.blocks is None else design.blocks.loc[response.index]
+    base = np.column_stack([np.ones(len(coded)), block_columns(blocks, coded.index).to_numpy()])
     columns = list(coded.columns)
-    matrix = np.column_stack([np.ones(len(coded)), coded.to_numpy()])
+    matrix = np.column_stack([base, coded.to_numpy()])
     if np.linalg.matrix_rank(matrix) < matrix.shape[1]:
         columns = design.names
-        matrix = matrix[:, : len(columns) + 1]
-    return pd.Series(2.0 * np.linalg.lstsq(matrix, response.to_numpy(), rcond=None)[0][1:], index=columns)
+        matrix = matrix[:, : base.shape[1] + len(columns)]
+    solved = np.linalg.lstsq(matrix, response.to_numpy(), rcond=None)[0][base.shape[1] :]
+    return pd.Series(2.0 * solved, index=columns)
 
 
 def _lenth_error(effects: pd.Series, observation_count: int) -> ErrorTerm:

@@ -11,7 +11,7 @@ from scipy import stats
 from statsmodels.regression.linear_model import RegressionResults
 
 from doe import contour, optimum, region
-from doe.anova import ErrorTerm, anova_table, least_squares, pure_error
+from doe.anova import ErrorTerm, anova_table, block_columns, block_sum, least_squares, pure_error
 from doe.checks import checked_level, real_array
 from doe.compare import Sample
 from doe.design import Design, observations
@@ -65,28 +65,35 @@ class Surface:
 
     @cached_property
     def fit(self) -> RegressionResults:
-        """The statsmodels least squares fit in coded units."""
-        return least_squares(model_matrix(self.points, self.terms), self.response)
+        """The statsmodels least squares fit in coded units: intercept, terms, then the blocks' columns."""
+        matrix = model_matrix(self.points, self.terms)
+        blocks = block_columns(self.blocks, matrix.index)
+        return least_squares(pd.concat([matrix, blocks], axis=1), self.response)
+
+    @property
+    def blocks(self) -> pd.Series | None:
+        """Block of every observation; None without blocks."""
+        return None if self.design.blocks is None else self.design.blocks.loc[self.response.index]
 
     @cached_property
     def pure_error(self) -> ErrorTerm:
         """Spread of the replicated settings."""
-        return pure_error(self.points, self.response)
+        return pure_error(self.points, self.response, self.blocks)
 
     @cached_property
     def anova(self) -> pd.DataFrame:
         """Analysis of variance by source (see ``doe.anova.anova_table``)."""
-        return anova_table(self.fit, self.pure_error)
+        return anova_table(self.fit, self.pure_error, blocks=block_sum(self.response, self.blocks))
 
     @property
     def coded_coefficients(self) -> pd.Series:
-        """Coefficients by term, in coded units."""
-        return self.fit.params.copy()
+        """Coefficients by term, in coded units; with blocks, the intercept is that of the average block."""
+        return self.fit.params.iloc[: len(self.terms) + 1].copy()
 
     @cached_property
     def coefficients(self) -> pd.Series:
         """Coefficients by term, in natural units."""
-        coded = dict(zip((INTERCEPT, *self.terms), self.fit.params, strict=True))
+        coded = dict(zip((INTERCEPT, *self.terms), self.coded_coefficients, strict=True))
         natural = natural_coefficients(coded, self.design.factors)
         return pd.Series({term_name(term): value for term, value in natural.items()})
 
@@ -100,7 +107,7 @@ class Surface:
     @cached_property
     def quadratic_form(self) -> QuadraticForm:
         """The fitted polynomial as c + b'x + x'Bx in coded units."""
-        return QuadraticForm.of(self.design.names, self.terms, self.fit.params)
+        return QuadraticForm.of(self.design.names, self.terms, self.coded_coefficients)
 
     @property
     def residual_df(self) -> float:
@@ -327,7 +334,7 @@ def fit_surface(design: Design, response: ArrayLike, model: str = "quadratic") -
     Parameters
     ----------
     design : Design
-        Dummy columns are not used.
+        Its blocks, where it has any, are a term of the model; dummy columns are not used.
     response : array-like, shape (runs,) or (runs, replicates)
     model : {"first-order", "interaction", "quadratic"}
         Linear terms; with the products of two factors; with the squares too.

@@ -164,10 +164,12 @@ def test_table_in_natural_units_is_the_same_design():
     assert again.coded.to_numpy() == pytest.approx(design.coded.to_numpy(), abs=1e-13)
 
 
-def test_further_columns_are_dummies_and_factor_order_is_the_factors():
+def test_dummies_are_named_and_factor_order_is_the_factors():
     design = plackett_burman(factors(4))
     shuffled = design.coded[design.coded.columns[::-1]]
-    again = Design.from_table(shuffled, design.factors)
+    with pytest.raises(DesignError, match="column 'dummy7' is no factor: name it among the dummies"):
+        Design.from_table(shuffled, design.factors)
+    again = Design.from_table(shuffled, design.factors, dummies=design.dummies)
     assert again.names == design.names
     assert set(again.dummies) == set(design.dummies)
 
@@ -185,7 +187,7 @@ def test_selection_renumbers_and_repeats():
     [
         ({"x1": [1.0, -1.0]}, "no column for factor 'x2'"),
         ({"x1": [1.0, -1.0], "x2": [1.0, float("nan")]}, "nan.* in run 1, column 'x2'"),
-        ({"x1": [1.0, -1.0], "x2": [1.0, -1.0], "angle": [9.2, 15.3]}, "column 'angle' holds 9.2 in run 0"),
+        ({"x1": [1.0, -1.0], "x2": [1.0, -1.0], "angle": [9.2, 15.3]}, "column 'angle' is no factor"),
         ({"x1": [1.0, -1.0], "x2": ["a", "b"]}, "holds numbers"),
         ({"x1": [], "x2": []}, "at least one run"),
     ],

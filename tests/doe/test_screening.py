@@ -34,7 +34,7 @@ def test_effects_without_noise_are_exact_and_other_columns_empty():
     design = plackett_burman(FACTORS)
     result = screen(design, noisy(design, 1, sd=0.0))
     assert result.table["effect"].to_numpy() == pytest.approx(EFFECTS, abs=1e-12)
-    assert result.effects[design.dummies].to_numpy() == pytest.approx(0.0, abs=1e-12)
+    assert result.effects[list(design.dummies)].to_numpy() == pytest.approx(0.0, abs=1e-12)
 
 
 def test_coefficients_predict_alike_in_both_units():
@@ -66,7 +66,7 @@ def test_errors_of_a_replicated_design_add_up():
     assert pooled.error.sum_sq == pytest.approx(dummies.error.sum_sq + pure.error.sum_sq, rel=1e-12)
     assert pure.error_ms == pytest.approx(response.var(axis=1, ddof=1).mean(), rel=1e-12)
     # The dummies' sum of squares: runs x replicates x half effect squared.
-    inert = 36.0 * (0.5 * pooled.effects[design.dummies]) ** 2
+    inert = 36.0 * (0.5 * pooled.effects[list(design.dummies)]) ** 2
     assert dummies.error.sum_sq == pytest.approx(inert.sum(), rel=1e-9)
     assert pooled.anova.loc["lack of fit", "df"] == 3
 

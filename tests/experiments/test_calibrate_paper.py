@@ -99,7 +99,9 @@ def noise() -> NoiseFloorResult:
 @pytest.fixture(scope="module")
 def screening(study: PaperStudy) -> ScreeningResult:
     table = published("plackett_burman")
-    design = Design.from_table(table.drop(columns=ANGLE), study.factors)
+    names = [factor.name for factor in study.factors]
+    runs = table.drop(columns=ANGLE)
+    design = Design.from_table(runs, study.factors, dummies=runs.columns.drop(names))
     rows = {"run": table.index, "replicate": 1, "status": "finished", "angle": table[ANGLE]}
     return analyse_screening(design, pd.DataFrame(rows).reset_index(drop=True))
 

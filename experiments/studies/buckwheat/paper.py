@@ -99,7 +99,8 @@ def verification() -> list[float]:
 
 def screening_design() -> Design:
     """Return the Plackett-Burman design in printed order, its idle columns as dummies."""
-    return Design.from_table(published("plackett_burman").drop(columns=RESPONSE), factors())
+    table = published("plackett_burman").drop(columns=RESPONSE)
+    return Design.from_table(table, factors(), dummies=table.columns.drop([f.name for f in factors()]))
 
 
 def composite_design() -> Design:
