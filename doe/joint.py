@@ -287,9 +287,7 @@ class JointFit:
         return result.x if better else start
 
 
-def _reach(
-    direction: NDArray[np.float64], slopes: NDArray[np.float64], limits: NDArray[np.float64]
-) -> float:
+def _reach(direction: NDArray[np.float64], slopes: NDArray[np.float64], limits: NDArray[np.float64]) -> float:
     """Return how far a direction leads from the origin to both sides within linear limits; NaN if none is."""
     rows = np.vstack([slopes, -slopes])
     bounds = np.concatenate([limits[:, 1], -limits[:, 0]])
