@@ -67,7 +67,7 @@ def pure_error(coded: pd.DataFrame, response: ArrayLike, blocks: pd.Series | Non
     """
     if not isinstance(coded, pd.DataFrame) or not len(coded) or not len(coded.columns):
         raise DesignError(f"pure error needs a table of settings, one row an observation, received {coded!r}")
-    response = in_rows("a response", response, coded.index)
+    values = in_rows("a response", response, coded.index)
     setting = settings_of(coded)
     if blocks is not None:
         setting = (
@@ -76,8 +76,8 @@ def pure_error(coded: pd.DataFrame, response: ArrayLike, blocks: pd.Series | Non
             .ngroup()
         )
         setting = setting.to_numpy()
-    within = response.to_numpy() - response.groupby(setting).transform("mean").to_numpy()
-    return ErrorTerm(float(len(response) - len(np.unique(setting))), float(within @ within))
+    within = values.to_numpy() - values.groupby(setting).transform("mean").to_numpy()
+    return ErrorTerm(float(len(values) - len(np.unique(setting))), float(within @ within))
 
 
 def settings_of(coded: pd.DataFrame) -> np.ndarray:

@@ -4,6 +4,7 @@ import math
 import numbers
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -16,7 +17,7 @@ from doe.two_errors import TwoErrors
 
 METHODS = ("welch", "pooled", "guarded", "one-sample")
 
-Values = Sequence[float] | NDArray | pd.Series
+Values: TypeAlias = Sequence[float] | NDArray | pd.Series
 
 
 @dataclass(frozen=True)

@@ -74,6 +74,8 @@ def steepest_path(
     if isinstance(steps, bool) or not isinstance(steps, numbers.Integral) or steps < 1:
         raise DesignError(f"a path has at least one step, received {steps!r}")
     moving = [fit.design.factor(name) for name in (factors if factors is not None else fit.design.names)]
+    if not moving:
+        raise DesignError("a path moves at least one factor, received none")
     names = [factor.name for factor in moving]
     _check_names(
         names, step=step if isinstance(step, Mapping) else {}, start=start or {}, limits=limits or {}
