@@ -6,10 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 import statsmodels.api as sm
+from numpy.typing import ArrayLike
 from scipy import stats
 from statsmodels.regression.linear_model import RegressionResults
 
 from doe.errors import DesignError
+from doe.labels import in_rows
 
 ALIAS_TOLERANCE = 1e-8
 """Length of what a column adds to those before it, relative to its own, below which it adds nothing."""
@@ -56,12 +58,16 @@ def least_squares(matrix: pd.DataFrame, response: pd.Series) -> RegressionResult
         return sm.OLS(response.to_numpy(), matrix).fit()
 
 
-def pure_error(coded: pd.DataFrame, response: pd.Series, blocks: pd.Series | None = None) -> ErrorTerm:
+def pure_error(coded: pd.DataFrame, response: ArrayLike, blocks: pd.Series | None = None) -> ErrorTerm:
     """Return the spread of replicates about the mean of their setting.
 
     Rows of ``coded`` that agree (in one block, where there are blocks) are replicates of one setting; the
-    degrees of freedom are the observations less the distinct settings.
+    degrees of freedom are the observations less the distinct settings. A labelled response is read by the
+    labels of ``coded``, an array by its position.
     """
+    if not isinstance(coded, pd.DataFrame) or not len(coded) or not len(coded.columns):
+        raise DesignError(f"pure error needs a table of settings, one row an observation, received {coded!r}")
+    values = in_rows("a response", response, coded.index)
     setting = settings_of(coded)
     if blocks is not None:
         setting = (
@@ -70,8 +76,8 @@ def pure_error(coded: pd.DataFrame, response: pd.Series, blocks: pd.Series | Non
             .ngroup()
         )
         setting = setting.to_numpy()
-    within = response.to_numpy() - response.groupby(setting).transform("mean").to_numpy()
-    return ErrorTerm(float(len(response) - len(np.unique(setting))), float(within @ within))
+    within = values.to_numpy() - values.groupby(setting).transform("mean").to_numpy()
+    return ErrorTerm(float(len(values) - len(np.unique(setting))), float(within @ within))
 
 
 def settings_of(coded: pd.DataFrame) -> np.ndarray:

@@ -79,6 +79,8 @@ def real_array(name: str, values: ArrayLike) -> NDArray[np.float64]:
         raise DesignError(f"{name}: a masked value is no measurement, received one at position {place}")
     if isinstance(values, str | bytes | dict | set) or values is None:
         raise DesignError(f"{name} must be numbers, received {values!r}")
+    if isinstance(getattr(values, "dtype", None), pd.CategoricalDtype):
+        raise DesignError(f"{name} must be real numbers, received categories")
     try:
         array = np.asarray(values)
         if array.dtype == object:  # pandas' missing values, Python's fractions and decimals, or no numbers

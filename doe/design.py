@@ -8,8 +8,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
+from doe.checks import real_array
 from doe.errors import DesignError
-from doe.factors import Factor, checked_factors, coded_points, natural_points
+from doe.factors import Category, Factor, checked_factors, coded_points, natural_points
 from doe.labels import aligned
 
 
@@ -75,7 +76,7 @@ class Design:
         cls,
         table: pd.DataFrame,
         factors: Iterable[Factor],
-        coded: bool = True,
+        coded: bool | None = None,
         *,
         dummies: Iterable[str] = (),
         block: str | None = None,
@@ -87,8 +88,9 @@ class Design:
         table : DataFrame, one row a run
             A column for each factor, each dummy and the blocks; no other.
         factors : iterable of Factor
-        coded : bool
-            Whether the factors' columns are coded (else in natural units).
+        coded : bool, optional
+            Whether the factors' columns are coded (else in natural units). By default they are taken as coded
+            where that is plain: each factor's column holds -1 and +1.
         dummies : names
             Columns in -1 and +1 that stand for no factor.
         block : name, optional
@@ -98,17 +100,23 @@ class Design:
         ------
         DesignError
             A factor without column, a column that is nothing of the three, a value that is not finite, a run
-            label that comes twice, or a dummy with other values than -1 and +1.
+            label that comes twice, a dummy with other values than -1 and +1, or a table of which it is not
+            plain whether it is coded.
         """
         factors, dummies = checked_factors(factors), tuple(dummies)
+        if not isinstance(table, pd.DataFrame):
+            raise DesignError(f"a design is made from a DataFrame, received {type(table).__name__}")
         blocks = None
         if block is not None:
             if block not in table.columns:
                 raise DesignError(f"no column for the block {block!r}; the table has {list(table.columns)}")
             blocks, table = table[block], table.drop(columns=block)
-        if not coded:
-            table = table.assign(**coded_points(factors, table))
-        return cls(factors, table, dummies=dummies, blocks=blocks)
+        if coded is not None and not coded:
+            table = table.assign(**coded_points(factors, _checked_natural(table, factors)))
+        design = cls(factors, table, dummies=dummies, blocks=blocks)
+        if coded is None:
+            _check_coded(design)
+        return design
 
     @property
     def names(self) -> list[str]:
@@ -215,6 +223,37 @@ def checked_blocks(blocks: pd.Series, coded: pd.DataFrame) -> pd.Series:
     return blocks
 
 
+def _check_coded(design: Design) -> None:
+    """Raise DesignError unless it is plain that a table's factors are coded."""
+    for factor in design.factors:
+        values = design.coded[factor.name].to_numpy()
+        if isinstance(factor, Category):
+            continue  # the names of levels are no numbers
+        coded, natural = (
+            all(np.isclose(values, end, rtol=1e-9, atol=1e-9 * factor.half_range).any() for end in ends)
+            for ends in ((-1.0, 1.0), (factor.low, factor.high))
+        )
+        if not coded or (natural and (factor.low, factor.high) != (-1.0, 1.0)):
+            raise DesignError(
+                f"it is not plain whether the table is coded or in natural units: factor {factor.name!r} has "
+                f"the levels {factor.low:g} and {factor.high:g}, its column runs from {values.min():g} to "
+                f"{values.max():g}; say coded=False (natural units) or coded=True"
+            )
+
+
+def _checked_natural(table: pd.DataFrame, factors: tuple[Factor, ...]) -> pd.DataFrame:
+    """Return the factors' columns, numbers as floats; raise DesignError when one is missing."""
+    columns = {}
+    for factor in factors:
+        if factor.name not in table.columns:
+            raise DesignError(f"no column for factor {factor.name!r}; the table has {list(table.columns)}")
+        column = table[factor.name]
+        if not isinstance(factor, Category):
+            column = real_array(f"every column of a design holds numbers: {factor.name!r}", column)
+        columns[factor.name] = column
+    return pd.DataFrame(columns, index=table.index)
+
+
 def _checked_table(table: pd.DataFrame, names: list[str], dummies: tuple[str, ...]) -> pd.DataFrame:
     """Return a float copy with the factors' columns first; raise DesignError when it is no table of runs."""
     for what, wanted in (("factor", names), ("dummy", dummies)):
@@ -236,10 +275,11 @@ def _checked_table(table: pd.DataFrame, names: list[str], dummies: tuple[str, ..
         raise DesignError(
             f"a column is a factor or a dummy: {min(set(names) & set(dummies))!r} is named as both"
         )
-    try:
-        table = table[[*names, *dummies]].astype(np.float64)
-    except (TypeError, ValueError) as error:
-        raise DesignError(f"every column of a design holds numbers: {error}") from None
+    columns = {
+        name: real_array(f"every column of a design holds numbers: {name!r}", table[name])
+        for name in (*names, *dummies)
+    }
+    table = pd.DataFrame(columns, index=table.index)
     values = table.to_numpy()
     bad = np.argwhere(~np.isfinite(values))
     if len(bad):

@@ -38,6 +38,29 @@ def aligned(name: str, values: ArrayLike, labels: pd.Index) -> NDArray[np.float6
     return real_array(name, values)
 
 
+def in_rows(name: str, values: ArrayLike, rows: pd.Index) -> pd.Series:
+    """Return values as a Series with these row labels, finite, one a row.
+
+    A Series with the same labels in another order is put in order; labels may repeat where the order is the
+    same already, as those of replicated runs do.
+    """
+    if isinstance(values, pd.Series | pd.DataFrame) and not values.index.equals(rows):
+        if rows.has_duplicates:
+            raise DesignError(
+                f"{name} aligns by label, each label once: {rows[rows.duplicated()][0]!r} comes again in the "
+                "settings; number the rows"
+            )
+        numbers = aligned(name, values, rows)
+    else:
+        numbers = real_array(name, values)
+    if numbers.shape != (len(rows),):
+        raise DesignError(f"{name} is one number a row of {len(rows)}, received shape {numbers.shape}")
+    bad = np.flatnonzero(~np.isfinite(numbers))
+    if bad.size:
+        raise DesignError(f"{name} must be finite: {numbers[bad[0]]} in row {rows[bad[0]]!r}")
+    return pd.Series(numbers, index=rows, name="response")
+
+
 def check_labels(name: str, received: pd.Index, labels: pd.Index) -> None:
     """Raise DesignError unless the received labels are the expected ones, each once, in any order."""
     by_position = "pass its .to_numpy() to have it read by position"

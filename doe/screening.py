@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 from statsmodels.regression.linear_model import RegressionResults
 
@@ -18,11 +18,14 @@ from doe.anova import (
     partial_sums,
     pure_error,
 )
+from doe.checks import checked_level
 from doe.design import Design, observations
 from doe.errors import DesignError
+from doe.lenth import LENTH_DRAWS, SEED, orthogonal_null, pseudo_error
 from doe.terms import Term, find_term, model_matrix, model_terms, natural_coefficients, term_name
 
 ERRORS = ("pooled", "dummies", "pure", "lenth")
+"""What effects can be tested against."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +93,7 @@ class ScreenResult:
                 "sum_sq": sums,
                 "F": t**2,
                 "t": t,
-                "p": 2.0 * stats.t.sf(t.abs(), self.error_df),
+                "p": self._p(t.abs()),
                 "percent": 100.0 * sums / self.fit.centered_tss,
                 "rank": sums.rank(ascending=False, method="first").astype(int),
             }
@@ -100,35 +103,69 @@ class ScreenResult:
     @cached_property
     def anova(self) -> pd.DataFrame:
         """Analysis of variance by source; model and factors are tested against the chosen error."""
-        return anova_table(self.fit, self.pure_error, self.error, block_sum(self.response, self.blocks))
+        table = anova_table(self.fit, self.pure_error, self.error, block_sum(self.response, self.blocks))
+        if self.error_rule == "lenth":  # F has no F distribution against a pseudo error
+            table["p"] = table["p"].where(table.index.isin(["lack of fit"]))
+            table.loc[self.design.names, "p"] = self.table["p"]
+        return table
 
     def critical_t(self, alpha: float = 0.05, bonferroni: bool = False) -> float:
         """Return the absolute t above which an effect is significant at a two-sided level.
 
         With ``bonferroni`` the level is shared among all columns of the design, dummies included.
         """
-        shared = alpha / self.design.coded.shape[1] if bonferroni else alpha
+        shared = checked_level(alpha) / (self.design.coded.shape[1] if bonferroni else 1)
+        if self.error_rule == "lenth":
+            return float(np.quantile(self._lenth_null, 1.0 - shared))
         return float(stats.t.isf(0.5 * shared, self.error_df))
 
     def significant(self, alpha: float = 0.05) -> list[str]:
         """Return the factors with p below alpha, largest effect first."""
-        return list(self.table[self.table["p"] < alpha].sort_values("rank").index)
+        return list(self.table[self.table["p"] < checked_level(alpha)].sort_values("rank").index)
+
+    def _p(self, size: pd.Series) -> pd.Series:
+        """Return the p values of absolute t: Student's, or the share of drawn inert effects as large."""
+        if self.error_rule != "lenth":
+            return pd.Series(2.0 * stats.t.sf(size, self.error_df), index=size.index)
+        drawn = self._lenth_null
+        below = np.searchsorted(drawn, size.to_numpy(), side="left")
+        return pd.Series((len(drawn) - below + 1.0) / (len(drawn) + 1.0), index=size.index)
+
+    @cached_property
+    def _lenth_null(self) -> NDArray[np.float64]:
+        """Absolute t that inert effects of this design show against Lenth's error, ascending."""
+        solver = _effect_solver(self.design, self.response.index)[1]
+        products = solver @ solver.T
+        if np.allclose(products, products[0, 0] * np.eye(len(solver)), atol=1e-9 * products[0, 0]):
+            return orthogonal_null(len(solver))
+        draws = max(1, min(LENTH_DRAWS, LENTH_DRAWS * 100 // len(self.response)))
+        noise = np.random.default_rng(SEED).standard_normal((draws, len(self.response)))
+        factors = 2.0 * np.linalg.pinv(self.fit.model.exog)[1 : len(self.design.names) + 1]
+        size = np.linalg.norm(factors, axis=1) * np.sqrt(len(self.response)) / 2.0
+        return np.sort(
+            np.abs(noise @ factors.T) / (pseudo_error(noise @ solver.T)[:, None] * size), axis=None
+        )
 
 
-def screen(design: Design, response: ArrayLike, error: str = "pooled") -> ScreenResult:
+def screen(design: Design, response: ArrayLike, error: str | None = None) -> ScreenResult:
     """Estimate every factor's effect (mean at +1 less mean at -1) and test it.
 
     Parameters
     ----------
     design : Design
-        Two-level; runs may be missing (``Design.select``): least squares then replaces the plain contrasts.
+        Two-level, with or without center runs, whose distance from the plane is a row ``curvature`` of the
+        analysis of variance; runs may be missing (``Design.select``): least squares then replaces the plain
+        contrasts.
     response : array-like, shape (runs,) or (runs, replicates)
-    error : {"pooled", "dummies", "pure", "lenth"}
-        What the effects are tested against. ``"pooled"``: all that the factors leave unexplained, dummy
-        columns and replicates together; ``"dummies"``: the columns without factor alone, which hold
-        interactions too (the careful choice with replicates); ``"pure"``: the replicates alone; ``"lenth"``:
-        Lenth's pseudo standard error (Technometrics 31, 1989, p. 469), for a design without dummies and
-        replicates in which few effects are active.
+    error : {"dummies", "lenth", "pooled", "pure"}, optional
+        What the effects are tested against. ``"dummies"``: the columns without factor alone, which hold
+        interactions too; ``"lenth"``: Lenth's pseudo standard error (Technometrics 31, 1989, p. 469), for a
+        design without dummies in which few effects are active, with limits drawn from inert effects (Ye and
+        Hamada, Journal of Quality Technology 32, 2000, p. 57); ``"pooled"``: all that the factors leave
+        unexplained, dummies and replicates together; ``"pure"``: the replicates alone. By default the
+        dummies, where there are none Lenth's. These two stay at their level when factors interact: what an
+        interaction adds to the factors' columns it adds to the dummies' too. Against the replicates it is
+        found significant, whichever column it falls on: one strong interaction alarms in most screenings.
 
     Raises
     ------
@@ -136,15 +173,19 @@ def screen(design: Design, response: ArrayLike, error: str = "pooled") -> Screen
         A response that is not finite or does not vary, terms that the runs cannot tell apart, or no degrees
         of freedom for the error that was asked for.
     """
-    if error not in ERRORS:
+    if error is not None and error not in ERRORS:
         raise DesignError(f"error is one of {', '.join(ERRORS)}, received {error!r}")
     coded, values = observations(design, response)
     blocks = None if design.blocks is None else design.blocks.loc[values.index]
     columns = model_matrix(coded, model_terms(design.names, "first-order"))
+    center = (coded[design.names] == 0.0).all(axis=1)
+    if center.any() and not center.all():  # runs at the center show curvature, which is no error
+        columns["curvature"] = center.to_numpy(dtype=float)
     fit = least_squares(pd.concat([columns, block_columns(blocks, columns.index)], axis=1), values)
     replicates = pure_error(coded, values, blocks)
-    chosen = _error_term(design, values, fit, replicates, error)
-    return ScreenResult(design, values, fit, replicates, chosen, error)
+    rule = error or ("dummies" if fit.df_resid > replicates.df else "lenth")
+    chosen = _error_term(design, values, fit, replicates, rule)
+    return ScreenResult(design, values, fit, replicates, chosen, rule)
 
 
 def aliases(design: Design, interaction: str) -> pd.Series:
@@ -188,24 +229,27 @@ def _error_term(
 
 def _all_effects(design: Design, response: pd.Series) -> pd.Series:
     """Return effects of factors and dummies; of the factors alone when too few runs are left for more."""
-    coded = design.coded.loc[response.index]
-    blocks = None if design.blocks is None else design.blocks.loc[response.index]
+    columns, solver = _effect_solver(design, response.index)
+    return pd.Series(solver @ response.to_numpy(), index=columns)
+
+
+def _effect_solver(design: Design, runs: pd.Index) -> tuple[list[str], NDArray[np.float64]]:
+    """Return the columns whose effects can be told, and the matrix that makes them of the observations."""
+    coded = design.coded.loc[runs]
+    blocks = None if design.blocks is None else design.blocks.loc[runs]
     base = np.column_stack([np.ones(len(coded)), block_columns(blocks, coded.index).to_numpy()])
     columns = list(coded.columns)
     matrix = np.column_stack([base, coded.to_numpy()])
     if np.linalg.matrix_rank(matrix) < matrix.shape[1]:
         columns = design.names
         matrix = matrix[:, : base.shape[1] + len(columns)]
-    solved = np.linalg.lstsq(matrix, response.to_numpy(), rcond=None)[0][base.shape[1] :]
-    return pd.Series(2.0 * solved, index=columns)
+    return columns, 2.0 * np.linalg.pinv(matrix)[base.shape[1] :]
 
 
 def _lenth_error(effects: pd.Series, observation_count: int) -> ErrorTerm:
     """Return Lenth's error: degrees of freedom m / 3; a mean square that gives effects their pseudo error."""
-    size = effects.abs()
-    first_guess = 1.5 * size.median()
-    pseudo_error = 1.5 * size[size < 2.5 * first_guess].median()
-    if not pseudo_error > 0.0:
+    error = float(pseudo_error(effects.to_numpy()[None, :])[0])
+    if not error > 1e-12 * float(effects.abs().max()):
         raise DesignError("Lenth's error needs effects that are not zero: more than half of them are")
     df = len(effects) / 3.0
-    return ErrorTerm(df, df * pseudo_error**2 * observation_count / 4.0)
+    return ErrorTerm(df, df * error**2 * observation_count / 4.0)

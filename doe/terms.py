@@ -79,7 +79,7 @@ def term_name(term: Term) -> str:
 def find_term(name: str, terms: Iterable[Term]) -> Term:
     """Return the term that a name writes (interactions in either order); raise DesignError when none does."""
     for term in terms:
-        if name == term_name(term) or ("^" not in name and sorted(name.split(":")) == sorted(term)):
+        if name == term_name(term) or sorted(str(name).split(":")) == sorted(term):
             return term
     raise DesignError(f"the model has no term {name!r}; it has {', '.join(map(term_name, terms))}")
 

@@ -69,7 +69,7 @@ class TwoErrors:
         return 1.0 / np.maximum(spread, np.finfo(float).tiny)
 
     def p(self, t: float, share: float) -> float:
-        """Return the two-sided p value of one difference over its error: the level at which it is critical."""
+        """Return the two-sided p value of a difference over its error: the level at which it is critical."""
         size = abs(float(t))
         if not size > 0.0:
             return 1.0

@@ -67,12 +67,11 @@ def analyse_screening(
 
 
 def _screen(design: Design, cases: pd.DataFrame, observable: str) -> ScreenResult:
-    """Test against dummies and replicates together; where there is neither, against Lenth's pseudo error."""
+    """Test against the dummies; where there are none, against Lenth's pseudo error."""
     used = measured(cases, observable)
     try:
         run = design.select(used["run"].tolist())
-        spare = len(run.coded) - len(run.factors) - 1
-        return screen(run, used[observable].to_numpy(), error="pooled" if spare > 0 else "lenth")
+        return screen(run, used[observable].to_numpy())
     except DesignError as error:
         need = f"cannot be analysed any more ({error})"
         raise too_many_failed(cases, STAGE, need, observable) from error
@@ -99,8 +98,8 @@ def _decision(design: Design, cases: pd.DataFrame, result: ScreenResult) -> Deci
     strongest = ranked.index[0]
     replicates = int(cases["replicate"].max())
     against = {
-        "pooled": "what the factors leave unexplained (dummy columns and replicates)",
-        "lenth": "Lenth's pseudo standard error, the design having neither dummies nor replicates",
+        "dummies": "the dummy columns, which hold interactions as the factors' columns do",
+        "lenth": "Lenth's pseudo standard error, the design having no dummies",
     }[result.error_rule]
     return Decision(
         STAGE,

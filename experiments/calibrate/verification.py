@@ -89,7 +89,7 @@ def _difference(comparison: Comparison, target: Sample, cases: pd.DataFrame) -> 
     found = "A difference is found" if comparison.different else "No difference is found"
     return Decision(
         STAGE,
-        f"Pooled two-sample t-test of fresh heaps against the target at {comparison.alpha:g}.",
+        f"Welch's two-sample t-test of fresh heaps against the target at {comparison.alpha:g}.",
         {
             "mean of the heaps [deg]": comparison.a.mean,
             "sd of the heaps [deg]": comparison.a.sd,
