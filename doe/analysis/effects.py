@@ -66,9 +66,9 @@ def two_level_effects(design: Design, response: ArrayLike, order: int | None = N
 
     For a design whose effects take every degree of freedom, so that no error is left: few of them are active,
     the others measure the noise (Lenth, Technometrics 31, 1989, p. 469). p and limits are shares of drawn
-    sets of inert effects (Ye and Hamada, J. Qual. Technol. 32, 2000, p. 57), not of the t distribution that Lenth
-    proposed, which is too strict with few effects. Effects that fall together stand in one row, under the
-    name of the lowest order. What blocks or dummies take is left out. Center runs do not count.
+    sets of inert effects (Ye and Hamada, J. Qual. Technol. 32, 2000, p. 57), not of the t distribution that
+    Lenth proposed, which is too strict with few effects. Effects that fall together stand in one row, under
+    the name of the lowest order. What blocks or dummies take is left out. Center runs do not count.
 
     Parameters
     ----------
