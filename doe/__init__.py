@@ -2,9 +2,10 @@
 
 from doe.agreement import Agreement, Estimate, agreement
 from doe.anova import ErrorTerm, pure_error
-from doe.central_composite import central_composite
 from doe.compare import Comparison, Sample, compare_means
 from doe.design import Design
+from doe.designs.central_composite import central_composite
+from doe.designs.plackett_burman import plackett_burman
 from doe.errors import DesignError, TargetError
 from doe.factors import Factor
 from doe.joint import Goal, JointFit, joint_fit
@@ -18,7 +19,6 @@ from doe.noise import (
     variance_ratio,
 )
 from doe.optimum import StationaryPoint
-from doe.plackett_burman import plackett_burman
 from doe.region import Region
 from doe.screening import ScreenResult, aliases, screen
 from doe.steepest import ClimbPath, climb_table, steepest_path

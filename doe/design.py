@@ -30,6 +30,8 @@ class Design:
         and interactions. A column is a dummy because it is named here, never by its values.
     blocks : Series, optional
         Label of each run's block (day, batch, oven), by run. Blocks are a term of every model of the design.
+    notes : sentences
+        What whoever uses the design should know: what it mixes up, which design does better.
     """
 
     factors: tuple[Factor, ...]
@@ -37,16 +39,19 @@ class Design:
     seed: int | None = None
     dummies: tuple[str, ...] = ()
     blocks: pd.Series | None = None
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         factors = checked_factors(self.factors)
         names, dummies = [factor.name for factor in factors], tuple(self.dummies)
         coded = _checked_table(self.coded, names, dummies)
         for name in dummies:
-            odd = coded.index[~coded[name].isin([-1.0, 1.0])]
+            center = (coded[names] == 0.0).all(axis=1) & (coded[name] == 0.0)
+            odd = coded.index[~(coded[name].isin([-1.0, 1.0]) | center)]
             if len(odd):
                 raise DesignError(
-                    f"a dummy holds only -1 and +1: column {name!r} holds {coded.loc[odd[0], name]} "
+                    f"a dummy holds only -1 and +1 (0 at the center): column {name!r} holds "
+                    f"{coded.loc[odd[0], name]} "
                     f"in run {odd[0]}"
                 )
         object.__setattr__(self, "factors", factors)

@@ -1,6 +1,6 @@
 """Response surfaces: polynomial fits of a designed experiment, their quality and their predictions."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -11,12 +11,13 @@ from scipy import stats
 from statsmodels.regression.linear_model import RegressionResults
 
 from doe import contour, optimum, region
+from doe.analysis.coefficients import anova_by_order, coefficient_table, significant_words, summary_text
 from doe.anova import ErrorTerm, anova_table, block_columns, block_sum, least_squares, pure_error
 from doe.checks import checked_level, real_array
 from doe.compare import Sample
 from doe.design import Design, observations
 from doe.errors import DesignError
-from doe.factors import coded_points
+from doe.factors import Category, coded_points, two_level_factors
 from doe.quadratic import QuadraticForm
 from doe.terms import (
     INTERCEPT,
@@ -27,6 +28,7 @@ from doe.terms import (
     model_matrix,
     model_terms,
     natural_coefficients,
+    parsed_terms,
     term_name,
 )
 
@@ -84,6 +86,39 @@ class Surface:
     def anova(self) -> pd.DataFrame:
         """Analysis of variance by source (see ``doe.anova.anova_table``)."""
         return anova_table(self.fit, self.pure_error, blocks=block_sum(self.response, self.blocks))
+
+    @cached_property
+    def anova_by_order(self) -> pd.DataFrame:
+        """Analysis of variance by order of the terms (see ``doe.analysis.coefficients.anova_by_order``)."""
+        return anova_by_order(self.fit, self.terms, block_sum(self.response, self.blocks), self.pure_error)
+
+    @cached_property
+    def coefficient_table(self) -> pd.DataFrame:
+        """Estimate, se, t, p and variance inflation of every coefficient in coded units, blocks included."""
+        return coefficient_table(self.fit)
+
+    def summary(self) -> str:
+        """Return coefficients, analysis of variance by order and quality as text."""
+        p = self.anova.loc["lack of fit", "p"]
+        facts = {
+            "R2": f"{self.r2:.4f}, adjusted {self.r2_adjusted:.4f}, predicted {self.r2_predicted:.4f}",
+            "residual sd": f"{np.sqrt(self.residual_ms):.5g} on {self.residual_df:g} degrees of freedom",
+            "lack of fit": "no replicates to test it" if np.isnan(p) else f"p = {p:.4f}",
+            "significant at 0.05": significant_words(self.coefficient_table),
+            "in natural units": self.equation(digits=4),
+        }
+        if self.dropped:
+            facts["taken out"] = ", ".join(self.dropped)
+        if self.selected_from is not None:
+            facts["chosen by the data"] = (
+                "se and p of what stayed are too small; predict and regions take the errors of the model before"
+            )
+        title = f"Surface of {self.design!r}, coded units"
+        return summary_text(title, self.coefficient_table, self.anova_by_order, facts)
+
+    def __repr__(self) -> str:
+        terms = ", ".join(map(term_name, self.terms)) or "the mean alone"
+        return f"Surface in {terms}: {len(self.response)} observations, R2 {self.r2:.4f}"
 
     @property
     def coded_coefficients(self) -> pd.Series:
@@ -276,6 +311,9 @@ class Surface:
         missing = [name for name in self.design.names if name not in table.columns]
         if missing:
             raise DesignError(f"no value for factor {missing[0]!r}; the points have {list(table.columns)}")
+        if not coded:
+            named = [factor for factor in self.design.factors if isinstance(factor, Category)]
+            table = table.assign(**{factor.name: factor.to_coded(table[factor.name]) for factor in named})
         numbers = {
             name: real_array(f"the points' values of factor {name!r}", table[name])
             for name in self.design.names
@@ -288,7 +326,10 @@ class Surface:
                     f"{table.index[bad[0]]!r}"
                 )
         inside = pd.DataFrame(numbers, index=table.index)
-        return inside if coded else coded_points(self.design.factors, inside)
+        if coded:
+            return inside
+        plain = [factor for factor in self.design.factors if not isinstance(factor, Category)]
+        return inside.assign(**coded_points(plain, inside))
 
     def contour(self, target: float, extent: float = 1.0, resolution: int | None = None) -> pd.DataFrame:
         """Return points of the target contour, natural units (see ``doe.contour.contour``)."""
@@ -328,7 +369,7 @@ class Surface:
         return region.band(self, target, half_width, extent, resolution)
 
 
-def fit_surface(design: Design, response: ArrayLike, model: str = "quadratic") -> Surface:
+def fit_surface(design: Design, response: ArrayLike, model: str | Iterable[str] = "quadratic") -> Surface:
     """Fit a polynomial to a design's response by least squares in coded units.
 
     Parameters
@@ -336,8 +377,9 @@ def fit_surface(design: Design, response: ArrayLike, model: str = "quadratic") -
     design : Design
         Its blocks, where it has any, are a term of the model; dummy columns are not used.
     response : array-like, shape (runs,) or (runs, replicates)
-    model : {"first-order", "interaction", "quadratic"}
-        Linear terms; with the products of two factors; with the squares too.
+    model : {"first-order", "interaction", "quadratic", "three-factor"} or terms
+        Linear terms; with the products of two factors; with the squares too; with products of two and three
+        factors. Or the terms themselves: ``["A", "B", "C", "A:B", "A:C", "B:C", "A:B:C", "A^2"]``.
 
     Raises
     ------
@@ -346,4 +388,6 @@ def fit_surface(design: Design, response: ArrayLike, model: str = "quadratic") -
         cannot tell apart.
     """
     coded, values = observations(design, response)
-    return Surface(design, coded[design.names], values, model_terms(design.names, model))
+    two_level_factors(design.factors, "a polynomial")
+    terms = model_terms(design.names, model) if isinstance(model, str) else parsed_terms(model, design.names)
+    return Surface(design, coded[design.names], values, terms)
