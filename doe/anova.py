@@ -65,7 +65,7 @@ def pure_error(coded: pd.DataFrame, response: ArrayLike, blocks: pd.Series | Non
     degrees of freedom are the observations less the distinct settings. A labelled response is read by the
     labels of ``coded``, an array by its position.
     """
-    if not isinstance(coded, pd.DataFrame) or not len(coded) or not len(coded.columns):
+    if not isinstance(coded, pd.DataFrame) or not len(coded.columns):
         raise DesignError(f"pure error needs a table of settings, one row an observation, received {coded!r}")
     values = in_rows("a response", response, coded.index)
     setting = settings_of(coded)

@@ -78,6 +78,8 @@ def term_name(term: Term) -> str:
 
 def find_term(name: str, terms: Iterable[Term]) -> Term:
     """Return the term that a name writes (interactions in either order); raise DesignError when none does."""
+    if not isinstance(name, str):
+        raise DesignError(f"a term is named by text such as 'E', 'E:F' or 'E^2', received {name!r}")
     for term in terms:
         if name == term_name(term) or sorted(str(name).split(":")) == sorted(term):
             return term
