@@ -55,7 +55,8 @@ class ScreenResult:
 
     def __repr__(self) -> str:
         found = ", ".join(self.significant(0.05)) or "none"
-        return f"Screening of {', '.join(self.design.names)}: significant at 0.05 against {self.error_rule}: {found}"
+        names = ", ".join(self.design.names)
+        return f"Screening of {names}: significant at 0.05 against {self.error_rule}: {found}"
 
     @property
     def error_df(self) -> float:

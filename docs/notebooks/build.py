@@ -1,6 +1,7 @@
 """Make and execute the notebooks: ``python docs/notebooks/build.py``.
 
-``NAME_source.py`` in percent format is the source of ``NAME.ipynb``. Needs nbformat, nbclient and ipykernel (``pip install -e ".[docs]"``).
+``NAME_source.py`` in percent format is the source of ``NAME.ipynb``. Needs nbformat, nbclient and ipykernel
+(``pip install -e ".[docs]"``).
 """
 
 from pathlib import Path
@@ -33,7 +34,7 @@ def _source(kind: str, lines: list[str]) -> str:
 def notebook_of(script: str) -> nbformat.NotebookNode:
     """Return the notebook of a script, not executed; figures that a cell ends with are shown."""
     make = {"code": nbformat.v4.new_code_cell, "markdown": nbformat.v4.new_markdown_cell}
-    cells = []
+    cells = [nbformat.v4.new_code_cell("%matplotlib inline", id="inline")]
     for number, (kind, source) in enumerate(cells_of(script)):
         shown = f"{source}\nfigure" if source.startswith("figure = ") else source
         cells.append(make[kind](shown, id=f"cell-{number}"))

@@ -1,11 +1,11 @@
 # %% [markdown]
 # # A cake, from nine guesses to a recipe
 #
-# A bakery wants a cake that rises well, costs little time and does not dry out. Nine things might matter, an oven
-# batch holds a handful of cakes, and every cake is an hour. This notebook goes the way that such an experiment
-# goes: screen, look at what interacts, fit a surface in blocks, and choose a recipe with its uncertainty. Nothing
-# here knows of grains or simulations: the cakes are drawn from a rule that the analysis does not see, so that each
-# answer can be compared with the truth at the end.
+# A bakery wants a cake that rises well, costs little time and does not dry out. Nine things might matter,
+# an oven batch holds a handful of cakes, and every cake is an hour. This notebook goes the way that such
+# an experiment goes: screen, look at what interacts, fit a surface in blocks, and choose a recipe with
+# its uncertainty. Nothing here knows of grains or simulations: the cakes are drawn from a rule that the
+# analysis does not see, so that each answer can be compared with the truth at the end.
 
 # %%
 import numpy as np
@@ -54,8 +54,9 @@ def bake(settings: pd.DataFrame, seed: int, ovens: pd.Series | None = None) -> p
 # %% [markdown]
 # ## Which of nine factors matter?
 #
-# A Plackett-Burman design tells main effects from 12 runs. It mixes interactions into them, by a third at most.
-# Before baking, ask what such a design can find: with noise of about 0.8 mm, is an effect of 2 mm seen?
+# A Plackett-Burman design tells main effects from 12 runs. It mixes interactions into them, by a third at
+# most. Before baking, ask what such a design can find: with noise of about 0.8 mm, is an effect of 2 mm
+# seen?
 
 # %%
 NAMES = {
@@ -70,15 +71,16 @@ print(*screening.notes, sep="\n")
 print(power_table(screening, [2.0, 4.0], sd=0.8).head(3))
 
 # %% [markdown]
-# Only two dummy columns are left to test against, so that 2 mm would often be missed. Twenty runs leave ten.
+# Only two dummy columns are left to test against, so that 2 mm would often be missed. Twenty runs leave
+# ten.
 
 # %%
 screening = plackett_burman(nine, runs=20, seed=4)
 print(power_table(screening, [2.0, 4.0], sd=0.8).head(3))
 
 # %% [markdown]
-# The cakes are baked in the drawn run order, and the heights come back in that order. A labelled Series is read
-# by its labels, so that nothing has to be sorted.
+# The cakes are baked in the drawn run order, and the heights come back in that order. A labelled Series
+# is read by its labels, so that nothing has to be sorted.
 
 # %%
 sheet = screening.natural.loc[screening.run_order]
@@ -87,9 +89,10 @@ screened = screen(screening, height)
 print(screened.summary())
 
 # %% [markdown]
-# Oven, powder and minutes stand far ahead. Sugar and whisk pass 0.05 too, with effects of 2 mm and less, and the
-# note says why that is not yet to be believed: an interaction of two strong factors falls onto other columns by up
-# to 60 % of its size. The three go on, and the next design keeps their interactions apart.
+# Oven, powder and minutes stand far ahead. Sugar and whisk pass 0.05 too, with effects of 2 mm and less,
+# and the note says why that is not yet to be believed: an interaction of two strong factors falls onto
+# other columns by up to 60 % of its size. The three go on, and the next design keeps their interactions
+# apart.
 
 # %%
 figure = plots.pareto_chart(screened)
@@ -97,8 +100,8 @@ figure = plots.pareto_chart(screened)
 # %% [markdown]
 # ## Do they interact, and does the middle lie on the plane?
 #
-# Three factors need eight corners. Center runs show whether a plane will do at all. The six other factors stay at
-# their middles from now on.
+# Three factors need eight corners. Center runs show whether a plane will do at all. The six other factors
+# stay at their middles from now on.
 
 # %%
 three = [nine[0], nine[1], nine[2]]
@@ -109,8 +112,8 @@ first = screen(corners, answer["height"], error="pure")
 print(first.anova.round(3).to_string(na_rep=""))
 
 # %% [markdown]
-# The curvature is significant: no plane. Lenth's method needs no replicates and agrees on the effects. Oven and
-# minutes interact by about 3 mm, which is what sugar and whisk had borrowed.
+# The curvature is significant: no plane. Lenth's method needs no replicates and agrees on the effects.
+# Oven and minutes interact by about 3 mm, which is what sugar and whisk had borrowed.
 
 # %%
 print(two_level_effects(corners, answer["height"]).table)
@@ -121,8 +124,8 @@ figure = plots.main_effects_plot(corners, answer["height"], "height [mm]")
 # %% [markdown]
 # ## A surface, in three ovens
 #
-# The surface needs more cakes than one oven holds, and ovens differ by millimetres. A central composite design in
-# three orthogonal blocks keeps that difference out of the answer.
+# The surface needs more cakes than one oven holds, and ovens differ by millimetres. A central composite
+# design in three orthogonal blocks keeps that difference out of the answer.
 
 # %%
 wider = [
@@ -166,8 +169,8 @@ figure = plots.contour_plot(
 # %% [markdown]
 # ## High and moist, in a compromise
 #
-# Moisture falls with heat and time, so that the highest cake is too dry. Two wishes and their desirability find
-# the recipe between them.
+# Moisture falls with heat and time, so that the highest cake is too dry. Two wishes and their
+# desirability find the recipe between them.
 
 # %%
 surfaces = {"height [mm]": surface, "moisture [%]": fit_surface(design, cakes["moisture"])}
@@ -179,13 +182,13 @@ print(best)
 figure = plots.profile_plot(surfaces, best.natural, wishes)
 
 # %% [markdown]
-# Against the truth, which nobody at the bakery has: the recipe's height and moisture without noise, in the
-# average oven.
+# Against the truth, which nobody at the bakery has: the recipe's height and moisture without noise, in
+# the average oven.
 
 # %%
 recipe = best.natural.to_frame().T
-many = pd.concat([recipe] * 4000, ignore_index=True)
-truth = bake(many, seed=9).mean() + [(-6.0 - 4.0) / 3.0, 0.0]
+many = recipe.loc[recipe.index.repeat(4000)].reset_index(drop=True)
+truth = bake(many, seed=9).mean() + np.array([(-6.0 - 4.0) / 3.0, 0.0])
 for (name, row), value in zip(best.responses.iterrows(), truth, strict=True):
     held = row["confidence_low"] <= value <= row["confidence_high"]
     print(f"{name}: predicted {row['mean']:.2f}, true {value:.2f}, inside the 95 % interval: {held}")

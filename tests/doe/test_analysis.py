@@ -177,6 +177,8 @@ def test_wishes_are_those_of_derringer_and_suich():
 
 def test_most_desirable_setting_is_that_of_a_fine_grid():
     design, response = drawn()
+    cost = 1.0 + design.points["a"] + 0.01 * response
+    surfaces = {"yield": fit_surface(design, response), "cost": fit_surface(design, cost)}
     wishes = {"yield": Wish(5.0, 11.0), "cost": Wish(0.0, 3.0, larger=False, importance=2.0)}
     best = most_desirable(surfaces, wishes)
     axis = np.linspace(-1.0, 1.0, 201)
