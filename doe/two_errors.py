@@ -77,7 +77,7 @@ class TwoErrors:
         def excess(log_level: float) -> float:
             return float(np.log(self._critical(np.array(share), float(np.exp(log_level)))) - np.log(size))
 
-        lowest, highest = np.log(1e-300), np.log(0.9999)
+        lowest, highest = np.log(1e-100), np.log(0.9999)
         if excess(lowest) <= 0.0 or excess(highest) >= 0.0:
             return 0.0 if excess(lowest) <= 0.0 else 1.0
         return float(np.exp(optimize.brentq(excess, lowest, highest, xtol=1e-10)))

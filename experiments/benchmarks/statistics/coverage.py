@@ -50,6 +50,16 @@ class Figure:
         return not (too_low or too_high)
 
 
+CHECKED = 20
+"""Trials of every case that go through `doe` itself, beside the vectorised computation of all of them."""
+
+
+def require_same(figure: str, found: object, expected: object) -> None:
+    """Raise unless the vectorised computation gives what `doe` gives (to rounding)."""
+    if not np.allclose(np.asarray(found, float), np.asarray(expected, float), rtol=1e-6, atol=1e-9):
+        raise StudyError(f"{figure}: the record computes {found}, doe gives {expected}")
+
+
 def generator(theme: str, case: int) -> np.random.Generator:
     """Return the random numbers of one case of a theme."""
     return np.random.default_rng([SEED, *theme.encode(), case])

@@ -5,16 +5,24 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from scipy import stats
 
-from doe import Sample, compare_means, noise_floor
+from doe import compare_means, noise_floor
 from doe.two_errors import TwoErrors
-from experiments.benchmarks.statistics.coverage import AT_MOST, EXACT, Figure, generator
+from experiments.benchmarks.statistics.coverage import (
+    AT_MOST,
+    CHECKED,
+    EXACT,
+    Figure,
+    generator,
+    require_same,
+)
 
 SIZES = ((2, 2), (2, 5), (3, 3), (3, 9), (4, 4), (4, 12), (5, 30))
 RATIOS = (1.0 / 3.0, 1.0, 3.0)
 """Standard deviation of the first sample over that of the second."""
 
-TRIALS = 10_000
+TRIALS = 40_000
 
 
 def means() -> Iterator[Figure]:
@@ -29,30 +37,32 @@ def means() -> Iterator[Figure]:
         yield from _floor(count, 100 + count)
 
 
-def _promise(sizes: tuple[int, int], method: str) -> str:
-    """Welch's holds from 4 values on; the guarded test has room to spare below."""
-    if method == "guarded":
-        return EXACT if min(sizes) >= 4 else AT_MOST
-    return EXACT
-
-
 def _compared(sizes: tuple[int, int], ratio: float, number: int) -> Iterator[Figure]:
     rng = generator("means", number)
-    samples = [
-        [Sample.of(sd * rng.standard_normal(size)) for _ in range(TRIALS)]
-        for sd, size in zip((ratio, 1.0), sizes, strict=True)
-    ]
     text = f"n = {sizes[0]} and {sizes[1]}, sd {ratio:.3g} and 1"
-    methods = ("welch", "guarded") if min(sizes) >= 4 else ("guarded",)
-    for method in methods:
-        tests = [compare_means(a, b, method=method) for a, b in zip(*samples, strict=True)]
-        alarms = np.mean([not test.interval[0] <= 0.0 <= test.interval[1] for test in tests])
-        yield Figure(f"compare_means, {method}", text, 0.05, _promise(sizes, method), float(alarms), TRIALS)
-        margin = 1.0 + ratio  # the true difference is the margin: equivalence is claimed by mistake
-        shifted = (Sample(a.mean + margin, a.sd, a.n) for a in samples[0])
-        tests = [compare_means(a, b, margin, method) for a, b in zip(shifted, samples[1], strict=True)]
-        passed = np.mean([test.smallest_margin < margin for test in tests])
-        yield Figure(f"equivalence, {method}", text, 0.05, AT_MOST, float(passed), TRIALS)
+    values = [sd * rng.standard_normal((TRIALS, size)) for sd, size in zip((ratio, 1.0), sizes, strict=True)]
+    difference = values[0].mean(axis=1) - values[1].mean(axis=1)
+    squares = [rows.var(axis=1, ddof=1) / rows.shape[1] for rows in values]
+    se, share = np.sqrt(squares[0] + squares[1]), squares[1] / (squares[0] + squares[1])
+    rule = TwoErrors(sizes[0] - 1.0, sizes[1] - 1.0)
+    margin = 1.0 + ratio
+    for method in ("welch", "guarded") if min(sizes) >= 4 else ("guarded",):
+        one, two = (
+            stats.t.isf(0.5 * alpha, rule.df(share)) if method == "welch" else rule.critical(share, alpha)
+            for alpha in (0.10, 0.05)
+        )
+        # The true difference is the margin: equivalence is claimed by mistake.
+        smallest = np.abs(difference + margin) + one * se
+        for trial in range(CHECKED):
+            test = compare_means(values[0][trial] + margin, values[1][trial], margin, method)
+            require_same("compare_means", smallest[trial], test.smallest_margin)
+            low, _ = test.interval
+            require_same("compare_means", difference[trial] + margin - two[trial] * se[trial], low)
+        alarms = float((np.abs(difference) > two * se).mean())
+        promise = AT_MOST if method == "guarded" else EXACT
+        yield Figure(f"compare_means, {method}", text, 0.05, promise, alarms, TRIALS)
+        passed = float((smallest < margin).mean())
+        yield Figure(f"equivalence, {method}", text, 0.05, AT_MOST, passed, TRIALS)
 
 
 def _worst(sizes: tuple[int, int]) -> Figure:
@@ -64,8 +74,13 @@ def _worst(sizes: tuple[int, int]) -> Figure:
 
 def _floor(count: int, number: int) -> Iterator[Figure]:
     values = generator("means", number).normal(5.0, 1.3, (TRIALS, count))
-    floors = [noise_floor(row) for row in values]
-    for name, truth in (("mean", 5.0), ("sd", 1.3)):
-        ends = np.array([getattr(floor, f"{name}_interval") for floor in floors])
-        share = float(((ends[:, 0] <= truth) & (truth <= ends[:, 1])).mean())
-        yield Figure(f"noise_floor, {name}", f"n = {count}", 0.95, EXACT, share, TRIALS)
+    mean, sd = values.mean(axis=1), values.std(axis=1, ddof=1)
+    reach = stats.t.isf(0.025, count - 1) * sd / np.sqrt(count)
+    low, high = (sd * np.sqrt((count - 1) / stats.chi2.isf(q, count - 1)) for q in (0.025, 0.975))
+    for trial in range(CHECKED):
+        floor = noise_floor(values[trial])
+        ends = [mean[trial] - reach[trial], mean[trial] + reach[trial], low[trial], high[trial]]
+        require_same("noise_floor", ends, [*floor.mean_interval, *floor.sd_interval])
+    shares = {"mean": np.abs(mean - 5.0) <= reach, "sd": (low <= 1.3) & (high >= 1.3)}
+    for name, inside in shares.items():
+        yield Figure(f"noise_floor, {name}", f"n = {count}", 0.95, EXACT, float(inside.mean()), TRIALS)
