@@ -12,7 +12,9 @@ from doe.errors import DesignError
 
 Values = TypeVar("Values", float, np.ndarray, pd.Series)
 
-RESERVED_NAMES = frozenset({"intercept", "blocks", "model", "residual", "lack of fit", "pure error", "total"})
+RESERVED_NAMES = frozenset(
+    {"intercept", "blocks", "curvature", "model", "residual", "lack of fit", "pure error", "total"}
+)
 """Rows of the analysis tables: a factor of that name could not be told from them."""
 
 

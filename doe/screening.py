@@ -1,7 +1,7 @@
 """Screening: effects of two-level factors, tested against dummies, replicates or Lenth's pseudo error."""
 
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 
 import numpy as np
 import pandas as pd
@@ -21,16 +21,11 @@ from doe.anova import (
 from doe.checks import checked_level
 from doe.design import Design, observations
 from doe.errors import DesignError
+from doe.lenth import LENTH_DRAWS, SEED, orthogonal_null, pseudo_error
 from doe.terms import Term, find_term, model_matrix, model_terms, natural_coefficients, term_name
 
 ERRORS = ("pooled", "dummies", "pure", "lenth")
 """What effects can be tested against."""
-
-LENTH_DRAWS = 100_000
-"""Drawn sets of inert effects behind Lenth's limits: that of 8 runs and .05 is known to 0.4 % of itself."""
-
-SEED = 1
-"""Of the drawing: the same effects give the same limits."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,13 +137,13 @@ class ScreenResult:
         solver = _effect_solver(self.design, self.response.index)[1]
         products = solver @ solver.T
         if np.allclose(products, products[0, 0] * np.eye(len(solver)), atol=1e-9 * products[0, 0]):
-            return _orthogonal_null(len(solver))
+            return orthogonal_null(len(solver))
         draws = max(1, min(LENTH_DRAWS, LENTH_DRAWS * 100 // len(self.response)))
         noise = np.random.default_rng(SEED).standard_normal((draws, len(self.response)))
         factors = 2.0 * np.linalg.pinv(self.fit.model.exog)[1 : len(self.design.names) + 1]
         size = np.linalg.norm(factors, axis=1) * np.sqrt(len(self.response)) / 2.0
         return np.sort(
-            np.abs(noise @ factors.T) / (_pseudo_error(noise @ solver.T)[:, None] * size), axis=None
+            np.abs(noise @ factors.T) / (pseudo_error(noise @ solver.T)[:, None] * size), axis=None
         )
 
 
@@ -158,7 +153,9 @@ def screen(design: Design, response: ArrayLike, error: str | None = None) -> Scr
     Parameters
     ----------
     design : Design
-        Two-level; runs may be missing (``Design.select``): least squares then replaces the plain contrasts.
+        Two-level, with or without center runs, whose distance from the plane is a row ``curvature`` of the
+        analysis of variance; runs may be missing (``Design.select``): least squares then replaces the plain
+        contrasts.
     response : array-like, shape (runs,) or (runs, replicates)
     error : {"dummies", "lenth", "pooled", "pure"}, optional
         What the effects are tested against. ``"dummies"``: the columns without factor alone, which hold
@@ -182,6 +179,9 @@ def screen(design: Design, response: ArrayLike, error: str | None = None) -> Scr
     coded, values = observations(design, response)
     blocks = None if design.blocks is None else design.blocks.loc[values.index]
     columns = model_matrix(coded, model_terms(design.names, "first-order"))
+    center = (coded[design.names] == 0.0).all(axis=1)
+    if center.any() and not center.all():  # runs at the center show curvature, which is no error
+        columns["curvature"] = center.to_numpy(dtype=float)
     fit = least_squares(pd.concat([columns, block_columns(blocks, columns.index)], axis=1), values)
     replicates = pure_error(coded, values, blocks)
     rule = error or ("dummies" if fit.df_resid > replicates.df else "lenth")
@@ -249,22 +249,8 @@ def _effect_solver(design: Design, runs: pd.Index) -> tuple[list[str], NDArray[n
 
 def _lenth_error(effects: pd.Series, observation_count: int) -> ErrorTerm:
     """Return Lenth's error: degrees of freedom m / 3; a mean square that gives effects their pseudo error."""
-    pseudo_error = float(_pseudo_error(effects.to_numpy()[None, :])[0])
-    if not pseudo_error > 1e-12 * float(effects.abs().max()):
+    error = float(pseudo_error(effects.to_numpy()[None, :])[0])
+    if not error > 1e-12 * float(effects.abs().max()):
         raise DesignError("Lenth's error needs effects that are not zero: more than half of them are")
     df = len(effects) / 3.0
-    return ErrorTerm(df, df * pseudo_error**2 * observation_count / 4.0)
-
-
-def _pseudo_error(effects: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return Lenth's pseudo standard error of each row of effects."""
-    size = np.abs(effects)
-    limit = 2.5 * 1.5 * np.median(size, axis=1, keepdims=True)
-    return np.asarray(1.5 * np.nanmedian(np.where(size < limit, size, np.nan), axis=1))
-
-
-@cache
-def _orthogonal_null(count: int) -> NDArray[np.float64]:
-    """Return the absolute t of so many inert effects of equal variance, drawn again and again, ascending."""
-    effects = np.random.default_rng(SEED).standard_normal((LENTH_DRAWS, count))
-    return np.sort(np.abs(effects) / _pseudo_error(effects)[:, None], axis=None)
+    return ErrorTerm(df, df * error**2 * observation_count / 4.0)

@@ -111,7 +111,7 @@ class Surface:
             facts["taken out"] = ", ".join(self.dropped)
         if self.selected_from is not None:
             facts["chosen by the data"] = (
-                "se and p of what stayed are too small; predict and regions take the errors of the model before"
+                "se and p of what stayed are too small; predict and regions take those of the model before"
             )
         title = f"Surface of {self.design!r}, coded units"
         return summary_text(title, self.coefficient_table, self.anova_by_order, facts)

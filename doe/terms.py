@@ -81,7 +81,7 @@ def find_term(name: str, terms: Iterable[Term]) -> Term:
     if not isinstance(name, str):
         raise DesignError(f"a term is named by text such as 'E', 'E:F' or 'E^2', received {name!r}")
     for term in terms:
-        if name == term_name(term) or ("^" not in name and sorted(name.split(":")) == sorted(term)):
+        if name == term_name(term) or sorted(str(name).split(":")) == sorted(term):
             return term
     raise DesignError(f"the model has no term {name!r}; it has {', '.join(map(term_name, terms))}")
 

@@ -139,6 +139,6 @@ def summary_text(
 
 def significant_words(coefficients: pd.DataFrame, alpha: float = 0.05) -> str:
     """Name the terms with p below alpha, smallest p first."""
-    tested = coefficients.drop(index="intercept", errors="ignore")
+    tested = coefficients.drop(index=["intercept", "Intercept"], errors="ignore")
     found = tested[tested["p"] < alpha].sort_values("p", kind="stable")
     return ", ".join(map(str, found.index)) or "none"

@@ -15,8 +15,11 @@ from doe.errors import DesignError
 from doe.factors import natural_points
 from doe.surface import Surface
 
-STARTS = 12
+STARTS = 6
 """Best points of the search grid from which the optimum is refined."""
+
+MOST_MOVES = 400
+"""Moves along the axes that end a search: where two wishes meet in an edge it would creep along for ever."""
 
 DRAWS_LOG2 = 12
 
@@ -184,8 +187,18 @@ def overall(
     logs = np.zeros(len(coded))
     with np.errstate(divide="ignore"):
         for name, wish in wishes.items():
-            logs += wish.importance / total * np.log(wish.of(surfaces[name].evaluate(coded)[0]))
+            logs += wish.importance / total * np.log(wish.of(fitted_means(surfaces[name], coded)))
     return np.exp(logs)
+
+
+def fitted_means(surface: Surface, coded: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the fitted means at coded points, shape (points, factors), without their errors."""
+    names = surface.design.names
+    powers = np.array([[term.count(name) for name in names] for term in surface.terms]).reshape(
+        -1, len(names)
+    )
+    weights = surface.coded_coefficients.to_numpy()
+    return weights[0] + np.prod(coded[:, None, :] ** powers[None], axis=2) @ weights[1:]
 
 
 def _best(
@@ -203,7 +216,7 @@ def _best(
         raise DesignError(f"extent and radius are positive, received {extent} and {radius}")
 
     def score(coded: NDArray[np.float64]) -> NDArray[np.float64]:
-        return overall(surfaces, wishes, coded) if wishes else sign * surface.evaluate(coded)[0]
+        return overall(surfaces, wishes, coded) if wishes else sign * fitted_means(surface, coded)
 
     unit = qmc.Sobol(count, rng=np.random.default_rng(seed)).random_base2(DRAWS_LOG2)
     corners = 2.0 * np.round(unit[:256]) - 1.0
@@ -220,8 +233,9 @@ def _best(
         )
     starts = inside.to_numpy()[np.argsort(-values, kind="stable")[:STARTS]]
     feasible = _feasible(surface, extent, radius, constraints)
-    candidates = [_refined(score, start, extent, radius, feasible) for start in starts]
+    candidates = [_climbed(score, start, extent, radius, feasible) for start in starts]
     best = max(candidates, key=lambda point: float(score(point[None, :])[0]))
+    best = _polished(score, best, extent, feasible)
     return _described(surfaces, wishes, best, extent, radius, score)
 
 
@@ -242,32 +256,42 @@ def _feasible(
     return check
 
 
-def _refined(
+def _climbed(
     score: Callable[[NDArray[np.float64]], NDArray[np.float64]],
     start: NDArray[np.float64],
     extent: float,
     radius: float | None,
     feasible: Callable[[NDArray[np.float64]], bool],
 ) -> NDArray[np.float64]:
-    """Return a better point near a start: by gradients, then by steps along the axes that keep every rule."""
-    settings: dict[str, Any] = {"method": "SLSQP", "options": {"ftol": 1e-14, "maxiter": 300}}
+    """Return a better point near a start by gradients, or the start."""
+    settings: dict[str, Any] = {"method": "SLSQP", "options": {"ftol": 1e-14, "maxiter": 100}}
     if radius is not None:
         settings["constraints"] = {"type": "ineq", "fun": lambda x: radius**2 - float(x @ x)}
     bounds = [(-extent, extent)] * len(start)
     found = optimize.minimize(lambda x: -float(score(x[None, :])[0]), start, bounds=bounds, **settings)
-    point, value = start, float(score(start[None, :])[0])
     better = np.clip(found.x, -extent, extent)
-    if feasible(better) and float(score(better[None, :])[0]) > value:
-        point, value = better, float(score(better[None, :])[0])
+    return better if feasible(better) and score(better[None, :])[0] > score(start[None, :])[0] else start
+
+
+def _polished(
+    score: Callable[[NDArray[np.float64]], NDArray[np.float64]],
+    point: NDArray[np.float64],
+    extent: float,
+    feasible: Callable[[NDArray[np.float64]], bool],
+) -> NDArray[np.float64]:
+    """Return the point after steps along the axes, ever shorter, that keep every rule."""
+    value = float(score(point[None, :])[0])
     step = 0.1 * extent
-    moves = np.vstack([np.eye(len(start)), -np.eye(len(start))])
-    while step > 1e-9 * extent:
+    moves = np.vstack([np.eye(len(point)), -np.eye(len(point))])
+    for _ in range(MOST_MOVES):
         trials = [trial for trial in point + step * moves if feasible(trial)]
         scores = score(np.array(trials)) if trials else np.array([-np.inf])
         if scores.max() > value:
             point, value = trials[int(scores.argmax())], float(scores.max())
         else:
             step *= 0.5
+        if step < 1e-9 * extent:
+            break
     return point
 
 

@@ -13,10 +13,10 @@ def stationary_region(
 ) -> Region:
     """Return the settings that may be the true stationary point (Box and Hunter 1954).
 
-    Source: Biometrika 41, p. 190. At the true point the k components of the gradient are zero. The fitted gradient d(x) has the covariance
-    V(x) of its coefficients, so that d' V^-1 d <= k F(1 - alpha; k, residual df) holds there with probability
-    1 - alpha, exactly for normal errors and a true quadratic. The region may be open: it then runs to the
-    edge of the box and on, which says that the runs do not settle the point.
+    Biometrika 41, p. 190. At the true point the k components of the gradient are zero. The fitted gradient
+    d(x) has the covariance V(x) of its coefficients, so that d' V^-1 d <= k F(1 - alpha; k, residual df)
+    holds there with probability 1 - alpha, exactly for normal errors and a true quadratic. The region may be
+    open: it then runs to the edge of the box and on, which says that the runs do not settle the point.
 
     Parameters
     ----------
