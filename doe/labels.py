@@ -47,7 +47,7 @@ def in_rows(name: str, values: ArrayLike, rows: pd.Index) -> pd.Series:
     if isinstance(values, pd.Series | pd.DataFrame) and not values.index.equals(rows):
         if rows.has_duplicates:
             raise DesignError(
-                f"{name} aligns by label, each label once: {rows[rows.duplicated()][0]!r} comes again in the "
+                f"{name} aligns by label, each label once: {_text(rows[rows.duplicated()][0])} comes again in the "
                 "settings; number the rows"
             )
         numbers = aligned(name, values, rows)
@@ -57,7 +57,7 @@ def in_rows(name: str, values: ArrayLike, rows: pd.Index) -> pd.Series:
         raise DesignError(f"{name} is one number a row of {len(rows)}, received shape {numbers.shape}")
     bad = np.flatnonzero(~np.isfinite(numbers))
     if bad.size:
-        raise DesignError(f"{name} must be finite: {numbers[bad[0]]} in row {rows[bad[0]]!r}")
+        raise DesignError(f"{name} must be finite: {numbers[bad[0]]} in row {_text(rows[bad[0]])}")
     return pd.Series(numbers, index=rows, name="response")
 
 
@@ -67,14 +67,14 @@ def check_labels(name: str, received: pd.Index, labels: pd.Index) -> None:
     twice = received[received.duplicated()]
     if len(twice):
         raise DesignError(
-            f"{name} is labelled and aligns by label, each label once: {twice[0]!r} comes again; give "
+            f"{name} is labelled and aligns by label, each label once: {_text(twice[0])} comes again; give "
             f"replicates as columns, or {by_position}"
         )
     for expected, given, problem in ((labels, received, "lacks"), (received, labels, "has")):
         other = expected[~expected.isin(given)]
         if len(other):
             raise DesignError(
-                f"{name} is labelled and aligns by label: it {problem} {other[0]!r} "
+                f"{name} is labelled and aligns by label: it {problem} {_text(other[0])} "
                 f"{'of' if problem == 'lacks' else 'beside'} the labels {_listed(labels)}; {by_position}"
             )
 
@@ -114,6 +114,11 @@ def same_labels(names: Sequence[str], tables: Sequence[Any]) -> list[Any]:
             table = table.loc[order]
         ordered.append(table)
     return ordered
+
+
+def _text(label: object) -> str:
+    """Write a label: text in quotes, numbers bare."""
+    return repr(label) if isinstance(label, str) else str(label)
 
 
 def _listed(labels: pd.Index, most: int = 8) -> str:

@@ -25,8 +25,8 @@ from doe.checks import checked_level
 SLACK = 1.08
 """Largest false alarms over the level: .054 for .05."""
 
-LEVELS = np.array([1e-6, 1e-4, 1e-3, 0.003, 0.01, 0.025, 0.05, 0.1, 0.2, 0.5])
-"""Levels at which the weight is solved for; between them it is interpolated, linearly in the log."""
+LEVELS = np.array([1e-6, 1e-4, 1e-3, 0.003, 0.05 / 6, 0.0125, 0.05 / 3, 0.025, 0.05, 0.1, 0.2, 0.5])
+"""Levels at which the weight is solved for, among them .05 shared by 1 to 6; interpolated in the log."""
 
 MANY = 200.0
 """More degrees of freedom than these change the weight no more."""
@@ -77,18 +77,25 @@ class TwoErrors:
         def excess(log_level: float) -> float:
             return float(np.log(self._critical(np.array(share), float(np.exp(log_level)))) - np.log(size))
 
-        lowest, highest = np.log(1e-300), np.log(0.9999)
+        lowest, highest = np.log(1e-100), np.log(0.9999)
         if excess(lowest) <= 0.0 or excess(highest) >= 0.0:
             return 0.0 if excess(lowest) <= 0.0 else 1.0
         return float(np.exp(optimize.brentq(excess, lowest, highest, xtol=1e-10)))
+
+    def worst_level(self, alpha: float) -> float:
+        """Return the largest probability of a false alarm at a level, over all ratios of the variances."""
+        first, second = min(self.first_df, MANY), min(self.second_df, MANY)
+        return float(false_alarms(first, second, alpha, self._weight(alpha)).max())
+
+    def _weight(self, alpha: float) -> float:
+        weights = _weights(min(self.first_df, MANY), min(self.second_df, MANY))
+        return float(np.interp(np.log(alpha), np.log(LEVELS), weights))
 
     def _table(self, alpha: float) -> NDArray[np.float64]:
         return _table(self.first_df, self.second_df, alpha)
 
     def _critical(self, share: NDArray[np.float64], alpha: float) -> NDArray[np.float64]:
-        weights = _weights(min(self.first_df, MANY), min(self.second_df, MANY))
-        weight = float(np.interp(np.log(alpha), np.log(LEVELS), weights))
-        return _between(self.first_df, self.second_df, share, alpha, weight)
+        return _between(self.first_df, self.second_df, share, alpha, self._weight(alpha))
 
 
 @cache
@@ -103,8 +110,8 @@ def _between(
     """Return critical values between Welch's (weight 0) and Banerjee's (weight 1)."""
     spread = (1.0 - share) ** 2 / first_df + share**2 / second_df
     welch = stats.t.isf(0.5 * alpha, 1.0 / np.maximum(spread, np.finfo(float).tiny))
-    ends = stats.t.isf(0.5 * alpha, np.array([first_df, second_df])) ** 2
-    banerjee = np.sqrt((1.0 - share) * ends[0] + share * ends[1])
+    first, second = stats.t.isf(0.5 * alpha, np.array([first_df, second_df]))
+    banerjee = np.hypot(np.sqrt(1.0 - share) * first, np.sqrt(share) * second)
     return np.asarray(welch ** (1.0 - weight) * banerjee**weight)
 
 

