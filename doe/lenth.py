@@ -16,7 +16,7 @@ def pseudo_error(effects: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return Lenth's pseudo standard error of each row of effects."""
     size = np.abs(effects)
     limit = 2.5 * 1.5 * np.median(size, axis=1, keepdims=True)
-    return np.asarray(1.5 * np.nanmedian(np.where(size < limit, size, np.nan), axis=1))
+    return np.asarray(1.5 * np.nanmedian(np.where(size <= limit, size, np.nan), axis=1))
 
 
 @cache

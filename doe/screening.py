@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 from statsmodels.regression.linear_model import RegressionResults
 
+from doe.analysis.coefficients import summary_text
 from doe.anova import (
     ErrorTerm,
     anova_table,
@@ -41,6 +42,21 @@ class ScreenResult:
     error: ErrorTerm
     """What the effects are tested against, by the rule ``error_rule``."""
     error_rule: str
+
+    def summary(self) -> str:
+        """Return effects, analysis of variance and what is significant as text."""
+        facts = {
+            "tested against": f"{self.error_rule}, {self.error_df:.3g} degrees of freedom",
+            "significant at 0.05": ", ".join(self.significant(0.05)) or "none",
+            "significant at 0.10": ", ".join(self.significant(0.10)) or "none",
+        } | {f"note {number}": note for number, note in enumerate(self.design.notes, start=1)}
+        columns = self.table.sort_values("rank").drop(columns=["rank", "sum_sq", "F"])
+        return summary_text(f"Screening by a {self.design!r}", columns, self.anova, facts)
+
+    def __repr__(self) -> str:
+        found = ", ".join(self.significant(0.05)) or "none"
+        names = ", ".join(self.design.names)
+        return f"Screening of {names}: significant at 0.05 against {self.error_rule}: {found}"
 
     @property
     def error_df(self) -> float:

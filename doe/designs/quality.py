@@ -62,15 +62,18 @@ def design_quality(
     columns = model_columns(design.points, design.factors, model)
     count, runs = columns.shape[1], len(columns)
     inverse = np.linalg.inv(matrix.T @ matrix)[:count, :count]
-    inside = allowed(design.factors, _box(design, seed), constraints)
-    box = model_columns(inside, design.factors, model).to_numpy()
-    variance = np.einsum("ij,jk,ik->i", box, inverse, box)
+    unit = qmc.Sobol(len(design.factors), rng=np.random.default_rng(seed)).random_base2(11)
+    box = pd.concat([_points(design, unit), _points(design, np.round(unit))], ignore_index=True)
+    inside = allowed(design.factors, box, constraints)
+    columns_inside = model_columns(inside, design.factors, model).to_numpy()
+    variance = np.einsum("ij,jk,ik->i", columns_inside, inverse, columns_inside)
+    average = variance[inside.index.to_numpy() < len(unit)]  # the corners count for the largest one alone
     log_determinant = -np.linalg.slogdet(inverse)[1]
     return DesignQuality(
         d_efficiency=float(100.0 * np.exp(log_determinant / count) / runs),
         a_efficiency=float(100.0 * count / (runs * np.trace(inverse))),
         g_efficiency=float(100.0 * count / (runs * variance.max())),
-        prediction_variance=float(variance.mean()),
+        prediction_variance=float(average.mean()),
         vif=_inflation(columns, inverse),
     )
 
@@ -156,11 +159,8 @@ def _inflation(columns: pd.DataFrame, inverse: np.ndarray) -> pd.Series:
     return pd.Series(np.diag(inverse) * alone, index=columns.columns).iloc[1:]
 
 
-def _box(design: Design, seed: int) -> pd.DataFrame:
-    """Return Sobol points and corners of the coded box."""
-    count = len(design.factors)
-    unit = qmc.Sobol(count, rng=np.random.default_rng(seed)).random_base2(11)
-    unit = np.vstack([unit, np.round(unit)])
+def _points(design: Design, unit: np.ndarray) -> pd.DataFrame:
+    """Return coded points of points in the unit cube."""
     columns = {}
     for place, factor in enumerate(design.factors):
         if isinstance(factor, Category):

@@ -209,9 +209,10 @@ def profile_plot(
             axes[-1, column].plot(places, np.prod(shares, axis=0), color=BLUE)
             axes[-1, column].set_ylim(-0.03, 1.03)
             axes[-1, 0].set_ylabel("desirability")
+        value = at[factor.name]
+        mark = factor.to_coded(value) if isinstance(factor, Category) else value
         for place in axes[:, column]:
-            place.axvline(factor.to_coded(at[factor.name]) if isinstance(factor, Category) else at[factor.name],
-                          color=RED, linestyle="--", linewidth=1.0)  # fmt: skip
+            place.axvline(mark, color=RED, linestyle="--", linewidth=1.0)
             plain(place)
         axes[-1, column].set_xlabel(factor.label)
         if isinstance(factor, Category):

@@ -54,7 +54,7 @@ def half_normal_plot(
     points = half_normal_points(result.effects)
     figure, axes = canvas(axes, 3.8)
     dummy = points.index.isin(result.design.dummies)
-    for chosen, fill, label in ((~dummy, BLUE, "factor"), (dummy, "white", "dummy")):
+    for chosen, fill, label in ((~dummy, BLUE, "effect"), (dummy, "white", "dummy")):
         if chosen.any():
             part = points[chosen]
             axes.scatter(part["abs_effect"], part["quantile"], c=fill, edgecolors=BLUE, zorder=3, label=label)
