@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 import pandas as pd
@@ -20,6 +20,9 @@ DRAWS = 4_000
 
 MANY_NOISES = 1e4
 """Mean square over the noise variance from which on the noise is taken out as it is."""
+
+CORRELATIONS = np.tanh(np.linspace(-4.0, 4.0, 65))
+"""Of the normal pairs among which the interval of a rank correlation is found."""
 
 SEED = 1
 """Of the drawing: the same numbers give the same ceiling."""
@@ -112,7 +115,8 @@ class Agreement:
         reference flattens a plain slope, noise of the values does not. NaN where the reference varies no more
         than its noise. The interval holds the slopes b for which the sum of products less b times the true
         spread is no farther from zero than t of its standard error, whose square is the plain one's plus
-        2 (n - 1) (noise variance)^2 b^2; infinite where the data do not bound the slope.
+        2 (n - 1) (noise variance)^2 b^2; infinite where the data do not bound the slope. It holds at least at
+        the level with 3 or 4 runs, at it with more.
         """
         return self._slope()
 
@@ -120,15 +124,14 @@ class Agreement:
     def spearman(self) -> Estimate:
         """Rank correlation, as it stands.
 
-        The interval is Fisher's, with the variance (1 + r^2 / 2) / (n - 3) of Bonett and Wright
-        (Psychometrika 65, 2000, p. 23); from -1 to 1 where fewer than 4 runs leave none.
+        The interval holds the rank correlations of normal pairs for which neither so high nor so low a one is
+        rarer than half of what the level leaves, from drawn pairs; a rank correlation of few runs takes few
+        values, so that it holds at least at the level there.
         """
         value = float(_spearman(self.response, self.reference))
-        if not math.isfinite(value) or self.runs < 4 or abs(value) > 1.0 - 1e-12:
-            return Estimate(value, *((value, value) if abs(value) > 1.0 - 1e-12 else (-1.0, 1.0)))
-        error = math.sqrt((1.0 + 0.5 * value**2) / (self.runs - 3))
-        reach = float(stats.norm.isf(self._tail)) * error
-        return Estimate(value, math.tanh(math.atanh(value) - reach), math.tanh(math.atanh(value) + reach))
+        if not math.isfinite(value):
+            return Estimate(value, math.nan, math.nan)
+        return Estimate(value, *_rank_interval(value, self.runs, self._tail))
 
     @cached_property
     def spearman_ceiling(self) -> Estimate:
@@ -282,6 +285,34 @@ def _median_misfit(total: float, noise: float, runs: int) -> float:
         return math.sqrt(total / runs - noise)
     shift = optimize.brentq(lambda size: stats.ncx2.cdf(found, runs, size) - 0.5, 1e-12, found, xtol=1e-9)
     return math.sqrt(float(shift) * noise / runs)
+
+
+def _rank_interval(value: float, runs: int, tail: float) -> tuple[float, float]:
+    """Return the population's rank correlations that do not contradict the one found in so many runs."""
+    drawn = _rank_correlations(runs)
+    rounding = 1e-9
+    above = np.array([1.0 - np.searchsorted(row, value - rounding) / row.size for row in drawn])
+    below = np.array([np.searchsorted(row, value + rounding, side="right") / row.size for row in drawn])
+    ranks = 6.0 / math.pi * np.arcsin(0.5 * CORRELATIONS)
+    # Both rise or fall with the correlation but for the drawing; their ends are those of +-1.
+    low = -1.0 if above[0] > tail else float(np.interp(tail, np.maximum.accumulate(above), ranks))
+    high = 1.0 if below[-1] > tail else float(np.interp(-tail, np.maximum.accumulate(-below), ranks))
+    return min(low, value), max(high, value)
+
+
+@cache
+def _rank_correlations(runs: int) -> list[FloatArray]:
+    """Return drawn rank correlations of normal pairs of each of `CORRELATIONS`, ascending."""
+    first, second = np.random.default_rng(SEED).standard_normal(
+        (2, max(200, min(DRAWS, 400_000 // runs)), runs)
+    )
+    ranks = _centred(first.argsort(axis=1).argsort(axis=1).astype(np.float64))
+    size = (runs**3 - runs) / 12.0
+    drawn = []
+    for correlation in CORRELATIONS:
+        mixed = correlation * first + math.sqrt(1.0 - correlation**2) * second
+        drawn.append(np.sort((ranks * mixed.argsort(axis=1).argsort(axis=1)).sum(axis=1) / size))
+    return drawn
 
 
 def _centred(values: FloatArray) -> FloatArray:

@@ -30,9 +30,10 @@ def checked_number(name: str, value: Any, above: float = -math.inf, least: float
     """
     if not isinstance(value, numbers.Real) or isinstance(value, bool | np.bool_):
         raise DesignError(f"{name} must be a number, received {value!r}")
-    if not math.isfinite(value) or not value > above or not value >= least:
+    number = float(value)
+    if not math.isfinite(number) or not number > above or not number >= least:
         raise DesignError(f"{name} must be {_range(above, least)}, received {value}")
-    return float(value)
+    return number
 
 
 def _range(above: float, least: float) -> str:
@@ -45,7 +46,7 @@ def _range(above: float, least: float) -> str:
 
 def checked_level(value: Any, name: str = "alpha") -> float:
     """Return a probability that lies between 0 and 1, such as the level of a test."""
-    if not isinstance(value, numbers.Real) or isinstance(value, bool) or not 0.0 < value < 1.0:
+    if not isinstance(value, numbers.Real) or isinstance(value, bool) or not 0.0 < float(value) < 1.0:
         raise DesignError(f"{name} lies between 0 and 1, received {value!r}")
     return float(value)
 
@@ -53,14 +54,14 @@ def checked_level(value: Any, name: str = "alpha") -> float:
 def checked_count(name: str, value: Any, least: int = 1) -> int:
     """Return a whole number that is at least ``least``."""
     whole = isinstance(value, numbers.Real) and not isinstance(value, bool | np.bool_)
-    if not whole or not math.isfinite(value) or int(value) != value or value < least:
+    if not whole or not math.isfinite(value) or int(value) != value or int(value) < least:
         raise DesignError(f"{name} must be a whole number of at least {least}, received {value!r}")
     return int(value)
 
 
 def checked_df(name: str, value: Any) -> float:
     """Return degrees of freedom: a positive number, which may be infinite."""
-    if not isinstance(value, numbers.Real) or isinstance(value, bool) or not value > 0.0:
+    if not isinstance(value, numbers.Real) or isinstance(value, bool) or not float(value) > 0.0:
         raise DesignError(f"{name} must be positive, received {value!r}")
     return float(value)
 

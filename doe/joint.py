@@ -160,7 +160,9 @@ class JointFit:
 
     def agrees(self, point: Mapping[str, float] | None = None) -> bool:
         """Whether all responses agree with their targets at a point (default: that of the smallest chi2)."""
-        return bool(self.tests(point)["agrees"].all())
+        coded = self.coded_point if point is None else self._coded(point)
+        level = self.alpha / len(self.goals)
+        return all(bool(goal.accepts(goal.misfit(coded[None]), level)[0]) for goal in self.goals.values())
 
     @cached_property
     def shrinkage(self) -> pd.DataFrame:

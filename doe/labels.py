@@ -46,9 +46,9 @@ def in_rows(name: str, values: ArrayLike, rows: pd.Index) -> pd.Series:
     """
     if isinstance(values, pd.Series | pd.DataFrame) and not values.index.equals(rows):
         if rows.has_duplicates:
+            twice = _text(rows[rows.duplicated()][0])
             raise DesignError(
-                f"{name} aligns by label, each label once: {_text(rows[rows.duplicated()][0])} comes again in the "
-                "settings; number the rows"
+                f"{name} aligns by label, each label once: {twice} comes again; number the rows"
             )
         numbers = aligned(name, values, rows)
     else:

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from doe.analysis.effects import TwoLevelEffects
@@ -27,20 +28,15 @@ def pareto_chart(
     levels = [(result.critical_t(alpha), f"p = {alpha:.2f}") for alpha in alphas]
     if bonferroni is not None:
         levels.append((result.critical_t(bonferroni, bonferroni=True), f"p = {bonferroni:.2f} (Bonferroni)"))
+    handles: list[Patch | Line2D] = [
+        Patch(color=BLUE, label="raises the response"),
+        Patch(color=ORANGE, label="lowers it"),
+    ]
     for (height, label), style in zip(levels, ("--", "-", "-.", ":"), strict=False):
+        text = f"{label}: {height:.2f}"
         axes.axhline(height, color="black", linestyle=style, linewidth=1.0)
-        axes.annotate(
-            f"{label}: {height:.2f}",
-            (1.0, height),
-            xycoords=("axes fraction", "data"),
-            xytext=(-3, 2),
-            textcoords="offset points",
-            ha="right",
-            va="bottom",
-            fontsize=8,
-        )
-    signs = [Patch(color=BLUE, label="raises the response"), Patch(color=ORANGE, label="lowers it")]
-    key(figure, axes, given, signs, 2)
+        handles.append(Line2D([], [], color="black", linestyle=style, linewidth=1.0, label=text))
+    key(figure, axes, given, handles, 3)
     axes.set(xlabel="factor", ylabel=f"|t| of the effect ({result.error_df:g} df)")
     axes.margins(y=0.12)
     plain(axes)

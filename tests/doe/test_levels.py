@@ -179,5 +179,5 @@ def test_the_misfit_without_noise_is_as_often_too_low_as_too_high(noise: float) 
 def test_few_runs_leave_intervals_that_say_so() -> None:
     found = agreement([1.0, 2.0, 4.0], [1.5, 1.0, 4.0], strata=["a", "b", "c"])
     assert (found.bias.low, found.bias.high) == (-np.inf, np.inf)
-    assert (found.spearman.low, found.spearman.high) == (-1.0, 1.0)
+    assert found.spearman.high - found.spearman.low > 1.5
     assert found.rmse.high > 2.0 * found.rmse.value

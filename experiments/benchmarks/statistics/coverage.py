@@ -9,8 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from experiments.errors import StudyError
-
 SEED = 20240
 """Of every theme, with the number of the case: each case can be repeated alone."""
 
@@ -37,10 +35,10 @@ class Figure:
 
     def __post_init__(self) -> None:
         if self.promise not in PROMISES:
-            raise StudyError(f"promise is one of {', '.join(PROMISES)}, received {self.promise!r}")
+            raise ValueError(f"promise is one of {', '.join(PROMISES)}, received {self.promise!r}")
         for name in ("stated", "found"):
             if not 0.0 <= getattr(self, name) <= 1.0:
-                raise StudyError(f"{name} lies between 0 and 1, received {getattr(self, name)}")
+                raise ValueError(f"{name} lies between 0 and 1, received {getattr(self, name)}")
 
     @property
     def holds(self) -> bool:
@@ -57,7 +55,7 @@ CHECKED = 20
 def require_same(figure: str, found: object, expected: object) -> None:
     """Raise unless the vectorised computation gives what `doe` gives (to rounding)."""
     if not np.allclose(np.asarray(found, float), np.asarray(expected, float), rtol=1e-6, atol=1e-9):
-        raise StudyError(f"{figure}: the record computes {found}, doe gives {expected}")
+        raise ValueError(f"{figure}: the record computes {found}, doe gives {expected}")
 
 
 def generator(theme: str, case: int) -> np.random.Generator:

@@ -43,8 +43,8 @@ def page(folder: Path = FOLDER) -> str:
         "What `doe` states against how often it holds, by simulation (normal errors, fixed seeds). "
         f"`{COMMAND}` repeats the record in some minutes of one core; with `--theme NAME`, one part of it.",
         "*exact*: the stated share within .01 (.94 to .96 for .95, .04 to .06 for .05). *at least*, *at "
-        "most*: so the documentation states it, conservative by construction; within .01 on that side. se: of "
-        "the share found, by the trials. n: measurements behind a target. Spread: standard deviation of a "
+        "most*: so the documentation states it, conservative by construction; within .01 on that side. se: "
+        "of the share found, by the trials. n: measurements behind a target. Spread: standard deviation of a "
         "measurement over that of a run.",
     ]
     for theme, title in TITLES.items():

@@ -15,7 +15,6 @@ from experiments.benchmarks.statistics.coverage import (
     generator,
     require_same,
 )
-from experiments.errors import StudyError
 
 TRIALS = 10_000
 
@@ -23,7 +22,7 @@ INTERACTION = 6.0
 """Strong effect of the product of two factors, over the standard deviation of a run."""
 
 ALIASED = 0.07
-"""Level under a strong interaction in 20 runs, which falls on one column by 60 % and on the others by 20 %."""
+"""Level under a strong interaction in 20 runs: it falls on one column by 60 %, on the others by 20 %."""
 
 DESIGNS = ((12, 5, 1), (12, 5, 3), (12, 8, 3), (8, 7, 1), (8, 7, 3), (12, 11, 1), (12, 11, 2), (20, 12, 1))
 """Runs, factors and replicates."""
@@ -58,7 +57,7 @@ def _alarms(runs: int, factors: int, replicates: int, interaction: float, number
         result = screen(design, values[trial])
         require_same("screen", t[trial], result.table["t"].abs())
         if result.error_rule != rule:
-            raise StudyError(f"the default error is {result.error_rule}, the record holds {rule}")
+            raise ValueError(f"the default error is {result.error_rule}, the record holds {rule}")
         critical = result.critical_t(0.05)
         require_same("screen", result.table["p"] < 0.05, t[trial] > critical)
     alarms = float((t > critical).mean())

@@ -145,7 +145,8 @@ def _joint(correlation: float, number: int) -> Iterator[Figure]:
     every = _Fits.of(np.sqrt(correlation) * shared + np.sqrt(1.0 - correlation) * own)
     kind = f"correlated {correlation:g}" if correlation else "independent"
     for responses in RESPONSES:
-        fits = _Fits(*(values[:, :responses] for values in (every.error, every.se, every.sd)), every.df)
+        error, se, sd = (values[:, :responses] for values in (every.error, every.se, every.sd))
+        fits = _Fits(error, se, sd, every.df)
         for count in MEASUREMENTS:
             for spread in SPREADS:
                 agreed = _agreeing(rng, fits, count, spread, 0.05 / responses).all(axis=-1)
