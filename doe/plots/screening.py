@@ -34,8 +34,7 @@ def pareto_chart(
     ]
     for (height, label), style in zip(levels, ("--", "-", "-.", ":"), strict=False):
         text = f"{label}: {height:.2f}"
-        axes.axhline(height, color="black", linestyle=style, linewidth=1.0)
-        handles.append(Line2D([], [], color="black", linestyle=style, linewidth=1.0, label=text))
+        handles.append(axes.axhline(height, color="black", linestyle=style, linewidth=1.0, label=text))
     key(figure, axes, given, handles, 3)
     axes.set(xlabel="factor", ylabel=f"|t| of the effect ({result.error_df:g} df)")
     axes.margins(y=0.12)
