@@ -1,22 +1,31 @@
 """Agreement of two sets of numbers for the same runs, with the noise of both taken out."""
 
-from collections.abc import Callable
+import math
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
+import pandas as pd
 from numpy.typing import ArrayLike, NDArray
-from scipy import stats
+from scipy import optimize, stats
 
+from doe.checks import checked_level, checked_number, real_array
 from doe.errors import DesignError
+from doe.labels import same_labels
 
 FloatArray = NDArray[np.float64]
 
-RESAMPLES = 4_000
-"""Bootstrap resamples: an end of a 95 % interval is then known to about 3 % of its width."""
+DRAWS = 4_000
+"""Drawn pairs behind the ceiling of the rank correlation: an end of its interval is known to 3 % of it."""
+
+MANY_NOISES = 1e4
+"""Mean square over the noise variance from which on the noise is taken out as it is."""
+
+CORRELATIONS = np.tanh(np.linspace(-4.0, 4.0, 65))
+"""Of the normal pairs among which the interval of a rank correlation is found."""
 
 SEED = 1
-"""Of the resampling: the same numbers give the same intervals."""
+"""Of the drawing: the same numbers give the same ceiling."""
 
 
 @dataclass(frozen=True)
@@ -32,8 +41,9 @@ class Estimate:
 class Agreement:
     """How values follow reference values, run by run; made by ``agreement``.
 
-    The intervals come from resampling the runs, within their strata, with replacement (percentiles; Efron and
-    Tibshirani, An Introduction to the Bootstrap, 1993, chapter 13). Of few runs they are rough.
+    The intervals hold for runs that are drawn: from as many others as these stand for, each with its misfit
+    (the true value less the true reference) and its noise, all of them normal. Each property says from what
+    its interval comes.
     """
 
     response: FloatArray
@@ -54,32 +64,47 @@ class Agreement:
 
     @cached_property
     def rmse(self) -> Estimate:
-        """Root mean square of the differences, the noise of both included."""
-        return self._estimate(lambda rows: np.sqrt(self._mean_square(rows)))
+        """Root mean square of the differences, the noise of both included.
+
+        Over its expectation the sum of squares is chi-square with as many degrees of freedom as there are
+        runs: so the interval holds at the stated level where the misfits scatter about zero, and at least so
+        where they share a bias.
+        """
+        return self._misfit(0.0)
 
     @cached_property
     def rmse_without_own_noise(self) -> Estimate:
-        """Root of the mean square less the mean of the values' noise variances, at least 0."""
-        return self._estimate(
-            lambda rows: _root(self._mean_square(rows) - self.value_variance[rows].mean(axis=-1))
-        )
+        """Root mean square that the differences would have without the noise of the values.
+
+        As ``rmse_without_noise``, with the noise of the values alone taken out.
+        """
+        return self._misfit(float(self.value_variance.mean()))
 
     @cached_property
     def rmse_without_noise(self) -> Estimate:
-        """Root of the mean square less the noise variances of values and reference, at least 0.
+        """Root mean square that the differences of these runs would have without the noise of either.
 
-        Were there no noise but the misfit the same, the root mean square would be this.
+        The root of the mean square less the noise variances is too small: of a misfit as large as the noise
+        it reads .85 at 10 runs. The sum of squares over the noise variance is noncentral chi-square, and the
+        estimate is the misfit for which what was found is its median: as often above the truth as below. The
+        interval is that of ``rmse``, squared, less the noise variances; both are at least 0.
         """
-        return self._estimate(
-            lambda rows: _root(
-                self._mean_square(rows) - self.value_variance[rows].mean(axis=-1) - self.reference_variance
-            )
-        )
+        return self._misfit(float(self.value_variance.mean()) + self.reference_variance)
 
     @cached_property
     def bias(self) -> Estimate:
-        """Mean difference, values less reference; noise does not move it."""
-        return self._estimate(lambda rows: self._difference[rows].mean(axis=-1))
+        """Mean difference, values less reference; noise does not move it.
+
+        Student's interval, with the spread within the strata.
+        """
+        difference = self._difference
+        value, count = float(difference.mean()), len(np.unique(self.strata))
+        df = self.runs - count
+        if df < 1:
+            return Estimate(value, -math.inf, math.inf)
+        means = np.bincount(self.strata, difference) / np.bincount(self.strata)
+        spread = float(((difference - means[self.strata]) ** 2).sum()) / df
+        return self._student(value, math.sqrt(spread / self.runs), df)
 
     @cached_property
     def slope(self) -> Estimate:
@@ -88,14 +113,25 @@ class Agreement:
         The least-squares slope over the reliability of the reference, (s^2 - noise variance) / s^2 with s^2
         the variance of the reference (Fuller, Measurement Error Models, 1987, section 1.1): noise of the
         reference flattens a plain slope, noise of the values does not. NaN where the reference varies no more
-        than its noise.
+        than its noise. The interval holds the slopes b for which the sum of products less b times the true
+        spread is no farther from zero than t of its standard error, whose square is the plain one's plus
+        2 (n - 1) (noise variance)^2 b^2; infinite where the data do not bound the slope. It holds at least at
+        the level with 3 or 4 runs, at it with more.
         """
-        return self._estimate(self._slopes)
+        return self._slope()
 
     @cached_property
     def spearman(self) -> Estimate:
-        """Rank correlation, as it stands."""
-        return self._estimate(lambda rows: _spearman(self.response[rows], self.reference[rows]))
+        """Rank correlation, as it stands.
+
+        The interval holds the rank correlations of normal pairs for which neither so high nor so low a one is
+        rarer than half of what the level leaves, from drawn pairs; a rank correlation of few runs takes few
+        values, so that it holds at least at the level there.
+        """
+        value = float(_spearman(self.response, self.reference))
+        if not math.isfinite(value):
+            return Estimate(value, math.nan, math.nan)
+        return Estimate(value, *_rank_interval(value, self.runs, self._tail))
 
     @cached_property
     def spearman_ceiling(self) -> Estimate:
@@ -105,25 +141,52 @@ class Agreement:
         the reference less its noise; noise of both sides is then added to them, again and again.
         """
         truth, rng = self._truth(), np.random.default_rng(SEED)
-        shape = (RESAMPLES, self.runs)
+        shape = (DRAWS, self.runs)
         values = truth + np.sqrt(self.value_variance) * rng.standard_normal(shape)
         reference = truth + np.sqrt(self.reference_variance) * rng.standard_normal(shape)
         seen = _spearman(values, reference)
-        return Estimate(float(seen.mean()), *self._percentiles(seen))
+        known = seen[np.isfinite(seen)]
+        if len(known) < 0.5 * len(seen):
+            return Estimate(math.nan, math.nan, math.nan)
+        low, high = np.quantile(known, [self._tail, 1.0 - self._tail])
+        return Estimate(float(known.mean()), float(low), float(high))
 
     @cached_property
     def _difference(self) -> FloatArray:
         return self.response - self.reference
 
-    def _mean_square(self, rows: NDArray[np.int_]) -> FloatArray:
-        return (self._difference[rows] ** 2).mean(axis=-1)
+    @property
+    def _tail(self) -> float:
+        return 0.5 * (1.0 - self.confidence)
 
-    def _slopes(self, rows: NDArray[np.int_]) -> FloatArray:
-        values, reference = _centred(self.response[rows]), _centred(self.reference[rows])
-        noise = (rows.shape[-1] - 1) * self.reference_variance
-        true_spread = (reference**2).sum(axis=-1) - noise
-        products = (values * reference).sum(axis=-1)
-        return np.where(true_spread > 0.0, products / np.where(true_spread > 0.0, true_spread, 1.0), np.nan)
+    def _misfit(self, noise: float) -> Estimate:
+        """Return the root mean square difference with a noise variance taken out."""
+        total = float((self._difference**2).sum())
+        low, high = total / stats.chi2.isf([self._tail, 1.0 - self._tail], self.runs) - noise
+        value = _median_misfit(total, noise, self.runs)
+        return Estimate(value, math.sqrt(max(low, 0.0)), math.sqrt(max(high, 0.0)))
+
+    def _slope(self) -> Estimate:
+        values, reference = _centred(self.response), _centred(self.reference)
+        noise = (self.runs - 1) * self.reference_variance
+        spread, products = float(reference @ reference), float(values @ reference)
+        true_spread = spread - noise
+        if not true_spread > 0.0:
+            return Estimate(math.nan, math.nan, math.nan)
+        slope, df = products / true_spread, self.runs - 2
+        left = max(float(values @ values) - products**2 / spread, 0.0) / df
+        t = float(stats.t.isf(self._tail, df))
+        # (products - b true_spread)^2 <= t^2 (spread left + 2 noise variance noise b^2), a quadratic in b.
+        a = true_spread**2 - 2.0 * t**2 * self.reference_variance * noise
+        if not a > 0.0:
+            return Estimate(slope, -math.inf, math.inf)
+        middle = products * true_spread / a
+        reach = math.sqrt(max(middle**2 - (products**2 - t**2 * spread * left) / a, 0.0))
+        return Estimate(slope, min(middle - reach, slope), max(middle + reach, slope))
+
+    def _student(self, value: float, error: float, df: int) -> Estimate:
+        reach = float(stats.t.isf(self._tail, df)) * error
+        return Estimate(value, value - reach, value + reach)
 
     def _truth(self) -> FloatArray:
         count = np.bincount(self.settings)
@@ -132,26 +195,6 @@ class Agreement:
         spread = float(means.var(ddof=1))
         share = max(1.0 - noise / spread, 0.0) if spread > 0.0 else 0.0
         return means.mean() + np.sqrt(share) * (means - means.mean())
-
-    @cached_property
-    def _resamples(self) -> NDArray[np.int_]:
-        """Rows of every resample, shape (resamples, runs): each stratum keeps its number of runs."""
-        rng = np.random.default_rng(SEED)
-        places = [np.flatnonzero(self.strata == stratum) for stratum in np.unique(self.strata)]
-        picks = [(rng.random((RESAMPLES, len(rows))) * len(rows)).astype(int) for rows in places]
-        return np.hstack([rows[pick] for rows, pick in zip(places, picks, strict=True)])
-
-    def _estimate(self, statistic: Callable[[NDArray[np.int_]], FloatArray]) -> Estimate:
-        value = float(statistic(np.arange(self.runs)))
-        return Estimate(value, *self._percentiles(statistic(self._resamples)))
-
-    def _percentiles(self, samples: FloatArray) -> tuple[float, float]:
-        known = samples[np.isfinite(samples)]
-        if len(known) < len(samples) / 2:
-            return float("nan"), float("nan")
-        tail = 50.0 * (1.0 - self.confidence)
-        low, high = np.percentile(known, [tail, 100.0 - tail])
-        return float(low), float(high)
 
 
 def agreement(
@@ -168,6 +211,7 @@ def agreement(
     Parameters
     ----------
     values, reference : array-like, shape (runs,)
+        Series align by their labels, the others by their position; so do the arguments below.
     value_variance : float or array-like, shape (runs,)
         Noise variance of each value; of a mean of n replicates that of one, over n.
     reference_variance : float
@@ -175,15 +219,20 @@ def agreement(
     settings : array-like, shape (runs,), optional
         Labels: runs of one setting have one true value. By default every run has a setting of its own.
     strata : array-like, shape (runs,), optional
-        Labels: the resampling behind the intervals keeps the number of runs of each, such as a table.
+        Labels, such as the table that a run is from: the interval of the bias takes the spread within each.
     confidence : float
 
     Raises
     ------
     DesignError
-        Fewer than 3 runs, arrays of different lengths, numbers that are not finite, negative variances.
+        Fewer than 3 runs, arrays of different lengths, labels that differ, numbers that are not finite,
+        negative variances.
     """
-    first, second = np.asarray(values, np.float64), np.asarray(reference, np.float64)
+    names = ("values", "reference", "value_variance", "settings", "strata")
+    values, reference, value_variance, settings, strata = same_labels(
+        names, (values, reference, value_variance, settings, strata)
+    )
+    first, second = real_array("values", values), real_array("reference", reference)
     if first.ndim != 1 or first.shape != second.shape or len(first) < 3:
         raise DesignError(
             f"agreement needs values and reference of the same 3 or more runs, received shapes {first.shape} "
@@ -191,35 +240,79 @@ def agreement(
         )
     if not (np.isfinite(first).all() and np.isfinite(second).all()):
         raise DesignError("agreement needs finite values and reference: leave out the runs that lack one")
-    variance = np.broadcast_to(np.asarray(value_variance, np.float64), first.shape)
-    if not ((variance >= 0.0).all() and 0.0 <= reference_variance < np.inf):
-        raise DesignError(
-            f"noise variances must be 0 or more, received {value_variance!r}, {reference_variance}"
-        )
-    if not 0.0 < confidence < 1.0:
-        raise DesignError(f"confidence lies between 0 and 1, received {confidence}")
+    own = real_array("value_variance", value_variance)
+    if own.shape not in ((), (1,), first.shape):
+        raise DesignError(f"value_variance is one number or one a run, received shape {own.shape}")
+    variance = np.broadcast_to(own, first.shape)
+    if not ((variance >= 0.0) & np.isfinite(variance)).all():
+        raise DesignError(f"noise variances must be 0 or more, received {value_variance!r}")
+    noise = checked_number(
+        "reference_variance: noise variances must be 0 or more: it", reference_variance, least=0.0
+    )
+    checked_level(confidence, "confidence")
     runs = len(first)
     return Agreement(
         first,
         second,
         variance,
-        float(reference_variance),
+        noise,
         np.arange(runs) if settings is None else _numbers(settings, runs, "settings"),
         np.zeros(runs, int) if strata is None else _numbers(strata, runs, "strata"),
-        confidence,
+        float(confidence),
     )
 
 
 def _numbers(labels: ArrayLike, runs: int, name: str) -> NDArray[np.int_]:
     """Return for every label the number of its kind."""
-    given = np.asarray(labels)
+    given = np.asarray(labels, dtype=object)
     if given.shape != (runs,):
         raise DesignError(f"{name} must be a label for each of {runs} runs, received shape {given.shape}")
-    return np.unique(given, return_inverse=True)[1]
+    if pd.isna(given).any():
+        raise DesignError(
+            f"{name} must be a label for each run: that of run {int(pd.isna(given).argmax()) + 1} is missing"
+        )
+    return pd.factorize(given)[0]
 
 
-def _root(mean_square: FloatArray) -> FloatArray:
-    return np.sqrt(np.maximum(mean_square, 0.0))
+def _median_misfit(total: float, noise: float, runs: int) -> float:
+    """Return the root mean square misfit for which a sum of squares is the median of what would be found."""
+    if not noise > 0.0:
+        return math.sqrt(total / runs)
+    found = total / noise
+    if found <= stats.chi2.ppf(0.5, runs):
+        return 0.0
+    if found > MANY_NOISES * runs:  # the median's excess over the mean is then beyond rounding
+        return math.sqrt(total / runs - noise)
+    shift = optimize.brentq(lambda size: stats.ncx2.cdf(found, runs, size) - 0.5, 1e-12, found, xtol=1e-9)
+    return math.sqrt(float(shift) * noise / runs)
+
+
+def _rank_interval(value: float, runs: int, tail: float) -> tuple[float, float]:
+    """Return the population's rank correlations that do not contradict the one found in so many runs."""
+    drawn = _rank_correlations(runs)
+    rounding = 1e-9
+    above = np.array([1.0 - np.searchsorted(row, value - rounding) / row.size for row in drawn])
+    below = np.array([np.searchsorted(row, value + rounding, side="right") / row.size for row in drawn])
+    ranks = 6.0 / math.pi * np.arcsin(0.5 * CORRELATIONS)
+    # Both rise or fall with the correlation but for the drawing; their ends are those of +-1.
+    low = -1.0 if above[0] > tail else float(np.interp(tail, np.maximum.accumulate(above), ranks))
+    high = 1.0 if below[-1] > tail else float(np.interp(-tail, np.maximum.accumulate(-below), ranks))
+    return min(low, value), max(high, value)
+
+
+@cache
+def _rank_correlations(runs: int) -> list[FloatArray]:
+    """Return drawn rank correlations of normal pairs of each of `CORRELATIONS`, ascending."""
+    first, second = np.random.default_rng(SEED).standard_normal(
+        (2, max(200, min(DRAWS, 400_000 // runs)), runs)
+    )
+    ranks = _centred(first.argsort(axis=1).argsort(axis=1).astype(np.float64))
+    size = (runs**3 - runs) / 12.0
+    drawn = []
+    for correlation in CORRELATIONS:
+        mixed = correlation * first + math.sqrt(1.0 - correlation**2) * second
+        drawn.append(np.sort((ranks * mixed.argsort(axis=1).argsort(axis=1)).sum(axis=1) / size))
+    return drawn
 
 
 def _centred(values: FloatArray) -> FloatArray:

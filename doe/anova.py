@@ -6,10 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 import statsmodels.api as sm
+from numpy.typing import ArrayLike
 from scipy import stats
 from statsmodels.regression.linear_model import RegressionResults
 
 from doe.errors import DesignError
+from doe.labels import in_rows
 
 ALIAS_TOLERANCE = 1e-8
 """Length of what a column adds to those before it, relative to its own, below which it adds nothing."""
@@ -56,15 +58,26 @@ def least_squares(matrix: pd.DataFrame, response: pd.Series) -> RegressionResult
         return sm.OLS(response.to_numpy(), matrix).fit()
 
 
-def pure_error(coded: pd.DataFrame, response: pd.Series) -> ErrorTerm:
+def pure_error(coded: pd.DataFrame, response: ArrayLike, blocks: pd.Series | None = None) -> ErrorTerm:
     """Return the spread of replicates about the mean of their setting.
 
-    Rows of ``coded`` that agree are replicates of one setting; the degrees of freedom are the observations
-    less the distinct settings.
+    Rows of ``coded`` that agree (in one block, where there are blocks) are replicates of one setting; the
+    degrees of freedom are the observations less the distinct settings. A labelled response is read by the
+    labels of ``coded``, an array by its position.
     """
+    if not isinstance(coded, pd.DataFrame) or not len(coded.columns):
+        raise DesignError(f"pure error needs a table of settings, one row an observation, received {coded!r}")
+    values = in_rows("a response", response, coded.index)
     setting = settings_of(coded)
-    within = response.to_numpy() - response.groupby(setting).transform("mean").to_numpy()
-    return ErrorTerm(float(len(response) - len(np.unique(setting))), float(within @ within))
+    if blocks is not None:
+        setting = (
+            pd.DataFrame({"setting": setting, "block": blocks.to_numpy()})
+            .groupby(["setting", "block"])
+            .ngroup()
+        )
+        setting = setting.to_numpy()
+    within = values.to_numpy() - values.groupby(setting).transform("mean").to_numpy()
+    return ErrorTerm(float(len(values) - len(np.unique(setting))), float(within @ within))
 
 
 def settings_of(coded: pd.DataFrame) -> np.ndarray:
@@ -77,6 +90,27 @@ def settings_of(coded: pd.DataFrame) -> np.ndarray:
         .ngroup()
         .to_numpy()
     )
+
+
+def block_columns(blocks: pd.Series | None, index: pd.Index) -> pd.DataFrame:
+    """Return the columns of the blocks in a model: one fewer than blocks, each adding up to zero over them.
+
+    So the intercept is that of the average block. Without blocks there is no column.
+    """
+    if blocks is None:
+        return pd.DataFrame(index=index)
+    labels = list(dict.fromkeys(blocks))
+    last = (blocks == labels[-1]).to_numpy(dtype=float)
+    columns = {f"block {label}": (blocks == label).to_numpy(dtype=float) - last for label in labels[:-1]}
+    return pd.DataFrame(columns, index=index)
+
+
+def block_sum(response: pd.Series, blocks: pd.Series | None) -> ErrorTerm:
+    """Return what the blocks alone explain: the spread of their means about the overall mean."""
+    if blocks is None:
+        return ErrorTerm(0.0, 0.0)
+    between = response.groupby(blocks.to_numpy()).transform("mean").to_numpy() - response.mean()
+    return ErrorTerm(float(blocks.nunique() - 1), float(between @ between))
 
 
 def partial_sums(fit: RegressionResults) -> pd.Series:
@@ -93,11 +127,15 @@ def f_ratio(effect: ErrorTerm, error: ErrorTerm) -> tuple[float, float]:
 
 
 def anova_table(
-    fit: RegressionResults, replicates: ErrorTerm, error: ErrorTerm | None = None
+    fit: RegressionResults,
+    replicates: ErrorTerm,
+    error: ErrorTerm | None = None,
+    blocks: ErrorTerm | None = None,
 ) -> pd.DataFrame:
-    """Return the analysis of variance of a fit whose first column is the intercept.
+    """Return the analysis of variance of a fit whose first column is the intercept and whose last are blocks.
 
-    Rows: model, every term (partial sum of squares: types II and III of a hierarchical model in coded units),
+    Rows: blocks (where there are any: what they explain alone), model (what it explains beyond the blocks),
+    every term (partial sum of squares: types II and III of a hierarchical model in coded units),
     residual, lack of fit (residual less pure error, tested against pure error), pure error, total (about the
     mean). Columns: df, sum_sq, mean_sq, F, p; NaN where a row has none.
 
@@ -107,14 +145,18 @@ def anova_table(
     replicates : ErrorTerm
         Pure error, from ``pure_error``.
     error : ErrorTerm, optional
-        What model and terms are tested against; default the residual.
+        What blocks, model and terms are tested against; default the residual.
+    blocks : ErrorTerm, optional
+        Sum of squares of the blocks, from ``block_sum``; its columns are the last of the fit.
     """
     residual = ErrorTerm(float(fit.df_resid), float(fit.ssr))
     error = residual if error is None else error
     lack_df = residual.df - replicates.df
     lack = ErrorTerm(lack_df, max(residual.sum_sq - replicates.sum_sq, 0.0) if lack_df > 0 else 0.0)
-    rows = {"model": (ErrorTerm(float(fit.df_model), float(fit.ess)), error)}
-    for name, sum_sq in partial_sums(fit).iloc[1:].items():
+    blocks = blocks or ErrorTerm(0.0, 0.0)
+    rows = {"blocks": (blocks, error)} if blocks.df > 0 else {}
+    rows["model"] = (ErrorTerm(fit.df_model - blocks.df, float(fit.ess) - blocks.sum_sq), error)
+    for name, sum_sq in partial_sums(fit).iloc[1 : len(fit.params) - int(blocks.df)].items():
         rows[str(name)] = (ErrorTerm(1.0, sum_sq), error)
     none = ErrorTerm(0.0, 0.0)
     rows |= {

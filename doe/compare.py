@@ -1,16 +1,23 @@
 """Two means: t-tests, the interval of their difference, and equivalence within a margin (TOST)."""
 
 import math
+import numbers
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 from scipy import stats
 
+from doe.checks import checked_count, checked_level, checked_number, real_array
 from doe.errors import DesignError
+from doe.two_errors import TwoErrors
 
-METHODS = ("pooled", "welch", "one-sample")
+METHODS = ("welch", "pooled", "guarded", "one-sample")
+
+Values: TypeAlias = Sequence[float] | NDArray | pd.Series
 
 
 @dataclass(frozen=True)
@@ -22,19 +29,17 @@ class Sample:
     n: int
 
     def __post_init__(self) -> None:
-        if not math.isfinite(self.mean):
-            raise DesignError(f"a sample's mean must be finite, received {self.mean}")
-        if not (math.isfinite(self.sd) and self.sd >= 0.0):
-            raise DesignError(f"a sample's sd must be finite and not negative, received {self.sd}")
-        if self.n < 2 or int(self.n) != self.n:
-            raise DesignError(f"a sample needs at least 2 values to have a spread, received n = {self.n}")
+        object.__setattr__(self, "mean", checked_number("a sample's mean", self.mean))
+        object.__setattr__(self, "sd", checked_number("a sample's sd", self.sd, least=0.0))
+        count = checked_count("n, the size of a sample, which needs 2 values to have a spread,", self.n, 2)
+        object.__setattr__(self, "n", count)
 
     @classmethod
-    def of(cls, values: "Sample | Sequence[float] | NDArray") -> "Sample":
+    def of(cls, values: "Sample | Values") -> "Sample":
         """Return the summary of values (a Sample is returned as it is)."""
         if isinstance(values, Sample):
             return values
-        numbers = np.asarray(values, dtype=np.float64)
+        numbers = real_array("a sample", values)
         if numbers.ndim != 1 or numbers.size < 2:
             raise DesignError(f"a sample is at least 2 values in one row, received shape {numbers.shape}")
         bad = np.flatnonzero(~np.isfinite(numbers))
@@ -75,12 +80,12 @@ class Comparison:
     @property
     def p(self) -> float:
         """Two-sided p value of no difference. A large one is no proof of equality: see ``equivalent``."""
-        return float(2.0 * stats.t.sf(abs(self.t), self.df))
+        return self._tails(self.t)
 
     @property
     def interval(self) -> tuple[float, float]:
         """Interval of the difference that holds with probability 1 - alpha."""
-        reach = float(stats.t.isf(0.5 * self.alpha, self.df)) * self.se
+        reach = self._critical(self.alpha) * self.se
         return self.difference - reach, self.difference + reach
 
     @property
@@ -93,7 +98,8 @@ class Comparison:
         """p value of the two one-sided tests (Schuirmann 1987) that the difference exceeds the margin."""
         if self.margin is None:
             return None
-        return float(stats.t.sf((self.margin - abs(self.difference)) / self.se, self.df))
+        t = (self.margin - abs(self.difference)) / self.se
+        return 0.5 * self._tails(t) if t >= 0.0 else 1.0 - 0.5 * self._tails(t)
 
     @property
     def equivalent(self) -> bool | None:
@@ -103,14 +109,35 @@ class Comparison:
     @property
     def smallest_margin(self) -> float:
         """Margin from which on these data show equivalence at alpha."""
-        return abs(self.difference) + float(stats.t.isf(self.alpha, self.df)) * self.se
+        return abs(self.difference) + self._critical(2.0 * self.alpha) * self.se
+
+    @property
+    def _guard(self) -> tuple[TwoErrors, float] | None:
+        """Rule of the guarded method and the second sample's share of the variance; None for the others."""
+        if self.method != "guarded" or not isinstance(self.b, Sample):
+            return None
+        return TwoErrors(float(self.a.df), float(self.b.df)), (self.b.se / self.se) ** 2
+
+    def _critical(self, alpha: float) -> float:
+        """Return the two-sided critical value of t."""
+        if self._guard is None:
+            return float(stats.t.isf(0.5 * alpha, self.df))
+        errors, share = self._guard
+        return float(errors.critical(share, alpha))
+
+    def _tails(self, t: float) -> float:
+        """Return the two-sided p value of a t."""
+        if self._guard is None:
+            return float(2.0 * stats.t.sf(abs(t), self.df))
+        errors, share = self._guard
+        return errors.p(t, share)
 
 
 def compare_means(
-    a: Sample | Sequence[float] | NDArray,
-    b: Sample | Sequence[float] | NDArray | float,
+    a: Sample | Values,
+    b: Sample | Values | float,
     margin: float | None = None,
-    method: str = "pooled",
+    method: str = "welch",
     alpha: float = 0.05,
 ) -> Comparison:
     """Compare the means of two samples.
@@ -118,40 +145,53 @@ def compare_means(
     Parameters
     ----------
     a, b : values, or Sample(mean, sd, n)
-        With ``method="one-sample"`` b may be a plain number.
+        Two samples; with ``method="one-sample"`` b is a plain number.
     margin : float, optional
         Difference that does not matter: asks for the equivalence test (TOST).
-    method : {"pooled", "welch", "one-sample"}
-        Student's t with one variance for both; Welch's with two; a against the mean of b taken as known.
+    method : {"welch", "pooled", "guarded", "one-sample"}
+        Welch's t with two variances; Student's t with one variance for both, whose level is wrong where they
+        differ (a test of equivalence at .05 may have .15 with 4 and 12 values); as Welch's, with the critical
+        value raised so that the level holds for 2 or 3 values too (``doe.two_errors``: Welch's becomes .12
+        with 2 and 12); a against the number b.
     alpha : float
-        Level of the tests; 1 - alpha that of the interval.
+        Level of the tests; 1 - alpha that of the interval. With a margin below .5.
 
     Raises
     ------
     DesignError
-        Fewer than two values, values that are not finite, no spread at all, a margin that is not positive.
+        Fewer than two values, values that are not finite, no spread at all, a margin that is not positive, a
+        sample where a number is due or the other way round.
     """
     if method not in METHODS:
         raise DesignError(f"method is one of {', '.join(METHODS)}, received {method!r}")
-    if margin is not None and not margin > 0.0:
-        raise DesignError(f"an equivalence margin must be positive, received {margin}")
-    if not 0.0 < alpha < 1.0:
-        raise DesignError(f"alpha lies between 0 and 1, received {alpha}")
+    if margin is not None:
+        margin = checked_number("an equivalence margin", margin)
+        if not margin > 0.0:
+            raise DesignError(f"an equivalence margin must be positive, received {margin:g}")
+    if checked_level(alpha) >= 0.5 and margin is not None:
+        raise DesignError(f"the level of a test of equivalence lies below 0.5: alpha is {alpha}")
     first = Sample.of(a)
-    if not isinstance(b, float | int):
-        b = Sample.of(b)
-    elif method != "one-sample":
+    if method == "one-sample":
+        if isinstance(b, Sample) or np.ndim(b) > 0:
+            raise DesignError(
+                "method='one-sample' compares with a known number, and a sample has an error of its own: "
+                f"give its mean where that error is to be ignored, or choose another method; received {b!r}"
+            )
+        second: Sample | float = checked_number("the number to compare with", b)
+    elif isinstance(b, numbers.Real):
         raise DesignError(f"a plain number has no spread: give a sample or method='one-sample', received {b}")
-    se, df = _difference_error(first, b, method)
+    else:
+        second = Sample.of(b)
+    se, df = _difference_error(first, second, method)
     if not se > 0.0:
         raise DesignError("no test without spread: every value of the samples is the same")
-    known = b.mean if isinstance(b, Sample) else float(b)
-    return Comparison(first, b, method, first.mean - known, se, df, alpha, margin)
+    known = second.mean if isinstance(second, Sample) else second
+    return Comparison(first, second, method, first.mean - known, se, df, float(alpha), margin)
 
 
 def _difference_error(a: Sample, b: Sample | float, method: str) -> tuple[float, float]:
     """Return the standard error of the difference and its degrees of freedom."""
-    if method == "one-sample" or not isinstance(b, Sample):
+    if not isinstance(b, Sample):
         return a.se, float(a.df)
     if method == "pooled":
         df = a.df + b.df

@@ -5,6 +5,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from doe.checks import checked_count, checked_number
 from doe.factors import natural_points
 from doe.fitted import FittedSurface
 from doe.quadratic import QuadraticForm
@@ -38,7 +39,16 @@ def contour(
     -------
     DataFrame
         A column for each factor in natural units; empty when the target is not reached.
+
+    Raises
+    ------
+    DesignError
+        A target, an extent or a resolution that is no finite number in its range.
     """
+    checked_number("target", target)
+    checked_number("extent, the coded half width of the box,", extent, above=0.0)
+    if resolution is not None:
+        checked_count("resolution", resolution, least=2)
     return natural_points(surface.design.factors, contour_points(surface, target, extent, resolution))
 
 

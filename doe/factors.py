@@ -2,8 +2,8 @@
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
-from typing import TypeVar
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -12,7 +12,9 @@ from doe.errors import DesignError
 
 Values = TypeVar("Values", float, np.ndarray, pd.Series)
 
-RESERVED_NAMES = frozenset({"intercept", "model", "residual", "lack of fit", "pure error", "total"})
+RESERVED_NAMES = frozenset(
+    {"intercept", "blocks", "curvature", "model", "residual", "lack of fit", "pure error", "total"}
+)
 """Rows of the analysis tables: a factor of that name could not be told from them."""
 
 
@@ -72,6 +74,11 @@ class Factor:
         """Name and unit for an axis or a table head; the unit 1 is not written."""
         return self.name if self.unit in ("", "1") else f"{self.name} [{self.unit}]"
 
+    @property
+    def levels_text(self) -> str:
+        """Both levels and the unit, for a heading: ``150..170 degC``."""
+        return f"{self.low:g}..{self.high:g}{'' if self.unit in ('', '1') else ' ' + self.unit}"
+
     def to_natural(self, coded: Values) -> Values:
         """Return natural values; -1 and +1 give ``low`` and ``high`` to the last bit."""
         return 0.5 * (self.low * (1.0 - coded) + self.high * (1.0 + coded))
@@ -79,6 +86,85 @@ class Factor:
     def to_coded(self, natural: Values) -> Values:
         """Return coded values of natural ones."""
         return (natural - self.center) / self.half_range
+
+
+@dataclass(frozen=True)
+class Category(Factor):
+    """A factor whose levels are names: a variety, a supplier, an operator.
+
+    Two levels are coded -1 and +1, as those of a number; more are coded 0, 1, 2, ..., which numbers them and
+    means no more, so that a polynomial refuses them and a formula (``doe.fit_formula``) takes their names.
+
+    Parameters
+    ----------
+    name : str
+    levels : sequence of str
+        Two or more, all different.
+    """
+
+    low: float = field(init=False, default=-1.0, repr=False)
+    high: float = field(init=False, default=1.0, repr=False)
+    unit: str = field(init=False, default="", repr=False)
+    levels: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        levels = tuple(self.levels)
+        if isinstance(self.levels, str) or len(levels) < 2 or len(set(levels)) < len(levels):
+            raise DesignError(
+                f"category {self.name!r}: two or more different levels, received {self.levels!r}"
+            )
+        object.__setattr__(self, "levels", levels)
+
+    @property
+    def codes(self) -> tuple[float, ...]:
+        """Coded value of each level."""
+        return (-1.0, 1.0) if len(self.levels) == 2 else tuple(float(k) for k in range(len(self.levels)))
+
+    @property
+    def levels_text(self) -> str:
+        """The levels' names: ``{old, new}``."""
+        return "{" + ", ".join(map(str, self.levels)) + "}"
+
+    def to_natural(self, coded: Any) -> Any:
+        """Return the levels' names of coded values; raise DesignError between the levels."""
+        return self._translated(coded, dict(zip(self.codes, self.levels, strict=True)))
+
+    def to_coded(self, natural: Any) -> Any:
+        """Return the coded values of levels' names; raise DesignError for a name that is no level."""
+        return self._translated(natural, dict(zip(self.levels, self.codes, strict=True)))
+
+    def _translated(self, values: Any, table: dict) -> Any:
+        strangers = [value for value in np.ravel(values) if value not in table]
+        if strangers:
+            raise DesignError(
+                f"category {self.name!r} has the levels {list(table)}, received {strangers[0]!r}"
+            )
+        if isinstance(values, pd.Series):
+            return values.map(table)
+        found = np.array([table[value] for value in np.ravel(values)])
+        return found.reshape(np.shape(values)) if np.ndim(values) else found[0]
+
+
+def numeric_factors(factors: Iterable[Factor], what: str) -> tuple[Factor, ...]:
+    """Return the factors; raise DesignError when one is a category (no values between its levels)."""
+    factors = checked_factors(factors)
+    for factor in factors:
+        if isinstance(factor, Category):
+            raise DesignError(f"{what} takes factors that are numbers; {factor.name!r} is a category")
+    return factors
+
+
+def two_level_factors(factors: Iterable[Factor], what: str) -> tuple[Factor, ...]:
+    """Return the factors; raise DesignError when one is a category of more than two levels."""
+    factors = checked_factors(factors)
+    for factor in factors:
+        if isinstance(factor, Category) and len(factor.levels) > 2:
+            raise DesignError(
+                f"{what} has two levels a factor; category {factor.name!r} has {len(factor.levels)} "
+                "(fit_formula takes them by name)"
+            )
+    return factors
 
 
 def checked_factors(factors: Iterable[Factor]) -> tuple[Factor, ...]:

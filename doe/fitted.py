@@ -26,3 +26,12 @@ class FittedSurface(Protocol):
 
     def evaluate(self, coded: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return mean and its standard error at coded points, shape (points, factors)."""
+
+
+def unselected(surface: FittedSurface) -> FittedSurface:
+    """Return the model that intervals and regions come from.
+
+    After terms were chosen by the data this is the model before the choice (``doe.Surface.unselected``): the
+    errors of the chosen one do not know that it was chosen, and are too small. Any other surface is its own.
+    """
+    return getattr(surface, "unselected", surface)

@@ -7,13 +7,17 @@ from functools import cached_property
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy import optimize, stats
+from scipy import optimize
 
+from doe.checks import checked_count, checked_level, checked_number
 from doe.compare import Sample
 from doe.errors import DesignError
 from doe.factors import Factor
-from doe.fitted import FittedSurface
+from doe.fitted import FittedSurface, unselected
 from doe.region import Region, box_cells, misfit
+from doe.two_errors import TwoErrors
+
+Misfit = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], TwoErrors]
 
 PULL = 1e-3
 """Weight of the squared distance to the centre beside chi2: it chooses among settings that are as good."""
@@ -30,12 +34,27 @@ class Goal:
     target: Sample
 
     def __post_init__(self) -> None:
+        for place, wanted in (("design", "a fitted surface"), ("evaluate", "a fitted surface")):
+            if not hasattr(self.surface, place):
+                raise DesignError(f"a goal's surface is {wanted}, received {self.surface!r}")
+        if not isinstance(self.target, Sample):
+            raise DesignError(f"a goal's target is a Sample (mean, sd, n), received {self.target!r}")
         if not self.target.sd > 0.0:
             raise DesignError(f"a response is weighed by its target's spread, received {self.target}")
 
-    def misfit(self, coded: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
-        """Return fit less target at coded points, its standard error and the degrees of freedom."""
+    @property
+    def fit(self) -> FittedSurface:
+        """The surface before the data chose its terms: its errors hold (``doe.Surface.unselected``)."""
+        return unselected(self.surface)
+
+    def misfit(self, coded: NDArray[np.float64]) -> Misfit:
+        """Return fit less target at coded points, its standard error and the shares of the two errors."""
         return misfit(self.surface, coded, self.target.mean, self.target.se, float(self.target.df))
+
+    def accepts(self, found: Misfit, alpha: float) -> NDArray[np.bool_]:
+        """Return where fit and target do not differ significantly at a level."""
+        difference, error, share, errors = found
+        return np.abs(difference) <= errors.critical(share, alpha) * error
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,8 +63,9 @@ class JointFit:
 
     The region explored is the coded box -extent..+extent as far as the farthest run. There a setting is
     compatible with k responses when none of them differs from its target significantly at alpha / k
-    (Bonferroni): so the true setting is compatible with probability 1 - alpha at least, where the models hold
-    and however the errors of the responses hang together.
+    (Bonferroni; ``doe.region.compatible_region`` has the rule for one): so the true setting is compatible
+    with probability 1 - alpha at least, where the models hold and however the errors of the responses hang
+    together. Surfaces whose terms the data chose count as they were before the choice.
     """
 
     goals: Mapping[str, Goal]
@@ -69,13 +89,9 @@ class JointFit:
         return np.linalg.norm(self.cells, axis=1) <= self.radius
 
     @cached_property
-    def p(self) -> dict[str, NDArray[np.float64]]:
-        """By response, the two-sided p value of no difference from its target, at every cell."""
-        values = {}
-        for name, goal in self.goals.items():
-            difference, error, df = goal.misfit(self.cells)
-            values[name] = 2.0 * stats.t.sf(np.abs(difference) / error, df)
-        return values
+    def misfits(self) -> dict[str, Misfit]:
+        """By response, how far fit and target differ at every cell."""
+        return {name: goal.misfit(self.cells) for name, goal in self.goals.items()}
 
     def region(self, *names: str) -> Region:
         """Return where some responses agree with their targets; without names, all of them."""
@@ -83,7 +99,9 @@ class JointFit:
 
     def band(self, name: str) -> Region:
         """Return where one response agrees at the level that all share; all bands meet in ``region()``."""
-        return self._region(self.explored & (self.p[name] >= self.alpha / len(self.goals)))
+        self._check_names((name,))
+        level = self.alpha / len(self.goals)
+        return self._region(self.explored & self.goals[name].accepts(self.misfits[name], level))
 
     def share(self, *names: str) -> float:
         """Return which part of the region explored is compatible with some responses (default: all)."""
@@ -93,7 +111,7 @@ class JointFit:
     @cached_property
     def coded_point(self) -> NDArray[np.float64]:
         """The setting with the smallest chi2; among several as good, the one nearest to the centre."""
-        objective = sum(self._chi2(goal, self.cells) for goal in self.goals.values())
+        objective = sum(self._chi2(found) for found in self.misfits.values())
         objective = objective + PULL * np.sum(self.cells**2, axis=1)
         order = np.argsort(np.where(self.explored, objective, np.inf), kind="stable")
         orthant = (self.cells[order] > 0.0) @ 2 ** np.arange(len(self.factors))
@@ -117,31 +135,34 @@ class JointFit:
         Returns
         -------
         DataFrame, index ``response``
-            fitted (mean), fitted_se, target, target_se, t (of the difference), df, p, agrees (p is not below
-            alpha over the number of responses).
+            fitted (mean), fitted_se, target, target_se, t (of the difference), df (Welch and
+            Satterthwaite's), p (the level from which on the difference is significant), agrees (p is not
+            below alpha over the number of responses).
         """
         coded = self.coded_point if point is None else self._coded(point)
+        level = self.alpha / len(self.goals)
         rows = {}
         for name, goal in self.goals.items():
-            mean, se = (values[0] for values in goal.surface.evaluate(coded))
-            difference, error, df = (values[0] for values in goal.misfit(coded[None]))
-            t = difference / error
+            found = goal.misfit(coded[None])
+            difference, error, share = (float(values[0]) for values in found[:3])
+            mean, se = (float(values[0]) for values in goal.fit.evaluate(coded[None]))
             rows[name] = {
                 "fitted": mean,
                 "fitted_se": se,
                 "target": goal.target.mean,
                 "target_se": goal.target.se,
-                "t": t,
-                "df": df,
-                "p": 2.0 * stats.t.sf(abs(t), df),
+                "t": difference / error,
+                "df": float(found[3].df(share)),
+                "p": found[3].p(difference / error, share),
+                "agrees": bool(goal.accepts(found, level)[0]),
             }
-        table = pd.DataFrame.from_dict(rows, orient="index").rename_axis("response")
-        table["agrees"] = table["p"] >= self.alpha / len(self.goals)
-        return table
+        return pd.DataFrame.from_dict(rows, orient="index").rename_axis("response")
 
     def agrees(self, point: Mapping[str, float] | None = None) -> bool:
         """Whether all responses agree with their targets at a point (default: that of the smallest chi2)."""
-        return bool(self.tests(point)["agrees"].all())
+        coded = self.coded_point if point is None else self._coded(point)
+        level = self.alpha / len(self.goals)
+        return all(bool(goal.accepts(goal.misfit(coded[None]), level)[0]) for goal in self.goals.values())
 
     @cached_property
     def shrinkage(self) -> pd.DataFrame:
@@ -178,14 +199,21 @@ class JointFit:
         Returns
         -------
         DataFrame, index ``direction`` from 1
-            A column for each factor (the unit vector, its largest component positive), half_width (of the
-            1 - alpha interval along it, coded; infinite where no response changes), span (of the compatible
+            A column for each factor (the unit vector, its largest component positive), half_width (coded;
+            infinite where no response changes, NaN where nothing is compatible), span (of the compatible
             region along it, over that of the region explored; 0 where nothing is compatible).
+
+            The true setting lies within half_width of the point along the direction with probability
+            1 - alpha at least, where the surfaces are straight that far: it is how far the settings reach
+            with which no response differs significantly at alpha / k, so that it holds for every direction
+            at once, though the data chose them.
         """
-        slopes = []
+        slopes, limits = [], []
         for goal in self.goals.values():
-            _, error, _ = goal.misfit(self.coded_point[None])
-            slopes.append(goal.surface.quadratic_form.gradient(self.coded_point) / error[0])
+            difference, error, share, errors = goal.misfit(self.coded_point[None])
+            slopes.append(goal.fit.quadratic_form.gradient(self.coded_point) / error[0])
+            reach = float(errors.critical(share, self.alpha / len(self.goals))[0])
+            limits.append((-reach - difference[0] / error[0], reach - difference[0] / error[0]))
         information = np.transpose(slopes) @ np.array(slopes)
         values, vectors = np.linalg.eigh(information)
         values, vectors = values[::-1], vectors[:, ::-1]
@@ -193,16 +221,26 @@ class JointFit:
         values = np.where(values > 1e-12 * max(values[0], np.finfo(float).tiny), values, 0.0)
         largest = np.abs(vectors).argmax(axis=0)
         vectors = vectors * np.sign(vectors[largest, range(len(values))])
-        with np.errstate(divide="ignore"):
-            half_width = stats.norm.isf(0.5 * self.alpha) / np.sqrt(values)
+        half_width = [
+            _reach(vector, np.array(slopes), np.array(limits)) if value > 0.0 else np.inf
+            for vector, value in zip(vectors.T, values, strict=True)
+        ]
         index = pd.RangeIndex(1, len(values) + 1, name="direction")
         table = pd.DataFrame(vectors.T, columns=[factor.name for factor in self.factors], index=index)
         return table.assign(half_width=half_width, span=[self._span(vector) for vector in vectors.T])
 
     def _mask(self, names: tuple[str, ...]) -> NDArray[np.bool_]:
         """Return the cells where some responses agree at the level that these share."""
+        self._check_names(names)
         level = self.alpha / len(names)
-        return self.explored & np.all([self.p[name] >= level for name in names], axis=0)
+        return self.explored & np.all(
+            [self.goals[name].accepts(self.misfits[name], level) for name in names], axis=0
+        )
+
+    def _check_names(self, names: tuple[str, ...]) -> None:
+        unknown = [name for name in names if name not in self.goals]
+        if unknown:
+            raise DesignError(f"no response is named {unknown[0]!r}; the fit has {', '.join(self.goals)}")
 
     def _region(self, mask: NDArray[np.bool_]) -> Region:
         table = pd.DataFrame(self.cells, columns=[factor.name for factor in self.factors])
@@ -226,14 +264,17 @@ class JointFit:
             yield chosen
 
     def _coded(self, point: Mapping[str, float]) -> NDArray[np.float64]:
-        return np.array([float(factor.to_coded(float(point[factor.name]))) for factor in self.factors])
+        missing = [factor.name for factor in self.factors if factor.name not in point]
+        if missing:
+            raise DesignError(f"no value for factor {missing[0]!r} in the point {dict(point)}")
+        values = {f: checked_number(f"the point's value of {f.name!r}", point[f.name]) for f in self.factors}
+        return np.array([float(factor.to_coded(value)) for factor, value in values.items()])
 
-    def _chi2(self, goal: Goal, coded: NDArray[np.float64]) -> NDArray[np.float64]:
-        difference, error, _ = goal.misfit(coded)
-        return (difference / error) ** 2
+    def _chi2(self, found: Misfit) -> NDArray[np.float64]:
+        return (found[0] / found[1]) ** 2
 
     def _objective(self, coded: NDArray[np.float64]) -> float:
-        chi2 = sum(float(self._chi2(goal, coded[None])[0]) for goal in self.goals.values())
+        chi2 = sum(float(self._chi2(goal.misfit(coded[None]))[0]) for goal in self.goals.values())
         return chi2 + PULL * float(coded @ coded)
 
     def _refined(self, start: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -246,6 +287,21 @@ class JointFit:
         )
         better = result.success and self._objective(result.x) <= self._objective(start)
         return result.x if better else start
+
+
+def _reach(direction: NDArray[np.float64], slopes: NDArray[np.float64], limits: NDArray[np.float64]) -> float:
+    """Return how far a direction leads from the origin to both sides within linear limits; NaN if none is."""
+    rows = np.vstack([slopes, -slopes])
+    bounds = np.concatenate([limits[:, 1], -limits[:, 0]])
+    ends = []
+    for sign in (1.0, -1.0):
+        found = optimize.linprog(-sign * direction, A_ub=rows, b_ub=bounds, bounds=(None, None))
+        if found.status == 3:
+            return np.inf
+        if not found.success:
+            return np.nan
+        ends.append(abs(float(direction @ found.x)))
+    return max(ends)
 
 
 def joint_fit(goals: Mapping[str, Goal], alpha: float = 0.05, resolution: int | None = None) -> JointFit:
@@ -267,8 +323,15 @@ def joint_fit(goals: Mapping[str, Goal], alpha: float = 0.05, resolution: int | 
     DesignError
         No response, surfaces over other factors, or a target without a spread.
     """
-    if not goals:
-        raise DesignError("a joint fit needs at least one response, received none")
+    if not isinstance(goals, Mapping) or not goals:
+        received = "none" if isinstance(goals, Mapping) else repr(goals)
+        raise DesignError(f"a joint fit needs at least one response by its name, received {received}")
+    for name, goal in goals.items():
+        if not isinstance(goal, Goal):
+            raise DesignError(f"response {name!r} of a joint fit is a Goal, received {goal!r}")
+    checked_level(alpha)
+    if resolution is not None:
+        checked_count("resolution", resolution)
     designs = {name: goal.surface.design for name, goal in goals.items()}
     first, design = next(iter(designs.items()))
     for name, other in designs.items():

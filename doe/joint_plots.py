@@ -39,12 +39,15 @@ def joint_plot(fit: JointFit, truth: Mapping[str, float] | None = None) -> Figur
     Raises
     ------
     DesignError
-        When there is only one factor.
+        When there is only one factor, or a true setting that lacks one.
     """
     names = [factor.name for factor in fit.factors]
     pairs = list(combinations(names, 2))
     if not pairs:
         raise DesignError(f"responses are drawn over two factors, the design has only {names[0]!r}")
+    missing = [name for name in names if truth is not None and name not in truth]
+    if missing:
+        raise DesignError(f"no value for factor {missing[0]!r} in the true setting {truth!r}")
     figure = Figure(figsize=(PANEL * len(pairs), PANEL + 0.7), layout="constrained")
     panels = figure.subplots(1, len(pairs), squeeze=False)[0]
     bands = {name: fit.band(name) for name in fit.goals}

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from numpy.typing import NDArray
 from scipy import optimize, stats
 
+from doe.checks import checked_level, checked_number
 from doe.compare import Sample
 from doe.errors import DesignError
 
@@ -58,21 +59,18 @@ class VarianceRatio:
 
 def noise_floor(values: Sample | Sequence[float] | NDArray, confidence: float = 0.95) -> NoiseFloor:
     """Return the noise floor of replicates of one setting (values, or their Sample)."""
-    if not 0.0 < confidence < 1.0:
-        raise DesignError(f"confidence lies between 0 and 1, received {confidence}")
-    return NoiseFloor(Sample.of(values), confidence)
+    return NoiseFloor(Sample.of(values), checked_level(confidence, "confidence"))
 
 
 def variance_ratio(mean_sq: float, df: float, error_ms: float, error_df: float) -> VarianceRatio:
     """Compare two independent mean squares, the first expected to be the larger."""
-    for name, value in (("mean_sq", mean_sq), ("df", df), ("error_ms", error_ms), ("error_df", error_df)):
-        if not (math.isfinite(value) and value > 0.0):
-            raise DesignError(f"{name} must be positive and finite, received {value}")
-    return VarianceRatio(mean_sq / error_ms, (df, error_df))
+    given = (("mean_sq", mean_sq), ("df", df), ("error_ms", error_ms), ("error_df", error_df))
+    first, first_df, second, second_df = (checked_number(*pair, above=0.0) for pair in given)
+    return VarianceRatio(first / second, (first_df, second_df))
 
 
 def curvature_test(
-    corners: Sequence[float] | NDArray, centers: Sample | Sequence[float] | NDArray
+    corners: Sample | Sequence[float] | NDArray, centers: Sample | Sequence[float] | NDArray
 ) -> VarianceRatio:
     """Test whether the center lies off the plane through a two-level design's runs.
 
@@ -103,9 +101,9 @@ def effect_power(effect: float, sd: float, observations: int, error_df: float, a
         Degrees of freedom of the error that the test uses.
     """
     for name, value in (("sd", sd), ("observations", observations), ("error_df", error_df)):
-        if not (math.isfinite(value) and value > 0.0):
-            raise DesignError(f"{name} must be positive and finite, received {value}")
-    shift = abs(effect) * math.sqrt(observations) / (2.0 * sd)
+        checked_number(name, value, above=0.0)
+    checked_level(alpha)
+    shift = abs(checked_number("effect", effect)) * math.sqrt(observations) / (2.0 * sd)
     critical = float(stats.t.isf(0.5 * alpha, error_df))
     # the lower tail as an upper one: scipy's cdf is not a number far below the centre
     return float(stats.nct.sf(critical, error_df, shift) + stats.nct.sf(critical, error_df, -shift))
@@ -115,8 +113,10 @@ def detectable_effect(
     sd: float, observations: int, error_df: float, alpha: float = 0.05, power: float = 0.8
 ) -> float:
     """Return the smallest effect that is found with a given power (see ``effect_power``)."""
-    if not alpha < power < 1.0:
+    if not checked_level(alpha) < checked_number("power", power) < 1.0:
         raise DesignError(f"power lies between alpha ({alpha}) and 1, received {power}")
+    for name, value in (("sd", sd), ("observations", observations), ("error_df", error_df)):
+        checked_number(name, value, above=0.0)
     standard_error = 2.0 * sd / math.sqrt(observations)
     top = standard_error
     while effect_power(top, sd, observations, error_df, alpha) < power:

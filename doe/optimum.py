@@ -9,6 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy import optimize
 
+from doe.checks import checked_number
 from doe.contour import contour_points
 from doe.errors import DesignError, TargetError
 from doe.factors import natural_points
@@ -65,14 +66,19 @@ def nearest(
     ------
     TargetError
         The fitted surface does not reach the target in the box.
+    DesignError
+        A target, an extent or a point that is no finite number.
     """
+    checked_number("target", target)
+    checked_number("extent, the coded half width of the box,", extent, above=0.0)
     factors = surface.design.factors
     origin = np.zeros(len(factors))
     if to is not None:
         missing = [name for name in surface.design.names if name not in to]
         if missing:
             raise DesignError(f"no value for factor {missing[0]!r} in the point to be near to: {dict(to)}")
-        origin = np.array([factor.to_coded(float(to[factor.name])) for factor in factors])
+        values = [checked_number(f"the value of {f.name!r} to be near to", to[f.name]) for f in factors]
+        origin = np.array([factor.to_coded(value) for factor, value in zip(factors, values, strict=True)])
     starts = contour_points(surface, target, extent, None).to_numpy()
     if not len(starts):
         mean, _ = surface.evaluate(box_cells(len(factors), extent)[0])

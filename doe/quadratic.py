@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from doe.terms import Term
+from doe.errors import DesignError
+from doe.terms import Term, term_name
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,7 +24,20 @@ class QuadraticForm:
     def of(
         cls, names: Sequence[str], terms: Iterable[Term], coefficients: Iterable[float]
     ) -> "QuadraticForm":
-        """Return the form of a coded polynomial; the coefficients start with the intercept's."""
+        """Return the form of a coded polynomial; the coefficients start with the intercept's.
+
+        Raises
+        ------
+        DesignError
+            A term of third or higher degree.
+        """
+        terms = tuple(terms)
+        higher = [term_name(term) for term in terms if len(term) > 2]
+        if higher:
+            raise DesignError(
+                "contours, regions and stationary points are those of a second degree; the model has "
+                f"{higher[0]}"
+            )
         constant, *others = coefficients
         slopes, matrix = np.zeros(len(names)), np.zeros((len(names), len(names)))
         for term, value in zip(terms, others, strict=True):

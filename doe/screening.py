@@ -5,16 +5,28 @@ from functools import cached_property
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 from statsmodels.regression.linear_model import RegressionResults
 
-from doe.anova import ErrorTerm, anova_table, least_squares, partial_sums, pure_error
+from doe.analysis.coefficients import summary_text
+from doe.anova import (
+    ErrorTerm,
+    anova_table,
+    block_columns,
+    block_sum,
+    least_squares,
+    partial_sums,
+    pure_error,
+)
+from doe.checks import checked_level
 from doe.design import Design, observations
 from doe.errors import DesignError
+from doe.lenth import LENTH_DRAWS, SEED, orthogonal_null, pseudo_error
 from doe.terms import Term, find_term, model_matrix, model_terms, natural_coefficients, term_name
 
 ERRORS = ("pooled", "dummies", "pure", "lenth")
+"""What effects can be tested against."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +43,21 @@ class ScreenResult:
     """What the effects are tested against, by the rule ``error_rule``."""
     error_rule: str
 
+    def summary(self) -> str:
+        """Return effects, analysis of variance and what is significant as text."""
+        facts = {
+            "tested against": f"{self.error_rule}, {self.error_df:.3g} degrees of freedom",
+            "significant at 0.05": ", ".join(self.significant(0.05)) or "none",
+            "significant at 0.10": ", ".join(self.significant(0.10)) or "none",
+        } | {f"note {number}": note for number, note in enumerate(self.design.notes, start=1)}
+        columns = self.table.sort_values("rank").drop(columns=["rank", "sum_sq", "F"])
+        return summary_text(f"Screening by a {self.design!r}", columns, self.anova, facts)
+
+    def __repr__(self) -> str:
+        found = ", ".join(self.significant(0.05)) or "none"
+        names = ", ".join(self.design.names)
+        return f"Screening of {names}: significant at 0.05 against {self.error_rule}: {found}"
+
     @property
     def error_df(self) -> float:
         """Degrees of freedom of the error."""
@@ -44,19 +71,24 @@ class ScreenResult:
     @property
     def standard_error(self) -> pd.Series:
         """Standard error of each factor's effect."""
-        variances = np.diag(self.fit.normalized_cov_params)[1:]
+        variances = np.diag(self.fit.normalized_cov_params)[1 : len(self.design.names) + 1]
         return pd.Series(2.0 * np.sqrt(self.error_ms * variances), index=self.design.names)
 
     @property
     def coded_coefficients(self) -> pd.Series:
         """Intercept and half effects: the first-order model in coded units."""
-        return self.fit.params.copy()
+        return self.fit.params.iloc[: len(self.design.names) + 1].copy()
+
+    @property
+    def blocks(self) -> pd.Series | None:
+        """Block of every observation; None without blocks."""
+        return None if self.design.blocks is None else self.design.blocks.loc[self.response.index]
 
     @property
     def coefficients(self) -> pd.Series:
         """The first-order model in natural units."""
         terms: list[Term] = [(), *model_terms(self.design.names, "first-order")]
-        coded = dict(zip(terms, self.fit.params, strict=True))
+        coded = dict(zip(terms, self.coded_coefficients, strict=True))
         natural = natural_coefficients(coded, self.design.factors)
         return pd.Series({term_name(term): value for term, value in natural.items()})
 
@@ -68,8 +100,8 @@ class ScreenResult:
     @cached_property
     def table(self) -> pd.DataFrame:
         """Tests by factor: effect, sum_sq, F, t, p, percent (of the total sum of squares), rank."""
-        sums = partial_sums(self.fit).iloc[1:]
-        effect = 2.0 * self.fit.params.iloc[1:]
+        sums = partial_sums(self.fit)[self.design.names]
+        effect = 2.0 * self.fit.params[self.design.names]
         t = effect / self.standard_error
         table = pd.DataFrame(
             {
@@ -77,7 +109,7 @@ class ScreenResult:
                 "sum_sq": sums,
                 "F": t**2,
                 "t": t,
-                "p": 2.0 * stats.t.sf(t.abs(), self.error_df),
+                "p": self._p(t.abs()),
                 "percent": 100.0 * sums / self.fit.centered_tss,
                 "rank": sums.rank(ascending=False, method="first").astype(int),
             }
@@ -87,35 +119,70 @@ class ScreenResult:
     @cached_property
     def anova(self) -> pd.DataFrame:
         """Analysis of variance by source; model and factors are tested against the chosen error."""
-        return anova_table(self.fit, self.pure_error, self.error)
+        table = anova_table(self.fit, self.pure_error, self.error, block_sum(self.response, self.blocks))
+        if self.error_rule == "lenth":  # F has no F distribution against a pseudo error
+            table["p"] = table["p"].where(table.index.isin(["lack of fit"]))
+            table.loc[self.design.names, "p"] = self.table["p"]
+        return table
 
     def critical_t(self, alpha: float = 0.05, bonferroni: bool = False) -> float:
         """Return the absolute t above which an effect is significant at a two-sided level.
 
         With ``bonferroni`` the level is shared among all columns of the design, dummies included.
         """
-        shared = alpha / self.design.coded.shape[1] if bonferroni else alpha
+        shared = checked_level(alpha) / (self.design.coded.shape[1] if bonferroni else 1)
+        if self.error_rule == "lenth":
+            return float(np.quantile(self._lenth_null, 1.0 - shared))
         return float(stats.t.isf(0.5 * shared, self.error_df))
 
     def significant(self, alpha: float = 0.05) -> list[str]:
         """Return the factors with p below alpha, largest effect first."""
-        return list(self.table[self.table["p"] < alpha].sort_values("rank").index)
+        return list(self.table[self.table["p"] < checked_level(alpha)].sort_values("rank").index)
+
+    def _p(self, size: pd.Series) -> pd.Series:
+        """Return the p values of absolute t: Student's, or the share of drawn inert effects as large."""
+        if self.error_rule != "lenth":
+            return pd.Series(2.0 * stats.t.sf(size, self.error_df), index=size.index)
+        drawn = self._lenth_null
+        below = np.searchsorted(drawn, size.to_numpy(), side="left")
+        return pd.Series((len(drawn) - below + 1.0) / (len(drawn) + 1.0), index=size.index)
+
+    @cached_property
+    def _lenth_null(self) -> NDArray[np.float64]:
+        """Absolute t that inert effects of this design show against Lenth's error, ascending."""
+        solver = _effect_solver(self.design, self.response.index)[1]
+        products = solver @ solver.T
+        if np.allclose(products, products[0, 0] * np.eye(len(solver)), atol=1e-9 * products[0, 0]):
+            return orthogonal_null(len(solver))
+        draws = max(1, min(LENTH_DRAWS, LENTH_DRAWS * 100 // len(self.response)))
+        noise = np.random.default_rng(SEED).standard_normal((draws, len(self.response)))
+        factors = 2.0 * np.linalg.pinv(self.fit.model.exog)[1 : len(self.design.names) + 1]
+        size = np.linalg.norm(factors, axis=1) * np.sqrt(len(self.response)) / 2.0
+        return np.sort(
+            np.abs(noise @ factors.T) / (pseudo_error(noise @ solver.T)[:, None] * size), axis=None
+        )
 
 
-def screen(design: Design, response: ArrayLike, error: str = "pooled") -> ScreenResult:
+def screen(design: Design, response: ArrayLike, error: str | None = None) -> ScreenResult:
     """Estimate every factor's effect (mean at +1 less mean at -1) and test it.
 
     Parameters
     ----------
     design : Design
-        Two-level; runs may be missing (``Design.select``): least squares then replaces the plain contrasts.
+        Two-level, with or without center runs, whose distance from the plane is a row ``curvature`` of the
+        analysis of variance; runs may be missing (``Design.select``): least squares then replaces the plain
+        contrasts.
     response : array-like, shape (runs,) or (runs, replicates)
-    error : {"pooled", "dummies", "pure", "lenth"}
-        What the effects are tested against. ``"pooled"``: all that the factors leave unexplained, dummy
-        columns and replicates together; ``"dummies"``: the columns without factor alone, which hold
-        interactions too (the careful choice with replicates); ``"pure"``: the replicates alone; ``"lenth"``:
-        Lenth's pseudo standard error (Technometrics 31, 1989, p. 469), for a design without dummies and
-        replicates in which few effects are active.
+    error : {"dummies", "lenth", "pooled", "pure"}, optional
+        What the effects are tested against. ``"dummies"``: the columns without factor alone, which hold
+        interactions too; ``"lenth"``: Lenth's pseudo standard error (Technometrics 31, 1989, p. 469), for a
+        design without dummies in which few effects are active, with limits drawn from inert effects (Ye and
+        Hamada, Journal of Quality Technology 32, 2000, p. 57); ``"pooled"``: all that the factors leave
+        unexplained, dummies and replicates together; ``"pure"``: the replicates alone. By default the
+        dummies, where there are none Lenth's. Both stay at their level when two factors interact in 12 runs:
+        what the interaction adds to the factors' columns it adds to the dummies' too. (In 20 runs it falls by
+        60 % on one column, and .05 becomes .07.) Against the replicates it is found significant on whichever
+        column it falls: one strong interaction alarms in most screenings.
 
     Raises
     ------
@@ -123,13 +190,19 @@ def screen(design: Design, response: ArrayLike, error: str = "pooled") -> Screen
         A response that is not finite or does not vary, terms that the runs cannot tell apart, or no degrees
         of freedom for the error that was asked for.
     """
-    if error not in ERRORS:
+    if error is not None and error not in ERRORS:
         raise DesignError(f"error is one of {', '.join(ERRORS)}, received {error!r}")
     coded, values = observations(design, response)
-    fit = least_squares(model_matrix(coded, model_terms(design.names, "first-order")), values)
-    replicates = pure_error(coded, values)
-    chosen = _error_term(design, values, fit, replicates, error)
-    return ScreenResult(design, values, fit, replicates, chosen, error)
+    blocks = None if design.blocks is None else design.blocks.loc[values.index]
+    columns = model_matrix(coded, model_terms(design.names, "first-order"))
+    center = (coded[design.names] == 0.0).all(axis=1)
+    if center.any() and not center.all():  # runs at the center show curvature, which is no error
+        columns["curvature"] = center.to_numpy(dtype=float)
+    fit = least_squares(pd.concat([columns, block_columns(blocks, columns.index)], axis=1), values)
+    replicates = pure_error(coded, values, blocks)
+    rule = error or ("dummies" if fit.df_resid > replicates.df else "lenth")
+    chosen = _error_term(design, values, fit, replicates, rule)
+    return ScreenResult(design, values, fit, replicates, chosen, rule)
 
 
 def aliases(design: Design, interaction: str) -> pd.Series:
@@ -173,21 +246,27 @@ def _error_term(
 
 def _all_effects(design: Design, response: pd.Series) -> pd.Series:
     """Return effects of factors and dummies; of the factors alone when too few runs are left for more."""
-    coded = design.coded.loc[response.index]
+    columns, solver = _effect_solver(design, response.index)
+    return pd.Series(solver @ response.to_numpy(), index=columns)
+
+
+def _effect_solver(design: Design, runs: pd.Index) -> tuple[list[str], NDArray[np.float64]]:
+    """Return the columns whose effects can be told, and the matrix that makes them of the observations."""
+    coded = design.coded.loc[runs]
+    blocks = None if design.blocks is None else design.blocks.loc[runs]
+    base = np.column_stack([np.ones(len(coded)), block_columns(blocks, coded.index).to_numpy()])
     columns = list(coded.columns)
-    matrix = np.column_stack([np.ones(len(coded)), coded.to_numpy()])
+    matrix = np.column_stack([base, coded.to_numpy()])
     if np.linalg.matrix_rank(matrix) < matrix.shape[1]:
         columns = design.names
-        matrix = matrix[:, : len(columns) + 1]
-    return pd.Series(2.0 * np.linalg.lstsq(matrix, response.to_numpy(), rcond=None)[0][1:], index=columns)
+        matrix = matrix[:, : base.shape[1] + len(columns)]
+    return columns, 2.0 * np.linalg.pinv(matrix)[base.shape[1] :]
 
 
 def _lenth_error(effects: pd.Series, observation_count: int) -> ErrorTerm:
     """Return Lenth's error: degrees of freedom m / 3; a mean square that gives effects their pseudo error."""
-    size = effects.abs()
-    first_guess = 1.5 * size.median()
-    pseudo_error = 1.5 * size[size < 2.5 * first_guess].median()
-    if not pseudo_error > 0.0:
+    error = float(pseudo_error(effects.to_numpy()[None, :])[0])
+    if not error > 1e-12 * float(effects.abs().max()):
         raise DesignError("Lenth's error needs effects that are not zero: more than half of them are")
     df = len(effects) / 3.0
-    return ErrorTerm(df, df * pseudo_error**2 * observation_count / 4.0)
+    return ErrorTerm(df, df * error**2 * observation_count / 4.0)

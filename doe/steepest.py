@@ -1,5 +1,6 @@
-"""The steepest path: from a first-order model along its gradient, or in fixed natural steps."""
+"""The steepest path: along the gradient of a fitted model at its start, or in fixed natural steps."""
 
+import numbers
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -7,6 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
+from doe.checks import checked_number, real_array
 from doe.design import Design, numbered, observations
 from doe.errors import DesignError
 from doe.factors import Factor, coded_points
@@ -15,6 +17,9 @@ from doe.surface import Surface
 
 ROUNDING = 1e-12
 """Slope relative to the largest coefficient below which it is a rounding error of the fit."""
+
+CLIMB_COLUMNS = {"response", "error", "error_percent"}
+"""Columns that the table of a climb adds to the factors'."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,19 +40,21 @@ def steepest_path(
     limits: Mapping[str, tuple[float, float]] | None = None,
     descend: bool = False,
 ) -> ClimbPath:
-    """Return ``steps + 1`` runs from a start along the direction in which the response rises.
+    """Return up to ``steps + 1`` runs from a start along the direction in which the response rises.
 
     Parameters
     ----------
     fit : ScreenResult or Surface
-        Gives the direction by its linear coded coefficients.
+        Gives the direction by its gradient at the start, in coded units: a plane's is the same everywhere,
+        a quadratic's is not. Factors off the path are at their centers.
     steps : int
-        Number of moves; the first run is the start itself.
+        Number of moves; the first run is the start itself. The path of a quadratic ends before the first run
+        at which the model predicts no further rise.
     factors : names, optional
         Factors that move; default all.
     step : float or mapping of positive natural steps by factor
-        A number: the textbook path, every factor moves in proportion to its coded coefficient, and the
-        strongest one by ``step`` coded units. A mapping: fixed natural steps; the model gives their signs
+        A number: the textbook path, every factor moves in proportion to its component of the gradient, and
+        the strongest one by ``step`` coded units. A mapping: fixed natural steps; the model gives their signs
         alone.
     start : mapping of natural values by factor, optional
         Default: the factors' centers.
@@ -59,34 +66,72 @@ def steepest_path(
     Raises
     ------
     DesignError
-        An unknown factor, a step that is not positive, a start outside its limits, no slope at all.
+        An unknown factor, a step that is not positive, a start outside its limits, no slope at all, or a
+        first step over the top of a quadratic.
     """
-    if steps < 1:
-        raise DesignError(f"a path has at least one step, received {steps}")
+    if not isinstance(fit, ScreenResult | Surface):
+        raise DesignError(f"a path starts from a ScreenResult or a Surface, received {fit!r}")
+    if isinstance(steps, bool) or not isinstance(steps, numbers.Integral) or steps < 1:
+        raise DesignError(f"a path has at least one step, received {steps!r}")
     moving = [fit.design.factor(name) for name in (factors if factors is not None else fit.design.names)]
+    if not moving:
+        raise DesignError("a path moves at least one factor, received none")
     names = [factor.name for factor in moving]
     _check_names(
         names, step=step if isinstance(step, Mapping) else {}, start=start or {}, limits=limits or {}
     )
-    coefficients = fit.coded_coefficients
-    slopes = coefficients[names].to_numpy() * (-1.0 if descend else 1.0)
-    if not np.abs(slopes).max() > ROUNDING * coefficients.abs().max():
+    begin = np.array([_start(factor, start or {}) for factor in moving])
+    sign = -1.0 if descend else 1.0
+    slopes = sign * _gradient(fit, moving, begin)
+    if not np.abs(slopes).max() > ROUNDING * fit.coded_coefficients.abs().max():
         raise DesignError(f"no direction to climb: the response has no slope in {', '.join(names)}")
     stride = _natural_stride(moving, slopes, step)
-    begin = np.array([(start or {}).get(factor.name, factor.center) for factor in moving])
-    table = numbered(pd.DataFrame(_walk(names, begin, stride, steps, limits or {}), columns=names))
+    table = numbered(pd.DataFrame(_walk(names, begin, stride, int(steps), limits or {}), columns=names))
     coded = coded_points(moving, table)
-    return ClimbPath(tuple(moving), coded, predicted=_predicted(fit, coded))
+    predicted = _predicted(fit, coded)
+    falls = np.flatnonzero(~(sign * np.diff(predicted) > 0.0))
+    if len(falls) and isinstance(fit, Surface):
+        if falls[0] == 0:
+            raise DesignError(
+                f"the first step leads over the {'bottom' if descend else 'top'}: from {predicted.iloc[0]:g} "
+                f"the surface predicts {predicted.iloc[1]:g}; take a smaller step than {step!r}"
+            )
+        coded, predicted = coded.iloc[: falls[0] + 1], predicted.iloc[: falls[0] + 1]
+    return ClimbPath(tuple(moving), coded, predicted=predicted)
 
 
 def climb_table(path: Design, response: ArrayLike, target: float) -> pd.DataFrame:
-    """Return natural settings, mean response, error against the target and its size in percent, by run."""
+    """Return natural settings, mean response, error against the target and its size in percent, by run.
+
+    A labelled response is read by the path's run labels; the percent of a target of 0 is NaN.
+    """
+    target = checked_number("target", target)
     _, values = observations(path, response)
+    taken = sorted(set(path.names) & CLIMB_COLUMNS)
+    if taken:
+        raise DesignError(f"{taken[0]!r} names a column of the climb's table: give the factor another name")
     table = path.natural.copy()
     table["response"] = values.groupby(level=0, sort=False).mean()
     table["error"] = table["response"] - target
-    table["error_percent"] = 100.0 * table["error"].abs() / abs(target)
+    table["error_percent"] = 100.0 * table["error"].abs() / (abs(target) or np.nan)
     return table
+
+
+def _start(factor: Factor, start: Mapping[str, float]) -> float:
+    return checked_number(f"the start of {factor.name!r}", start.get(factor.name, factor.center))
+
+
+def _gradient(
+    fit: ScreenResult | Surface, moving: list[Factor], begin: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the coded gradient's components of the moving factors at the start."""
+    names = [factor.name for factor in moving]
+    if isinstance(fit, ScreenResult):
+        return fit.coded_coefficients[names].to_numpy(dtype=np.float64)
+    places = [fit.design.names.index(name) for name in names]
+    point = np.zeros(len(fit.design.names))
+    point[places] = [factor.to_coded(value) for factor, value in zip(moving, begin, strict=True)]
+    return fit.quadratic_form.gradient(point)[places]
 
 
 def _check_names(names: list[str], **mappings: Mapping) -> None:
@@ -101,12 +146,11 @@ def _natural_stride(
 ) -> NDArray[np.float64]:
     """Return the signed natural move of each factor in one step."""
     if not isinstance(step, Mapping):
-        if not (np.isfinite(step) and step > 0.0):
-            raise DesignError(f"step must be positive and finite, received {step}")
+        step = checked_number("step", step, above=0.0)
         return step * slopes / np.abs(slopes).max() * np.array([factor.half_range for factor in factors])
     for factor in factors:
         size = step.get(factor.name)
-        if size is None or not (np.isfinite(size) and size > 0.0):
+        if not isinstance(size, numbers.Real) or not (np.isfinite(size) and size > 0.0):
             raise DesignError(
                 f"a natural step must be positive and finite for every factor: {factor.name!r} has {size}"
             )
@@ -121,7 +165,11 @@ def _walk(
     limits: Mapping[str, tuple[float, float]],
 ) -> NDArray[np.float64]:
     """Return the natural points of a path inside the limits, shape (points, factors)."""
-    low, high = np.array([limits.get(name, (-np.inf, np.inf)) for name in names], dtype=float).T
+    pairs = [real_array(f"the limits of {name!r}", limits.get(name, (-np.inf, np.inf))) for name in names]
+    for name, pair in zip(names, pairs, strict=True):
+        if pair.shape != (2,):
+            raise DesignError(f"the limits of {name!r} are a low and a high value, received {limits[name]!r}")
+    low, high = np.array(pairs).T
     for name, value, bottom, top in zip(names, begin, low, high, strict=True):
         if not bottom <= value <= top:
             raise DesignError(

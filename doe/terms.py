@@ -14,11 +14,15 @@ Term = tuple[str, ...]
 """Names of the factors that are multiplied: () intercept, ("E",), ("E", "F"), ("E", "E")."""
 
 INTERCEPT: Term = ()
-MODELS = ("first-order", "interaction", "quadratic")
+HIGHEST_POWER = 4
+MODELS = ("first-order", "interaction", "quadratic", "three-factor")
 
 
 def model_terms(names: Sequence[str], model: str) -> tuple[Term, ...]:
-    """Return the terms of a model without its intercept: linear, then interactions, then squares."""
+    """Return the terms of a model without its intercept: linear, then interactions, then squares.
+
+    ``three-factor`` has the interactions of two and of three factors, and no squares.
+    """
     if model not in MODELS:
         raise DesignError(f"model is one of {', '.join(MODELS)}, received {model!r}")
     terms: list[Term] = [(name,) for name in names]
@@ -26,20 +30,58 @@ def model_terms(names: Sequence[str], model: str) -> tuple[Term, ...]:
         terms += itertools.combinations(names, 2)
     if model == "quadratic":
         terms += [(name, name) for name in names]
+    if model == "three-factor":
+        terms += itertools.combinations(names, 3)
     return tuple(terms)
 
 
+def parsed_terms(written: Iterable[str], names: Sequence[str]) -> tuple[Term, ...]:
+    """Return the terms that are written, in the order of a polynomial: ``["A", "B", "A:B", "A^2", "A:B:C"]``.
+
+    Raises
+    ------
+    DesignError
+        A factor that is none of ``names``, a term that comes twice, or one whose parts are not all there: the
+        model is hierarchical.
+    """
+    terms: list[Term] = []
+    for text in written:
+        base, power, degree = text.partition("^")
+        parts = [part.strip() for part in base.split(":")]
+        if power:
+            if len(parts) > 1 or not degree.strip().isdigit() or not 2 <= int(degree) <= HIGHEST_POWER:
+                raise DesignError(f"a term is a product or one power, such as A:B or A^2; received {text!r}")
+            parts *= int(degree)
+        strangers = [part for part in parts if part not in names]
+        if strangers:
+            raise DesignError(
+                f"term {text!r}: no factor is named {strangers[0]!r}; there are {', '.join(names)}"
+            )
+        term = tuple(sorted(parts, key=list(names).index))
+        if term in terms:
+            raise DesignError(f"term {text!r} comes twice")
+        terms.append(term)
+    for term in terms:
+        for place in range(len(term)):
+            part = term[:place] + term[place + 1 :]
+            if part and part not in terms:
+                raise DesignError(f"the model is hierarchical: {term_name(term)} needs {term_name(part)} too")
+    return tuple(sorted(terms, key=lambda term: (len(term), len(set(term)) == 1)))
+
+
 def term_name(term: Term) -> str:
-    """Return the written term: ``intercept``, ``E``, ``E:F`` or ``E^2``."""
+    """Return the written term: ``intercept``, ``E``, ``E:F``, ``E^2`` or ``E:F:G``."""
     if term == INTERCEPT:
         return "intercept"
-    return f"{term[0]}^2" if len(term) == 2 and term[0] == term[1] else ":".join(term)
+    return f"{term[0]}^{len(term)}" if len(term) > 1 and len(set(term)) == 1 else ":".join(term)
 
 
 def find_term(name: str, terms: Iterable[Term]) -> Term:
     """Return the term that a name writes (interactions in either order); raise DesignError when none does."""
+    if not isinstance(name, str):
+        raise DesignError(f"a term is named by text such as 'E', 'E:F' or 'E^2', received {name!r}")
     for term in terms:
-        if name in (term_name(term), term_name(term[::-1])):
+        if name == term_name(term) or sorted(str(name).split(":")) == sorted(term):
             return term
     raise DesignError(f"the model has no term {name!r}; it has {', '.join(map(term_name, terms))}")
 

@@ -69,12 +69,11 @@ def analyse_screening(
 
 
 def _screen(design: Design, cases: pd.DataFrame, response: Response) -> ScreenResult:
-    """Test against dummies and replicates together; where there is neither, against Lenth's pseudo error."""
+    """Test against the dummies; where there are none, against Lenth's pseudo error."""
     used = measured(cases, response)
     try:
         run = design.select(used["run"].tolist())
-        spare = len(run.coded) - len(run.factors) - 1
-        return screen(run, used[response.observable].to_numpy(), error="pooled" if spare > 0 else "lenth")
+        return screen(run, used[response.observable].to_numpy())
     except DesignError as error:
         raise too_many_failed(cases, STAGE, f"cannot be analysed any more ({error})", response) from error
 
@@ -85,8 +84,8 @@ def _decision(
     first = result.table.sort_values("rank").iloc[0]
     replicates = int(cases["replicate"].max())
     against = {
-        "pooled": "what the factors leave unexplained (dummy columns and replicates)",
-        "lenth": "Lenth's pseudo standard error, the design having neither dummies nor replicates",
+        "dummies": "the dummy columns, which hold interactions as the factors' columns do",
+        "lenth": "Lenth's pseudo standard error, the design having no dummies",
     }[result.error_rule]
     own = cases[cases["scene"] == response.scene]
     return Decision(

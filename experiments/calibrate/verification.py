@@ -57,7 +57,7 @@ def _decision(response: Response, test: Comparison, cases: pd.DataFrame) -> Deci
     margin, smallest = (quantity(value, unit) for value in (test.margin or 0.0, test.smallest_margin))
     return Decision(
         STAGE,
-        f"Pooled two-sample t-test of fresh cases against the target of the {response.name}{held_out}, at "
+        f"Welch's two-sample t-test of fresh cases against the target of the {response.name}{held_out}, at "
         f"{test.alpha:.3g}, and two one-sided tests (TOST) of equivalence within {margin}.",
         {
             key_of("mean", response): test.a.mean,

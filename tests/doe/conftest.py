@@ -35,7 +35,8 @@ def screening_factors() -> list[Factor]:
 def screening(screening_factors: list[Factor]) -> ScreenResult:
     table = read("plackett_burman", index_col="run")
     angles = table.pop("repose_angle_deg")
-    return screen(Design.from_table(table, screening_factors), angles)
+    dummies = table.columns.drop([factor.name for factor in screening_factors])
+    return screen(Design.from_table(table, screening_factors, dummies=dummies), angles)
 
 
 @pytest.fixture

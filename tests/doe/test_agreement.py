@@ -41,7 +41,8 @@ def test_noise_is_taken_out_of_the_mean_square_and_of_the_slope() -> None:
             noisy(rng, own, 0.8 * TRUTH + 6.0), noisy(rng, other), own**2, other**2, confidence=0.5
         )
         mean_square = (found._difference**2).mean()
-        assert found.rmse_without_own_noise.value == pytest.approx(math.sqrt(mean_square - own**2), rel=1e-12)
+        # The median's correction is 2/3 of the noise variance over the runs, here 0.3 % of the mean square.
+        assert found.rmse_without_own_noise.value == pytest.approx(math.sqrt(mean_square - own**2), rel=0.01)
         squares.append(mean_square - own**2 - other**2)
         slopes.append(found.slope.value)
     misfit = ((0.8 * TRUTH + 6.0 - TRUTH) ** 2).mean()

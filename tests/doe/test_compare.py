@@ -23,7 +23,8 @@ def test_one_sample_test_is_that_of_scipy():
     theirs = stats.ttest_1samp(A, 30.0)
     ours = compare_means(A, 30.0, method="one-sample")
     assert (ours.t, ours.p, ours.df) == pytest.approx((theirs.statistic, theirs.pvalue, 3), rel=1e-12)
-    assert compare_means(A, Sample(30.0, 0.5, 5), method="one-sample").p == pytest.approx(ours.p, rel=1e-12)
+    with pytest.raises(DesignError, match=r"a known number, .*received Sample\(mean=30.0, sd=0.5, n=5\)"):
+        compare_means(A, Sample(30.0, 0.5, 5), method="one-sample")
 
 
 def test_a_sample_is_its_values_or_its_summary():
@@ -33,8 +34,11 @@ def test_a_sample_is_its_values_or_its_summary():
 
 @pytest.mark.parametrize("margin", [0.3, 1.0, 3.0])
 def test_equivalence_is_that_of_statsmodels(margin):
-    ours = compare_means(A, B, margin=margin)
+    ours = compare_means(A, B, margin=margin, method="pooled")
     p, _, _ = ttost_ind(A, B, -margin, margin)
+    assert compare_means(A, B, margin=margin).equivalence_p == pytest.approx(
+        ttost_ind(A, B, -margin, margin, usevar="unequal")[0], rel=1e-10
+    )
     assert ours.equivalence_p == pytest.approx(p, rel=1e-10)
     assert ours.equivalent == (p < 0.05)
 

@@ -7,8 +7,8 @@ import pandas as pd
 import pytest
 
 from doe import Design, DesignError, Factor, central_composite, fit_surface, plackett_burman
-from doe.central_composite import two_level_part
-from doe.plackett_burman import hadamard, screening_matrix
+from doe.designs.central_composite import two_level_part
+from doe.designs.hadamard import hadamard_candidates, screening_matrix, worst_alias
 
 CONSTRUCTIBLE = [n for n in range(4, 129, 4) if n not in (92, 116)]
 
@@ -57,10 +57,25 @@ def test_screening_columns_are_orthogonal_and_balanced(runs):
     assert (matrix[-1, 1:] == -1.0).all()
 
 
-@pytest.mark.parametrize("order", [1, 2, 28, 52])
+@pytest.mark.parametrize("order", [1, 2, 28, 52, 64])
 def test_hadamard(order):
-    matrix = hadamard(order)
-    assert np.array_equal(matrix.T @ matrix, order * np.eye(order))
+    candidates = hadamard_candidates(order)
+    assert candidates
+    for matrix in candidates:
+        assert np.array_equal(matrix.T @ matrix, order * np.eye(order))
+
+
+@pytest.mark.parametrize(
+    ("runs", "factor_count", "worst"),
+    [
+        (12, 11, 1 / 3), (28, 27, 3 / 7), (36, 35, 1 / 3), (40, 19, 0.0), (40, 38, 0.6), (44, 43, 3 / 11),
+        (52, 25, 1 / 13), (52, 50, 5 / 13), (56, 27, 0.0), (56, 54, 3 / 7), (64, 62, 0.25), (76, 37, 1 / 19),
+        (88, 86, 3 / 11), (112, 108, 3 / 7),
+    ],
+)  # fmt: skip
+def test_interactions_fall_no_more_than_so_far_onto_a_factor(runs, factor_count, worst):
+    """The sums of the entries' products are integers over N: no rounding."""
+    assert worst_alias(screening_matrix(runs, factor_count)[:, :factor_count]) <= worst + 1e-12
 
 
 def test_twelve_runs_are_the_published_cyclic_design():
@@ -108,8 +123,10 @@ def test_two_level_part_keeps_effects_and_interactions_apart(count):
     assert np.array_equal(columns @ columns.T, len(part) * np.eye(len(columns)))
 
 
-def test_two_level_part_is_full_up_to_five_factors():
-    assert [len(two_level_part(count)) for count in range(1, 11)] == [2, 4, 8, 16, 32, 32, 64, 64, 128, 128]
+def test_two_level_part_is_a_fraction_from_five_factors_on():
+    assert [len(two_level_part(count)) for count in range(1, 11)] == [2, 4, 8, 16, 16, 32, 64, 64, 128, 128]
+    assert len(two_level_part(5, full=True)) == 32
+    assert len(central_composite(factors(5), center=6).coded) == 32
 
 
 def test_composite_of_two_factors():
@@ -142,7 +159,10 @@ def test_rotatable_prediction_variance_depends_on_the_radius_alone(count):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"alpha": "corner"}, "alpha is one of rotatable, face, spherical or a number, received 'corner'"),
+        (
+            {"alpha": "corner"},
+            "alpha is one of rotatable, face, spherical, orthogonal, blocks or a number, received 'corner'",
+        ),
         ({"alpha": 0.0}, "alpha must be positive and finite, received 0"),
         ({"center": -1}, "not negative, received -1"),
     ],
@@ -164,10 +184,12 @@ def test_table_in_natural_units_is_the_same_design():
     assert again.coded.to_numpy() == pytest.approx(design.coded.to_numpy(), abs=1e-13)
 
 
-def test_further_columns_are_dummies_and_factor_order_is_the_factors():
+def test_dummies_are_named_and_factor_order_is_the_factors():
     design = plackett_burman(factors(4))
     shuffled = design.coded[design.coded.columns[::-1]]
-    again = Design.from_table(shuffled, design.factors)
+    with pytest.raises(DesignError, match="column 'dummy7' is no factor: name it among the dummies"):
+        Design.from_table(shuffled, design.factors)
+    again = Design.from_table(shuffled, design.factors, dummies=design.dummies)
     assert again.names == design.names
     assert set(again.dummies) == set(design.dummies)
 
@@ -185,7 +207,7 @@ def test_selection_renumbers_and_repeats():
     [
         ({"x1": [1.0, -1.0]}, "no column for factor 'x2'"),
         ({"x1": [1.0, -1.0], "x2": [1.0, float("nan")]}, "nan.* in run 1, column 'x2'"),
-        ({"x1": [1.0, -1.0], "x2": [1.0, -1.0], "angle": [9.2, 15.3]}, "column 'angle' holds 9.2 in run 0"),
+        ({"x1": [1.0, -1.0], "x2": [1.0, -1.0], "angle": [9.2, 15.3]}, "column 'angle' is no factor"),
         ({"x1": [1.0, -1.0], "x2": ["a", "b"]}, "holds numbers"),
         ({"x1": [], "x2": []}, "at least one run"),
     ],

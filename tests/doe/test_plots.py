@@ -7,7 +7,18 @@ import pytest
 from matplotlib.figure import Figure
 from scipy import stats
 
-from doe import DesignError, Factor, central_composite, fit_surface, plots, steepest_path
+from doe import (
+    Category,
+    DesignError,
+    Factor,
+    Wish,
+    central_composite,
+    fit_surface,
+    full_factorial,
+    plots,
+    steepest_path,
+    two_level_effects,
+)
 from doe.plot_data import half_normal_points, normal_points, pareto_points, surface_grid
 
 TARGET = 30.148
@@ -96,4 +107,82 @@ def test_surface_figures_are_drawn(reduced, measured):
         "runs",
         "chosen point",
     ]
+    assert drawn(figure) > 50
+
+
+def cube_data():
+    design = full_factorial([Factor(name, 10.0, 20.0, "mm") for name in "abc"])
+    x = design.points
+    response = 50.0 + 4.0 * x["a"] - 2.0 * x["b"] + 3.0 * x["a"] * x["c"]
+    return design, np.column_stack([response + 0.1, response - 0.1])
+
+
+def test_main_effects_and_interactions_show_the_means():
+    design, response = cube_data()
+    axes = plots.main_effects_plot(design, response).axes[0]
+    drawn_means = [line.get_ydata().tolist() for line in axes.lines[1:]]
+    assert drawn_means == [
+        pytest.approx([46.0, 54.0]),
+        pytest.approx([52.0, 48.0]),
+        pytest.approx([50.0, 50.0]),
+    ]
+    figure = plots.interaction_plot(design, response, "a", "c", "length")
+    low, high = figure.axes[0].lines
+    assert low.get_ydata().tolist() == pytest.approx([49.0, 51.0])
+    assert high.get_ydata().tolist() == pytest.approx([43.0, 57.0])
+    assert drawn(figure) > 50
+    with pytest.raises(DesignError, match="two different factors"):
+        plots.interaction_plot(design, response, "a", "a")
+
+
+def test_cube_shows_the_fitted_corners():
+    design, response = cube_data()
+    figure = plots.cube_plot(fit_surface(design, response, "interaction"))
+    texts = [text.get_text() for text in figure.axes[0].texts]
+    assert sorted(texts[:8]) == sorted(["51", "53", "47", "49", "45", "59", "41", "55"])
+    assert drawn(figure) > 50
+    with pytest.raises(DesignError, match="three different factors"):
+        plots.cube_plot(fit_surface(design, response, "first-order"), ["a", "b"])
+
+
+def test_profiler_and_overlay(reduced):
+    surfaces = {"angle": reduced}
+    at = {"E": 0.48, "F": 0.45}
+    figure = plots.profile_plot(surfaces, at, {"angle": Wish(28.0, 33.0, target=TARGET)})
+    assert len(figure.axes) == 4
+    line = figure.axes[0].lines[0]
+    middle = reduced.predict(at)["mean"].iloc[0]
+    assert np.interp(0.48, line.get_xdata(), line.get_ydata()) == pytest.approx(middle, rel=1e-9)
+    assert drawn(figure) > 50
+    overlay = plots.overlay_plot(surfaces, {"angle": (30.0, 31.0)}, point=at)
+    assert [text.get_text() for text in overlay.legends[0].get_texts()] == ["angle 30 to 31", "all kept"]
+    assert drawn(overlay) > 50
+    with pytest.raises(DesignError, match="no value for factor 'F'"):
+        plots.profile_plot(surfaces, {"E": 0.5})
+    with pytest.raises(DesignError, match="limits for each"):
+        plots.overlay_plot(surfaces, {})
+
+
+def test_profiler_draws_categories():
+    design = full_factorial([Factor("t", 0.0, 1.0), Category("kind", ["old", "new"])], levels=3)
+    surface = fit_surface(design, np.arange(6.0) + np.array([0.0, 0.1, 0.0, 0.0, 0.2, 0.0]), "first-order")
+    figure = plots.profile_plot({"y": surface}, {"t": 0.5, "kind": "old"})
+    assert [label.get_text() for label in figure.axes[1].get_xticklabels()] == ["old", "new"]
+
+
+def test_figures_are_drawn_on_given_axes(reduced, screening, measured):
+    figure = Figure(figsize=(9.0, 6.0))
+    axes = figure.subplots(2, 3).ravel()
+    design, response = cube_data()
+    noise = np.random.default_rng(7).normal(size=response.shape)
+    effects = two_level_effects(design, response + noise)
+    drawings = [
+        plots.pareto_chart(screening, axes=axes[0]),
+        plots.half_normal_plot(effects, axes=axes[1]),
+        plots.contour_plot(reduced, TARGET, axes=axes[2]),
+        plots.overlay_plot({"angle": reduced}, {"angle": (30.0, None)}, axes=axes[3]),
+        plots.residual_plots(reduced, (axes[4], axes[5])),
+    ]
+    assert all(drawing is figure for drawing in drawings)
+    assert all(axis.has_data() for axis in axes)
     assert drawn(figure) > 50

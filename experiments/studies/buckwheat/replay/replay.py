@@ -129,7 +129,8 @@ class Replay:
     def screening(self) -> ScreenResult:
         """Effects at the paper's screening runs, tested against the idle columns as the paper does."""
         cases = self._of("screening")
-        return screen(paper.screening_design().select(cases["run"].tolist()), cases["angle"], error="dummies")
+        design = paper.screening_design().select(cases["run"].tolist())
+        return screen(design, cases["angle"].to_numpy(), error="dummies")
 
     @cached_property
     def effects(self) -> pd.DataFrame:
@@ -144,7 +145,7 @@ class Replay:
     def surface(self) -> Surface:
         """Full quadratic at the paper's composite runs."""
         cases = self._of("composite")
-        return fit_surface(paper.composite_design().select(cases["run"].tolist()), cases["angle"])
+        return fit_surface(paper.composite_design().select(cases["run"].tolist()), cases["angle"].to_numpy())
 
     @cached_property
     def anova(self) -> pd.DataFrame:

@@ -75,8 +75,9 @@ def agreement_table(replay: Replay) -> Table:
         f"{fixed(low, 2)}° (its composite centre) or {fixed(high, 2)}° (its verification). Noise is taken "
         "out of the mean square: less the mean of s²/n, and less the square of the first of the paper's two. "
         "Slope: our degrees per true published degree. “Highest” is the mean Spearman that a perfect model "
-        "would show through the noise of both. Intervals (95 %) resample the runs within their table: rough "
-        "for six runs, next to meaningless for three."
+        "would show through the noise of both. Intervals (95 %) of rmse, bias, slope and Spearman: "
+        "chi-square, Student's within the tables, Fuller's and that of normal pairs; wide for six runs, and "
+        "for three without end."
     )
     return make_table("replay-agreement", frame, columns, "Agreement with the published angles.", note)
 

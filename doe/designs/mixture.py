@@ -1,0 +1,127 @@
+"""Mixture designs: shares of components that add up to one."""
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from doe.design import numbered
+from doe.errors import DesignError
+
+TOLERANCE = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Mixture:
+    """Blends in standard order.
+
+    Parameters
+    ----------
+    shares : DataFrame, one row a blend
+        Share of each component; every row adds up to 1.
+    lower : mapping of float by component
+        Least shares, to which the design is scaled (pseudo-components); what is not named has 0.
+    seed : int, optional
+        Seed of ``run_order``.
+    """
+
+    shares: pd.DataFrame
+    lower: Mapping[str, float]
+    seed: int | None = None
+
+    def __post_init__(self) -> None:
+        totals = self.shares.sum(axis=1)
+        off = totals.index[(totals - 1.0).abs() > TOLERANCE]
+        if len(off) or not (self.shares >= -TOLERANCE).all(axis=None):
+            place = off[0] if len(off) else self.shares.index[(self.shares < -TOLERANCE).any(axis=1)][0]
+            raise DesignError(
+                f"shares are not negative and add up to 1; blend {place} adds up to {totals[place]}"
+            )
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the components."""
+        return list(self.shares.columns)
+
+    @property
+    def run_order(self) -> pd.Index:
+        """Labels in the order of execution."""
+        if self.seed is None:
+            return self.shares.index
+        return self.shares.index[np.random.default_rng(self.seed).permutation(len(self.shares))]
+
+    def __repr__(self) -> str:
+        return f"Mixture of {len(self.shares)} blends of {', '.join(self.names)}"
+
+
+def simplex_lattice(
+    components: Sequence[str],
+    degree: int,
+    *,
+    interior: bool = False,
+    lower: Mapping[str, float] | None = None,
+    seed: int | None = None,
+) -> Mixture:
+    """Return the lattice of shares 0, 1/m, ..., 1, for a model of degree m (Scheffe 1958).
+
+    Parameters
+    ----------
+    components : sequence of str
+    degree : int
+        m, 1 or more; the lattice of q components has C(q + m - 1, m) blends.
+    interior : bool
+        Add the blend of equal shares and those half way to the pure components, which a lattice of low degree
+        lacks and which show whether the model holds inside.
+    lower : mapping of float by component, optional
+        Least shares.
+    seed : int, optional
+        Seed of the run order.
+    """
+    names = _checked(components)
+    if degree < 1:
+        raise DesignError(f"degree: 1 or more, received {degree}")
+    count = len(names)
+    rows = [row for row in itertools.product(range(degree, -1, -1), repeat=count) if sum(row) == degree]
+    shares = np.array(rows) / degree
+    if interior:
+        equal = np.full((1, count), 1.0 / count)
+        shares = np.vstack([shares, equal, 0.5 * (np.eye(count) + equal)])
+    return _scaled(names, shares, lower, seed)
+
+
+def simplex_centroid(
+    components: Sequence[str], *, lower: Mapping[str, float] | None = None, seed: int | None = None
+) -> Mixture:
+    """Return the equal blends of one, two, ... and all components (Scheffe 1963): 2^q - 1 of them."""
+    names = _checked(components)
+    count = len(names)
+    rows = []
+    for size in range(1, count + 1):
+        for chosen in itertools.combinations(range(count), size):
+            row = np.zeros(count)
+            row[list(chosen)] = 1.0 / size
+            rows.append(row)
+    return _scaled(names, np.array(rows), lower, seed)
+
+
+def _checked(components: Sequence[str]) -> list[str]:
+    names = [str(name) for name in components]
+    if isinstance(components, str) or len(names) < 2 or len(set(names)) < len(names):
+        raise DesignError(f"a mixture has two or more different components, received {components!r}")
+    return names
+
+
+def _scaled(
+    names: list[str], shares: np.ndarray, lower: Mapping[str, float] | None, seed: int | None
+) -> Mixture:
+    lower = dict(lower or {})
+    strangers = [name for name in lower if name not in names]
+    if strangers:
+        raise DesignError(f"lower names {strangers[0]!r}, which is no component of {', '.join(names)}")
+    least = np.array([lower.get(name, 0.0) for name in names])
+    if not (np.isfinite(least).all() and (least >= 0.0).all() and least.sum() < 1.0):
+        raise DesignError(f"least shares are not negative and add up to less than 1, received {lower}")
+    table = pd.DataFrame(least + (1.0 - least.sum()) * shares, columns=names)
+    return Mixture(numbered(table), lower, seed)

@@ -1,0 +1,1 @@
+"""Levels and coverage of `doe` by simulation: every figure that it states against how often it holds."""

@@ -1,0 +1,198 @@
+"""Regions, joint fits and predictions: is the true setting, the true mean, the next observation inside."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import stats
+
+from doe import Design, Factor, Goal, Sample, central_composite, fit_surface, joint_fit
+from doe.quadratic import QuadraticForm
+from doe.two_errors import TwoErrors
+from experiments.benchmarks.statistics.coverage import (
+    AT_LEAST,
+    CHECKED,
+    EXACT,
+    Figure,
+    generator,
+    require_same,
+)
+
+FACTORS = (Factor("A", -1.0, 1.0), Factor("B", -1.0, 1.0))
+DESIGN = central_composite(FACTORS, center=5)
+POINT = np.array([[0.4, -0.5]])
+"""The true setting, coded."""
+
+MEASUREMENTS = (2, 3, 4, 5, 10)
+RESPONSES = (2, 3, 6)
+SPREADS = (0.3, 1.0, 3.0)
+"""Standard deviation of a measurement over that of a run."""
+
+FITS, DRAWS = 10_000, 5
+"""Fitted surfaces, and measured targets for each."""
+
+SHARED = 0.8
+"""Correlation of the errors of the responses of one run, where they hang together."""
+
+CURVED = {
+    "plane": (1.0, -0.8, 0.0, 0.0, 0.0),
+    "curved": (1.0, -0.8, 0.5, 0.9, -0.7),
+    "faint": (0.6, 0.3, 0.3, 0.4, 0.2),
+}
+"""True slopes, interaction and squares over the standard deviation of a run."""
+
+PAIRS, JOINT_TRIALS = ((2, 2), (2, 6), (3, 3), (5, 2), (10, 6)), 400
+"""Measurements and responses of the directions, and trials of each."""
+
+
+def surfaces() -> Iterator[Figure]:
+    """Yield the coverage of regions of one and more responses, of predictions, and of directions."""
+    for number, name in enumerate(CURVED):
+        yield from _reduced(name, number)
+    for number, correlation in enumerate((0.0, SHARED)):
+        yield from _joint(correlation, 10 + number)
+    for number, (count, responses) in enumerate(PAIRS):
+        yield _direction(count, responses, 20 + number)
+
+
+@dataclass(frozen=True)
+class _Fits:
+    """Quadratic fits of drawn responses, at the true setting; each array has the shape of the draws."""
+
+    error: NDArray[np.float64]
+    """Fitted less true mean."""
+    se: NDArray[np.float64]
+    sd: NDArray[np.float64]
+    """Root of the residual mean square."""
+    df: float
+
+    @classmethod
+    def of(cls, noise: NDArray[np.float64]) -> _Fits:
+        """Return the fits of the errors of runs, shape (..., runs): the true surface is in the model."""
+        a, b = DESIGN.points.to_numpy().T
+        matrix = np.column_stack([np.ones(len(a)), a, b, a * b, a**2, b**2])
+        row = np.array([1.0, *POINT[0], POINT[0].prod(), *POINT[0] ** 2])
+        solver, df = np.linalg.pinv(matrix), len(a) - matrix.shape[1]
+        coefficients = noise @ solver.T
+        sd = np.sqrt(((noise - coefficients @ matrix.T) ** 2).sum(axis=-1) / df)
+        leverage = float(row @ np.linalg.inv(matrix.T @ matrix) @ row)
+        return cls(coefficients @ row, sd * np.sqrt(leverage), sd, float(df))
+
+
+def _true_mean(coded: NDArray[np.float64], name: str) -> NDArray[np.float64]:
+    a, b = coded.T
+    return np.column_stack([a, b, a * b, a**2, b**2]) @ np.array(CURVED[name])
+
+
+def _reduced(name: str, number: int) -> Iterator[Figure]:
+    """Yield what a surface covers after backward elimination at .05, as every campaign fits it."""
+    rng = generator("surfaces", number)
+    noise = rng.standard_normal((FITS, len(DESIGN.coded)))
+    fits = _Fits.of(noise)
+    _check_reduced(name, noise[:CHECKED], fits)
+    t = stats.t.isf(0.025, fits.df)
+    fresh = rng.standard_normal(FITS)
+    mean = float((np.abs(fits.error) <= t * fits.se).mean())
+    single = float((np.abs(fits.error - fresh) <= t * np.hypot(fits.se, fits.sd)).mean())
+    yield Figure("predict, mean", f"{name}, reduced", 0.95, EXACT, mean, FITS)
+    yield Figure("predict, observation", f"{name}, reduced", 0.95, EXACT, single, FITS)
+    for count in MEASUREMENTS:
+        for spread in SPREADS:
+            case = f"{name}, reduced, n = {count}, spread {spread:g}"
+            promise = AT_LEAST if count < 5 else EXACT
+            share = float(_agreeing(rng, fits, count, spread, 0.05).mean())
+            yield Figure("compatible_region", case, 0.95, promise, share, FITS)
+
+
+def _check_reduced(name: str, noise: NDArray[np.float64], fits: _Fits) -> None:
+    """Hold the vectorised fits against ``reduce``, ``predict`` and the region's rule themselves."""
+    mean, truth = _true_mean(DESIGN.points.to_numpy(), name), _true_mean(POINT, name)[0]
+    point = dict(zip(DESIGN.names, POINT[0], strict=True))
+    for trial, error in enumerate(noise):
+        surface = fit_surface(DESIGN, mean + error).reduce(0.05)
+        low, high = surface.predict(point, coded=True)[["prediction_low", "prediction_high"]].iloc[0]
+        reach = stats.t.isf(0.025, fits.df) * np.hypot(fits.se[trial], fits.sd[trial])
+        expected = truth + fits.error[trial] + np.array([-reach, reach])
+        require_same("predict", expected, [low, high])
+        target = Sample(truth + 0.5, 0.7, 3)
+        share = target.se**2 / (fits.se[trial] ** 2 + target.se**2)
+        limit = TwoErrors(fits.df, 2.0).critical(share, 0.05) * np.hypot(fits.se[trial], target.se)
+        agreed = abs(fits.error[trial] - 0.5) <= limit
+        require_same("compatible_region", agreed, surface.agrees(point, target, coded=True))
+
+
+def _agreeing(
+    rng: np.random.Generator, fits: _Fits, count: int, spread: float, alpha: float
+) -> NDArray[np.bool_]:
+    """Return in which draws a measured target does not contradict the true setting, by the region's rule."""
+    shape = (DRAWS, *fits.error.shape)
+    target = spread * rng.standard_normal(shape) / np.sqrt(count)
+    variance = spread**2 * rng.chisquare(count - 1, shape) / (count - 1) / count
+    total = fits.se**2 + variance
+    critical = TwoErrors(fits.df, count - 1.0).critical(variance / total, alpha)
+    return np.asarray(np.abs(fits.error - target) <= critical * np.sqrt(total))
+
+
+def _joint(correlation: float, number: int) -> Iterator[Figure]:
+    """Yield what a joint region covers: six responses by run, independent or hanging together."""
+    rng = generator("surfaces", number)
+    runs, most = len(DESIGN.coded), max(RESPONSES)
+    own = rng.standard_normal((FITS, most, runs))
+    shared = rng.standard_normal((FITS, 1, runs))
+    every = _Fits.of(np.sqrt(correlation) * shared + np.sqrt(1.0 - correlation) * own)
+    kind = f"correlated {correlation:g}" if correlation else "independent"
+    for responses in RESPONSES:
+        error, se, sd = (values[:, :responses] for values in (every.error, every.se, every.sd))
+        fits = _Fits(error, se, sd, every.df)
+        for count in MEASUREMENTS:
+            for spread in SPREADS:
+                agreed = _agreeing(rng, fits, count, spread, 0.05 / responses).all(axis=-1)
+                case = f"{responses} responses, {kind}, n = {count}, spread {spread:g}"
+                yield Figure("joint_fit", case, 0.95, AT_LEAST, float(agreed.mean()), FITS)
+
+
+@dataclass(frozen=True)
+class _Plane:
+    """A fitted plane: estimated coefficients and their covariance."""
+
+    coefficients: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+    residual_df: float
+    design: Design = DESIGN
+
+    @property
+    def quadratic_form(self) -> QuadraticForm:
+        return QuadraticForm(float(self.coefficients[0]), self.coefficients[1:], np.zeros((2, 2)))
+
+    def evaluate(self, coded: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        points = np.atleast_2d(np.asarray(coded, dtype=np.float64))
+        rows = np.column_stack([np.ones(len(points)), points])
+        return rows @ self.coefficients, np.sqrt(np.einsum("ij,jk,ik->i", rows, self.covariance, rows))
+
+
+def _direction(count: int, responses: int, number: int) -> Figure:
+    """Return what ``directions.half_width`` covers: the true setting along both directions of a joint fit."""
+    rng = generator("surfaces", number)
+    matrix = np.column_stack([np.ones(len(DESIGN.coded)), DESIGN.points.to_numpy()])
+    inverse, df = np.linalg.inv(matrix.T @ matrix), len(matrix) - 3.0
+    inside = 0.0
+    for _ in range(JOINT_TRIALS):
+        goals = {}
+        for name in range(responses):
+            angle = np.pi * (name + rng.uniform()) / responses
+            true = 12.0 * np.array([0.0, np.cos(angle), np.sin(angle)])
+            response = matrix @ true + rng.standard_normal(len(matrix))
+            found = inverse @ matrix.T @ response
+            variance = float(((response - matrix @ found) ** 2).sum()) / df
+            target = POINT[0] @ true[1:] + rng.standard_normal(count)
+            goals[str(name)] = Goal(_Plane(found, variance * inverse, df), Sample.of(target))
+        fit = joint_fit(goals, resolution=12)
+        vectors = fit.directions[DESIGN.names].to_numpy()
+        away = np.abs(vectors @ (POINT[0] - fit.coded_point))
+        reach = fit.directions["half_width"].to_numpy()
+        inside += float((away <= reach).mean())
+    case = f"{responses} responses, n = {count}"
+    return Figure("directions.half_width", case, 0.95, AT_LEAST, inside / JOINT_TRIALS, JOINT_TRIALS)

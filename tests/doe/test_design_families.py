@@ -1,0 +1,306 @@
+"""Designs: published tables, resolution, orthogonality, optimality, and what is refused."""
+
+import itertools
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from doe import (
+    Category,
+    Design,
+    DesignError,
+    Factor,
+    add_axial,
+    add_center,
+    alias_structure,
+    box_behnken,
+    central_composite,
+    definitive_screening,
+    design_quality,
+    effect_power,
+    fit_surface,
+    foldover,
+    fractional_factorial,
+    full_factorial,
+    join,
+    latin_hypercube,
+    optimal_design,
+    plackett_burman,
+    power_table,
+    screen,
+    simplex_centroid,
+    simplex_lattice,
+    sobol,
+)
+from doe.designs.factorial import CATALOGUE
+from doe.designs.hadamard import conference_matrix
+from doe.designs.mixture import Mixture
+
+# Word lengths of the catalogue's first designs (Chen, Sun and Wu 1993): resolution by runs and factors.
+RESOLUTIONS = {
+    8: {4: 4, 5: 3, 6: 3, 7: 3},
+    16: {5: 5, 6: 4, 7: 4, 8: 4, 9: 3, 10: 3, 11: 3, 12: 3, 13: 3, 14: 3, 15: 3},
+    32: {6: 6, 7: 4, 8: 4, 9: 4, 10: 4, 11: 4, 12: 4, 16: 4},
+    64: {7: 7, 8: 5, 9: 4, 10: 4, 11: 4},
+    128: {8: 8, 9: 6, 10: 5, 11: 5, 12: 4},
+}
+SIZES = [(runs, count, r) for runs, table in RESOLUTIONS.items() for count, r in table.items()]
+
+
+def factors(count: int) -> list[Factor]:
+    return [Factor(f"x{number}", 10.0 * number, 10.0 * number + 4.0) for number in range(1, count + 1)]
+
+
+@pytest.mark.parametrize(("runs", "count", "resolution"), SIZES)
+def test_fractions_have_the_published_resolution(runs, count, resolution):
+    design = fractional_factorial(factors(count), runs)
+    matrix = design.coded.to_numpy()
+    assert np.array_equal(matrix.T @ matrix, runs * np.eye(count))
+    assert alias_structure(design, order=1).resolution == resolution
+
+
+def test_catalogue_lists_as_many_generators_as_are_needed():
+    for runs, table in CATALOGUE.items():
+        assert all(2 ** (count - len(words)) == runs for count, words in table.items())
+
+
+def test_fraction_of_a_resolution_is_the_smallest():
+    sizes = [len(fractional_factorial(factors(7), resolution=r).coded) for r in (3, 4, 5, 7)]
+    assert sizes == [8, 16, 64, 64]
+    with pytest.raises(DesignError, match="no fraction of resolution 6 in 12 factors"):
+        fractional_factorial(factors(12), resolution=6)
+
+
+def test_generators_and_their_aliases_in_words():
+    design = fractional_factorial(factors(5), generators=["x4 = -x1:x2", "x5 = x1:x3"])
+    text = str(alias_structure(design))
+    assert "Resolution III" in text
+    assert "-x1:x2:x4, x1:x3:x5" in text
+    assert "Not told apart: x1 = -x2:x4 = x3:x5" in text
+    for bad in (["x4 = x1:x9"], ["x9 = x1:x2"], ["x1:x2"], ["x5 = x4:x1", "x4 = x1:x2"]):
+        with pytest.raises(DesignError, match="a generator gives one of"):
+            fractional_factorial(factors(5), generators=bad)
+
+
+def test_partial_aliases_of_plackett_burman():
+    structure = alias_structure(plackett_burman(factors(5)))
+    assert structure.resolution == pytest.approx(3.0 + 2.0 / 3.0)
+    assert structure.chains == []
+    assert structure.of("x1:x2").abs().max() == pytest.approx(1.0 / 3.0)
+    with pytest.raises(DesignError, match="factor 'x1' is 0"):
+        alias_structure(box_behnken(factors(3)))
+
+
+@pytest.mark.parametrize(
+    ("count", "runs", "note"),
+    [(5, 16, "resolution V"), (8, 16, "resolution IV"), (11, 24, "foldover"), (8, 12, "33 % of it")],
+)
+def test_plackett_burman_says_what_does_better(count, runs, note):
+    assert note in " ".join(plackett_burman(factors(count), runs).notes)
+
+
+@pytest.mark.parametrize(("count", "blocks"), [(3, 2), (4, 2), (4, 4), (5, 4), (6, 8)])
+def test_blocks_of_a_factorial_cost_no_main_effect(count, blocks):
+    design = full_factorial(factors(count), blocks=blocks)
+    means = design.coded.groupby(design.blocks.to_numpy()).mean()
+    assert np.array_equal(means.to_numpy(), np.zeros((blocks, count)))
+    if (count, blocks) != (3, 2):
+        pairs = [design.coded[a] * design.coded[b] for a, b in itertools.combinations(design.names, 2)]
+        moved = sum(bool(pair.groupby(design.blocks.to_numpy()).mean().abs().max() > 0) for pair in pairs)
+        # Montgomery, table 7.9: only 4 factors in 4 blocks must lose an interaction of two.
+        assert moved == (1 if (count, blocks) == (4, 4) else 0)
+    with pytest.raises(DesignError, match=r"2, 4, \.\.\. and fewer than"):
+        full_factorial(factors(count), blocks=3)
+
+
+@pytest.mark.parametrize(("count", "blocks"), [(2, 2), (3, 3), (4, 3), (5, 2), (6, 2)])
+def test_blocks_of_a_composite_design_do_not_disturb_the_model(count, blocks):
+    design = central_composite(factors(count), "blocks", center=2, blocks=blocks)
+    response = np.random.default_rng(3).normal(size=len(design.coded))
+    response += 5.0 * design.blocks.to_numpy()
+    with_blocks = fit_surface(design, response)
+    without = fit_surface(Design(design.factors, design.coded), response)
+    ours, theirs = (surface.coded_coefficients.iloc[1:].to_numpy() for surface in (with_blocks, without))
+    assert ours == pytest.approx(theirs, abs=1e-10)  # rounding of the two solutions
+
+
+def test_orthogonal_axial_distance_makes_squares_uncorrelated():
+    design = central_composite(factors(3), "orthogonal", center=4)
+    squares = design.points.to_numpy() ** 2
+    covariance = np.cov(squares.T)
+    assert covariance[0, 1] == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("count", [4, 5, 6, 7])
+def test_blocks_of_box_behnken_are_orthogonal(count):
+    design = box_behnken(factors(count), blocks=True)
+    points = design.points
+    terms = [points[a] * points[b] for a, b in itertools.combinations_with_replacement(points, 2)]
+    for column in [*(points[name] for name in points), *terms]:
+        assert np.ptp(column.groupby(design.blocks.to_numpy()).mean()) == pytest.approx(0.0, abs=1e-15)
+
+
+@pytest.mark.parametrize("count", [3, 4, 5, 6, 7, 8, 10, 16, 22])
+def test_definitive_screening_keeps_main_effects_clear(count):
+    design = definitive_screening(factors(count))
+    points = design.points.to_numpy()
+    second = np.column_stack(
+        [points[:, i] * points[:, j] for i, j in itertools.combinations_with_replacement(range(count), 2)]
+    )
+    assert np.array_equal(points.T @ points, (points[:, 0] ** 2).sum() * np.eye(count))
+    assert np.abs(points.T @ second).max() == 0.0
+    assert len(points) == 2 * {3: 4, 5: 6, 7: 8, 22: 24}.get(count, count) + 1
+
+
+@pytest.mark.parametrize("order", [4, 6, 8, 10, 12, 14, 16, 24, 26])
+def test_conference_matrices(order):
+    matrix = conference_matrix(order)
+    assert np.array_equal(matrix.T @ matrix, (order - 1) * np.eye(order))
+    assert np.array_equal(np.abs(matrix), 1.0 - np.eye(order))
+
+
+def test_foldover_clears_main_effects():
+    design = fractional_factorial(factors(7), 8)
+    whole = foldover(design)
+    assert alias_structure(design).resolution == 3
+    assert alias_structure(whole).resolution == 4
+    assert whole.blocks.value_counts().to_list() == [8, 8]
+    single = alias_structure(foldover(design, ["x1"]))
+    assert [name for name in single.of("x1").index if name.count(":") == 1] == []
+
+
+def test_a_factorial_that_ran_becomes_composite():
+    design = add_axial(add_center(full_factorial(factors(2)), 2), 2.0**0.5, center=2)
+    assert len(design.coded) == 12
+    assert design.blocks.to_list() == ["factorial"] * 6 + ["axial"] * 6
+    response = np.random.default_rng(1).normal(size=12)
+    assert fit_surface(design, response).anova.loc["blocks", "df"] == 1
+
+
+def test_joined_designs_keep_the_first_coding():
+    first = full_factorial([Factor("a", 0.0, 2.0)])
+    second = full_factorial([Factor("a", 2.0, 6.0)])
+    both = join(first, second, blocks=["old", "new"])
+    assert both.natural["a"].to_list() == [0.0, 2.0, 2.0, 6.0]
+    assert both.coded["a"].to_list() == [-1.0, 1.0, 1.0, 5.0]
+    with pytest.raises(DesignError, match="same factors"):
+        join(first, full_factorial([Factor("b", 0.0, 2.0)]))
+
+
+def test_center_runs_show_curvature_in_a_screening():
+    design = add_center(plackett_burman(factors(4)), 4)
+    response = 3.0 * design.points["x1"].to_numpy() + 5.0 * (design.points["x2"] == 0.0).to_numpy()
+    noise = np.random.default_rng(5).normal(scale=0.1, size=16)
+    result = screen(design, response + noise)
+    assert result.anova.loc["curvature", "sum_sq"] == pytest.approx(75.0, rel=0.1)  # 12 x 4 / 16 x 5^2
+    assert result.significant(0.01) == ["x1"]
+
+
+def test_latin_hypercube_has_one_run_in_every_slice():
+    design = latin_hypercube(factors(3), 20, seed=4)
+    slices = np.floor((design.coded.to_numpy() + 1.0) * 10.0)
+    assert (np.sort(slices, axis=0) == np.arange(20)[:, None]).all()
+    pd.testing.assert_frame_equal(design.coded, latin_hypercube(factors(3), 20, seed=4).coded)
+
+
+def test_sobol_is_balanced_and_refuses_other_sizes():
+    design = sobol(factors(4), 16)
+    assert (np.sort(np.floor((design.coded.to_numpy() + 1.0) * 8.0), axis=0) == np.arange(16)[:, None]).all()
+    with pytest.raises(DesignError, match="such as 8 or 16; received 12"):
+        sobol(factors(4), 12)
+
+
+def test_optimal_designs_are_the_known_ones():
+    # First order in a box: the full factorial, D = 100 %; a quadratic in 9 runs of 2 factors: the 3 x 3 grid.
+    assert design_quality(optimal_design(factors(3), 8, "interaction"), "interaction").d_efficiency == (
+        pytest.approx(100.0)
+    )
+    grid = optimal_design(factors(2), 9, "quadratic", levels=3)
+    assert len(grid.coded.drop_duplicates()) == 9
+    # Atkinson, Donev and Tobias (2007), chapter 11: |X'X|^(1/p) / N of exact D-optimal designs, k = 2.
+    for runs, efficiency in ((6, 0.8915), (9, 0.9740)):
+        design = optimal_design(factors(2), runs, "quadratic", levels=41, starts=10)
+        d = design_quality(design).d_efficiency / 100.0
+        # Relative to the continuous optimum, |M| = 1.14e-2 of six coefficients.
+        assert d / 1.14e-2 ** (1.0 / 6.0) == pytest.approx(efficiency, abs=2e-3), runs
+
+
+def test_i_optimal_predicts_better_and_d_optimal_determines_better():
+    d, i = (design_quality(optimal_design(factors(3), 14, criterion=c, starts=8)) for c in "DI")
+    assert i.prediction_variance < d.prediction_variance
+    assert d.d_efficiency > i.d_efficiency
+
+
+def test_constraints_are_kept():
+    speeds = [Factor(name, 0.0, 10.0) for name in ("v0", "v1", "v2")]
+    rules = ["v0 < v1 < v2", lambda table: table["v2"] < 9.9]
+    design = optimal_design(speeds, 12, constraints=rules, levels=7)
+    natural = design.natural
+    assert ((natural["v0"] < natural["v1"]) & (natural["v1"] < natural["v2"]) & (natural["v2"] < 9.9)).all()
+    with pytest.raises(DesignError, match="no candidate run keeps"):
+        optimal_design(speeds, 12, constraints=["v0 > 11"])
+    with pytest.raises(DesignError, match="cannot be evaluated"):
+        optimal_design(speeds, 12, constraints=["v9 > 11"])
+    with pytest.raises(DesignError, match="cannot tell 10 coefficients"):
+        optimal_design(speeds, 12, constraints=["v0 == v1"])
+
+
+def test_optimal_design_adds_to_what_ran():
+    ran = full_factorial(factors(2))
+    design = optimal_design(factors(2), 5, existing=ran)
+    pd.testing.assert_frame_equal(design.points.iloc[:4], ran.points)
+    assert design.blocks.to_list() == ["existing"] * 4 + ["added"] * 5
+    assert design_quality(design).vif.max() < 3.0
+
+
+def test_categories_enter_where_the_design_allows():
+    variety = Category("variety", ["old", "new", "wild"])
+    design = full_factorial([Factor("t", 20.0, 30.0), variety], levels=3)
+    assert design.natural["variety"].value_counts().to_list() == [3, 3, 3]
+    balanced = optimal_design([Factor("t", 20.0, 30.0), variety], 12, "interaction")
+    assert balanced.natural.value_counts().to_list() == [2] * 6
+    assert Category("kind", ["a", "b"]).to_natural(-1.0) == "a"
+    two = plackett_burman([*factors(3), Category("kind", ["a", "b"])])
+    assert set(two.natural["kind"]) == {"a", "b"}
+    for refused in (central_composite, box_behnken, definitive_screening):
+        with pytest.raises(DesignError, match="'variety' is a category"):
+            refused([*factors(3), variety])
+    with pytest.raises(DesignError, match="category 'variety' has 3"):
+        plackett_burman([variety])
+    with pytest.raises(DesignError, match="has the levels"):
+        variety.to_coded("tame")
+
+
+def test_power_is_that_of_a_balanced_effect():
+    design = full_factorial(factors(3))
+    table = power_table(design, [1.0, 2.0], sd=0.8, replicates=2)
+    assert (table["vif"] == 1.0).all()
+    assert table["df"].iloc[0] == 12
+    assert table["power at 2"].to_numpy() == pytest.approx(effect_power(2.0, 0.8, 16, 12), rel=1e-12)
+    with pytest.raises(DesignError, match="leave no degrees of freedom"):
+        power_table(design, model="three-factor")
+
+
+def test_power_holds_in_simulation():
+    design = add_center(full_factorial(factors(3)), 3)
+    expected = power_table(design, [1.5], sd=1.0, model="interaction").loc["x1", "power at 1.5"]
+    rng = np.random.default_rng(8)
+    found = 0
+    for _ in range(150):
+        response = 0.75 * design.points["x1"].to_numpy() + rng.normal(size=len(design.coded))
+        found += fit_surface(design, response, "interaction").anova.loc["x1", "p"] < 0.05
+    # Three standard errors of a share of 150.
+    assert found / 150 == pytest.approx(expected, abs=3.0 * (expected * (1.0 - expected) / 150) ** 0.5)
+
+
+def test_mixtures():
+    assert len(simplex_lattice(list("abcd"), 3).shares) == 20
+    assert len(simplex_centroid(list("abcd")).shares) == 15
+    design = simplex_lattice(list("abc"), 2, interior=True, lower={"a": 0.1, "b": 0.2})
+    assert design.shares.sum(axis=1).to_numpy() == pytest.approx(1.0)
+    assert design.shares.min().to_list() == pytest.approx([0.1, 0.2, 0.0])
+    with pytest.raises(DesignError, match="add up to 1"):
+        Mixture(pd.DataFrame({"a": [0.5], "b": [0.6]}), {})
+    with pytest.raises(DesignError, match="less than 1"):
+        simplex_centroid(list("ab"), lower={"a": 0.6, "b": 0.5})

@@ -1,0 +1,54 @@
+"""The record of levels and coverage: complete, kept, and the page follows from its tables."""
+
+import pandas as pd
+import pytest
+
+from experiments.benchmarks.statistics.coverage import AT_LEAST, AT_MOST, EXACT, Figure, figures_table
+from experiments.benchmarks.statistics.record import FOLDER, PAGE, THEMES, page
+
+
+@pytest.mark.parametrize("theme", THEMES)
+def test_every_committed_figure_holds(theme: str) -> None:
+    table = pd.read_csv(FOLDER / f"{theme}.csv")
+    assert len(table) > 10
+    figures = [
+        Figure(row.figure, row.case, row.stated, row.promise, row.found, row.trials)
+        for row in table.itertuples()
+    ]
+    assert [figure for figure in figures if not figure.holds] == []
+    assert table["holds"].all()
+
+
+def test_the_committed_page_follows_from_the_committed_tables() -> None:
+    assert (FOLDER / PAGE).read_text(encoding="utf-8") == page()
+
+
+def test_regions_are_recorded_from_two_measurements_and_up_to_six_responses() -> None:
+    cases = pd.read_csv(FOLDER / "surfaces.csv")["case"].str.cat(sep="; ")
+    for part in ("n = 2", "n = 10", "2 responses", "6 responses", "reduced", "plane", "curved", "faint"):
+        assert part in cases
+
+
+@pytest.mark.parametrize(
+    ("promise", "found", "holds"),
+    [
+        (EXACT, 0.955, True),
+        (EXACT, 0.935, False),
+        (EXACT, 0.965, False),
+        (AT_LEAST, 0.999, True),
+        (AT_LEAST, 0.935, False),
+        (AT_MOST, 0.5, True),
+        (AT_MOST, 0.965, False),
+    ],
+)
+def test_a_promise_is_held_on_its_side(promise: str, found: float, holds: bool) -> None:
+    figure = Figure("figure", "case", 0.95, promise, found, 1000)
+    assert figure.holds is holds
+    assert figures_table([figure])["holds"].tolist() == [holds]
+
+
+@pytest.mark.parametrize("arguments", [(1.5, EXACT, 0.5), (0.95, "about", 0.5), (0.95, EXACT, -0.1)])
+def test_a_figure_is_a_share_with_a_promise(arguments: tuple) -> None:
+    stated, promise, found = arguments
+    with pytest.raises(ValueError, match="received"):
+        Figure("figure", "case", stated, promise, found, 10)
