@@ -19,7 +19,7 @@ EVIDENCE = shutil.ignore_patterns(
 )
 
 EXPORTER = """
-from experiments.export.exporter import Exporter
+from experiments.export.contact import Exporter
 
 MAGNETS = Exporter("Magnets", "none", "in all", lambda material: (), lambda contact: ())
 """
@@ -73,7 +73,8 @@ trial = pathlib.Path("experiments/studies/trial/study.toml")
 magnets, corners = {"magnetism": {"magnetic_force": "0.5 mN"}}, {"screening": {"design": "corners"}}
 study = load_study(trial, "bench", {"mechanism": magnets, "campaign": corners})
 paper = load_study(scale="bench")
-jar = paper.with_document(paper.document | {"scene": {"jar": {"diameter": "28 mm", "height": "28 mm"}}})
+written = {key: value for key, value in paper.document.items() if key != "target"}  # no heap, no angle
+jar = paper.with_document(written | {"scene": {"jar": {"diameter": "28 mm", "height": "28 mm"}}})
 app(["new", str(trial), "--measured"], standalone_mode=False)
 [measured] = pathlib.Path(".").rglob("*-measured.csv")
 print(json.dumps({

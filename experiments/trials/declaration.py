@@ -14,7 +14,7 @@ import numpy as np
 from doe.discrepancy import Emulator, MechanismRange, Settings
 from doe.discrepancy.contest.power import Effects, detectable_coded_size
 from doe.discrepancy.contest.signatures import signatures
-from doe.discrepancy.emulation.bank import sobol
+from doe.discrepancy.emulation.bank import sobol_points
 from doe.discrepancy.fitting.evidence import Block
 from doe.discrepancy.fitting.fit import weigh
 from doe.discrepancy.fitting.model import Model, Stack
@@ -94,7 +94,7 @@ def declared_effects(emulator: Emulator, settings: Settings, replicates: int) ->
     """
     space = emulator.space
     drawn, correlations = [], []
-    for theta in 2.0 * sobol(THETAS, len(space.factors), seed=0) - 1.0:
+    for theta in 2.0 * sobol_points(THETAS, len(space.factors), seed=0) - 1.0:
         stack = Stack(Model(emulator, (), settings.systematic), perfect_means(emulator, theta, replicates))
         fitted = weigh(stack, theta)
         effects = Effects.of(fitted, signatures(fitted))

@@ -21,8 +21,8 @@ import numpy as np
 import pandas as pd
 import typer
 
+from doe import Factor
 from doe.discrepancy import Emulator, Settings, analyse, drive, fit_emulator
-from doe.factors import Factor
 from experiments.discover.search import Search
 from experiments.measurement.observables import NAMES, PHOTOGRAPHED
 from experiments.studyfile import load_study

@@ -9,15 +9,7 @@ import pandas as pd
 import pytest
 
 from doe import Factor, Sample
-from experiments.calibrate import (
-    CampaignSettings,
-    ClimbEnd,
-    Outcome,
-    Response,
-    Target,
-    Twin,
-    calibrate,
-)
+from experiments.calibrate import CampaignSettings, ClimbEnd, Outcome, Response, Target, Twin, calibrate
 from experiments.calibrate.results import STAGES
 
 NOISE = 0.3

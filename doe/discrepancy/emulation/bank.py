@@ -21,7 +21,7 @@ from doe.discrepancy.problem.space import MechanismRange, SearchSpace
 from doe.errors import RuleError
 
 
-def sobol(count: int, columns: int, seed: int) -> np.ndarray:
+def sobol_points(count: int, columns: int, seed: int) -> np.ndarray:
     """First points of a scrambled Sobol sequence in the unit cube, (count, columns)."""
     sampler = qmc.Sobol(columns, seed=np.random.default_rng(seed))
     return np.asarray(sampler.random_base2(int(np.ceil(np.log2(max(count, 2)))))[:count])
@@ -44,10 +44,10 @@ def bank_points(space: SearchSpace, settings: Settings, seed: int = 0) -> list[P
     """
     factors = len(space.factors)
     rows: list[tuple[np.ndarray, tuple[str, ...]]] = []
-    for row in sobol(settings.bank_points, factors, seed):
+    for row in sobol_points(settings.bank_points, factors, seed):
         rows += [(2.0 * row - 1.0, ())] * settings.bank_repeats
     for number, name in enumerate(space.names, start=1):
-        for row in sobol(settings.bank_mechanism_points, factors + 1, seed + number):
+        for row in sobol_points(settings.bank_mechanism_points, factors + 1, seed + number):
             rows.append((np.append(2.0 * row[:-1] - 1.0, row[-1]), (name,)))
     cases = [(row, names, condition) for row, names in rows for condition in space.conditions]
     seeds = np.random.SeedSequence(seed).generate_state(len(cases)) >> 1

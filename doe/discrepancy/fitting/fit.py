@@ -8,7 +8,7 @@ import numpy as np
 from scipy import stats
 from scipy.linalg import cholesky, solve_triangular
 
-from doe.discrepancy.emulation.bank import sobol
+from doe.discrepancy.emulation.bank import sobol_points
 from doe.discrepancy.fitting.model import Model, Stack
 
 ITERATIONS = 40
@@ -167,7 +167,7 @@ def fit(stack: Stack, starts: np.ndarray | None = None, count: int = 8) -> Fitte
     """
     model = stack.model
     lower, upper = model.lower, model.upper
-    tried = [model.start[None], lower + sobol(count, len(lower), 0) * (upper - lower)]
+    tried = [model.start[None], lower + sobol_points(count, len(lower), 0) * (upper - lower)]
     x = np.concatenate(tried if starts is None else [np.atleast_2d(starts), *tried])
     for iterations in (SCOUTING, ITERATIONS, ITERATIONS):
         whitening = whiten(stack.covariance(x[0]))

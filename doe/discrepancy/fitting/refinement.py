@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import stats
 
-from doe.discrepancy.emulation.bank import sobol
+from doe.discrepancy.emulation.bank import sobol_points
 from doe.discrepancy.emulation.correction import Prior, condition_on, log_likelihood
 from doe.discrepancy.emulation.noise import repeat_deviations
 from doe.discrepancy.fitting.fit import Fitted, whiten
@@ -62,7 +62,7 @@ def point_spread(fitted: Fitted) -> np.ndarray:
 
 def points_around(fitted: Fitted, count: int, seed: int) -> np.ndarray:
     """Normal Sobol points around an optimum as uncertain as the fit, the first at it, (count, parameters)."""
-    normal = stats.norm.ppf(sobol(count, len(fitted.x), seed).clip(0.01, 0.99))
+    normal = stats.norm.ppf(sobol_points(count, len(fitted.x), seed).clip(0.01, 0.99))
     sd = np.sqrt(np.diag(fitted.spread))
     triangle = np.linalg.cholesky(fitted.spread / np.outer(sd, sd) + 1e-9 * np.eye(len(sd)))
     x = fitted.x + (normal @ triangle.T) * point_spread(fitted)
