@@ -15,14 +15,7 @@ from doe import Design, Region, Surface
 from doe.palette import BLUE, GREEN, MUTED, PURPLE, VERMILION
 from doe.plot_data import SurfaceGrid, normal_points, surface_grid
 from experiments.calibrate.results import OptimumResult, SurfaceResult, TargetResult
-from experiments.report.kit.chart import (
-    LANDSCAPE,
-    Chart,
-    add_line,
-    add_points,
-    add_target,
-    new_figure,
-)
+from experiments.report.kit.chart import LANDSCAPE, Chart, add_line, add_points, add_target, new_figure
 from experiments.report.kit.numbers import axis_title, hover, quantity
 from experiments.studyfile.campaign import Response
 
@@ -219,13 +212,7 @@ def _curve_chart(
 
 
 def _add_points_3d(
-    figure: go.Figure,
-    plane: Slice,
-    rows: pd.DataFrame,
-    z: Any,
-    name: str,
-    color: str,
-    symbol: str = "circle",
+    figure: go.Figure, plane: Slice, rows: pd.DataFrame, z: Any, name: str, color: str, symbol: str = "circle"
 ) -> None:
     marker = {"size": 4, "color": color, "symbol": symbol, "line": {"color": "#ffffff", "width": 1}}
     figure.add_scatter3d(x=rows[plane.x], y=rows[plane.y], z=z, mode="markers", name=name, marker=marker)

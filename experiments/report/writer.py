@@ -19,15 +19,7 @@ from experiments.report.material_card import write_material_card
 from experiments.report.pictures import HeapPicture
 from experiments.studyfile import Study
 
-LIBRARIES = (
-    "warp-lang",
-    "numpy",
-    "scipy",
-    "pandas",
-    "statsmodels",
-    "scikit-learn",
-    "opencv-python-headless",
-)
+LIBRARIES = ("warp-lang", "numpy", "scipy", "pandas", "statsmodels", "scikit-learn", "opencv-python-headless")
 """Packages whose version may change a number."""
 
 

@@ -40,9 +40,7 @@ TITLES = {
 
 
 def _chapter(
-    name: str,
-    tables: Mapping[str, Table] | None = None,
-    charts: Mapping[str, Sequence[Chart]] | None = None,
+    name: str, tables: Mapping[str, Table] | None = None, charts: Mapping[str, Sequence[Chart]] | None = None
 ) -> Chapter:
     """Build a chapter that a template of its name fills."""
     return Chapter(name, TITLES[name], tables or {}, charts or {}, template=f"discovery/{name}.html.j2")

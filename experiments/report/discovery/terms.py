@@ -32,10 +32,7 @@ class Terms:
 
     @classmethod
     def of(
-        cls,
-        library: Sequence[Mechanism],
-        observables: Sequence[Observable],
-        factors: Sequence[FactorSection],
+        cls, library: Sequence[Mechanism], observables: Sequence[Observable], factors: Sequence[FactorSection]
     ) -> Terms:
         """Collect the vocabulary by name."""
         return cls(

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from experiments.discover.discovery import Discovery
+from doe.discrepancy import Discovery
 from experiments.report.companion import Companion
 from experiments.report.discovery.terms import Terms
 from experiments.report.kit.html import Chapter
@@ -34,9 +34,7 @@ class Truth:
     """Sizes of the effects that the study lacks."""
 
 
-TRUTHS = {
-    "tilted-bench.csv": Truth({"mu_gg": 0.55, "mu_gw": 0.45, "e_gg": 0.35}, {"plate_tilt": 5.0}),
-}
+TRUTHS = {"tilted-bench.csv": Truth({"mu_gg": 0.55, "mu_gw": 0.45, "e_gg": 0.35}, {"plate_tilt": 5.0})}
 """By the file beside this one that the heaps are in, whose head says the same."""
 
 

@@ -25,11 +25,7 @@ from doe import (
     screen,
 )
 from experiments.studies.buckwheat import paper
-from experiments.studies.buckwheat.replay.runs import (
-    DESIGNS,
-    STAGES,
-    published_runs,
-)
+from experiments.studies.buckwheat.replay.runs import DESIGNS, STAGES, published_runs
 
 RUN = ["stage", "run"]
 """Labels of a run."""
