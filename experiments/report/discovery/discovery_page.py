@@ -101,10 +101,8 @@ def render_discovery(
         "rules": flat(asdict(settings)),
         "document": flat(study.document),
     }
-    chapters = [*shown, *further, last]
-    return render_page(
-        "report on a disagreement", study.name, "discovery/summary.html.j2", chapters, drawn_on
-    )
+    summary, chapters = "discovery/summary.html.j2", [*shown, *further, last]
+    return render_page("report on a disagreement", study.name, summary, chapters, drawn_on)
 
 
 @dataclass(frozen=True)
@@ -119,9 +117,8 @@ class Card:
 def _cards(found: Discovery, terms: Terms) -> list[Card]:
     cards = []
     if found.base:
-        more = (
-            f"{found.base.degrees_of_freedom:.0f} degrees of freedom, limit {trimmed(found.base.q_limit, 3)}"
-        )
+        df, limit = found.base.degrees_of_freedom, trimmed(found.base.q_limit, 3)
+        more = f"{df:.0f} degrees of freedom, limit {limit}"
         cards.append(Card("Q of the calibrated base", trimmed(found.base.q, 3), more))
     if found.gap and found.gap.drop_mechanism and not found.chosen:
         more = f"{terms.title(found.gap.drop_mechanism)}; limit {trimmed(found.gap.drop_limit, 3)}"
@@ -176,9 +173,8 @@ def _candidates(found: Discovery, terms: Terms) -> Chapter | None:
 def _before_after(found: Discovery) -> Chapter | None:
     if not found.before_after:
         return None
-    return _chapter(
-        "before_after", {"gaps": tables.before_after_table(found)}, {"gaps": [charts.gap_chart(found)]}
-    )
+    gaps = {"gaps": tables.before_after_table(found)}
+    return _chapter("before_after", gaps, {"gaps": [charts.gap_chart(found)]})
 
 
 def _compared(found: Discovery, terms: Terms) -> Chapter | None:

@@ -61,13 +61,13 @@ def wall_times_table(facts: Mapping[str, Any], what: str) -> str:
     rows = pd.DataFrame(facts.get(WALL_TIMES, []))
     if rows.empty:
         return ""
-    columns = [
+    shown = [
         Column("stage", "batch"),
         Column("simulated", f"{what} simulated", "label"),
         Column("seconds", "wall time", "count", "s"),
     ]
     total = f"In all {fixed(rows['simulated'].sum(), 0)} {what} in {fixed(rows['seconds'].sum(), 0)} s."
-    return markdown_table(make_table("wall-times", rows, columns, "Wall times.", total))
+    return markdown_table(make_table("wall-times", rows, shown, "Wall times.", total))
 
 
 def _texts(row: Row) -> list[str]:

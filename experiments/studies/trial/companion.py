@@ -13,7 +13,7 @@ from experiments.report.companion import Companion
 from experiments.report.discovery.terms import Terms
 from experiments.report.kit.html import Chapter
 from experiments.report.kit.numbers import MISSING, fixed, interval, trimmed
-from experiments.report.kit.table import Column, Table, make_table
+from experiments.report.kit.table import Table, columns, make_table
 
 NORMAL_90 = 1.645
 """Standard errors to either side that hold a normal value with 90 %."""
@@ -77,13 +77,8 @@ def truth_table(truth: Truth, found: Discovery, terms: Terms) -> Table:
                 "within": _within(truth.factors[name], low, high),
             }
         )
-    columns = [
-        Column("what", "what"),
-        Column("hidden", "hidden"),
-        Column("found", "found, 90 % interval"),
-        Column("within", "interval holds it"),
-    ]
-    return make_table("hidden", pd.DataFrame(rows), columns, "Truth and findings.")
+    shown = ["what", "hidden", *columns(found="found, 90 % interval", within="interval holds it")]
+    return make_table("hidden", pd.DataFrame(rows), shown, "Truth and findings.")
 
 
 def _within(value: float, low: float, high: float) -> str:

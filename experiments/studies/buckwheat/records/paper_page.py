@@ -18,12 +18,12 @@ from experiments.calibrate.results import Campaign
 from experiments.files import replacing, write_text
 from experiments.report.kit.figure import save_figure
 from experiments.report.kit.markdown import facts_list, markdown_page, markdown_table, wall_times_table
-from experiments.report.kit.table import Column, Table, make_table
+from experiments.report.kit.table import Column, Table, columns, make_table
 from experiments.report.material_card import CARD
 from experiments.report.pictures import heap_row
 from experiments.studies.buckwheat.replay.replay import RUN, Replay
 from experiments.studies.buckwheat.replay.replay_tables import ranking_sentence, replay_tables
-from experiments.studies.buckwheat.replay.runs import DESIGNS, STAGES
+from experiments.studies.buckwheat.replay.runs import DESIGNS, TABLES
 from experiments.studies.buckwheat.sensitivity.sensitivities import Sensitivities
 from experiments.studies.buckwheat.sensitivity.sensitivity_tables import sensitivity_tables
 from experiments.studyfile import Study
@@ -142,7 +142,7 @@ def write_record_page(folder: Path) -> Path:
     """Write the page of a record, and its plot, anew from the tables beside it."""
     record = Record.read(folder)
     runs = record.replay.runs[lambda runs: runs["stage"].isin(DESIGNS) & runs["angle"].notna()]
-    groups = [STAGES[stage].partition(",")[0] for stage in runs["stage"]]
+    groups = [TABLES[stage] for stage in runs["stage"]]
     figure = agreement_plot(record.replay.agreement(), groups, "simulated angle [°]", "published angle [°]")
     save_figure(figure, folder / SCATTER, dpi=130)
     write_text(folder / PAGE, record_page(record))
@@ -244,17 +244,14 @@ def _scales(record: Record) -> list[str]:
                 "published": replay.agreement().rmse.value,
             }
         )
-    columns = [
-        Column("scale", "scale"),
+    shown = [
+        "scale",
         Column("runs", "runs", "label"),
-        Column("rmse", "rmse against full scale", "angle", "°"),
-        Column("without", "noise of both out", "angle", "°"),
-        Column("bias", "bias", "angle", "°"),
-        Column("slope", "slope", "ratio"),
-        Column("spearman", "Spearman", "ratio"),
-        Column("published", "rmse against the paper", "angle", "°"),
+        *columns("angle", "°", rmse="rmse against full scale", without="noise of both out", bias="bias"),
+        *columns("ratio", slope="slope", spearman="Spearman"),
+        *columns("angle", "°", published="rmse against the paper"),
     ]
-    table = make_table("scales", pd.DataFrame(rows), columns, "The 31 runs at smaller scales.")
+    table = make_table("scales", pd.DataFrame(rows), shown, "The 31 runs at smaller scales.")
     return ["## What a smaller scale costs", markdown_table(table)]
 
 

@@ -16,6 +16,9 @@ STAGES = {
 }
 """The paper's stages, in order, and where its angles stand."""
 
+TABLES = {stage: place.partition(",")[0] for stage, place in STAGES.items()}
+"""The paper's stages, in order, and the table of each."""
+
 DESIGNS = ("screening", "climb", "composite")
 """Stages whose points differ: the 31 runs that a model is held against."""
 

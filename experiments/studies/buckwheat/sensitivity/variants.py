@@ -39,6 +39,11 @@ class Variant(Section):
     settings: dict[str, float] = Field(default_factory=dict)
     """Factors that have one value in all runs, in natural units."""
 
+    @property
+    def full_title(self) -> str:
+        """Property that is varied and its new value, in words."""
+        return f"{self.group}: {self.title}"
+
     def load_study(self, scale: str | None = None, modulus_scale: float | None = None) -> Study:
         """Load the buckwheat study with this change.
 
