@@ -77,19 +77,9 @@ def _spread(cases: pd.DataFrame, count: int) -> pd.DataFrame:
 
 
 def heap_row(study: Study, heaps: Mapping[str, CaseResult]) -> np.ndarray:
-    """Draw heaps next to each other at one scale, on one plate.
+    """Draw heaps next to each other at one scale, on one plate: (rows, columns, 3), blue-green-red.
 
-    Parameters
-    ----------
-    study
-        The study whose measurement gives the angles.
-    heaps
-        Finished cases by what is written above them (ASCII).
-
-    Returns
-    -------
-    numpy.ndarray
-        Picture (rows, columns, 3), blue-green-red.
+    The study's measurement gives the angles; heaps come by what is written above them (ASCII).
     """
     drawn = [drawn_heap(study, result) for result in heaps.values()]
     coarsest = max(picture.meters_per_pixel for _, picture, _ in drawn)

@@ -60,14 +60,10 @@ def render_discovery(
 
     Parameters
     ----------
-    found
-        What the analysis found.
-    study
-        The study that was analysed.
-    terms
-        What the names mean.
-    settings
-        The rules of the analysis.
+    found, study
+        What the analysis found, and the study that it analysed.
+    terms, settings
+        The meaning of the names, and the rules of the analysis.
     pictures
         Heaps to show side by side.
     files

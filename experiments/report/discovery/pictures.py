@@ -56,14 +56,7 @@ def photograph(path: Path, condition: str, fit: str) -> HeapPicture | None:
 def simulated_heaps(models: Mapping[str, CaseResult], condition: str, study: Study) -> list[HeapPicture]:
     """Draw heaps as a photograph would show them, x to the right, all at one scale.
 
-    Parameters
-    ----------
-    models
-        Results of models by their titles; one that left no heap is left out.
-    condition
-        Name of the condition.
-    study
-        The study under that condition.
+    They come from models by their titles, with the study under the condition; one without a heap is left out.
     """
     heaps = {}
     for title, result in models.items():

@@ -49,15 +49,7 @@ WALL_TIMES = "wall_times"
 
 
 def wall_times_table(facts: Mapping[str, Any], what: str) -> str:
-    """Lay out the wall times among some facts; empty where there are none.
-
-    Parameters
-    ----------
-    facts
-        What made some numbers.
-    what
-        What was simulated, in the plural.
-    """
+    """Lay out the wall times among some facts, of `what` (a plural) was simulated; empty without any."""
     rows = pd.DataFrame(facts.get(WALL_TIMES, []))
     if rows.empty:
         return ""

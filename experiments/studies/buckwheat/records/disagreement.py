@@ -64,15 +64,7 @@ both static frictions free within its square.
 
 
 def disagreement_page(tables: Discovery, physical: Discovery, emulator: Emulator, settings: Settings) -> str:
-    """Write both analyses as Markdown.
-
-    Parameters
-    ----------
-    tables, physical
-        What was found.
-    emulator, settings
-        What the tables were analysed with.
-    """
+    """Write both analyses as Markdown: of the tables, by this emulator and settings, and the physical."""
     names = [power.mechanism for power in tables.power]
     library = f"{len(names)} of them" if names else "none in the record yet"
     head = _INTRODUCTION.format(

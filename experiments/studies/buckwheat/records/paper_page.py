@@ -60,13 +60,7 @@ class Record:
 
     @classmethod
     def read(cls, folder: Path) -> Record:
-        """Read the tables of a record.
-
-        Raises
-        ------
-        FileNotFoundError
-            When the folder holds no record.
-        """
+        """Read the tables of a record; a folder that holds none raises `FileNotFoundError`."""
         campaign = folder / CAMPAIGN
         scales = {path.stem.removeprefix("runs-"): path for path in sorted(folder.glob("runs-*.csv"))}
         return cls(
@@ -84,23 +78,10 @@ class Record:
 def write_record(
     folder: Path, cases: pd.DataFrame, provenance: Mapping[str, Any], campaign: Campaign | None = None
 ) -> Path:
-    """Write the tables of a record, and its page.
+    """Write the tables of a record, and its page; return the page.
 
-    Parameters
-    ----------
-    folder
-        The record's folder; what stands there of a picture, of other scales or of sensitivities is taken in.
-    cases
-        The paper's runs simulated again, a row a case.
-    provenance
-        What made the numbers, by name.
-    campaign
-        A campaign of our own, to be set beside.
-
-    Returns
-    -------
-    Path
-        The page.
+    Its cases are the paper's runs simulated again; the campaign is our own, to be set beside. What stands in
+    the folder of a picture, of other scales or of sensitivities is taken in.
     """
     write_text(folder / RUNS, cases.to_csv(index=False))
     write_text(folder / PROVENANCE, _json(provenance))
@@ -112,16 +93,7 @@ def write_record(
 def draw_heaps(folder: Path, study: Study, replay: Replay, load: Callable[[str], CaseResult]) -> None:
     """Draw the first heaps of three runs next to each other, those that were measured.
 
-    Parameters
-    ----------
-    folder
-        The record's folder.
-    study
-        The study whose measurement gives the angles.
-    replay
-        The paper's runs.
-    load
-        Finds the result of a case by its ``case_key``, as ``Store.load`` does.
+    `load` finds the result of a case by its ``case_key``, as ``Store.load`` does.
     """
     cases = replay.measured
     shown = {}

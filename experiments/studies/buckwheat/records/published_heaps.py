@@ -53,13 +53,9 @@ LEFT_OUT = ("base", "estimator")
 
 
 def published_settings() -> pd.DataFrame:
-    """Distinct settings of Tables 3, 5 and 6.
+    """Every run of Tables 3, 5 and 6 as `published_runs` has it, no factor left empty.
 
-    Returns
-    -------
-    DataFrame
-        A row a run of the paper: stage, run, every factor in its natural unit, published (angle [deg]), and
-        condition, the name of the setting after its first run.
+    The column condition names its setting, after the first run that has it.
     """
     runs = published_runs().fillna({factor.name: factor.center for factor in paper.factors()})
     runs = runs[runs["stage"].isin(DESIGNS)].reset_index(drop=True)
@@ -87,14 +83,9 @@ def physical_heaps() -> Measured:
 
 
 def tables_emulator(base: Replay, found: Sensitivities | None) -> Emulator:
-    """Our runs of the paper's settings as the emulator of EDEM's.
+    """Our runs of the paper's settings, with the study as written (`base`), as the emulator of EDEM's.
 
-    Parameters
-    ----------
-    base
-        The runs with the study as written.
-    found
-        The runs with its variants; None: none were simulated, and the library is empty.
+    The library holds the variants that were simulated; without any it is empty.
     """
     settings = published_settings()
     angles = _by_setting(settings, base).dropna(subset=["mean"])
@@ -120,10 +111,7 @@ def tables_emulator(base: Replay, found: Sensitivities | None) -> Emulator:
 def physical_emulator(base: Replay, found: Sensitivities | None) -> Emulator:
     """Our runs of Table 6 as the emulator of the one physical test: a quadratic of its two static frictions.
 
-    Parameters
-    ----------
-    base, found
-        See `tables_emulator`. A mechanism shifts the angle by as much at all frictions.
+    As of `tables_emulator`; a mechanism shifts the angle by as much at all frictions.
     """
     settings, noise = published_settings(), _noise(base, HELD_OUT, 2)
     table_6 = settings[settings["stage"] == HELD_OUT]

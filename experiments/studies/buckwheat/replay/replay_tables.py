@@ -24,12 +24,7 @@ NO_BREAK = "\u00a0"
 def replay_tables(replay: Replay, campaign: pd.DataFrame | None = None) -> dict[str, Table]:
     """Lay out everything that the paper's runs have to say, by name.
 
-    Parameters
-    ----------
-    replay
-        The cases, and their analysis.
-    campaign
-        Effects of a campaign of our own by factor (effect, p, rank), set beside those at the paper's runs.
+    Effects of a campaign of our own by factor (effect, p, rank) are set beside those at the paper's runs.
     """
     tables = {"agreement": agreement_table(replay)}
     if "screening" in replay.analysed:

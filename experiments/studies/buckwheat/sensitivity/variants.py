@@ -45,14 +45,9 @@ class Variant(Section):
         return f"{self.group}: {self.title}"
 
     def load_study(self, scale: str | None = None, modulus_scale: float | None = None) -> Study:
-        """Load the buckwheat study with this change.
+        """Load the buckwheat study with this change, its shear modulus divided as the variant says.
 
-        Parameters
-        ----------
-        scale
-            A scale of the study.
-        modulus_scale
-            What the shear modulus is divided by, unless the variant says; None: as the scale says.
+        Where it says nothing, `modulus_scale` does; None: the scale of the study.
         """
         softened = {} if modulus_scale is None else {"numerics": {"modulus_scale": modulus_scale}}
         return load_study(scale=scale, changes=merge(softened, self.study))
