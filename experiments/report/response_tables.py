@@ -10,9 +10,9 @@ from markupsafe import Markup
 
 from doe import JointFit
 from experiments.calibrate.joint import direction_text, open_directions
-from experiments.calibrate.results import Campaign
+from experiments.calibrate.results import Campaign, ScreeningResult, SurfaceResult
 from experiments.report.kit.numbers import term, unit_sign
-from experiments.report.kit.table import Column, Table, columns, make_table
+from experiments.report.kit.table import Column, Layout, Table, columns, make_table
 from experiments.studyfile.campaign import TARGET_SCENE, OptimumSettings, Response
 
 
@@ -27,7 +27,7 @@ def goals_table(campaign: Campaign) -> Table:
         table = table.join(tests[["t", "p"]])
         apart = tests.index[~tests["agrees"]]
         marks = ["failed" if name in apart else "" for name in table.index]
-    shown = [
+    shown: Layout = [
         *("response", "scene", "unit"),
         *columns("free", target="target", sd="sd"),
         "n",
@@ -67,15 +67,16 @@ def _goal(campaign: Campaign, response: Response) -> dict[str, Any]:
 
 def response_tables(campaign: Campaign) -> dict[str, Table]:
     """Lay out what several responses buy together; empty where there is one, or none was fitted."""
-    if campaign.optimum is None or campaign.optimum.joint is None:
+    screening, surface = campaign.screening, campaign.surface
+    joint = campaign.optimum.joint if campaign.optimum else None
+    if joint is None or screening is None or surface is None:
         return {}
-    joint = campaign.optimum.joint
     return {
         "responses": goals_table(campaign),
         "shrinkage": _shrinkage_table(campaign, joint),
         "directions": _directions_table(joint, campaign.settings.optimum),
-        "effects": _effects_table(campaign),
-        "surfaces": _surfaces_table(campaign),
+        "effects": _effects_table(screening, campaign.settings.selection.alpha),
+        "surfaces": _surfaces_table(surface),
     }
 
 
@@ -93,7 +94,7 @@ def _shrinkage_table(campaign: Campaign, joint: JointFit) -> Table:
         for column in ("cases", "simulated_time", "work"):
             table.loc[name, column] = 0.0 if scene in paid else costs.loc[scene, column]
         paid.add(scene)
-    shown = [
+    shown: Layout = [
         Column("response", "response added"),
         Column("share", "compatible with all so far", "free", "%"),
         Column("ratio", "over the row above", "free"),
@@ -117,7 +118,7 @@ def _directions_table(joint: JointFit, settings: OptimumSettings) -> Table:
     names = [factor.name for factor in joint.factors]
     table["moves"] = [direction_text(row) for _, row in joint.directions.iterrows()]
     table["open"] = np.where(table.index.isin(left), "open", "pinned down")
-    shown = [
+    shown: Layout = [
         Column("direction", "", "label"),
         "moves",
         *(Column(name, f"{name} coded", "coded") for name in names),
@@ -136,15 +137,12 @@ def _directions_table(joint: JointFit, settings: OptimumSettings) -> Table:
     return make_table("directions", table, shown, caption, note, marks)
 
 
-def _effects_table(campaign: Campaign) -> Table:
+def _effects_table(result: ScreeningResult, alpha: float) -> Table:
     """Lay out what every factor does to every response, in the screening."""
-    if (result := campaign.screening) is None:
-        raise ValueError("a campaign with an optimum has a screening")
-    alpha = campaign.settings.selection.alpha
     screens = {name: found.screen for name, found in result.responses.items()}
     frames = {name: screen.table[["effect", "p"]].add_prefix(f"{name} ") for name, screen in screens.items()}
     table = pd.concat(frames.values(), axis=1).rename_axis("factor")
-    shown: list[str | Column] = ["factor"]
+    shown: Layout = ["factor"]
     for name in screens:
         shown += [Column(f"{name} effect", name, "free"), Column(f"{name} p", "p", "p")]
     marks = ["strong" if row.filter(like=" p").min() < alpha else "" for _, row in table.iterrows()]
@@ -152,10 +150,8 @@ def _effects_table(campaign: Campaign) -> Table:
     return make_table("response-effects", table, shown, "Effects on every response.", note, marks)
 
 
-def _surfaces_table(campaign: Campaign) -> Table:
+def _surfaces_table(result: SurfaceResult) -> Table:
     """Lay out how well a quadratic describes every response."""
-    if (result := campaign.surface) is None:
-        raise ValueError("a campaign with an optimum has a surface")
     fits = {name: (fit.full, fit.reduced) for name, fit in result.responses.items()}
     rows = {
         name: {
@@ -169,7 +165,7 @@ def _surfaces_table(campaign: Campaign) -> Table:
         for name, (full, reduced) in fits.items()
     }
     table = pd.DataFrame.from_dict(rows, orient="index").rename_axis("response")
-    shown = [
+    shown: Layout = [
         "response",
         Column("cases", "cases", "label"),
         Column("terms", "terms kept", write=_terms),

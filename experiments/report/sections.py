@@ -150,7 +150,7 @@ def _surface(context: Context, result: SurfaceResult) -> Chapter:
         "reduced": stage_tables.anova_table(
             "anova-reduced", fit.reduced.anova, "Reduced model.", paper["reduced"]
         ),
-        "quality": stage_tables.quality_table(fit, published.quality if published else None),
+        "quality": stage_tables.quality_table(fit, published),
         "coefficients": stage_tables.coefficients_table(fit.reduced, response),
     }
     outside = stage_tables.outside_table(result)

@@ -20,20 +20,12 @@ from experiments.calibrate.results import (
     failed,
 )
 from experiments.report.kit.numbers import unit_sign
-from experiments.report.kit.table import Column, Table, columns, make_table
-from experiments.report.published import QUALITY, Published
+from experiments.report.kit.table import Column, Layout, Table, columns, make_table
+from experiments.report.published import QUALITY, Published, quality_of
 from experiments.studyfile.campaign import Response
 
 SIGNIFICANT = 0.05
 """Rows of an analysis of variance with p below this are marked."""
-
-QUALITY_NAMES = (
-    "R²",
-    "R² adjusted",
-    "R² predicted",
-    "coefficient of variation [%]",
-    "adequate precision (above 4 is wanted)",
-)
 
 ERROR_PERCENT = Column("error_percent", "relative error", "ratio", "%")
 PAPER_TEST = (Column("paper_F", "paper, F", "ratio"), Column("paper_p", "paper, p", "p"))
@@ -55,13 +47,13 @@ def factors_table(
     if truth is not None:
         frame["truth"] = pd.Series(truth)
     heads = columns("level", low="low (−1)", center="middle (0)", high="high (+1)", truth="hidden truth")
-    shown = ["factor", Column("label", "parameter"), *heads, "unit"]
+    shown: Layout = ["factor", Column("label", "parameter"), *heads, "unit"]
     return make_table("factors", frame, shown, "Factors and their levels.")
 
 
 def cases_table(name: str, cases: pd.DataFrame, responses: Sequence[Response], caption: str) -> Table:
     """Lay out replicated cases of one setting."""
-    shown = {response.observable: response for response in responses}
+    measured = {response.observable: response for response in responses}
     several = len(cases["scene"].unique()) > 1
     facts = (
         Column("grain_count", "grains", "count"),
@@ -69,16 +61,16 @@ def cases_table(name: str, cases: pd.DataFrame, responses: Sequence[Response], c
         Column("solid_fraction", "solid fraction", "share"),
         Column("time_to_rest", "time to rest", "ratio", "s"),
     )
-    layout = [
+    shown: Layout = [
         *(["scene"] if several else []),
         *columns("label", replicate="case", seed="seed"),
-        *(column for column in facts if column.key not in shown),
-        *(response_column(response, key) for key, response in shown.items()),
+        *(column for column in facts if column.key not in measured),
+        *(response_column(response, key) for key, response in measured.items()),
         *columns("angle", "°", angle_se="se of the angle over views"),
         "status",
     ]
     lost = cases.index.isin(failed(cases, responses).index)
-    return make_table(name, cases, layout, caption, marks=["failed" if each else "" for each in lost])
+    return make_table(name, cases, shown, caption, marks=["failed" if each else "" for each in lost])
 
 
 def screening_design_table(result: ScreeningResult, responses: Sequence[Response]) -> Table:
@@ -105,7 +97,7 @@ def effects_table(
         frame = frame.join(published[["F", "p"]].add_prefix("paper_"))
     effect, share = response_column(response, "effect", "effect"), Column("percent", "share", "percent", "%")
     parameter = Column("label", "parameter")
-    shown = ["rank", "factor", parameter, effect, "sum_sq", share, "F", "t", "p", *PAPER_TEST]
+    shown: Layout = ["rank", "factor", parameter, effect, "sum_sq", share, "F", "t", "p", *PAPER_TEST]
     note = f"Marked: p < {alpha:g}. The effect is the change of the mean {response.name} from low to high."
     if published is not None:
         note += " The paper's columns are recomputed from its printed runs."
@@ -117,7 +109,7 @@ def anova_table(name: str, anova: pd.DataFrame, caption: str, published: pd.Data
     """Lay out an analysis of variance, the paper's F and p beside it."""
     if published is not None:
         anova = anova.join(published[["F", "p"]].add_prefix("paper_")).rename_axis("source")
-    shown = ["source", "df", "sum_sq", "mean_sq", "F", "p", *PAPER_TEST]
+    shown: Layout = ["source", "df", "sum_sq", "mean_sq", "F", "p", *PAPER_TEST]
     note, marks = f"Marked: p < {SIGNIFICANT}.", _p_marks(anova["p"], SIGNIFICANT)
     return make_table(name, anova, shown, caption, note, marks)
 
@@ -127,7 +119,7 @@ def selection_table(result: SelectionResult, response: Response) -> Table:
     frame = result.table.rename_axis("factor").copy()
     frame["kept"] = np.where(frame["kept"], "kept", "left at its middle")
     frame["visible"] = np.where(frame["visible"], "yes", "no")
-    shown = [
+    shown: Layout = [
         "factor",
         response_column(response, "effect", "effect"),
         "p",
@@ -140,7 +132,7 @@ def selection_table(result: SelectionResult, response: Response) -> Table:
 
 def climb_table(result: ClimbResult, response: Response) -> Table:
     """Lay out the steps of the climb, the nearest to the target marked."""
-    shown = [
+    shown: Layout = [
         "step",
         *(Column(name, name, "value") for name in result.kept),
         response_column(response, "predicted", "predicted"),
@@ -158,7 +150,7 @@ def climb_table(result: ClimbResult, response: Response) -> Table:
 def paper_climb_table(path: pd.DataFrame) -> Table:
     """Lay out the paper's climb."""
     factors = [Column(name, name, "value") for name in path.columns.drop(["angle", "error_percent"])]
-    shown = ["step", *factors, *columns("angle", "°", angle="angle"), ERROR_PERCENT]
+    shown: Layout = ["step", *factors, *columns("angle", "°", angle="angle"), ERROR_PERCENT]
     return make_table("paper-climb", path, shown, "The paper's climb.")
 
 
@@ -170,7 +162,7 @@ def surface_design_table(result: SurfaceResult, responses: Sequence[Response]) -
     frame, measured = _with_responses(natural, values, responses)
     values_of = [Column(factor.name, factor.name, "value", factor.unit) for factor in design.factors]
     coded = [Column(f"{name}_coded", f"{name} coded", "coded") for name in design.names]
-    shown = ["run", *values_of, *coded, *measured]
+    shown: Layout = ["run", *values_of, *coded, *measured]
     return make_table("surface-design", frame, shown, "Composite design and responses.")
 
 
@@ -178,7 +170,7 @@ def outside_table(result: SurfaceResult) -> Table | None:
     """Lay out the runs that leave the stated ranges; None when none does."""
     if result.outside.empty:
         return None
-    shown = ["run", "factor", *columns("level", value="value", low="low", high="high")]
+    shown: Layout = ["run", "factor", *columns("level", value="value", low="low", high="high")]
     return make_table("outside", result.outside, shown, "Runs outside the factors' stated ranges.")
 
 
@@ -194,23 +186,18 @@ def coefficients_table(surface: Surface, response: Response) -> Table:
         }
     ).rename_axis("term")
     coded = columns("sum", sign, coded="coded", coded_se="se (coded)")
-    shown = ["term", *columns("free", sign, natural="natural units"), *coded, "p"]
+    shown: Layout = ["term", *columns("free", sign, natural="natural units"), *coded, "p"]
     frame = frame.loc[surface.coefficients.index]
     return make_table("coefficients", frame, shown, "Coefficients of the reduced model.")
 
 
-def quality_table(result: FittedResponse, published: pd.DataFrame | None) -> Table:
+def quality_table(result: FittedResponse, published: Published | None) -> Table:
     """Lay out how well both models fit, the paper's beside them."""
-    names = dict(zip(QUALITY, QUALITY_NAMES, strict=True))
-    models = {"full": result.full, "reduced": result.reduced}
-    frame = pd.DataFrame(
-        {key: [getattr(model, name) for name in names] for key, model in models.items()}, index=names
-    )
+    frame = quality_of({"full": result.full, "reduced": result.reduced}).assign(measure=pd.Series(QUALITY))
     if published is not None:
-        frame = frame.join(published.add_prefix("paper_"))
-    frame.insert(0, "measure", list(names.values()))
-    paper = {f"paper_{key}": f"paper, {key}" for key in models}
-    shown = ["measure", *columns("share", full="full", reduced="reduced", **paper)]
+        frame = frame.join(quality_of(published.surfaces).add_prefix("paper_"))
+    paper = {"paper_full": "paper, full", "paper_reduced": "paper, reduced"}
+    shown: Layout = ["measure", *columns("share", full="full", reduced="reduced", **paper)]
     return make_table("quality", frame, shown, "Quality of the fits.")
 
 
@@ -223,7 +210,7 @@ def ranges_table(optimum: OptimumResult) -> Table:
     if optimum.truth is not None:
         frame["truth"] = pd.Series(optimum.truth.values)
     heads = columns("free", chosen="chosen", low="compatible from", high="to", truth="hidden truth")
-    shown = ["factor", *heads, "unit", Column("pinned", "pinned down by the target")]
+    shown: Layout = ["factor", *heads, "unit", Column("pinned", "pinned down by the target")]
     frame, caption = frame.rename_axis("factor"), "Chosen values and compatible ranges."
     note = (
         "The factors trade off against one another: not every combination inside these ranges is compatible."
@@ -244,7 +231,7 @@ def tests_table(
     ]
     level = f"{100.0 * (1.0 - result.leading.alpha):.3g} %"
     kind = "angle" if {unit for _, _, unit in tests} == {"deg"} else "free"
-    shown = [
+    shown: Layout = [
         *("response", "unit"),
         *columns(kind, mean="mean", sd="sd"),
         "n",
@@ -273,7 +260,7 @@ def failed_table(campaign: Campaign) -> Table | None:
     if lost.empty:
         return None
     several = len(campaign.scene_costs) > 1
-    shown = ["stage", *(["scene"] if several else []), "run", "replicate", "seed", "status", "reason"]
+    shown: Layout = ["stage", *(["scene"] if several else []), "run", "replicate", "seed", "status", "reason"]
     caption = f"{len(lost)} of {len(campaign.cases)} cases failed, or lack a response."
     return make_table("failed", lost, shown, caption)
 

@@ -10,7 +10,7 @@ import pandas as pd
 
 from doe.discrepancy import BeforeAfter, Candidate, Discovery, Drift, Fit, Interval, Power
 from experiments.report.discovery.terms import GAP, Terms, condition_name
-from experiments.report.kit.numbers import MISSING, fixed, interval, trimmed
+from experiments.report.kit.numbers import MISSING, estimate, trimmed
 from experiments.report.kit.table import Column, Table, columns, make_table
 
 T = TypeVar("T")
@@ -265,7 +265,7 @@ def _sizes(candidate: Candidate, terms: Terms) -> str:
 def _interval(ends: Interval | None, decimals: int) -> str:
     if ends is None:
         return MISSING
-    return f"{fixed(ends.value, decimals)} {interval((ends.low, ends.high), decimals)}".replace(" ", GAP)
+    return estimate(ends.value, ends.low, ends.high, decimals).replace(" ", GAP)
 
 
 def _estimate(value: float, se: float) -> str:

@@ -49,7 +49,7 @@ WALL_TIMES = "wall_times"
 
 
 def wall_times_table(facts: Mapping[str, Any], what: str) -> str:
-    """Lay out the wall times among some facts, of `what` (a plural) was simulated; empty without any."""
+    """Lay out the wall times among some facts (empty without any); `what` names, in the plural, the cases."""
     rows = pd.DataFrame(facts.get(WALL_TIMES, []))
     if rows.empty:
         return ""

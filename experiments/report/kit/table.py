@@ -30,6 +30,10 @@ class Column:
     """Typesets a text."""
 
 
+Layout = list[Column | str]
+"""Columns of a table in order, those of `KNOWN` and those that need no more than their name by their key."""
+
+
 def columns(kind: str = "text", unit: str = "", /, **heads: str) -> list[Column]:
     """Columns of one kind and unit: by key, the text above each."""
     return [Column(key, head, kind, unit) for key, head in heads.items()]

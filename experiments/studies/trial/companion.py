@@ -12,8 +12,8 @@ from doe.discrepancy import Discovery
 from experiments.report.companion import Companion
 from experiments.report.discovery.terms import Terms
 from experiments.report.kit.html import Chapter
-from experiments.report.kit.numbers import MISSING, fixed, interval, trimmed
-from experiments.report.kit.table import Table, columns, make_table
+from experiments.report.kit.numbers import MISSING, estimate, trimmed
+from experiments.report.kit.table import Layout, Table, columns, make_table
 
 NORMAL_90 = 1.645
 """Standard errors to either side that hold a normal value with 90 %."""
@@ -73,11 +73,11 @@ def truth_table(truth: Truth, found: Discovery, terms: Terms) -> Table:
             {
                 "what": terms.factors[name].label,
                 "hidden": trimmed(truth.factors[name], 3),
-                "found": f"{fixed(value, 3)} {interval((low, high), 3)}",
+                "found": estimate(value, low, high, 3),
                 "within": _within(truth.factors[name], low, high),
             }
         )
-    shown = ["what", "hidden", *columns(found="found, 90 % interval", within="interval holds it")]
+    shown: Layout = ["what", "hidden", *columns(found="found, 90 % interval", within="interval holds it")]
     return make_table("hidden", pd.DataFrame(rows), shown, "Truth and findings.")
 
 

@@ -22,8 +22,8 @@ from doe.discrepancy import Candidate, Discovery, Emulator, Fit, Interval, Setti
 from experiments.calibrate.export import jsonable
 from experiments.files import write_text
 from experiments.report.kit.markdown import markdown_page, markdown_table
-from experiments.report.kit.numbers import fixed, interval
-from experiments.report.kit.table import Column, columns, make_table
+from experiments.report.kit.numbers import estimate, fixed
+from experiments.report.kit.table import Column, Layout, columns, make_table
 from experiments.studies.buckwheat.records.paper_page import Record
 from experiments.studies.buckwheat.records.paper_record import FOLDER
 from experiments.studies.buckwheat.records.published_heaps import (
@@ -84,7 +84,7 @@ def _fits(found: Discovery) -> list[str]:
     fits = {"study as written": found.base, "with the effect": found.chosen}
     shown = {name: fit for name, fit in fits.items() if fit is not None}
     rows = [{"model": name, **_fit_row(fit)} for name, fit in shown.items()]
-    models = [
+    models: Layout = [
         "model",
         Column("shift", "shift of all angles", unit="°"),
         Column("q", "Q", "ratio"),
@@ -145,7 +145,7 @@ def _candidates(candidates: Sequence[Candidate], emulator: Emulator, settings: S
         }
         for candidate in candidates
     ]
-    shown = [
+    shown: Layout = [
         *columns(mechanism="what is added", sizes="size, 90 % interval"),
         *columns("ratio", over_se="size / se", base="Q without it, in the same errors", q="Q with it"),
         *columns(gain="gain of the log score on Table 6", objection="objection"),
@@ -173,7 +173,7 @@ def _power(found: Discovery) -> list[str]:
         }
         for power in found.power
     ]
-    shown = [
+    shown: Layout = [
         *columns(mechanism="effect", detectable="smallest size named with 80 % probability"),
         Column("visible", "of its signature, a shift of all angles cannot imitate", "percent", "%"),
         Column("resolvable", "may be named"),
@@ -182,7 +182,7 @@ def _power(found: Discovery) -> list[str]:
 
 
 def _interval(ends: Interval | None) -> str:
-    return "" if ends is None else f"{fixed(ends.value, 2)} {interval((ends.low, ends.high))}"
+    return "" if ends is None else estimate(ends.value, ends.low, ends.high)
 
 
 def main(

@@ -18,7 +18,7 @@ from experiments.calibrate.results import Campaign
 from experiments.files import replacing, write_text
 from experiments.report.kit.figure import save_figure
 from experiments.report.kit.markdown import facts_list, markdown_page, markdown_table, wall_times_table
-from experiments.report.kit.table import Column, Table, columns, make_table
+from experiments.report.kit.table import Column, Layout, Table, columns, make_table
 from experiments.report.material_card import CARD
 from experiments.report.pictures import heap_row
 from experiments.studies.buckwheat.replay.replay import RUN, Replay
@@ -216,7 +216,7 @@ def _scales(record: Record) -> list[str]:
                 "published": replay.agreement().rmse.value,
             }
         )
-    shown = [
+    shown: Layout = [
         "scale",
         Column("runs", "runs", "label"),
         *columns("angle", "°", rmse="rmse against full scale", without="noise of both out", bias="bias"),

@@ -6,8 +6,8 @@ import pandas as pd
 
 from doe.palette import BLUE, GREEN, MUTED, PURPLE, VERMILION
 from experiments.report.kit.chart import Chart, add_line, add_points, new_figure
-from experiments.report.kit.numbers import fixed, interval, p_value
-from experiments.report.kit.table import Column, Table, columns, make_table
+from experiments.report.kit.numbers import estimate, fixed, p_clause
+from experiments.report.kit.table import Column, Layout, Table, columns, make_table
 from experiments.report.stage_tables import comparison_facts
 from experiments.studies.buckwheat.replay.replay import COURSE, Replay, published_noise
 from experiments.studies.buckwheat.replay.runs import TABLES
@@ -46,11 +46,9 @@ def agreement_table(replay: Replay) -> Table:
     for name in ("rmse", "bias", "slope", "spearman"):
         ends = zip(*(frame[f"{name}{end}"] for end in ("", "_low", "_high")), strict=True)
         # No break inside an interval.
-        frame[name] = [
-            f"{fixed(value, 2)} {interval((low, high)).replace(' ', NO_BREAK)}" for value, low, high in ends
-        ]
+        frame[name] = [estimate(*each).replace(", ", f",{NO_BREAK}") for each in ends]
     low, high = published_noise()
-    shown = [
+    shown: Layout = [
         Column("table", "runs of"),
         Column("runs", "runs", "label"),
         Column("rmse", "rmse", unit="°"),
@@ -77,7 +75,7 @@ def agreement_table(replay: Replay) -> Table:
 def runs_table(replay: Replay) -> Table:
     """Lay out every run beside its published angle."""
     frame = replay.runs.assign(table=replay.runs["stage"].map(TABLES))
-    shown = [
+    shown: Layout = [
         Column("table", "stage"),
         "run",
         *(Column(name, name, "value") for name in "ABCDEFGH"),
@@ -95,7 +93,7 @@ def replay_effects_table(replay: Replay, campaign: pd.DataFrame | None) -> Table
     frame = replay.effects.copy()
     if campaign is not None:
         frame = frame.join(campaign[["effect", "p", "rank"]].add_prefix("campaign_"))
-    shown = [
+    shown: Layout = [
         "factor",
         Column("paper_effect", "published effect", "angle", "°"),
         Column("paper_p", "p", "p"),
@@ -117,7 +115,7 @@ def replay_effects_table(replay: Replay, campaign: pd.DataFrame | None) -> Table
 
 def replay_anova_table(replay: Replay) -> Table:
     """Lay out both analyses of variance of the composite design."""
-    shown = [
+    shown: Layout = [
         "source",
         Column("paper_df", "published, df", "label"),
         Column("paper_sum_sq", "sum of squares", "sum"),
@@ -134,7 +132,7 @@ def replay_anova_table(replay: Replay) -> Table:
 def replay_coefficients_table(replay: Replay) -> Table:
     """Lay out the coded coefficients of both surfaces."""
     ours = {"coefficient": "simulated again", "se": "se"}
-    shown = ["term", *columns("angle", "°", paper_coefficient="published", paper_se="se", **ours)]
+    shown: Layout = ["term", *columns("angle", "°", paper_coefficient="published", paper_se="se", **ours)]
     caption = "Coefficients of the full quadratic, coded."
     return make_table("replay-coefficients", replay.coefficients, shown, caption)
 
@@ -142,7 +140,7 @@ def replay_coefficients_table(replay: Replay) -> Table:
 def replay_verification_table(replay: Replay) -> Table:
     """Lay out the heaps at the published optimum against the measured angle."""
     rows = [{"heaps": name, **comparison_facts(test)} for name, test in replay.verification.items()]
-    shown = [
+    shown: Layout = [
         "heaps",
         *columns("angle", "°", mean="mean", sd="sd"),
         "n",
@@ -156,7 +154,7 @@ def replay_verification_table(replay: Replay) -> Table:
 
 def course_table(replay: Replay) -> Table:
     """Lay out what became of the grains along the climb."""
-    shown = [
+    shown: Layout = [
         "run",
         *columns("value", E="E", F="F"),
         Column("published", "published angle", "angle", "°"),
@@ -174,7 +172,7 @@ def slopes_table(replay: Replay) -> Table:
     """Lay out how the observables change over the composite design."""
     frame = replay.slopes.rename(index={name: title for name, (title, _) in COURSE.items()}).reset_index()
     error = "over its error"
-    shown = ["observable", *columns("ratio", E="a step of E", E_t=error, F="a step of F", F_t=error)]
+    shown: Layout = ["observable", *columns("ratio", E="a step of E", E_t=error, F="a step of F", F_t=error)]
     note = "Planes by least squares through all heaps of Table 6; a step is one coded unit."
     return make_table("replay-slopes", frame, shown, "Slopes over Table 6.", note)
 
@@ -184,17 +182,12 @@ def ranking_sentence(replay: Replay) -> str:
     table = replay.effects
     ours, theirs = (table.sort_values(column).index[:2] for column in ("rank", "paper_rank"))
     values = ", ".join(
-        f"{name} {table['effect'][name]:+.1f}° (p {_against(table['p'][name])})" for name in ours
+        f"{name} {table['effect'][name]:+.1f}° (p {p_clause(table['p'][name])})" for name in ours
     )
     return (
         f"The two strongest factors of the screening are {' and '.join(ours)} here ({values}), "
         f"{' and '.join(theirs)} in the paper."
     )
-
-
-def _against(p: float) -> str:
-    text = p_value(p)
-    return text if text.startswith("<") else f"= {text}"
 
 
 def replay_chart(replay: Replay) -> Chart:

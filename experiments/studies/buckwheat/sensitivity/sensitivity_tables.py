@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from experiments.report.kit.numbers import fixed
-from experiments.report.kit.table import Column, Table, columns, make_table
+from experiments.report.kit.table import Column, Layout, Table, columns, make_table
 from experiments.studies.buckwheat.replay.runs import DESIGNS, TABLES
 from experiments.studies.buckwheat.sensitivity.sensitivities import Sensitivities
 from experiments.studies.buckwheat.sensitivity.variants import variants
@@ -25,7 +25,7 @@ def shifts_table(found: Sensitivities) -> Table:
     frame = found.shifts.copy()
     states = dict.fromkeys(found.replays, "") | dict.fromkeys(found.spoilt, TOO_FEW)
     frame["state"] = [states.get(name, NOT_RUN) for name in frame.index]
-    shown = [
+    shown: Layout = [
         *columns(group="what", title="variant"),
         *columns("angle", "°", shift="shift of the mean", se="se by seeds", bias="bias"),
         Column("spearman", "Spearman", "ratio"),
@@ -46,7 +46,7 @@ def effect_shifts_table(found: Sensitivities) -> Table:
     frame = found.effects.drop(index="base")
     frame.insert(0, "title", [variants()[name].full_title for name in frame.index])
     effects = columns("angle", "°", **{name: name for name in "ABCDEFGH"}, se="se by seeds")
-    shown = [Column("title", "variant"), *effects]
+    shown: Layout = [Column("title", "variant"), *effects]
     return make_table("sensitivity-effects", frame, shown, "Shift of the screening's effects.")
 
 
@@ -56,7 +56,7 @@ def left_out_table(found: Sensitivities) -> Table:
     frame.insert(0, "left_out", [TABLES[stage] for stage in frame.index])
     frame["chosen"] = [variants()[name].full_title for name in frame["chosen"]]
     left_out = {"base_left_out": "on the one left out: base", "chosen_left_out": "chosen"}
-    shown = [
+    shown: Layout = [
         *columns(left_out="left out", chosen="chosen by the other two"),
         *columns("angle", "°", base_rest="there: base", chosen_rest="chosen", **left_out),
     ]
