@@ -85,10 +85,10 @@ def climb_chart(climb: ClimbResult, target: TargetResult, response: Response) ->
     cases = measured(climb.cases, response)
     add_points(figure, cases["run"], cases[response.observable], "case", BLUE, size=7, opacity=0.6)
     kept = "<br>".join(f"{name} = %{{customdata[{i}]:.4g}}" for i, name in enumerate(climb.kept))
-    line = {"mode": "lines+markers", "line": {"color": BLUE, "width": 2}}
-    shown = f"step %{{x}}: {hover('y', response)}<br>{kept}<extra></extra>"
-    pointed = {"customdata": path[list(climb.kept)], "hovertemplate": shown}
-    add_points(figure, path.index, path["mean"], "mean of the step", BLUE, **line, **pointed)
+    line: dict[str, Any] = {"mode": "lines+markers", "line": {"color": BLUE, "width": 2}}
+    line["hovertemplate"] = f"step %{{x}}: {hover('y', response)}<br>{kept}<extra></extra>"
+    line["customdata"] = path[list(climb.kept)]
+    add_points(figure, path.index, path["mean"], "mean of the step", BLUE, **line)
     if climb.crossing_step is not None:
         crossing = [climb.crossing_step], [target.leading.mean]
         add_points(figure, *crossing, "crosses the target", VERMILION, "diamond", 13)

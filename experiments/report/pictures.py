@@ -96,9 +96,8 @@ def heap_row(study: Study, heaps: Mapping[str, CaseResult]) -> np.ndarray:
     for (image, ground), title in zip(panels, heaps, strict=True):
         top, bottom = above - ground, below - (len(image) - ground)
         panel = cv2.copyMakeBorder(image, top, bottom, 0, 0, cv2.BORDER_REPLICATE)
-        cv2.putText(
-            panel, title, (12, ROW_HEAD - 12), cv2.FONT_HERSHEY_DUPLEX, 0.6, (40, 32, 28), 1, cv2.LINE_AA
-        )
+        place, font = (12, ROW_HEAD - 12), cv2.FONT_HERSHEY_DUPLEX
+        cv2.putText(panel, title, place, font, 0.6, (40, 32, 28), 1, cv2.LINE_AA)
         row.append(panel)
     return np.hstack(row)
 

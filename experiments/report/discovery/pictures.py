@@ -47,9 +47,8 @@ def photograph(path: Path, condition: str, fit: str) -> HeapPicture | None:
         angle = measure_photograph(path, fit)
     except PictureError:
         return None
-    caption = (
-        f"“{condition}”, {path.name}: {angle.mean:.1f}°; left {angle.left:.1f}°, right {angle.right:.1f}°."
-    )
+    sides = f"left {angle.left:.1f}°, right {angle.right:.1f}°"
+    caption = f"“{condition}”, {path.name}: {angle.mean:.1f}°; {sides}."
     return HeapPicture("Measured", caption, _shown(read_picture(path), angle, _Window.around(*_size(angle))))
 
 
@@ -65,10 +64,8 @@ def simulated_heaps(models: Mapping[str, CaseResult], condition: str, study: Stu
                 heaps[title] = drawn_heap(_in_large(study), result, view=0)
         except PictureError:
             continue
-    sizes = [
-        picture.meters_per_pixel * np.array(_size(angle.views[view]))
-        for (angle, view), picture, _ in heaps.values()
-    ]
+    drawn = heaps.values()
+    sizes = [seen.meters_per_pixel * np.array(_size(angle.views[view])) for (angle, view), seen, _ in drawn]
     pictures = []
     for title, ((angle, view), picture, _) in heaps.items():
         seen = angle.views[view]

@@ -148,16 +148,10 @@ def misprints() -> list[Misprint]:
     """List what the paper's own numbers contradict: printed numbers first, then formulas and statements."""
     table = comparison()
     wrong = table[~table["agrees"]]
-    numbers = [
-        Misprint(
-            row.place,
-            row.item,
-            row.printed,
-            f"{row.recomputed:.{_decimals(row.printed)}f}",
-            _REASONS.get((row.place, row.item), "does not follow from the printed runs"),
-        )
-        for row in wrong.itertuples()
-    ]
+    numbers = []
+    for place, item, text, recomputed, *_ in wrong.itertuples(index=False):
+        reason = _REASONS.get((place, item), "does not follow from the printed runs")
+        numbers.append(Misprint(place, item, text, f"{recomputed:.{_decimals(text)}f}", reason))
     return [*numbers, _modulus_name(), _climb_step(), *_points_outside(), *_FORMULAS]
 
 
@@ -234,13 +228,9 @@ def _points_outside() -> Iterator[Misprint]:
             # Coded values of a range's ends come back with rounding.
             for run, value in table[factor.name].items():
                 if not factor.low - 1e-9 <= value <= factor.high + 1e-9:
-                    yield Misprint(
-                        place,
-                        f"{run}, {factor.name}",
-                        f"{value:g}",
-                        f"{factor.low:g} to {factor.high:g}",
-                        "outside the range that Tables 1 and 2 give",
-                    )
+                    stated = f"{factor.low:g} to {factor.high:g}"
+                    reason = "outside the range that Tables 1 and 2 give"
+                    yield Misprint(place, f"{run}, {factor.name}", f"{value:g}", stated, reason)
 
 
 def _recomputed_tables() -> Iterator[tuple[str, str, pd.DataFrame]]:

@@ -68,15 +68,9 @@ def truth_table(truth: Truth, found: Discovery, terms: Terms) -> Table:
         )
     thetas = zip(found.factors, fit.theta, fit.theta_se, strict=True) if fit else ()
     for name, value, error in thetas:
-        low, high = value - NORMAL_90 * error, value + NORMAL_90 * error
-        rows.append(
-            {
-                "what": terms.factors[name].label,
-                "hidden": trimmed(truth.factors[name], 3),
-                "found": estimate(value, low, high, 3),
-                "within": _within(truth.factors[name], low, high),
-            }
-        )
+        hidden, low, high = truth.factors[name], value - NORMAL_90 * error, value + NORMAL_90 * error
+        row = {"what": terms.factors[name].label, "hidden": trimmed(hidden, 3)}
+        rows.append(row | {"found": estimate(value, low, high, 3), "within": _within(hidden, low, high)})
     shown: Layout = ["what", "hidden", *columns(found="found, 90 % interval", within="interval holds it")]
     return make_table("hidden", pd.DataFrame(rows), shown, "Truth and findings.")
 

@@ -82,8 +82,7 @@ def _verdict(found: Discovery) -> str:
 def _fits(found: Discovery) -> list[str]:
     """The calibrated base, the chosen model beside it, and where they stand against every setting."""
     fits = {"study as written": found.base, "with the effect": found.chosen}
-    shown = {name: fit for name, fit in fits.items() if fit is not None}
-    rows = [{"model": name, **_fit_row(fit)} for name, fit in shown.items()]
+    rows = [{"model": name, **_fit_row(fit)} for name, fit in fits.items() if fit is not None]
     models: Layout = [
         "model",
         Column("shift", "shift of all angles", unit="°"),
@@ -136,9 +135,7 @@ def _candidates(candidates: Sequence[Candidate], emulator: Emulator, settings: S
             "mechanism": " with ".join(variants()[name].full_title for name in candidate.mechanisms),
             "sizes": ", ".join(_interval(size) for size in candidate.sizes),
             "over_se": min(candidate.size_over_se),
-            "base": base_q(
-                emulator, candidate.mechanisms, [size.value for size in candidate.sizes], settings
-            ),
+            "base": base_q(emulator, candidate.mechanisms, [one.value for one in candidate.sizes], settings),
             "q": candidate.q,
             "gain": _interval(candidate.held_out_gain),
             "objection": candidate.objection or "none",

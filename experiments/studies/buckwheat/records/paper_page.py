@@ -36,6 +36,7 @@ SENSITIVITIES = "sensitivities"
 
 SHOWN = {"Screening 3": ("screening", 3), "Screening 12": ("screening", 12), "Optimum": ("verification", 1)}
 """Runs in the picture of heaps."""
+HEAPS_TITLE = "Screening run 3, screening run 12 and the published optimum, at one scale"
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +152,7 @@ def record_page(record: Record) -> str:
         markdown_table(tables["agreement"]),
         f"![Simulated against published angles]({SCATTER})",
         record.notes,
-        *_picture(record),
+        *(["## Heaps", f"![{HEAPS_TITLE}]({HEAPS})"] if record.picture else []),
         *_section("Screening", tables, "effects"),
         *([ranking_sentence(record.replay)] if "effects" in tables else []),
         *_section("Response surface", tables, "anova", "coefficients"),
@@ -169,15 +170,6 @@ def record_page(record: Record) -> str:
 def _section(title: str, tables: Mapping[str, Table], *names: str) -> list[str]:
     found = [markdown_table(tables[name]) for name in names if name in tables]
     return [f"## {title}", *found] if found else []
-
-
-def _picture(record: Record) -> list[str]:
-    if not record.picture:
-        return []
-    return [
-        "## Heaps",
-        f"![Screening run 3, screening run 12 and the published optimum, at one scale]({HEAPS})",
-    ]
 
 
 def _campaign(record: Record) -> list[str]:
@@ -204,22 +196,14 @@ def _scales(record: Record) -> list[str]:
     rows = []
     for name, replay in record.scales.items():
         cost = scale_cost(replay, record.replay)
-        rows.append(
-            {
-                "scale": name,
-                "runs": cost.runs,
-                "rmse": cost.rmse.value,
-                "without": cost.rmse_without_noise.value,
-                "bias": cost.bias.value,
-                "slope": cost.slope.value,
-                "spearman": cost.spearman.value,
-                "published": replay.agreement().rmse.value,
-            }
-        )
+        estimates = ("rmse", "rmse_without_noise", "bias", "slope", "spearman")
+        row = {"scale": name, "runs": cost.runs, "published": replay.agreement().rmse.value}
+        rows.append(row | {estimate: getattr(cost, estimate).value for estimate in estimates})
     shown: Layout = [
         "scale",
         Column("runs", "runs", "label"),
-        *columns("angle", "°", rmse="rmse against full scale", without="noise of both out", bias="bias"),
+        *columns("angle", "°", rmse="rmse against full scale", rmse_without_noise="noise of both out"),
+        *columns("angle", "°", bias="bias"),
         *columns("ratio", slope="slope", spearman="Spearman"),
         *columns("angle", "°", published="rmse against the paper"),
     ]

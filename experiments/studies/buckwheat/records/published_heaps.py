@@ -97,14 +97,9 @@ def tables_emulator(base: Replay, found: Sensitivities | None) -> Emulator:
         # A mean, a shift as it is read, and no curvature.
         fitted, spread = np.array([heap["mean"], READING]), np.diag([1.0 / heap["count"], 0.0])
         surfaces[str(condition)] = _surfaces(fitted, spread, noise, additions)
-    space = SearchSpace(
-        ("reading",),
-        (-READING,),
-        (READING,),
-        tuple(surfaces),
-        tuple(condition.startswith(HELD_OUT) for condition in surfaces),
-        _ranges(library),
-    )
+    held_out = tuple(condition.startswith(HELD_OUT) for condition in surfaces)
+    box = ("reading",), (-READING,), (READING,)
+    space = SearchSpace(*box, tuple(surfaces), held_out, _ranges(library))
     return Emulator(space, (OBSERVABLE,), surfaces, (0,), _heap_count(base, found, library))
 
 
@@ -122,14 +117,8 @@ def physical_emulator(base: Replay, found: Sensitivities | None) -> Emulator:
     additions = {name: _addition(_averaged(table), noise) for name, table in library.items()}
     surfaces = _surfaces(fit.params[terms].to_numpy(), spread, noise, additions)
     factors = paper.composite_factors()
-    space = SearchSpace(
-        tuple(factor.name for factor in factors),
-        tuple(factor.low for factor in factors),
-        tuple(factor.high for factor in factors),
-        (CENTRE,),
-        (False,),
-        _ranges(library),
-    )
+    names, low, high = (tuple(getattr(one, key) for one in factors) for key in ("name", "low", "high"))
+    space = SearchSpace(names, low, high, (CENTRE,), (False,), _ranges(library))
     return Emulator(space, (OBSERVABLE,), {CENTRE: surfaces}, (0,), _heap_count(base, found, library))
 
 
@@ -197,14 +186,8 @@ def _signatures(settings: pd.DataFrame, found: Sensitivities) -> dict[str, pd.Da
         with_it = _by_setting(settings, replay)
         shift = with_it["mean"] - without["mean"]
         share = 1.0 / with_it["count"] + 1.0 / without["count"]
-        signatures[name] = pd.DataFrame(
-            {
-                "shift": shift.fillna(shift.mean()),
-                "share": share,
-                "lost": shift.isna(),
-                "spread": shift.var(ddof=1),
-            }
-        )
+        known = {"shift": shift.fillna(shift.mean()), "share": share, "lost": shift.isna()}
+        signatures[name] = pd.DataFrame(known | {"spread": shift.var(ddof=1)})
     return signatures
 
 
