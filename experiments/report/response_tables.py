@@ -47,10 +47,8 @@ def _goal(campaign: Campaign, response: Response) -> dict[str, Any]:
     """Facts about a response; what is not known yet is left out."""
     name = response.name
     scene = "own" if response.scene == TARGET_SCENE else response.scene
-    facts: dict[str, Any] = {
-        "scene": f"{scene}, held out" if response.held_out else scene,
-        "unit": unit_sign(response.unit),
-    }
+    scene += ", held out" if response.held_out else ""
+    facts: dict[str, Any] = {"scene": scene, "unit": unit_sign(response.unit)}
     if campaign.target is not None:
         sample = campaign.target.responses[name]
         facts |= {"target": sample.mean, "sd": sample.sd, "n": sample.n, "target_se": sample.se}

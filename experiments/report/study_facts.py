@@ -18,10 +18,8 @@ def study_facts(study: Study) -> dict[str, str]:
     softened = "real" if numerics.modulus_scale == 1.0 else f"divided by {numerics.modulus_scale:g}"
     test = {"Test": _scene_text(study.document["scene"])}
     if tube is not None:
-        test = {
-            "Tube": f"{1e3 * tube.diameter:g} mm wide, {1e3 * tube.height:g} mm high",
-            "Lift": f"{tube.lift_speed:g} m/s",
-        }
+        size = f"{1e3 * tube.diameter:g} mm wide, {1e3 * tube.height:g} mm high"
+        test = {"Tube": size, "Lift": f"{tube.lift_speed:g} m/s"}
     further = study.document.get("response-scene", {})
     return {
         "Scale": study.scale or "the study as written",

@@ -126,13 +126,9 @@ def power_table(found: Discovery, terms: Terms) -> Table:
     entries: Entries[Power] = {
         Column("mechanism", "mechanism"): lambda one: terms.title(one.mechanism),
         Column("what", "what it does"): lambda one: terms.mechanisms[one.mechanism].sentence,
-        Column("detectable", "smallest size named"): lambda one: terms.value(
-            one.mechanism, one.detectable_size
-        ),
+        Column("least", "smallest size named"): lambda one: terms.value(one.mechanism, one.detectable_size),
         Column("maximum", "end of its range"): lambda one: terms.value(one.mechanism, one.maximum),
-        Column("share", "of the range", "percent", "%"): lambda one: (
-            100.0 * one.detectable_size / one.maximum
-        ),
+        Column("share", "of the range", "percent", "%"): lambda one: 100 * one.detectable_size / one.maximum,
         Column("visible", "left after calibration", "percent", "%"): lambda one: 100.0 * one.visible_share,
         Column("resolvable", "resolvable"): lambda one: "yes" if one.resolvable else "no",
     }

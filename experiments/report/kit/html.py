@@ -55,15 +55,8 @@ def render_page(
         What the templates of summary and chapters draw on.
     """
     page = environment().get_template("page.html.j2")
-    return page.render(
-        kind=kind,
-        heading=heading,
-        summary=summary,
-        chapters=chapters,
-        palette=palette,
-        plotly=Markup(get_plotlyjs()),
-        **context,
-    )
+    shared = {"palette": palette, "plotly": Markup(get_plotlyjs())}
+    return page.render(kind=kind, heading=heading, summary=summary, chapters=chapters, **shared, **context)
 
 
 def flat(settings: Mapping[str, Any], prefix: str = "") -> dict[str, str]:

@@ -83,7 +83,7 @@ def runs_table(replay: Replay) -> Table:
         Column("n", "heaps", "label"),
         *columns("angle", "°", difference="difference"),
     ]
-    marks = ["strong" if abs(value) > STRAY else "" for value in replay.runs["difference"]]
+    marks = ["strong" if abs(value) > STRAY else "" for value in frame["difference"]]
     note = f"Empty factors are at their middle. Marked: more than {STRAY:g}° off."
     return make_table("replay-runs", frame, shown, "Every run.", note, marks)
 
