@@ -102,7 +102,7 @@ def effects_table(
     if published is not None:
         note += " The paper's columns are recomputed from its printed runs."
     caption = f"Effects of the factors on the {response.name}."
-    return make_table("effects", frame, shown, caption, note, _p_marks(frame["p"], alpha))
+    return make_table("effects", frame, shown, caption, note, p_marks(frame["p"], alpha))
 
 
 def anova_table(name: str, anova: pd.DataFrame, caption: str, published: pd.DataFrame | None = None) -> Table:
@@ -110,7 +110,7 @@ def anova_table(name: str, anova: pd.DataFrame, caption: str, published: pd.Data
     if published is not None:
         anova = anova.join(published[["F", "p"]].add_prefix("paper_")).rename_axis("source")
     shown: Layout = ["source", "df", "sum_sq", "mean_sq", "F", "p", *PAPER_TEST]
-    note, marks = f"Marked: p < {SIGNIFICANT}.", _p_marks(anova["p"], SIGNIFICANT)
+    note, marks = f"Marked: p < {SIGNIFICANT}.", p_marks(anova["p"])
     return make_table(name, anova, shown, caption, note, marks)
 
 
@@ -280,5 +280,6 @@ def _with_responses(
     return settings.assign(**added).rename_axis("run"), heads
 
 
-def _p_marks(p: pd.Series, alpha: float) -> list[str]:
+def p_marks(p: pd.Series, alpha: float = SIGNIFICANT) -> list[str]:
+    """Marks of rows whose p value is below a level."""
     return ["strong" if value < alpha else "" for value in p]

@@ -132,11 +132,12 @@ def _cards(found: Discovery, terms: Terms) -> list[Card]:
 
 def _chapters(found: Discovery, terms: Terms) -> list[Chapter]:
     """Build the chapters that this discovery has something for."""
+    compared = charts.comparison_charts(found, terms)
     built = {
         "gap": _gap(found, terms),
         "candidates": _candidates(found, terms),
         "before_after": _before_after(found),
-        "compared": _compared(found, terms),
+        "compared": _chapter("compared", charts={"compared": compared}) if found.base else None,
         "heaps": _chapter("heaps"),
         "power": _chapter("power", {"power": tables.power_table(found, terms)}) if found.power else None,
         "changes": _chapter("changes"),
@@ -171,9 +172,3 @@ def _before_after(found: Discovery) -> Chapter | None:
         return None
     gaps = {"gaps": tables.before_after_table(found)}
     return _chapter("before_after", gaps, {"gaps": [charts.gap_chart(found)]})
-
-
-def _compared(found: Discovery, terms: Terms) -> Chapter | None:
-    if found.base is None:
-        return None
-    return _chapter("compared", charts={"compared": charts.comparison_charts(found, terms)})

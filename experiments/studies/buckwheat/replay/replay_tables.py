@@ -8,14 +8,12 @@ from doe.palette import BLUE, GREEN, MUTED, PURPLE, VERMILION
 from experiments.report.kit.chart import Chart, add_line, add_points, new_figure
 from experiments.report.kit.numbers import estimate, fixed, p_clause
 from experiments.report.kit.table import Column, Layout, Table, columns, make_table
-from experiments.report.stage_tables import comparison_facts
+from experiments.report.stage_tables import comparison_facts, p_marks
 from experiments.studies.buckwheat.replay.replay import COURSE, Replay, published_noise
 from experiments.studies.buckwheat.replay.runs import TABLES
 
 STRAY = 5.0
 """A run is marked when its angle strays from the published one by more than this [deg]."""
-
-SIGNIFICANT = 0.05
 
 NO_BREAK = "\u00a0"
 """A space at which no line ends."""
@@ -109,8 +107,7 @@ def replay_effects_table(replay: Replay, campaign: pd.DataFrame | None) -> Table
         "the printed runs; they and ours at the same runs are tested against the idle columns, as the paper "
         "does."
     )
-    marks = ["strong" if p < SIGNIFICANT else "" for p in frame["p"]]
-    return make_table("replay-effects", frame, shown, "Effects of the screening.", note, marks)
+    return make_table("replay-effects", frame, shown, "Effects of the screening.", note, p_marks(frame["p"]))
 
 
 def replay_anova_table(replay: Replay) -> Table:
