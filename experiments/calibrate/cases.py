@@ -89,13 +89,7 @@ def measured(cases: pd.DataFrame, response: Response) -> pd.DataFrame:
 
 
 def values_of(cases: pd.DataFrame, stage: str, response: Response, least: int = 2) -> np.ndarray:
-    """Return a response of replicated cases.
-
-    Raises
-    ------
-    StageEnd
-        When fewer than ``least`` cases gave it.
-    """
+    """Return a response of replicated cases; StageEnd where fewer than ``least`` gave it."""
     values = measured(cases, response)[response.observable].to_numpy(dtype=np.float64)
     if len(values) < least:
         raise too_many_failed(cases, stage, f"needs at least {least} measured cases", response)

@@ -78,10 +78,7 @@ def climb(
 ) -> ClimbResult:
     """Walk along the leading response's steepest path, every step at once, and on if the target is ahead.
 
-    Raises
-    ------
-    StageEnd
-        When the path has no room, or fewer than two steps gave a value.
+    StageEnd where the path has no room, or fewer than two steps gave a value.
     """
     settings, response = study.campaign.climb, study.target.leading
     line, rule = _line(study, screening.leading.screen, kept)
@@ -109,13 +106,7 @@ def climb(
 
 
 def require_crossing(study: Study, result: ClimbResult, target: TargetResult) -> None:
-    """Go on when the climb crossed the target, or when the study fixes the centre of the surface.
-
-    Raises
-    ------
-    StageEnd
-        When it turned, was flat, or ended before the target.
-    """
+    """Go on when the climb crossed the target or the study fixes the centre of the surface; else StageEnd."""
     center = fixed_values(study.campaign.surface.center, result.kept)
     if result.end is ClimbEnd.CROSSED or center is not None:
         return
@@ -183,13 +174,7 @@ def _further_points(line: _Line, path: pd.DataFrame, settings: ClimbSettings) ->
 
 
 def _path_table(points: pd.DataFrame, cases: pd.DataFrame, response: Response, target: float) -> pd.DataFrame:
-    """Return the points with what was measured at each.
-
-    Raises
-    ------
-    StageEnd
-        When fewer than two steps gave a value.
-    """
+    """Return the points with what was measured at each; StageEnd where fewer than two gave a value."""
     found = measured(cases, response).groupby("run")[response.observable]
     used = found.agg(["mean", "std", "size"]).reindex(points.index)
     if used["mean"].count() < LEAST_STEPS:

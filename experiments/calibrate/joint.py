@@ -7,8 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 import pandas as pd
 
-from doe import Goal, JointFit, joint_fit
-from experiments.calibrate.results import Decision, SurfaceResult, TargetResult
+from doe import JointFit
+from experiments.calibrate.results import Decision
 from experiments.calibrate.values import fixed_values, p_text
 from experiments.studyfile.campaign import OptimumSettings
 
@@ -19,12 +19,6 @@ SMALL_COMPONENT = 0.2
 
 NO_HELP = 0.95
 """A response that leaves more than this share of the region buys nothing worth the name."""
-
-
-def fit_jointly(surface: SurfaceResult, target: TargetResult, settings: OptimumSettings) -> JointFit:
-    """Fit all responses together, by their reduced surfaces."""
-    goals = {name: Goal(fit.reduced, target.responses[name]) for name, fit in surface.responses.items()}
-    return joint_fit(goals, alpha=1.0 - settings.confidence)
 
 
 def choose_jointly(joint: JointFit, settings: OptimumSettings) -> tuple[dict[str, float], str]:

@@ -20,13 +20,7 @@ def plan_noise_floor(study: Study) -> pd.DataFrame:
 
 
 def analyse_noise_floor(study: Study, cases: pd.DataFrame) -> NoiseFloorResult:
-    """Measure mean and standard deviation of the replicates.
-
-    Raises
-    ------
-    StageEnd
-        When fewer than two of them gave a response.
-    """
+    """Measure mean and standard deviation of the replicates; StageEnd with fewer than two values."""
     responses, confidence = study.target.fitted, study.campaign.noise_floor.confidence
     floors = {r.name: noise_floor(values_of(cases, STAGE, r), confidence) for r in responses}
     numbers: dict[str, float] = {"confidence": confidence}

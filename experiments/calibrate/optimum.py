@@ -8,9 +8,9 @@ from collections.abc import Mapping
 import numpy as np
 import pandas as pd
 
-from doe import JointFit, Region, Sample, Surface, TargetError, compare_means
+from doe import Goal, JointFit, Region, Sample, Surface, TargetError, compare_means, joint_fit
 from experiments.calibrate.cases import StageEnd, middle
-from experiments.calibrate.joint import choose_jointly, fit_jointly, joint_decisions
+from experiments.calibrate.joint import choose_jointly, joint_decisions
 from experiments.calibrate.results import (
     Decision,
     OptimumResult,
@@ -36,15 +36,13 @@ STAGE = "optimum"
 def find_optimum(study: Study, surface: SurfaceResult, target: TargetResult) -> OptimumResult:
     """Choose a point on the target contour and map the compatible region.
 
-    Raises
-    ------
-    StageEnd
-        When the fitted surface of a single response does not reach the target where the design explored it.
+    StageEnd where the surface of a single response does not reach the target in what the design explored.
     """
     settings, fit, sample = study.campaign.optimum, surface.leading.reduced, target.leading
     reach = float(surface.design.coded.abs().to_numpy().max())
     response = study.target.leading
-    joint = fit_jointly(surface, target, settings) if len(surface.responses) > 1 else None
+    goals = {name: Goal(found.reduced, target.responses[name]) for name, found in surface.responses.items()}
+    joint = joint_fit(goals, alpha=1.0 - settings.confidence) if len(goals) > 1 else None
     if joint is None:
         # The box of the two-level part first: inside it the fit is at its best. Axial points reach further.
         point, rule, extent = _choose(settings, surface, sample.mean, sorted({1.0, reach}))

@@ -51,10 +51,7 @@ def analyse_screening(
 ) -> ScreeningResult:
     """Estimate and test the effects on every response from the cases that gave it, in a design of a name.
 
-    Raises
-    ------
-    StageEnd
-        When too few runs are left to tell the factors apart.
+    StageEnd where too few runs are left to tell the factors apart.
     """
     runs = design.coded.index.tolist()
     found = {r.name: Screened(response_table(cases, r, runs), _screen(design, cases, r)) for r in responses}

@@ -51,13 +51,7 @@ def select_factors(
 
 
 def require_kept(settings: SelectionSettings, selection: SelectionResult, response: Response) -> None:
-    """Go on when a factor was kept.
-
-    Raises
-    ------
-    StageEnd
-        When none was.
-    """
+    """Go on when a factor was kept; else StageEnd."""
     if selection.kept:
         return
     strongest = selection.table.iloc[0]

@@ -37,13 +37,7 @@ ROUNDING = 1e-12
 
 
 def explore_surface(study: Study, climb: ClimbResult, runner: Runner) -> SurfaceResult:
-    """Simulate the composite design and fit the surfaces of every response.
-
-    Raises
-    ------
-    StageEnd
-        When too few runs are left for a quadratic surface.
-    """
+    """Simulate the composite design and fit every response's surfaces; StageEnd with too few runs left."""
     settings, responses = study.campaign.surface, study.target.fitted
     kept = kept_factors(study, climb.kept)
     center, half_range, decisions = _place(study, climb)
@@ -66,13 +60,7 @@ def explore_surface(study: Study, climb: ClimbResult, runner: Runner) -> Surface
 
 
 def require_slope(result: SurfaceResult) -> None:
-    """Go on when the reduced surface has a term left.
-
-    Raises
-    ------
-    StageEnd
-        When nothing moves the leading response there beyond the noise.
-    """
+    """Go on when the leading response's reduced surface has a term left; else StageEnd."""
     if not result.leading.reduced.terms:
         name = next(iter(result.responses))
         raise StageEnd(

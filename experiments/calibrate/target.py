@@ -24,13 +24,7 @@ def plan_target(study: Study) -> pd.DataFrame:
 
 
 def settle_target(study: Study, cases: pd.DataFrame | None = None) -> TargetResult:
-    """Take what was measured as it is, or in a twin study what its simulated cases give.
-
-    Raises
-    ------
-    StageEnd
-        When fewer than two cases of a twin study gave a response.
-    """
+    """Take what was measured, or in a twin study what its cases give; StageEnd with fewer than two values."""
     target = study.target
     samples = {r.name: _sample(r, cases) for r in target.responses}
     numbers: dict[str, float] = {}

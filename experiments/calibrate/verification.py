@@ -17,12 +17,7 @@ STAGE = "verification"
 def verify(study: Study, optimum: OptimumResult, target: TargetResult, runner: Runner) -> VerificationResult:
     """Simulate the chosen point with fresh seeds; test every response for a difference and for equivalence.
 
-    The level of the tests is shared among the responses (Bonferroni).
-
-    Raises
-    ------
-    StageEnd
-        When fewer than two cases gave a response.
+    The level of the tests is shared among the responses (Bonferroni). StageEnd with fewer than two values.
     """
     settings, responses = study.campaign.verification, study.target.responses
     point = pd.DataFrame([optimum.settings], index=[1])

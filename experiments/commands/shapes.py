@@ -26,13 +26,7 @@ class Clump:
     """How well it fits; None for spheres that were given."""
 
     def to_dict(self, density: float | None = None) -> dict[str, Any]:
-        """Describe the clump as JSON-able data, in mm and mg.
-
-        Parameters
-        ----------
-        density
-            Density of the solid [kg/m3], for the mass; None: without mass.
-        """
+        """Describe the clump as JSON-able data, in mm and mg; with a density [kg/m3], its mass too."""
         shape, fit = self.shape, self.fit
         spheres = [
             [1e3 * value for value in (*center, radius)]
@@ -70,9 +64,8 @@ def make_clump(source: str, sphere_count: int | None = None, protrusion: float =
     """
     given = ":" not in source and Path(source).suffix.lower() in SPHERE_FILES
     if given != (sphere_count is None):
-        rule = (
-            "spheres that are given are not fitted" if given else "a solid is filled with a number of spheres"
-        )
+        rule = "a solid is filled with a number of spheres"
+        rule = "spheres that are given are not fitted" if given else rule
         raise InputError(rule, sphere_count or "none", "--spheres")
     try:
         if sphere_count is None:

@@ -45,19 +45,7 @@ study's; left out, it is taken to be that."""
 
 
 def write_measured_template(study: Study, folder: Path | None = None) -> Path:
-    """Write a commented file for the measured heaps of a study.
-
-    Parameters
-    ----------
-    study
-        Whose conditions are to be measured.
-    folder
-        Where it is written; None: the current folder.
-
-    Returns
-    -------
-    Path
-        The file, ``NAME-measured.csv`` for ``NAME.toml``.
+    """Write a commented file for the measured heaps of a study, ``NAME-measured.csv`` for ``NAME.toml``.
 
     Raises
     ------

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from experiments.commands.run import check_runs
 
 from doe import Sample
 from experiments.errors import InputError
 from experiments.measurement.target import with_measurements
+from experiments.runs.campaign import check_runs
 from experiments.studyfile import Study, load_study
 from imaging import measure_photograph, save_picture
 from imaging.synthetic import Camera, DrawnHeap, draw
