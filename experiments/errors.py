@@ -23,15 +23,7 @@ class Problem:
 
 
 class InputError(ValueError):
-    """Bad input, found before anything runs.
-
-    Parameters
-    ----------
-    rule, value, place
-        What must hold, what was received, and where.
-    more
-        Further problems of the same input.
-    """
+    """Bad input, found before anything runs; rule, value and place are those of its first problem."""
 
     def __init__(self, rule: str, value: object, place: str, more: tuple[Problem, ...] = ()) -> None:
         self.rule, self.place = rule, place

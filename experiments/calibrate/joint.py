@@ -65,20 +65,16 @@ def _agreement(joint: JointFit, point: Mapping[str, float]) -> Decision:
     if apart.empty:
         outcome = "All responses agree with their targets at the chosen point."
     else:
-        missed = ", ".join(
-            f"{row.Index} ({row.t:+.1f} errors, {p_text(row.p)})" for row in apart.itertuples()
-        )
-        outcome = f"At the chosen point these differ from their targets: {missed}."
+        missed = [f"{row.Index} ({row.t:+.1f} errors, {p_text(row.p)})" for row in apart.itertuples()]
+        outcome = f"At the chosen point these differ from their targets: {', '.join(missed)}."
         if not joint.region().mask.any():
             outcome += (
                 " No setting that the design explored agrees with all: fix surface.center nearer to where "
                 "they might, widen surface.half_range, or look for a mechanism that the model lacks."
             )
     level = joint.alpha / len(joint.goals)
-    rule = (
-        f"A response agrees when its fit at the chosen point differs from its target with p >= {level:.3g}."
-    )
-    return Decision(STAGE, rule, numbers, outcome)
+    rule = "A response agrees when its fit at the chosen point differs from its target with p >= "
+    return Decision(STAGE, f"{rule}{level:.3g}.", numbers, outcome)
 
 
 def _purchase(joint: JointFit) -> Decision:
@@ -107,9 +103,8 @@ def _purchase(joint: JointFit) -> Decision:
 
 
 def _directions(joint: JointFit, settings: OptimumSettings) -> Decision:
-    numbers = {
-        f"span along {direction_text(row)}": float(row["span"]) for _, row in joint.directions.iterrows()
-    }
+    rows = [row for _, row in joint.directions.iterrows()]
+    numbers = {f"span along {direction_text(row)}": float(row["span"]) for row in rows}
     left = open_directions(joint, settings)
     if not joint.region().mask.any():
         outcome = "Nothing is compatible, so that nothing can be said of what stays open."

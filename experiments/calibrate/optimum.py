@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from contextlib import suppress
 
 import numpy as np
 import pandas as pd
@@ -136,11 +137,9 @@ def _check_truth(
     truth, sample = target.truth or {}, target.leading
     values = {name: truth[name] for name in fit.design.names}
     coded, far = _coded(fit, values), _reach(fit, values)
-    try:
+    distance = None
+    with suppress(TargetError):  # a point fixed in the study needs no contour
         nearest = fit.nearest(sample.mean, to=values, extent=max(reach, far))
-    except TargetError:  # a point fixed in the study needs no contour
-        distance = None
-    else:
         distance = float(np.linalg.norm(_coded(fit, dict(nearest)) - coded))
     predicted = fit.predict(values).iloc[0]
     inside = far <= reach

@@ -68,7 +68,10 @@ class Heap:
             "reason": self.reason,
             "fit": self.study.measurement.fit,
             "angle": {"mean": angle.mean, "se": angle.se} if angle else None,
-            "views": _views(angle) if angle else [],
+            "views": [
+                {"azimuth": math.degrees(azimuth), "left": view.left, "right": view.right}
+                for azimuth, view in (zip(angle.azimuths, angle.views, strict=True) if angle else ())
+            ],
             "observables": self.observed.observables,
             "observable_units": self.units,
             "provenance": self.result.provenance,
@@ -137,10 +140,3 @@ def write_spheres(path: Path, result: CaseResult) -> None:
     points["grain"] = result.sphere_grain
     points["shape"] = result.shapes[result.sphere_grain]
     points.save(path)
-
-
-def _views(angle: HeapAngle) -> list[dict[str, float]]:
-    return [
-        {"azimuth": math.degrees(azimuth), "left": view.left, "right": view.right}
-        for azimuth, view in zip(angle.azimuths, angle.views, strict=True)
-    ]

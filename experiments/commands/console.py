@@ -92,13 +92,9 @@ class CaseProgress:
 
 
 def describe_progress(progress: BatchProgress, first: BatchProgress | None = None) -> str:
-    """Say how long it will take, how many cases are done, and what those that run are doing.
+    """Say how long it will take and what runs, as ``1 min 20 s left, 3 of 12 cases, 2 lift``.
 
     The speed is that since the `first` progress: what an earlier run had done is not this one's speed.
-
-    Examples
-    --------
-    ``1 min 20 s left, 3 of 12 cases, 2 lift``
     """
     parts = [f"{progress.done} of {progress.total} cases"]
     parts += [f"{count} {phase}" for phase, count in progress.phase_counts.items() if phase != "waiting"]

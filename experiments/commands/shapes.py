@@ -45,17 +45,10 @@ class Clump:
 
 
 def make_clump(source: str, sphere_count: int | None = None, protrusion: float = 0.0) -> Clump:
-    """Read a clump, or fit one to a solid.
+    """Read a clump from a file of spheres (``x y z r`` in mm), or fit one to a solid.
 
-    Parameters
-    ----------
-    source
-        A file of spheres (``x y z r`` in mm), a mesh file in mm, or a solid by its dimensions in mm
-        (``tri-pyramid:5.90x3.93``).
-    sphere_count
-        Spheres to fill a solid with.
-    protrusion
-        How far a sphere may pass the solid's surface [m].
+    A solid is a mesh file in mm, or named by its dimensions in mm (``tri-pyramid:5.90x3.93``). A sphere may
+    pass its surface by the ``protrusion`` [m].
 
     Raises
     ------

@@ -99,11 +99,11 @@ class Desk:
 
 def run_campaign(desk: Desk, on_stage: StageHook | None = None, replay: Replay | None = None) -> Campaign:
     """Calibrate a study and write its report, its tables and its material card, a replay set beside."""
-    started = time.perf_counter()
 
     def runner(table: pd.DataFrame) -> pd.DataFrame:
         return desk.run(table, ", ".join(str(stage).replace("_", " ") for stage in table["stage"].unique()))
 
+    started = time.perf_counter()
     campaign = calibrate(desk.study, runner, on_stage)
     provenance = {
         **_source_and_day(),

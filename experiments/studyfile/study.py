@@ -199,16 +199,9 @@ class Study(Physics):
         return natural
 
     def case(self, settings: Mapping[str, float], seed: int, scene: str = TARGET_SCENE) -> Case:
-        """Build one case.
+        """Build one case of a scene or a condition; its seed is that of everything random.
 
-        Parameters
-        ----------
-        settings
-            Values by factor name in natural units; a factor that is not named is at its middle.
-        seed
-            Seed of everything random in the case.
-        scene
-            Name of the scene, or of the condition.
+        Settings are values by factor name in natural units; a factor that is not named is at its middle.
 
         Raises
         ------
