@@ -23,7 +23,7 @@ from experiments.studyfile import Study
 from experiments.studyfile.schema import nearest_name
 
 if TYPE_CHECKING:
-    from experiments.discover.discovery import Discovery
+    from doe.discrepancy import Discovery
     from experiments.report.discovery.terms import Terms
 
 STUDIES = Path(__file__).parents[1] / "studies"

@@ -7,8 +7,8 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from experiments.discover.settings import Settings
 
+from doe.discrepancy import Settings
 from experiments.studyfile import load_study, write_template
 from experiments.studyfile.campaign import CampaignSettings
 from experiments.studyfile.reference import Row, study_reference

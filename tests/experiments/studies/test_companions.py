@@ -8,8 +8,8 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from experiments.discover.discovery import Interval
 
+from doe.discrepancy import Interval
 from experiments.discover.search import Search
 from experiments.errors import StudyError
 from experiments.measurement.observables import OBSERVABLES
