@@ -25,7 +25,7 @@ from experiments.discover.library import library_for
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.search import Search
 from experiments.errors import InputError
-from experiments.runs.choices import chosen_devices
+from experiments.runs.choices import chosen_device
 from experiments.studyfile import Study, load_study
 from experiments.studyfile.toml_files import read_toml
 from experiments.trials.declaration import (
@@ -173,7 +173,7 @@ def measure(
 ) -> None:
     """Simulate and measure the heaps of the trials."""
     with clear_errors("the same command"):
-        place, device = Folder(folder), chosen_devices(device)
+        place, device = Folder(folder), chosen_device(device, several=True)
         declaration = read_declaration(place.declared)
         sealed = [trial for trial in read_sealed(place.sealed) if part in (None, trial.part)]
         labels = list(revealed(read_labels(place.hidden_labels), sealed).values())

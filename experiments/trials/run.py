@@ -26,7 +26,7 @@ from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.search import Search
 from experiments.errors import InputError
 from experiments.report.kit.markdown import markdown_table
-from experiments.runs.choices import chosen_devices
+from experiments.runs.choices import chosen_device
 from experiments.studyfile import load_study
 from experiments.trials.cost import planned_cases
 from experiments.trials.declaration import read_declaration
@@ -140,7 +140,7 @@ def main(
             return
         trials = chosen(read_sealed(place.sealed), part, every)
         try:
-            run_trials(place, trials, bank, views, chosen_devices(device), workers, seconds)
+            run_trials(place, trials, bank, views, chosen_device(device, several=True), workers, seconds)
         except OutOfTime:
             print(f"time is up; {len(open_jobs(place, trials, views))} analyses have not ended: run it again")
             raise typer.Exit(UNFINISHED) from None
