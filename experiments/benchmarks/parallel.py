@@ -30,11 +30,7 @@ def processes_table(columns: Columns, folder: Path, count: int, steps: int) -> t
     speeds = [sum(_together(columns, folder, n, steps)) / 1e6 for n in counts]
     alone = (speeds[0] + speeds[-1]) / 2
     table = pd.DataFrame(
-        {
-            "processes": counts,
-            "million sphere-steps/s": speeds,
-            "of one": [speed / alone for speed in speeds],
-        }
+        {"processes": counts, "million sphere-steps/s": speeds, "of one": [speed / alone for speed in speeds]}
     )
     text = "Processes at once on the CPU, each with a settled column; one before, one after."
     return "processes", text, table

@@ -29,13 +29,7 @@ from experiments.files import write_text
 from experiments.measurement.measured_file import read_measured
 from experiments.measurement.observables import PHOTOGRAPHED
 from experiments.studyfile import Study
-from experiments.trials.findings import (
-    PHOTOGRAPHS,
-    Finding,
-    findings_table,
-    read_findings,
-    write_findings,
-)
+from experiments.trials.findings import PHOTOGRAPHS, Finding, findings_table, read_findings, write_findings
 from experiments.trials.folder import Folder
 from experiments.trials.lockstep import Crash
 from experiments.trials.truth import Sealed

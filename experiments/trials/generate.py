@@ -28,23 +28,11 @@ from experiments.errors import InputError
 from experiments.runs.choices import chosen_devices
 from experiments.studyfile import Study, load_study
 from experiments.studyfile.toml_files import read_toml
-from experiments.trials.declaration import (
-    Declaration,
-    declared_effects,
-    read_declaration,
-    with_names,
-)
+from experiments.trials.declaration import Declaration, declared_effects, read_declaration, with_names
 from experiments.trials.drawing import Declared, Plan, draw
 from experiments.trials.folder import Folder, Run
 from experiments.trials.heaps import cases_of, write_heaps
-from experiments.trials.truth import (
-    Label,
-    read_labels,
-    read_sealed,
-    revealed,
-    write_labels,
-    write_sealed,
-)
+from experiments.trials.truth import Label, read_labels, read_sealed, revealed, write_labels, write_sealed
 
 STUDY = Path(__file__).parents[1] / "studies" / "trial" / "study.toml"
 """The study that the trials are about."""

@@ -26,14 +26,7 @@ from experiments.benchmarks.peers.lammps_files import (
     run_input,
     timed_runs,
 )
-from experiments.benchmarks.peers.peer import (
-    MARGIN,
-    PeerRun,
-    Plan,
-    grain_of_sphere,
-    judged,
-    spheres_in_place,
-)
+from experiments.benchmarks.peers.peer import MARGIN, PeerRun, Plan, grain_of_sphere, judged, spheres_in_place
 from experiments.export import contacts_of
 from experiments.export.lammps import granular_words
 

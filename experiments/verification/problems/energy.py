@@ -18,15 +18,7 @@ from experiments.verification.problems.setups import (
     contact,
     world,
 )
-from experiments.verification.result import (
-    Curve,
-    Plot,
-    Result,
-    Row,
-    absolute_row,
-    detection_row,
-    order_row,
-)
+from experiments.verification.result import Curve, Plot, Result, Row, absolute_row, detection_row, order_row
 
 SOFT = Material(BUCKWHEAT.density, BUCKWHEAT.shear_modulus / 400.0, BUCKWHEAT.poisson_ratio)
 """Grain at bench scale."""

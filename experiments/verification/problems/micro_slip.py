@@ -18,15 +18,7 @@ from experiments.verification.problems.kicks import (
 )
 from experiments.verification.problems.one_spring import LAWS, one_spring_rebound
 from experiments.verification.problems.partial_slip import rebound_slip
-from experiments.verification.result import (
-    Curve,
-    Plot,
-    Result,
-    Row,
-    absolute_row,
-    order_row,
-    relative_row,
-)
+from experiments.verification.result import Curve, Plot, Result, Row, absolute_row, order_row, relative_row
 
 PROBLEM = "Chung and Ooi test 5: micro-slip"
 THEORY = "Maw, Barber and Fawcett (1976)"

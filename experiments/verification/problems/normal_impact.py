@@ -10,15 +10,7 @@ from dem_warp.walls import Plane
 from experiments.verification.problems import chung_ooi
 from experiments.verification.problems.impact import HERTZ_DURATION, Course, Impact, simulate_impacts
 from experiments.verification.problems.setups import BUCKWHEAT, CLUMP, STEEL, bodies, contact, record, world
-from experiments.verification.result import (
-    Curve,
-    Plot,
-    Result,
-    Row,
-    absolute_row,
-    order_row,
-    relative_row,
-)
+from experiments.verification.result import Curve, Plot, Result, Row, absolute_row, order_row, relative_row
 
 PHASES = (0.0, 0.25, 0.5, 0.75)
 """Parts of a step at which the surfaces meet; what is seen of an impact depends on it: the worst counts."""

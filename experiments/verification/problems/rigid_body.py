@@ -9,15 +9,7 @@ from dem_warp import ClumpShape
 from dem_warp.model import WorldSetup
 from dem_warp.solver import CHUNK, Solver
 from experiments.verification.problems.setups import BUCKWHEAT, CLUMP, bodies, contact, world
-from experiments.verification.result import (
-    Curve,
-    Plot,
-    Result,
-    Row,
-    absolute_row,
-    detection_row,
-    order_row,
-)
+from experiments.verification.result import Curve, Plot, Result, Row, absolute_row, detection_row, order_row
 
 BOOT = ClumpShape.from_spheres(
     1e-3 * np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 1.2, 0.0]]), 1e-3 * np.array([1.0, 0.8, 0.6])
