@@ -20,7 +20,7 @@ from experiments.runs.campaign import (
     replay_published,
     run_campaign,
 )
-from experiments.runs.choices import chosen_device, chosen_devices, chosen_study, default_folder
+from experiments.runs.choices import chosen_device, chosen_study, default_folder
 from experiments.runs.search import Job, SearchResult, run_search
 from experiments.studyfile import Study
 
@@ -142,7 +142,7 @@ def discover(
     InputError
         When study, data, bank, device or folder break a rule; nothing is written then.
     """
-    chosen = chosen_study(study, scale, device := chosen_devices(device))
+    chosen = chosen_study(study, scale, device := chosen_device(device, several=True))
     folder = Path(out) if out is not None else default_folder(chosen, "discover")
     data, bank = (Path(file) if file is not None else None for file in (data, bank))
     return run_search(Job(chosen, data, folder, bank, photographs_only, device, workers, seed), resume, watch)

@@ -67,13 +67,15 @@ Devices = Annotated[
     ),
 ]
 Workers = Annotated[int | None, typer.Option(min=1, help="Processes on the CPU. Left out: one a core.")]
+Out = Annotated[Path | None, typer.Option(help="Folder of the results, new or empty.")]
+Resume = Annotated[bool, typer.Option("--resume", help="Go on in the folder of an earlier run.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Write the result to standard output as JSON.")]
 
 
 @app.command(epilog="Example: [bold]dem-warp calibrate mygrain.toml --out out/mygrain[/]")
 def calibrate(
     study: StudyFile = None,
-    out: Annotated[Path | None, typer.Option(help="Folder of the results, new or empty.")] = None,
+    out: Out = None,
     scale: Scale = None,
     device: Device = None,
     workers: Workers = None,
@@ -81,7 +83,7 @@ def calibrate(
         str | None,
         typer.Option(metavar="NAME", help="Engine of an installed package. Left out: dem-warp's own."),
     ] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on in the folder of an earlier run.")] = False,
+    resume: Resume = False,
     follow_paper: Annotated[
         bool, typer.Option("--follow-paper", help="Simulate the paper's own runs too, and set them beside.")
     ] = False,
@@ -139,7 +141,7 @@ def discover(
             metavar="[MEASURED.csv]", help="Measured heaps; left out: only the library waves are run."
         ),
     ] = None,
-    out: Annotated[Path | None, typer.Option(help="Folder of the results, new or empty.")] = None,
+    out: Out = None,
     bank: Annotated[
         Path | None, typer.Option(help="Library waves run earlier for this study; left out: they are run.")
     ] = None,
@@ -150,16 +152,16 @@ def discover(
     scale: Scale = None,
     device: Devices = None,
     workers: Workers = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on in the folder of an earlier run.")] = False,
+    resume: Resume = False,
     as_json: AsJson = False,
 ) -> None:
     """Find the effect that a model lacks: calibrate, test the gap, name what explains it, show it closed."""
     with clear_errors():
         from experiments import api
         from experiments.report.discovery import results_of, verdict_line
-        from experiments.runs.choices import chosen_devices, chosen_study, default_folder
+        from experiments.runs.choices import chosen_device, chosen_study, default_folder
 
-        device = chosen_devices(device)
+        device = chosen_device(device, several=True)
         chosen = chosen_study(study, scale, device)
         folder = out or default_folder(chosen, "discover")
     go_on = _go_on(
@@ -193,14 +195,13 @@ def discover(
 def heap(
     study: StudyFile = None,
     settings: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="NAME=VALUE", help="Value of a factor."),
+        list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="Value of a factor.")
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of sizes, places and orientations.")] = 1,
     scene: Annotated[
         str | None, typer.Option(metavar="NAME", help="A further scene of the study, [response-scene.NAME].")
     ] = None,
-    out: Annotated[Path | None, typer.Option(help="Folder of the results, new or empty.")] = None,
+    out: Out = None,
     scale: Scale = None,
     device: Device = None,
     as_json: AsJson = False,

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Self
 
 
 @dataclass(frozen=True)
@@ -21,35 +23,19 @@ class Problem:
 
 
 class InputError(ValueError):
-    """Bad input, found before anything runs.
-
-    Parameters
-    ----------
-    rule, value, place
-        What must hold, what was received, and where.
-    more
-        Further problems of the same input.
-    """
+    """Bad input, found before anything runs; rule, value and place are those of its first problem."""
 
     def __init__(self, rule: str, value: object, place: str, more: tuple[Problem, ...] = ()) -> None:
-        first = Problem(rule, value if isinstance(value, str) else repr(value), place)
-        self.problems = (first, *more)
+        self.rule, self.place = rule, place
+        self.value = value if isinstance(value, str) else repr(value)
+        self.problems = (Problem(rule, self.value, place), *more)
         super().__init__("\n".join(str(problem) for problem in self.problems))
 
-    @property
-    def rule(self) -> str:
-        """What must hold (the first problem's)."""
-        return self.problems[0].rule
-
-    @property
-    def value(self) -> str:
-        """What was received (the first problem's)."""
-        return self.problems[0].value
-
-    @property
-    def place(self) -> str:
-        """Where (the first problem's)."""
-        return self.problems[0].place
+    @classmethod
+    def of(cls, problems: Iterable[Problem]) -> Self:
+        """Build the error of one problem or more."""
+        first, *more = problems
+        return cls(first.rule, first.value, first.place, tuple(more))
 
     def __reduce__(self) -> tuple[type, tuple]:
         return type(self), (self.rule, self.value, self.place, self.problems[1:])

@@ -15,15 +15,8 @@ from experiments.errors import InputError
 def replacing(path: Path) -> Iterator[Path]:
     """Name a temporary file beside a file, and rename it over the file when the block ends without an error.
 
-    Parameters
-    ----------
-    path
-        The file; its folder is made when it is missing, and an older file is replaced.
-
-    Yields
-    ------
-    Path
-        The temporary name, with the same ending: after a crash the file itself is whole or absent.
+    The temporary name has the same ending. The file's folder is made when it is missing, an older file is
+    replaced, and after a crash the file itself is whole or absent.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")

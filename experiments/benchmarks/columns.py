@@ -7,7 +7,6 @@ again before it counts. A column lives through all its moments in one simulation
 
 import hashlib
 import json
-import os
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -19,6 +18,7 @@ from dem_warp.model import Grains, WorldSetup
 from dem_warp.scenes.lifted_cylinder import TUBE
 from dem_warp.view import WorldView
 from dem_warp.walls import Motion
+from experiments.files import replacing
 
 CLUMP = Path(__file__).parents[1] / "studies" / "buckwheat" / "clump.txt"
 BUCKWHEAT = Material(density=698.0, shear_modulus=34.325e6, poisson_ratio=0.29)
@@ -68,17 +68,9 @@ class Moment:
 
 
 class Columns:
-    """Moments of columns of one scale and several seeds, simulated unless a folder has them.
+    """Moments of columns of one scale of the study and several seeds, simulated unless a folder has them.
 
-    Parameters
-    ----------
-    scale : str
-        Of the study.
-    seeds : int
-        Number of columns that are really simulated.
-    device : str
-    folder : Path
-        Where the moments are kept; part of a file's name is made from all that determines them.
+    Part of a file's name in the folder is made from all that determines the moments.
     """
 
     def __init__(self, scale: str, seeds: int, device: str, folder: Path) -> None:
@@ -87,7 +79,9 @@ class Columns:
         self._setups = self.cases[0].scene.prepare(self.cases, device)
         path = folder / f"columns-{scale}-{seeds}-{self._key()}.npz"
         if not path.exists():
-            _save(path, self._simulate())
+            arrays = self._simulate()
+            with replacing(path) as temporary:
+                np.savez_compressed(temporary, **arrays)  # type: ignore[arg-type]
         with np.load(path) as file:
             self._arrays = dict(file.items())
 
@@ -121,15 +115,12 @@ class Columns:
         """Arrays of every moment of every column, by phase, number of the moment, seed and name."""
         batch = Batch(self.cases, self.device)
         worlds = range(len(self.cases))
-        missing = {
-            (phase, k, w) for phase, moments in MOMENTS.items() for k in range(len(moments)) for w in worlds
-        }
+        missing = {(phase, k, w) for phase in MOMENTS for k in range(len(MOMENTS[phase])) for w in worlds}
         arrays: dict[str, np.ndarray] = {}
         while missing:
             for world, result in batch.advance():
-                raise RuntimeError(
-                    f"column of seed {world} ended before its last moment: {result.reason or 'at rest'}"
-                )
+                reason = result.reason or "at rest"
+                raise RuntimeError(f"column of seed {world} ended before its last moment: {reason}")
             views = batch.solver.view(worlds)
             elapsed = [_elapsed(batch, w, views[w]) for w in worlds]
             for phase, k, w in sorted(missing):
@@ -163,10 +154,3 @@ def _elapsed(batch: Batch, world: int, view: WorldView) -> dict[str, float]:
         "settled": float(lifting),
         "lifting": since * scene.lift_speed / scene.diameter if lifting else 0.0,
     }
-
-
-def _save(path: Path, arrays: dict[str, np.ndarray]) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(f"partial-{os.getpid()}.npz")
-    np.savez_compressed(partial, **arrays)  # type: ignore[arg-type]
-    partial.rename(path)

@@ -37,14 +37,9 @@ class ContactCounts:
 def count_contacts(
     centers: np.ndarray, radii: np.ndarray, grain: np.ndarray, walls: Sequence[Wall]
 ) -> ContactCounts:
-    """Count the touching pairs of spheres in place.
+    """Count the touching pairs of spheres in place [m]; `grain` is the one that each belongs to.
 
-    Parameters
-    ----------
-    centers, radii, grain : (n, 3), (n,) and (n,) arrays
-        Of the spheres [m], and the grain that each belongs to.
-    walls : sequence of Wall
-        Planes, and cylinders of which the rims are left out.
+    Walls are planes, and cylinders of which the rims are left out.
 
     Raises
     ------

@@ -53,16 +53,7 @@ def speeds(velocities: np.ndarray) -> np.ndarray:
 def draw_cut(
     centers: np.ndarray, radii: np.ndarray, colors: np.ndarray, lines: Sequence[np.ndarray], view: View
 ) -> Picture:
-    """Draw spheres, and walls in front of them.
-
-    Parameters
-    ----------
-    centers, radii, colors : (n, 3), (n,) and (n, 3) arrays
-        Spheres [m] and their blue-green-red.
-    lines : sequence of (k, 2) arrays
-        x and z of the walls [m].
-    view : View
-    """
+    """Draw spheres [m] in their blue-green-red, and in front of them lines, x and z of walls [m], (k, 2)."""
     frame, foot = view.frame, np.array([0.0, 0.0, view.bottom])
     shown, kept = frame.select(Spheres.of(centers - foot, radii))
     layer = shaded(shown, colors[kept], frame, 0.0)
@@ -79,12 +70,7 @@ def draw_cut(
 def wall_section(wall: Wall, moved: np.ndarray) -> list[np.ndarray]:
     """Lines, (k, 2) arrays of x and z [m], in which a wall meets the plane y = 0.
 
-    Parameters
-    ----------
-    wall : Wall
-        A level plane, a mesh, or a wall about an axis that is along y or z.
-    moved : (3,) array
-        How far it has come from where it is described to be [m].
+    The wall is a level plane, a mesh, or one about an axis along y or z, and has `moved` [m] since described.
     """
     x, _, z = np.array(wall.point) + moved
     if isinstance(wall, Plane):

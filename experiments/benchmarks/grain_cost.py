@@ -21,7 +21,7 @@ import warp as wp
 
 from dem_warp import ClumpShape
 from dem_warp.device import resolve_device
-from dem_warp.model import ContactCoefficients, Grains, WorldSetup
+from dem_warp.model import ContactCoefficients, WorldSetup
 from dem_warp.solver import Solver
 from dem_warp.walls import Cylinder, Plane
 from doe.palette import BLUE, GRID, VERMILION
@@ -31,6 +31,7 @@ from experiments.benchmarks.roofline import memory_bytes
 from experiments.benchmarks.timing import run_in, time_steps
 from experiments.report.kit.figure import new_axes, save_figure
 from experiments.report.kit.machine import machine
+from experiments.verification.problems.setups import bodies
 
 DEPTH = 0.020
 """Of a bed at rest, roughly [m]."""
@@ -50,17 +51,11 @@ SETTLING = 0.45
 STEPS = 1024
 """Of a stretch."""
 
+GRAINS = "300,1000,3000,10000,30000,100000,300000"
+
 
 def bed(count: int, seed: int = 0) -> WorldSetup:
-    """Grains on a lattice over a plate, turned at random, that will settle to a bed.
-
-    Parameters
-    ----------
-    count : int
-        Number of grains.
-    seed : int
-        Of their orientations.
-    """
+    """Grains on a lattice over a plate, turned at random, that will settle to a bed."""
     case = reference_case("soft")
     grain, steel = case.grain_material, case.scene.wall_material
     shape = ClumpShape.read(CLUMP)
@@ -68,16 +63,9 @@ def bed(count: int, seed: int = 0) -> WorldSetup:
     radius = float(np.sqrt(count * shape.volume / (SOLID_FRACTION * DEPTH * np.pi))) + reach
     positions = _lattice(count, radius - reach, 2.0 * reach)
     top = float(positions[:, 2].max()) + 2.0 * reach
-    grains = Grains(
-        positions=positions,
-        orientations=np.random.default_rng(seed).normal(size=(count, 4)),
-        velocities=np.tile([0.0, 0.0, -FALL_SPEED], (count, 1)),
-        spins=np.zeros((count, 3)),
-        sizes=np.ones(count),
-        densities=np.full(count, grain.density),
-        shapes=np.zeros(count, dtype=int),
-        release_steps=np.zeros(count, dtype=int),
-    )
+    turned = np.random.default_rng(seed).normal(size=(count, 4))
+    fall = (0.0, 0.0, -FALL_SPEED)
+    grains = bodies(positions, grain.density, velocities=fall, orientations=turned)
     return WorldSetup(
         grains=grains,
         shapes=(shape,),
@@ -147,9 +135,7 @@ def draw_cost(table: pd.DataFrame, singles: int, title: str, path: Path) -> None
 
 def main(
     device: Annotated[str, typer.Option(help="cpu or cuda.")] = "cpu",
-    grains: Annotated[
-        str, typer.Option(help="Grains of a single world.")
-    ] = "300,1000,3000,10000,30000,100000,300000",
+    grains: Annotated[str, typer.Option(help="Grains of a single world.")] = GRAINS,
     worlds: Annotated[str, typer.Option(help="Numbers of worlds.")] = "1,2,4,8,16,32,64,128,256,512",
     world_grains: Annotated[int, typer.Option(help="Grains of each of these worlds.")] = 2600,
     out: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("out/cost"),

@@ -25,29 +25,16 @@ from experiments.benchmarks.columns import MOMENTS, Columns
 from experiments.benchmarks.parallel import processes_table
 from experiments.benchmarks.peers.comparison import compare
 from experiments.benchmarks.peers.library import PEERS, PeerName
-from experiments.benchmarks.results import parse_counts, write_results
+from experiments.benchmarks.results import Part, parse_counts, write_results
 from experiments.benchmarks.roofline import Traffic, copy_bandwidth, step_traffic
 from experiments.benchmarks.timing import Timing, run_in, start, time_steps
 from experiments.report.kit.machine import machine
-
-Part = tuple[str, str, pd.DataFrame]
 
 
 def speed_tables(columns: Columns, counts: Sequence[int], steps: int) -> Iterator[list[Part]]:
     """Time every phase with each number of worlds, and count what a settled grain must move.
 
-    Parameters
-    ----------
-    columns : Columns
-    counts : sequence of int
-        Numbers of worlds.
-    steps : int
-        Of a stretch.
-
-    Yields
-    ------
-    list of (name, text, table)
-        All that is known so far, after each number of worlds.
+    All that is known so far is yielded after each number of worlds.
     """
     bandwidth = copy_bandwidth(columns.device)
     text = (

@@ -8,33 +8,20 @@ import pandas as pd
 
 from dem_warp.device import resolve_device
 from experiments.benchmarks.columns import Columns
+from experiments.benchmarks.results import Part
 from experiments.benchmarks.timing import run_in, start, time_steps
 
 PATIENCE = 600.0
 """Longest time that a process may take to get ready, or to finish [s]."""
 
 
-def processes_table(columns: Columns, folder: Path, count: int, steps: int) -> tuple[str, str, pd.DataFrame]:
-    """Time settled columns in one process, in `count` at once, and in one again.
-
-    Parameters
-    ----------
-    columns : Columns
-        Whose file in `folder` the processes read.
-    folder : Path
-    count : int
-    steps : int
-        Of a stretch.
-    """
+def processes_table(columns: Columns, folder: Path, count: int, steps: int) -> Part:
+    """Time settled columns, read from a folder, in one process, in `count` at once, and in one again."""
     counts = (1, count, 1)
     speeds = [sum(_together(columns, folder, n, steps)) / 1e6 for n in counts]
     alone = (speeds[0] + speeds[-1]) / 2
     table = pd.DataFrame(
-        {
-            "processes": counts,
-            "million sphere-steps/s": speeds,
-            "of one": [speed / alone for speed in speeds],
-        }
+        {"processes": counts, "million sphere-steps/s": speeds, "of one": [speed / alone for speed in speeds]}
     )
     text = "Processes at once on the CPU, each with a settled column; one before, one after."
     return "processes", text, table

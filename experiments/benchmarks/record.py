@@ -16,18 +16,10 @@ HERE = Path(__file__).parent
 
 
 def record_page(folder: Path, name: str, readme: Path, record: Path) -> None:
-    """Put one benchmark's results into the record.
+    """Put one benchmark's results, a Markdown page with tables and perhaps pictures, into the record.
 
-    Parameters
-    ----------
-    folder : Path
-        With one Markdown page, CSV tables and perhaps pictures.
-    name : str
-        Of the page in the record; tables and pictures get it as a suffix.
-    readme : Path
-        Has the lines ``<!-- begin NAME -->`` and ``<!-- end NAME -->``.
-    record : Path
-        Folder for tables and pictures, beside `readme`.
+    The page goes between the lines ``<!-- begin NAME -->`` and ``<!-- end NAME -->`` of the readme. Tables
+    and pictures go to the folder `record` beside it; their suffix is what follows the first dash of NAME.
 
     Raises
     ------

@@ -26,22 +26,7 @@ def parse_counts(text: str) -> list[int]:
 
 
 def write_results(folder: Path, name: str, parts: list[Part]) -> Path:
-    """Write tables to a folder.
-
-    Parameters
-    ----------
-    folder : Path
-        Made if it is not there.
-    name : str
-        Of the page, `name`.md.
-    parts : list of (name, text, table)
-        Each table goes to a CSV of its name, and below its text to the page.
-
-    Returns
-    -------
-    Path
-        The page.
-    """
+    """Write each table to a CSV of its name, and below its text to the page `name`.md; return its path."""
     for part, _, table in parts:
         write_text(folder / f"{part}.csv", table.to_csv(index=False, float_format="%.6g"))
     texts = (text for _, head, table in parts for text in (head, markdown_table(table)))

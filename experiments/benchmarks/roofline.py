@@ -62,12 +62,9 @@ def step_traffic(solver: Solver) -> Traffic:
     length, touching = _list_length(solver), _touching(solver)
     grains, neighbours = solver.layout.grain_total, solver.neighbours
     each, reactions = neighbours.memory.size / neighbours.history.size, _arrays(neighbours.reactions)
+    state = [(name, array) for name, array in _arrays(solver.grains[0]) if name != "step"]
     rows = [
-        *(
-            (name, array, array.size / grains, 2)
-            for name, array in _arrays(solver.grains[0])
-            if name != "step"
-        ),
+        *((name, array, array.size / grains, 2) for name, array in state),
         *((name, getattr(solver.model, name), 1.0, 1) for name in ("shape", "inertia", "release_step")),
         ("alive", solver.alive, 1.0, 1),
         ("numbers of near entries", neighbours.near.count, 1.0, 1),

@@ -3,12 +3,11 @@
 from experiments.calibrate.campaign import calibrate
 from experiments.calibrate.cases import Runner, case_seed
 from experiments.calibrate.results import Campaign, ClimbEnd, Decision, Outcome
-from experiments.studyfile.campaign import CampaignSettings, CampaignStudy, Response, Target, Twin
+from experiments.studyfile.campaign import CampaignSettings, Response, Target, Twin
 
 __all__ = [
     "Campaign",
     "CampaignSettings",
-    "CampaignStudy",
     "ClimbEnd",
     "Decision",
     "Outcome",

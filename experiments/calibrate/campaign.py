@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 import pandas as pd
 
-from experiments.calibrate.cases import Runner, StageEnd, simulate
+from experiments.calibrate.cases import Runner, StageEnd
 from experiments.calibrate.checks import check_study
 from experiments.calibrate.climb import climb, require_crossing
 from experiments.calibrate.noise_floor import analyse_noise_floor, plan_noise_floor
@@ -28,7 +28,8 @@ from experiments.calibrate.surface import explore_surface, require_slope
 from experiments.calibrate.target import plan_target, settle_target
 from experiments.calibrate.values import listed, p_text, quantity
 from experiments.calibrate.verification import verify
-from experiments.studyfile.campaign import CampaignStudy, Response
+from experiments.studyfile import Study
+from experiments.studyfile.campaign import Response
 
 Found = TypeVar("Found", bound=StageResult)
 
@@ -36,13 +37,11 @@ StageHook = Callable[[str, StageResult], None]
 """Called with the name and the result of every stage as it is finished."""
 
 
-def calibrate(study: CampaignStudy, runner: Runner, on_stage: StageHook | None = None) -> Campaign:
+def calibrate(study: Study, runner: Runner, on_stage: StageHook | None = None) -> Campaign:
     """Run a calibration campaign.
 
     Parameters
     ----------
-    study
-        Factors, limits, target and decisions.
     runner
         Simulates all rows of a table at once, each in its ``scene``, and returns them with ``status``,
         ``reason`` and observables, NaN where there is none; a case that fails is a row,
@@ -96,7 +95,7 @@ class _Record:
         return result
 
 
-def _run(study: CampaignStudy, record: _Record) -> tuple[Outcome, str]:
+def _run(study: Study, record: _Record) -> tuple[Outcome, str]:
     """Run the stages one after another and return the outcome; StageEnd where the campaign cannot go on."""
     settings, response = study.campaign.selection, study.target.leading
     target, noise, screening = _open(study, record)
@@ -111,13 +110,14 @@ def _run(study: CampaignStudy, record: _Record) -> tuple[Outcome, str]:
     return _verdict(study.target.responses, optimum, verification)
 
 
-def _open(study: CampaignStudy, record: _Record) -> tuple[TargetResult, NoiseFloorResult, ScreeningResult]:
+def _open(study: Study, record: _Record) -> tuple[TargetResult, NoiseFloorResult, ScreeningResult]:
     """Run the stages that wait for nothing, in one batch: a twin's target, the noise floor, the screening."""
     design = screening_design(study.factors, study.campaign.screening)
     plans = [plan_noise_floor(study), plan_screening(study, design)]
     if study.target.twin is not None:
         plans = [plan_target(study), *plans]
-    *hidden, noise_cases, screening_cases = simulate(record.run, *plans)
+    finished = record.run(pd.concat(plans, ignore_index=True)).groupby("stage", sort=False)
+    *hidden, noise_cases, screening_cases = (cases.reset_index(drop=True) for _, cases in finished)
     target = record.keep("target", settle_target(study, *hidden))
     noise = record.keep("noise_floor", analyse_noise_floor(study, noise_cases))
     name = study.campaign.screening.design

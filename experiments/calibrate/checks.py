@@ -6,10 +6,10 @@ from collections.abc import Mapping
 
 from experiments.calibrate.screening import screening_design
 from experiments.calibrate.values import UNLIMITED, reach_limits
-from experiments.studyfile.campaign import CampaignStudy
+from experiments.studyfile import Study
 
 
-def check_study(study: CampaignStudy) -> None:
+def check_study(study: Study) -> None:
     """Check the campaign's decisions against the factors.
 
     Raises
@@ -25,10 +25,8 @@ def check_study(study: CampaignStudy) -> None:
     _check_values(settings.surface.center, hard, "campaign.surface.center")
     _check_values(settings.optimum.point, hard, "campaign.optimum.point")
     positive = dict.fromkeys(hard, (0.0, float("inf")))
-    for place, sizes in (
-        ("climb.step", settings.climb.step),
-        ("surface.half_range", settings.surface.half_range),
-    ):
+    steps = {"climb.step": settings.climb.step, "surface.half_range": settings.surface.half_range}
+    for place, sizes in steps.items():
         _check_values(sizes, positive, f"campaign.{place}")
         for name, size in (sizes or {}).items():
             if not size > 0.0:

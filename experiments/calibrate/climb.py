@@ -17,7 +17,6 @@ from experiments.calibrate.cases import (
     failure_summary,
     measured,
     plan_cases,
-    simulate,
     too_many_failed,
 )
 from experiments.calibrate.results import (
@@ -38,7 +37,8 @@ from experiments.calibrate.values import (
     quantity,
     reach_limits,
 )
-from experiments.studyfile.campaign import CampaignStudy, ClimbSettings, Response
+from experiments.studyfile import Study
+from experiments.studyfile.campaign import ClimbSettings, Response
 
 STAGE = "climb"
 
@@ -69,7 +69,7 @@ class _Line:
 
 
 def climb(
-    study: CampaignStudy,
+    study: Study,
     screening: ScreeningResult,
     kept: tuple[str, ...],
     noise: NoiseFloorResult,
@@ -78,16 +78,14 @@ def climb(
 ) -> ClimbResult:
     """Walk along the leading response's steepest path, every step at once, and on if the target is ahead.
 
-    Raises
-    ------
-    StageEnd
-        When the path has no room, or fewer than two steps gave a value.
+    StageEnd where the path has no room, or fewer than two steps gave a value.
     """
     settings, response = study.campaign.climb, study.target.leading
     line, rule = _line(study, screening.leading.screen, kept)
     batches, tables = [_first_points(line, settings)], []
     for _ in range(1 + settings.extensions):
-        tables.append(_simulate_steps(study, batches[-1], kept, runner))
+        steps = batches[-1][list(kept)]
+        tables.append(runner(plan_cases(study, STAGE, steps, settings.replicates, [response])))
         points, cases = pd.concat(batches).sort_index(), pd.concat(tables, ignore_index=True)
         path = _path_table(points, cases, response, target.leading.mean)
         end = _end(path, measured(cases, response)[["run", response.observable]], noise.leading, settings)
@@ -98,37 +96,28 @@ def climb(
     place, crossing = _crossing(path, kept) if end is ClimbEnd.CROSSED else (None, None)
     best = int(path["error"].abs().idxmin())
     step = _stride(path, kept)
+    start_and_step = numbered_values("start", line.start) | numbered_values("step", step)
+    moves = ", ".join(f"{name} by {move:+.4g}" for name, move in step.items())
     decisions = (
-        Decision(
-            STAGE,
-            rule,
-            numbered_values("start", line.start) | numbered_values("step", step),
-            _direction(step),
-        ),
+        Decision(STAGE, rule, start_and_step, f"One step moves {moves}."),
         _end_decision(path, cases, end, response, target.leading, crossing, place, best),
     )
     return ClimbResult(cases, kept, path, step, end, crossing, place, best, decisions)
 
 
-def require_crossing(study: CampaignStudy, result: ClimbResult, target: TargetResult) -> None:
-    """Go on when the climb crossed the target, or when the study fixes the centre of the surface.
-
-    Raises
-    ------
-    StageEnd
-        When it turned, was flat, or ended before the target.
-    """
+def require_crossing(study: Study, result: ClimbResult, target: TargetResult) -> None:
+    """Go on when the climb crossed the target or the study fixes the centre of the surface; else StageEnd."""
     center = fixed_values(study.campaign.surface.center, result.kept)
     if result.end is ClimbEnd.CROSSED or center is not None:
         return
     response = study.target.leading
-    nearest, aim = (
-        quantity(value, response.unit)
-        for value in (result.path.loc[result.best_step, "mean"], target.leading.mean)
-    )
+    nearest = quantity(result.path.loc[result.best_step, "mean"], response.unit)
+    aim = quantity(target.leading.mean, response.unit)
     best = f"{nearest} at best ({listed(result.best)}) against {aim}"
     if result.end is ClimbEnd.BOUNDED:
-        at_bound = _factors_at_bound(study, result)
+        # The end that the climb was heading for.
+        edge, limits = result.path.iloc[0 if result.path["error"].min() > 0.0 else -1], reach_limits(study)
+        at_bound = [n for n in result.kept if any(math.isclose(edge[n], bound) for bound in limits[n])]
         where = f"at the bound: {', '.join(at_bound)}" if at_bound else "all batches were used up"
         raise StageEnd(
             Outcome.TARGET_NOT_REACHED,
@@ -136,18 +125,16 @@ def require_crossing(study: CampaignStudy, result: ClimbResult, target: TargetRe
             f"{', '.join(result.kept)}, raise climb.reach or climb.extensions, or keep further factors; if "
             "the ranges are physical, the model lacks a mechanism.",
         )
-    what = {
-        ClimbEnd.TURNED: "turned before",
-        ClimbEnd.FLAT: "does not change beyond the noise and never meets",
-    }
+    turned = result.end is ClimbEnd.TURNED
+    course = "turned before" if turned else "does not change beyond the noise and never meets"
     raise StageEnd(
         Outcome.PLATEAU,
-        f"The {response.name} {what[result.end]} the target: {best}. More of {', '.join(result.kept)} does "
+        f"The {response.name} {course} the target: {best}. More of {', '.join(result.kept)} does "
         "not help: keep further factors, or look for a mechanism that the model lacks.",
     )
 
 
-def _line(study: CampaignStudy, screen: ScreenResult, kept: tuple[str, ...]) -> tuple[_Line, str]:
+def _line(study: Study, screen: ScreenResult, kept: tuple[str, ...]) -> tuple[_Line, str]:
     """Return the path to walk and the rule that chose it."""
     settings, limits = study.campaign.climb, reach_limits(study)
     start, step = fixed_values(settings.start, kept), fixed_values(settings.step, kept)
@@ -186,23 +173,8 @@ def _further_points(line: _Line, path: pd.DataFrame, settings: ClimbSettings) ->
     return more.set_axis(pd.Index(labels, name="step"))
 
 
-def _simulate_steps(
-    study: CampaignStudy, points: pd.DataFrame, kept: tuple[str, ...], runner: Runner
-) -> pd.DataFrame:
-    settings = study.campaign
-    points, replicates, seed = points[list(kept)], settings.climb.replicates, settings.seeds.campaign
-    plan = plan_cases(study.factors, STAGE, points, replicates, seed, (study.target.leading.scene,))
-    return simulate(runner, plan)[0]
-
-
 def _path_table(points: pd.DataFrame, cases: pd.DataFrame, response: Response, target: float) -> pd.DataFrame:
-    """Return the points with what was measured at each.
-
-    Raises
-    ------
-    StageEnd
-        When fewer than two steps gave a value.
-    """
+    """Return the points with what was measured at each; StageEnd where fewer than two gave a value."""
     found = measured(cases, response).groupby("run")[response.observable]
     used = found.agg(["mean", "std", "size"]).reindex(points.index)
     if used["mean"].count() < LEAST_STEPS:
@@ -266,17 +238,6 @@ def _stride(path: pd.DataFrame, kept: tuple[str, ...]) -> dict[str, float]:
     return {name: float(moves[name].iloc[int(moves[name].abs().argmax())]) for name in kept}
 
 
-def _direction(step: Mapping[str, float]) -> str:
-    return "One step moves " + ", ".join(f"{name} by {move:+.4g}" for name, move in step.items()) + "."
-
-
-def _factors_at_bound(study: CampaignStudy, result: ClimbResult) -> list[str]:
-    """Return the kept factors that stand at their bound at the end which the climb was heading for."""
-    edge = result.path.iloc[0 if result.path["error"].min() > 0.0 else -1]
-    limits = reach_limits(study)
-    return [name for name in result.kept if any(math.isclose(edge[name], bound) for bound in limits[name])]
-
-
 def _end_decision(
     path: pd.DataFrame,
     cases: pd.DataFrame,
@@ -300,8 +261,5 @@ def _end_decision(
         }[end]
     nearest = quantity(path.loc[best, "mean"], response.unit)
     outcome += f" The nearest step is {best} ({nearest}). {failure_summary(cases, response)}"
-    rule = (
-        f"The climb goes on until its mean {response.name} has crossed the target, turned away, or met its "
-        "bounds."
-    )
-    return Decision(STAGE, rule, numbers, outcome.strip())
+    aim = f"until its mean {response.name} has crossed the target, turned away, or met its bounds"
+    return Decision(STAGE, f"The climb goes on {aim}.", numbers, outcome.strip())

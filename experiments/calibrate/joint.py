@@ -7,8 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 import pandas as pd
 
-from doe import Goal, JointFit, joint_fit
-from experiments.calibrate.results import Decision, SurfaceResult, TargetResult
+from doe import JointFit
+from experiments.calibrate.results import Decision
 from experiments.calibrate.values import fixed_values, p_text
 from experiments.studyfile.campaign import OptimumSettings
 
@@ -19,12 +19,6 @@ SMALL_COMPONENT = 0.2
 
 NO_HELP = 0.95
 """A response that leaves more than this share of the region buys nothing worth the name."""
-
-
-def fit_jointly(surface: SurfaceResult, target: TargetResult, settings: OptimumSettings) -> JointFit:
-    """Fit all responses together, by their reduced surfaces."""
-    goals = {name: Goal(fit.reduced, target.responses[name]) for name, fit in surface.responses.items()}
-    return joint_fit(goals, alpha=1.0 - settings.confidence)
 
 
 def choose_jointly(joint: JointFit, settings: OptimumSettings) -> tuple[dict[str, float], str]:
@@ -71,20 +65,16 @@ def _agreement(joint: JointFit, point: Mapping[str, float]) -> Decision:
     if apart.empty:
         outcome = "All responses agree with their targets at the chosen point."
     else:
-        missed = ", ".join(
-            f"{row.Index} ({row.t:+.1f} errors, {p_text(row.p)})" for row in apart.itertuples()
-        )
-        outcome = f"At the chosen point these differ from their targets: {missed}."
+        missed = [f"{row.Index} ({row.t:+.1f} errors, {p_text(row.p)})" for row in apart.itertuples()]
+        outcome = f"At the chosen point these differ from their targets: {', '.join(missed)}."
         if not joint.region().mask.any():
             outcome += (
                 " No setting that the design explored agrees with all: fix surface.center nearer to where "
                 "they might, widen surface.half_range, or look for a mechanism that the model lacks."
             )
     level = joint.alpha / len(joint.goals)
-    rule = (
-        f"A response agrees when its fit at the chosen point differs from its target with p >= {level:.3g}."
-    )
-    return Decision(STAGE, rule, numbers, outcome)
+    rule = "A response agrees when its fit at the chosen point differs from its target with p >= "
+    return Decision(STAGE, f"{rule}{level:.3g}.", numbers, outcome)
 
 
 def _purchase(joint: JointFit) -> Decision:
@@ -113,9 +103,8 @@ def _purchase(joint: JointFit) -> Decision:
 
 
 def _directions(joint: JointFit, settings: OptimumSettings) -> Decision:
-    numbers = {
-        f"span along {direction_text(row)}": float(row["span"]) for _, row in joint.directions.iterrows()
-    }
+    rows = [row for _, row in joint.directions.iterrows()]
+    numbers = {f"span along {direction_text(row)}": float(row["span"]) for row in rows}
     left = open_directions(joint, settings)
     if not joint.region().mask.any():
         outcome = "Nothing is compatible, so that nothing can be said of what stays open."

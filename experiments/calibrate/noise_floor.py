@@ -8,28 +8,19 @@ from doe import noise_floor
 from experiments.calibrate.cases import failure_summary, middle, plan_cases, values_of
 from experiments.calibrate.results import Decision, NoiseFloorResult
 from experiments.calibrate.values import interval_text, key_of, quantity
-from experiments.studyfile.campaign import CampaignStudy, scenes_of
+from experiments.studyfile import Study
 
 STAGE = "noise_floor"
 
 
-def plan_noise_floor(study: CampaignStudy) -> pd.DataFrame:
+def plan_noise_floor(study: Study) -> pd.DataFrame:
     """Lay out replicates with every factor at its middle."""
-    settings, center = study.campaign, pd.DataFrame([middle(study.factors)], index=[1])
-    scenes = scenes_of(study.target.fitted)
-    return plan_cases(
-        study.factors, STAGE, center, settings.noise_floor.replicates, settings.seeds.campaign, scenes
-    )
+    center = pd.DataFrame([middle(study.factors)], index=[1])
+    return plan_cases(study, STAGE, center, study.campaign.noise_floor.replicates, study.target.fitted)
 
 
-def analyse_noise_floor(study: CampaignStudy, cases: pd.DataFrame) -> NoiseFloorResult:
-    """Measure mean and standard deviation of the replicates.
-
-    Raises
-    ------
-    StageEnd
-        When fewer than two of them gave a response.
-    """
+def analyse_noise_floor(study: Study, cases: pd.DataFrame) -> NoiseFloorResult:
+    """Measure mean and standard deviation of the replicates; StageEnd with fewer than two values."""
     responses, confidence = study.target.fitted, study.campaign.noise_floor.confidence
     floors = {r.name: noise_floor(values_of(cases, STAGE, r), confidence) for r in responses}
     numbers: dict[str, float] = {"confidence": confidence}
@@ -37,9 +28,8 @@ def analyse_noise_floor(study: CampaignStudy, cases: pd.DataFrame) -> NoiseFloor
     for response, floor in zip(responses, floors.values(), strict=True):
         numbers |= {key_of("mean", response): floor.mean, key_of("sd", response): floor.sd}
         numbers |= {f"n of {response.name}": floor.sample.n}
-        numbers |= dict(
-            zip((key_of("sd low", response), key_of("sd high", response)), floor.sd_interval, strict=True)
-        )
+        low, high = floor.sd_interval
+        numbers |= {key_of("sd low", response): low, key_of("sd high", response): high}
         said.append(
             f"{response.name} by {quantity(floor.sd, response.unit)} ({confidence:.0%} interval "
             f"{interval_text(floor.sd_interval, response.unit)}) about {quantity(floor.mean, response.unit)}"

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 
 import numpy as np
 
-from doe import JointFit, Region, Surface, TargetError
+from doe import Goal, JointFit, Region, Surface, TargetError, joint_fit
 from experiments.calibrate.cases import StageEnd, middle
-from experiments.calibrate.joint import choose_jointly, fit_jointly, joint_decisions
+from experiments.calibrate.joint import choose_jointly, joint_decisions
 from experiments.calibrate.results import (
     Decision,
     OptimumResult,
@@ -25,23 +26,22 @@ from experiments.calibrate.values import (
     numbered_values,
     quantity,
 )
-from experiments.studyfile.campaign import CampaignStudy, OptimumSettings, Response
+from experiments.studyfile import Study
+from experiments.studyfile.campaign import OptimumSettings, Response
 
 STAGE = "optimum"
 
 
-def find_optimum(study: CampaignStudy, surface: SurfaceResult, target: TargetResult) -> OptimumResult:
+def find_optimum(study: Study, surface: SurfaceResult, target: TargetResult) -> OptimumResult:
     """Choose a point on the target contour and map the compatible region.
 
-    Raises
-    ------
-    StageEnd
-        When the fitted surface of a single response does not reach the target where the design explored it.
+    StageEnd where the surface of a single response does not reach the target in what the design explored.
     """
     settings, fit, sample = study.campaign.optimum, surface.leading.reduced, target.leading
     reach = float(surface.design.coded.abs().to_numpy().max())
     response = study.target.leading
-    joint = fit_jointly(surface, target, settings) if len(surface.responses) > 1 else None
+    goals = {name: Goal(found.reduced, target.responses[name]) for name, found in surface.responses.items()}
+    joint = joint_fit(goals, alpha=1.0 - settings.confidence) if len(goals) > 1 else None
     if joint is None:
         # The box of the two-level part first: inside it the fit is at its best. Axial points reach further.
         point, rule, extent = _choose(settings, surface, sample.mean, sorted({1.0, reach}))
@@ -52,15 +52,14 @@ def find_optimum(study: CampaignStudy, surface: SurfaceResult, target: TargetRes
     likely = (prediction["confidence_low"], prediction["confidence_high"])
     unidentified = _unidentified(settings, region)
     truth = None if target.truth is None else _check_truth(fit, target, settings.confidence, reach, joint)
+    numbers = numbered_values("chosen", point)
+    numbers |= {key_of("prediction", response): prediction["mean"]}
+    numbers |= {key_of("se of the fit", response): prediction["se"]}
     decisions = [
         Decision(
             STAGE,
             rule,
-            numbered_values("chosen", point)
-            | {
-                key_of("prediction", response): prediction["mean"],
-                key_of("se of the fit", response): prediction["se"],
-            },
+            numbers,
             f"Chosen: {listed(point)}; the surface of the {response.name} predicts "
             f"{quantity(prediction['mean'], response.unit)} ({interval_text(likely, response.unit)}).",
         ),
@@ -136,11 +135,9 @@ def _check_truth(
     truth, sample = target.truth or {}, target.leading
     values = {name: truth[name] for name in fit.design.names}
     coded, far = _coded(fit, values), _reach(fit, values)
-    try:
+    distance = None
+    with suppress(TargetError):  # a point fixed in the study needs no contour
         nearest = fit.nearest(sample.mean, to=values, extent=max(reach, far))
-    except TargetError:  # a point fixed in the study needs no contour
-        distance = None
-    else:
         distance = float(np.linalg.norm(_coded(fit, dict(nearest)) - coded))
     predicted = fit.predict(values).iloc[0]
     inside = far <= reach
@@ -152,11 +149,9 @@ def _check_truth(
 def _region_decision(
     settings: OptimumSettings, region: Region, unidentified: tuple[str, ...], joint: JointFit | None
 ) -> Decision:
-    ranges = region.ranges
     numbers = {"share of the region": region.fraction, "extent, coded": region.extent}
-    numbers |= {
-        f"{bound} of {name}": ranges[bound][name] for name in ranges.index for bound in ("low", "high")
-    }
+    for name, ends in region.ranges.iterrows():
+        numbers |= {f"low of {name}": ends["low"], f"high of {name}": ends["high"]}
     outcome = f"{region.fraction:.0%} of the design region is compatible with the target."
     if len(region.factors) > 1 and joint is None:
         outcome += " The target is one equation: the factors trade off along its contour."
@@ -180,18 +175,15 @@ def _truth_decision(truth: TruthCheck, target: float, response: Response) -> Dec
         False: "The hidden truth lies outside the compatible region: it was not recovered.",
         None: "The hidden truth lies outside the region that the design explored: nothing can be said.",
     }[truth.compatible]
+    distance = "The surface has no contour of the target"
+    if truth.distance is not None:
+        distance = f"It is {truth.distance:.2f} coded units from the contour"
     return Decision(
         STAGE,
         "A twin study: the hidden settings are looked up in the compatible region.",
         numbered_values("hidden", truth.values)
         | {"distance to the contour, coded": truth.distance}
         | {key_of("prediction at the truth", response): truth.predicted, key_of("target", response): target},
-        f"{verdict} {_distance(truth.distance)}; the surface predicts "
+        f"{verdict} {distance}; the surface predicts "
         f"{quantity(truth.predicted, response.unit)} there, the target is {quantity(target, response.unit)}.",
     )
-
-
-def _distance(distance: float | None) -> str:
-    if distance is None:
-        return "The surface has no contour of the target"
-    return f"It is {distance:.2f} coded units from the contour"

@@ -71,8 +71,10 @@ class Decision:
     """The decision, as a sentence."""
 
 
-class _Tabled:
-    """A stage's result with tables worth a file of their own."""
+class StageResult:
+    """A stage's result, with tables worth a file of their own."""
+
+    decisions: tuple[Decision, ...]
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """Tables by file name (without ending), beside the cases."""
@@ -80,7 +82,7 @@ class _Tabled:
 
 
 @dataclass(frozen=True)
-class _ByResponse(_Tabled, Generic[Found]):
+class _ByResponse(StageResult, Generic[Found]):
     """A stage's result that has a part for each response."""
 
     responses: dict[str, Found]
@@ -150,7 +152,7 @@ class ScreeningResult(_ByResponse[Screened]):
 
 
 @dataclass(frozen=True)
-class SelectionResult(_Tabled):
+class SelectionResult(StageResult):
     """The factors that the later stages vary."""
 
     kept: tuple[str, ...]
@@ -168,7 +170,7 @@ class SelectionResult(_Tabled):
 
 
 @dataclass(frozen=True)
-class ClimbResult(_Tabled):
+class ClimbResult(StageResult):
     """The leading response's path of steepest ascent, and the place where it meets the target."""
 
     cases: pd.DataFrame
@@ -252,7 +254,7 @@ class TruthCheck:
 
 
 @dataclass(frozen=True)
-class OptimumResult(_Tabled):
+class OptimumResult(StageResult):
     """The chosen point and everything that is as good."""
 
     point: dict[str, float]
@@ -297,17 +299,6 @@ class VerificationResult(_ByResponse[Comparison]):
         """The fresh cases."""
         return {"verification": self.cases}
 
-
-StageResult = (
-    TargetResult
-    | NoiseFloorResult
-    | ScreeningResult
-    | SelectionResult
-    | ClimbResult
-    | SurfaceResult
-    | OptimumResult
-    | VerificationResult
-)
 
 STAGES = ("target", "noise_floor", "screening", "selection", "climb", "surface", "optimum", "verification")
 
@@ -375,15 +366,7 @@ class Campaign:
         return {name: indexed(table) for name, table in tables.items()}
 
     def _decision_table(self) -> pd.DataFrame:
-        rows = [
-            {
-                "stage": decision.stage,
-                "rule": decision.rule,
-                "numbers": "; ".join(
-                    f"{name} = {value}" for name, value in jsonable(decision.numbers).items()
-                ),
-                "outcome": decision.outcome,
-            }
-            for decision in self.decisions
-        ]
-        return pd.DataFrame(rows, columns=["stage", "rule", "numbers", "outcome"])
+        columns = [field.name for field in fields(Decision)]
+        table = pd.DataFrame([jsonable(decision) for decision in self.decisions], columns=columns)
+        texts = ["; ".join(f"{name} = {value}" for name, value in each.items()) for each in table["numbers"]]
+        return table.assign(numbers=texts)

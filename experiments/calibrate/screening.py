@@ -8,16 +8,11 @@ import pandas as pd
 
 from dem_warp.registry import Registry
 from doe import Design, DesignError, Factor, ScreenResult, plackett_burman, screen
-from experiments.calibrate.cases import (
-    failure_summary,
-    measured,
-    plan_cases,
-    response_table,
-    too_many_failed,
-)
+from experiments.calibrate.cases import failure_summary, measured, plan_cases, response_table, too_many_failed
 from experiments.calibrate.results import Decision, Screened, ScreeningResult
 from experiments.calibrate.values import key_of, p_text, quantity
-from experiments.studyfile.campaign import CampaignStudy, Response, ScreeningSettings, scenes_of
+from experiments.studyfile import Study
+from experiments.studyfile.campaign import Response, ScreeningSettings
 
 STAGE = "screening"
 
@@ -45,11 +40,10 @@ def screening_design(factors: Sequence[Factor], settings: ScreeningSettings) -> 
     return DESIGNS[settings.design](factors, settings.runs or fewest)
 
 
-def plan_screening(study: CampaignStudy, design: Design) -> pd.DataFrame:
+def plan_screening(study: Study, design: Design) -> pd.DataFrame:
     """Lay out every run and replicate of the design."""
-    settings, scenes = study.campaign, scenes_of(study.target.fitted)
-    replicates, seed = settings.screening.replicates, settings.seeds.campaign
-    return plan_cases(study.factors, STAGE, design.natural, replicates, seed, scenes)
+    replicates = study.campaign.screening.replicates
+    return plan_cases(study, STAGE, design.natural, replicates, study.target.fitted)
 
 
 def analyse_screening(
@@ -57,10 +51,7 @@ def analyse_screening(
 ) -> ScreeningResult:
     """Estimate and test the effects on every response from the cases that gave it, in a design of a name.
 
-    Raises
-    ------
-    StageEnd
-        When too few runs are left to tell the factors apart.
+    StageEnd where too few runs are left to tell the factors apart.
     """
     runs = design.coded.index.tolist()
     found = {r.name: Screened(response_table(cases, r, runs), _screen(design, cases, r)) for r in responses}
@@ -87,7 +78,6 @@ def _decision(
         "dummies": "the dummy columns, which hold interactions as the factors' columns do",
         "lenth": "Lenth's pseudo standard error, the design having no dummies",
     }[result.error_rule]
-    own = cases[cases["scene"] == response.scene]
     return Decision(
         STAGE,
         f"A {name.title()} design of {len(design.coded)} runs, {replicates} "
@@ -102,5 +92,5 @@ def _decision(
             "critical |t| at 0.05, Bonferroni": result.critical_t(0.05, bonferroni=True),
         },
         f"{first.name} moves the {response.name} most: {quantity(first['effect'], response.unit, '+')} from "
-        f"low to high ({p_text(first['p'])}). {failure_summary(own, response)}".strip(),
+        f"low to high ({p_text(first['p'])}). {failure_summary(cases, response)}".strip(),
     )

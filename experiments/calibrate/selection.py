@@ -31,9 +31,12 @@ def select_factors(
     """
     leading, floor = screening.leading, noise.leading
     ranked = leading.screen.table.sort_values("rank")
-    p = _p_values(screening, ranked.index)
+    # By factor and response, the leading one first.
+    screens = {name: found.screen for name, found in screening.responses.items()}
+    p = pd.DataFrame({name: screen.table["p"].reindex(ranked.index) for name, screen in screens.items()})
     significant = [str(name) for name in ranked.index if (p.loc[name] < settings.alpha).any()]
-    chosen = _chosen(settings, _by_strength(p, settings.alpha), significant)
+    count = min(max(len(significant), settings.at_least), settings.at_most)
+    chosen = _by_strength(p, settings.alpha)[:count] if settings.keep is None else settings.keep
     kept = tuple(name for name in screening.design.names if name in chosen)
     cases = len(leading.screen.response)
     table = ranked[["effect", "p", "percent", "rank"]].copy()
@@ -42,7 +45,9 @@ def select_factors(
         table[f"p_{name}"] = p[name]
     table["kept"] = table.index.isin(kept)
     table["reason"] = [_reason(settings, str(name), kept, p.loc[name]) for name in table.index]
-    visible = _visible_effect(settings, floor, cases, leading.screen.error_df)
+    visible = 0.0
+    if floor.sd > 0.0:
+        visible = detectable_effect(floor.sd, cases, leading.screen.error_df, settings.alpha, settings.power)
     decisions = (
         _kept_decision(settings, p, kept, significant),
         _noise_decision(settings, table, visible, floor, response),
@@ -51,13 +56,7 @@ def select_factors(
 
 
 def require_kept(settings: SelectionSettings, selection: SelectionResult, response: Response) -> None:
-    """Go on when a factor was kept.
-
-    Raises
-    ------
-    StageEnd
-        When none was.
-    """
+    """Go on when a factor was kept; else StageEnd."""
     if selection.kept:
         return
     strongest = selection.table.iloc[0]
@@ -68,12 +67,6 @@ def require_kept(settings: SelectionSettings, selection: SelectionResult, respon
         f"the design sees effects from about {quantity(selection.visible_effect, response.unit)} on: widen "
         "the ranges, add screening replicates or dummies, or name the factors to keep in selection.keep.",
     )
-
-
-def _p_values(screening: ScreeningResult, names: pd.Index) -> pd.DataFrame:
-    """Return the p values of every factor (rows) for every response (columns), the leading one first."""
-    screens = {name: found.screen for name, found in screening.responses.items()}
-    return pd.DataFrame({name: screen.table["p"].reindex(names) for name, screen in screens.items()})
 
 
 def _by_strength(p: pd.DataFrame, alpha: float) -> list[str]:
@@ -87,13 +80,6 @@ def _by_strength(p: pd.DataFrame, alpha: float) -> list[str]:
         return not first < alpha, 0.0 if first < alpha or not others else min(others)
 
     return sorted(map(str, p.index), key=order)
-
-
-def _chosen(settings: SelectionSettings, ranked: list[str], significant: list[str]) -> set[str]:
-    if settings.keep is not None:
-        return set(settings.keep)
-    count = min(max(len(significant), settings.at_least), settings.at_most)
-    return set(ranked[:count])
 
 
 def _reason(settings: SelectionSettings, name: str, kept: tuple[str, ...], p: pd.Series) -> str:
@@ -110,12 +96,6 @@ def _reason(settings: SelectionSettings, name: str, kept: tuple[str, ...], p: pd
 def _noise_effect(floor: NoiseFloor, cases: int, alpha: float) -> float:
     """Return the effect that seeds alone exceed with probability alpha (its error: 2 sd / sqrt(n))."""
     return float(stats.t.isf(0.5 * alpha, floor.sample.df)) * 2.0 * floor.sd / math.sqrt(cases)
-
-
-def _visible_effect(settings: SelectionSettings, floor: NoiseFloor, cases: int, error_df: float) -> float:
-    if not floor.sd > 0.0:
-        return 0.0
-    return detectable_effect(floor.sd, cases, error_df, settings.alpha, settings.power)
 
 
 def _kept_decision(
@@ -136,11 +116,8 @@ def _kept_decision(
         outcome += " Every factor is significant."
     if settings.keep is None and len(significant) > len(kept):
         outcome += f" Of {len(significant)} significant ones the weaker stay at their middle."
-    numbers = {
-        f"p of {name} for {response}": float(value)
-        for response in p.columns
-        for name, value in p[response].items()
-    }
+    pairs = ((name, response) for response in p.columns for name in p.index)
+    numbers = {f"p of {name} for {response}": float(p.loc[name, response]) for name, response in pairs}
     return Decision(STAGE, rule, numbers, outcome)
 
 
@@ -149,9 +126,8 @@ def _noise_decision(
 ) -> Decision:
     missed = [str(name) for name in table.index[table["visible"] & ~table["kept"]]]
     numbers = {key_of("sd", response): floor.sd, key_of("visible effect", response): visible}
-    outcome = (
-        f"Effects from {quantity(visible, response.unit)} on had a chance of {settings.power:.0%} to be seen."
-    )
+    seen = quantity(visible, response.unit)
+    outcome = f"Effects from {seen} on had a chance of {settings.power:.0%} to be seen."
     if missed:
         outcome += (
             f" {', '.join(missed)}: larger than the noise alone explains, yet not kept. The screening's "

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -17,7 +16,6 @@ from experiments.calibrate.cases import (
     measured,
     plan_cases,
     response_table,
-    simulate,
     too_many_failed,
 )
 from experiments.calibrate.results import ClimbResult, Decision, FittedResponse, Outcome, SurfaceResult
@@ -29,7 +27,8 @@ from experiments.calibrate.values import (
     numbered_values,
     p_text,
 )
-from experiments.studyfile.campaign import CampaignStudy, Response, SurfaceSettings, scenes_of
+from experiments.studyfile import Study
+from experiments.studyfile.campaign import Response, SurfaceSettings
 
 STAGE = "surface"
 
@@ -37,35 +36,19 @@ ROUNDING = 1e-12
 """A shrunk design keeps this share of its half-range away from a limit, so that rounding cannot cross it."""
 
 
-@dataclass(frozen=True)
-class _Placement:
-    """Place and width of a composite design."""
-
-    center: dict[str, float]
-    half_range: dict[str, float]
-    decisions: tuple[Decision, ...]
-
-    def factors(self, kept: tuple[Factor, ...]) -> tuple[Factor, ...]:
-        """Return the factors in the design's own coding."""
-        return tuple(
-            Factor.around(f.name, self.center[f.name], self.half_range[f.name], f.unit) for f in kept
-        )
-
-
-def explore_surface(study: CampaignStudy, climb: ClimbResult, runner: Runner) -> SurfaceResult:
-    """Simulate the composite design and fit the surfaces of every response.
-
-    Raises
-    ------
-    StageEnd
-        When too few runs are left for a quadratic surface.
-    """
+def explore_surface(study: Study, climb: ClimbResult, runner: Runner) -> SurfaceResult:
+    """Simulate the composite design and fit every response's surfaces; StageEnd with too few runs left."""
     settings, responses = study.campaign.surface, study.target.fitted
-    placement = _place(study, climb)
-    design = _composite(placement.factors(kept_factors(study, climb.kept)), settings)
-    cases = simulate(runner, _plan(study, design))[0]
-    outside = _outside_ranges(study, design)
-    decisions = [*placement.decisions, _design_decision(design, settings, outside, cases, responses)]
+    kept = kept_factors(study, climb.kept)
+    center, half_range, decisions = _place(study, climb)
+    factors = tuple(Factor.around(f.name, center[f.name], half_range[f.name], f.unit) for f in kept)
+    design = central_composite(factors, settings.alpha, settings.center_points)
+    # The centre is replicated by its own rows.
+    at_center = (design.coded == 0.0).all(axis=1)
+    replicates = {int(run): 1 if central else settings.replicates for run, central in at_center.items()}
+    cases = runner(plan_cases(study, STAGE, design.natural, replicates, responses))
+    outside = _outside_ranges(kept, design)
+    decisions.append(_design_decision(design, settings, outside, cases, responses))
     found = {}
     for response in responses:
         full = _fit(design, cases, response)
@@ -73,19 +56,11 @@ def explore_surface(study: CampaignStudy, climb: ClimbResult, runner: Runner) ->
         values = _run_means(response_table(cases, response, design.coded.index.tolist()))
         found[response.name] = FittedResponse(values, full, reduced)
         decisions.append(_fit_decision(response, full, reduced, rule, settings))
-    return SurfaceResult(
-        found, cases, design, placement.center, placement.half_range, outside, tuple(decisions)
-    )
+    return SurfaceResult(found, cases, design, center, half_range, outside, tuple(decisions))
 
 
 def require_slope(result: SurfaceResult) -> None:
-    """Go on when the reduced surface has a term left.
-
-    Raises
-    ------
-    StageEnd
-        When nothing moves the leading response there beyond the noise.
-    """
+    """Go on when the leading response's reduced surface has a term left; else StageEnd."""
     if not result.leading.reduced.terms:
         name = next(iter(result.responses))
         raise StageEnd(
@@ -96,12 +71,13 @@ def require_slope(result: SurfaceResult) -> None:
         )
 
 
-def _place(study: CampaignStudy, climb: ClimbResult) -> _Placement:
-    """Choose centre and half-ranges, then fit the design into the hard physical limits."""
-    settings = study.campaign.surface
+def _place(study: Study, climb: ClimbResult) -> tuple[dict[str, float], dict[str, float], list[Decision]]:
+    """Choose centre and half-ranges, fitted into the hard physical limits, and say why."""
+    settings, kept = study.campaign.surface, kept_factors(study, climb.kept)
     center, center_rule = _center(settings, climb)
-    half_range, half_rule = _half_range(study, climb)
-    reach = _axial_reach(kept_factors(study, climb.kept), settings)
+    half_range, half_rule = _half_range(settings, climb, kept)
+    coded = central_composite(kept, settings.alpha, settings.center_points).coded
+    reach = float(coded.abs().to_numpy().max())
     fitted = {
         name: fit_inside(center[name], half_range[name], reach, *study.limits.get(name, UNLIMITED))
         for name in climb.kept
@@ -114,18 +90,15 @@ def _place(study: CampaignStudy, climb: ClimbResult) -> _Placement:
     shrunk = [n for n in climb.kept if not math.isclose(new_half[n], half_range[n])]
     note = f" Moved into the physical limits: {', '.join(moved)}." if moved else ""
     shrink = f" Shrunk to stay inside the physical limits: {', '.join(shrunk)}." if shrunk else ""
-    decisions = (
-        Decision(
-            STAGE, center_rule, numbered_values("center", new_center), f"Centre: {listed(new_center)}.{note}"
-        ),
-        Decision(
-            STAGE,
-            half_rule,
-            numbered_values("half-range", new_half),
-            f"Half-ranges: {listed(new_half)}.{shrink}",
-        ),
+    centers, halves = numbered_values("center", new_center), numbered_values("half-range", new_half)
+    return (
+        new_center,
+        new_half,
+        [
+            Decision(STAGE, center_rule, centers, f"Centre: {listed(new_center)}.{note}"),
+            Decision(STAGE, half_rule, halves, f"Half-ranges: {listed(new_half)}.{shrink}"),
+        ],
     )
-    return _Placement(new_center, new_half, decisions)
 
 
 def _center(settings: SurfaceSettings, climb: ClimbResult) -> tuple[dict[str, float], str]:
@@ -140,16 +113,14 @@ def _center(settings: SurfaceSettings, climb: ClimbResult) -> tuple[dict[str, fl
     )
 
 
-def _half_range(study: CampaignStudy, climb: ClimbResult) -> tuple[dict[str, float], str]:
-    settings = study.campaign.surface
+def _half_range(
+    settings: SurfaceSettings, climb: ClimbResult, kept: tuple[Factor, ...]
+) -> tuple[dict[str, float], str]:
     fixed = fixed_values(settings.half_range, climb.kept)
     if fixed is not None:
         return fixed, "The study fixes the half-ranges of the composite design."
     least = settings.half_range_least
-    values = {
-        factor.name: max(abs(climb.step[factor.name]), least * factor.half_range)
-        for factor in kept_factors(study, climb.kept)
-    }
+    values = {factor.name: max(abs(climb.step[factor.name]), least * factor.half_range) for factor in kept}
     rule = f"A half-range is one climb step, at least {least:g} of the factor's screening half-range."
     return values, rule
 
@@ -160,33 +131,11 @@ def fit_inside(
     """Fit a factor's axial points (center +- reach * half_range) between its hard limits.
 
     The half-range shrinks, but not below half of itself while moving the centre inward can avoid that.
-
-    Returns
-    -------
-    tuple of float
-        Centre and half-range.
     """
     least = min(0.5 * half_range, (high - low) / (2.0 * reach))
     center = min(max(center, low + reach * least), high - reach * least)
     room = (1.0 - ROUNDING) * min(center - low, high - center) / reach
     return center, min(half_range, room)
-
-
-def _axial_reach(factors: tuple[Factor, ...], settings: SurfaceSettings) -> float:
-    """Return the largest coded value of the design."""
-    return float(_composite(factors, settings).coded.abs().to_numpy().max())
-
-
-def _composite(factors: tuple[Factor, ...], settings: SurfaceSettings) -> Design:
-    return central_composite(factors, settings.alpha, settings.center_points)
-
-
-def _plan(study: CampaignStudy, design: Design) -> pd.DataFrame:
-    """Lay out the runs; the centre is replicated by its own rows."""
-    settings, scenes = study.campaign, scenes_of(study.target.fitted)
-    at_center = (design.coded == 0.0).all(axis=1)
-    replicates = {int(run): 1 if center else settings.surface.replicates for run, center in at_center.items()}
-    return plan_cases(study.factors, STAGE, design.natural, replicates, settings.seeds.campaign, scenes)
 
 
 def _fit(design: Design, cases: pd.DataFrame, response: Response) -> Surface:
@@ -243,11 +192,11 @@ def _fit_decision(
     )
 
 
-def _outside_ranges(study: CampaignStudy, design: Design) -> pd.DataFrame:
+def _outside_ranges(kept: tuple[Factor, ...], design: Design) -> pd.DataFrame:
     """List the runs outside the ranges that the study states."""
     rows = [
         {"run": run, "factor": factor.name, "value": value, "low": factor.low, "high": factor.high}
-        for factor in kept_factors(study, design.names)
+        for factor in kept
         for run, value in design.natural[factor.name].items()
         if not factor.low - 1e-9 * factor.half_range <= value <= factor.high + 1e-9 * factor.half_range
     ]
@@ -261,7 +210,10 @@ def _design_decision(
     cases: pd.DataFrame,
     responses: Sequence[Response],
 ) -> Decision:
-    where = _outside_sentence(outside)
+    points = [f"run {row.run} ({row.factor} = {row.value:.4g})" for row in outside.itertuples()]
+    where = (
+        f"Outside the stated ranges: {', '.join(points)}." if points else "All lie inside the stated ranges."
+    )
     return Decision(
         STAGE,
         "A central composite design, inside the hard physical limits; it may leave the stated ranges.",
@@ -273,10 +225,3 @@ def _design_decision(
         },
         f"{len(design.coded)} runs. {where} {failure_summary(cases, *responses)}".strip(),
     )
-
-
-def _outside_sentence(outside: pd.DataFrame) -> str:
-    if outside.empty:
-        return "All lie inside the stated ranges."
-    points = [f"run {row.run} ({row.factor} = {row.value:.4g})" for row in outside.itertuples()]
-    return f"Outside the stated ranges: {', '.join(points)}."

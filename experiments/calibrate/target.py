@@ -8,29 +8,23 @@ from doe import Sample
 from experiments.calibrate.cases import failure_summary, middle, plan_cases, values_of
 from experiments.calibrate.results import Decision, TargetResult
 from experiments.calibrate.values import key_of, numbered_values, quantity
-from experiments.studyfile.campaign import CampaignStudy, Response, scenes_of
+from experiments.studyfile import Study
+from experiments.studyfile.campaign import Response
 
 STAGE = "target"
 
 
-def plan_target(study: CampaignStudy) -> pd.DataFrame:
+def plan_target(study: Study) -> pd.DataFrame:
     """Lay out the cases of a twin study's target, with seeds that no case of the campaign has."""
-    target, seeds = study.target, study.campaign.seeds
+    target = study.target
     if target.twin is None:
         raise ValueError("a measured target has no cases")
     hidden = pd.DataFrame([middle(study.factors, target.twin.truth)], index=[1])
-    scenes = scenes_of(target.responses)
-    return plan_cases(study.factors, STAGE, hidden, target.twin.replicates, seeds.target, scenes)
+    return plan_cases(study, STAGE, hidden, target.twin.replicates, target.responses)
 
 
-def settle_target(study: CampaignStudy, cases: pd.DataFrame | None = None) -> TargetResult:
-    """Take what was measured as it is, or in a twin study what its simulated cases give.
-
-    Raises
-    ------
-    StageEnd
-        When fewer than two cases of a twin study gave a response.
-    """
+def settle_target(study: Study, cases: pd.DataFrame | None = None) -> TargetResult:
+    """Take what was measured, or in a twin study what its cases give; StageEnd with fewer than two values."""
     target = study.target
     samples = {r.name: _sample(r, cases) for r in target.responses}
     numbers: dict[str, float] = {}
@@ -39,8 +33,8 @@ def settle_target(study: CampaignStudy, cases: pd.DataFrame | None = None) -> Ta
             numbers[key_of(what, response)] = getattr(sample, what)
         numbers[f"n of {response.name}"] = sample.n
     aims = [
-        f"{r.name} {quantity(samples[r.name].mean, r.unit)}, known to {quantity(samples[r.name].se, r.unit)}"
-        for r in target.responses
+        f"{r.name} {quantity(s.mean, r.unit)}, known to {quantity(s.se, r.unit)}"
+        for r, s in zip(target.responses, samples.values(), strict=True)
     ]
     outcome = f"To be matched: {'; '.join(aims)} (standard error)."
     rule, truth = "The target is the mean of the physical measurements.", None

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 from doe import Factor
 
 if TYPE_CHECKING:
-    from experiments.studyfile.campaign import CampaignStudy, Response
+    from experiments.studyfile import Study
+    from experiments.studyfile.campaign import Response
 
 UNLIMITED = (float("-inf"), float("inf"))
 
@@ -59,13 +60,13 @@ def key_of(what: str, response: Response) -> str:
     return f"{what} of {response.name}{unit}"
 
 
-def kept_factors(study: CampaignStudy, kept: Iterable[str]) -> tuple[Factor, ...]:
+def kept_factors(study: Study, kept: Iterable[str]) -> tuple[Factor, ...]:
     """Return the study's factors of these names, in the order of the names."""
     by_name = {factor.name: factor for factor in study.factors}
     return tuple(by_name[name] for name in kept)
 
 
-def reach_limits(study: CampaignStudy) -> dict[str, tuple[float, float]]:
+def reach_limits(study: Study) -> dict[str, tuple[float, float]]:
     """Return how far a climb may go: the reach of the settings inside the hard physical limits."""
     reach = study.campaign.climb.reach
     limits = {}

@@ -5,54 +5,44 @@ from __future__ import annotations
 import pandas as pd
 
 from doe import Comparison, compare_means
-from experiments.calibrate.cases import Runner, failure_summary, plan_cases, simulate, values_of
+from experiments.calibrate.cases import Runner, failure_summary, plan_cases, values_of
 from experiments.calibrate.results import Decision, OptimumResult, TargetResult, VerificationResult
 from experiments.calibrate.values import interval_text, key_of, p_text, quantity
-from experiments.studyfile.campaign import CampaignStudy, Response, VerificationSettings, scenes_of
+from experiments.studyfile import Study
+from experiments.studyfile.campaign import Response
 
 STAGE = "verification"
 
 
-def verify(
-    study: CampaignStudy, optimum: OptimumResult, target: TargetResult, runner: Runner
-) -> VerificationResult:
+def verify(study: Study, optimum: OptimumResult, target: TargetResult, runner: Runner) -> VerificationResult:
     """Simulate the chosen point with fresh seeds; test every response for a difference and for equivalence.
 
-    The level of the tests is shared among the responses (Bonferroni).
-
-    Raises
-    ------
-    StageEnd
-        When fewer than two cases gave a response.
+    The level of the tests is shared among the responses (Bonferroni). StageEnd with fewer than two values.
     """
     settings, responses = study.campaign.verification, study.target.responses
-    point, seed = pd.DataFrame([optimum.settings], index=[1]), study.campaign.seeds.campaign
-    plan = plan_cases(study.factors, STAGE, point, settings.replicates, seed, scenes_of(responses))
-    cases = simulate(runner, plan)[0]
+    point = pd.DataFrame([optimum.settings], index=[1])
+    cases = runner(plan_cases(study, STAGE, point, settings.replicates, responses))
     alpha = settings.alpha / len(responses)
     tests = {}
     for response in responses:
         aim = target.responses[response.name]
         margin = settings.margin if response is responses[0] else None
         margin = settings.margin_sds * aim.sd if margin is None else margin
-        tests[response.name] = compare_means(
-            values_of(cases, STAGE, response), aim, margin=margin, alpha=alpha
-        )
-    verified = all(_verified(test, settings) for test in tests.values())
+        values = values_of(cases, STAGE, response)
+        tests[response.name] = compare_means(values, aim, margin=margin, alpha=alpha)
+    verified = all(
+        not test.different and (test.equivalent or not settings.require_equivalence)
+        for test in tests.values()
+    )
     decisions = [_decision(response, tests[response.name], cases) for response in responses]
     return VerificationResult(tests, cases, verified, tuple(decisions))
-
-
-def _verified(test: Comparison, settings: VerificationSettings) -> bool:
-    """Tell if fresh cases show no difference and, where the study asks for it, equivalence."""
-    return not test.different and (bool(test.equivalent) or not settings.require_equivalence)
 
 
 def _decision(response: Response, test: Comparison, cases: pd.DataFrame) -> Decision:
     """Say how fresh cases compare with the target of a response."""
     found = "A difference is found" if test.different else "No difference is found"
     shown = "is shown" if test.equivalent else "is not shown"
-    unit, own = response.unit, cases[cases["scene"] == response.scene]
+    unit = response.unit
     held_out = ", which took no part in the fit" if response.held_out else ""
     margin, smallest = (quantity(value, unit) for value in (test.margin or 0.0, test.smallest_margin))
     return Decision(
@@ -74,5 +64,5 @@ def _decision(response: Response, test: Comparison, cases: pd.DataFrame) -> Deci
         f"{found} ({p_text(test.p)}): {quantity(test.difference, unit, '+')}, "
         f"{100.0 * (1.0 - test.alpha):.3g} % interval {interval_text(test.interval, unit, '+')}. "
         f"Equivalence {shown} ({p_text(test.equivalence_p)}); these cases show it from a margin of "
-        f"{smallest} on. {failure_summary(own, response)}".strip(),
+        f"{smallest} on. {failure_summary(cases, response)}".strip(),
     )

@@ -47,7 +47,6 @@ def engine_named(name: str | None) -> Engine | None:
     if name is None:
         return None
     if name not in ENGINES:
-        raise InputError(
-            f"must be one of {', '.join(ENGINES) or 'none, no package adds any'}", name, "engine"
-        )
+        known = ", ".join(ENGINES) or "none, no package adds any"
+        raise InputError(f"must be one of {known}", name, "engine")
     return ENGINES[name]

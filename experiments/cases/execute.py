@@ -48,12 +48,8 @@ def run_cases(
         Store of the results; each is saved as it ends, failed ones too: the same case fails again. A run
         that the machine ends raises, and leaves no result of what was running. Checkpoints of the running
         cases are kept there too: what an interrupted run had begun goes on where it was.
-    device
-        ``"cpu"``, ``"cuda"``, ``"cuda:1"``; None: the engine's choice.
-    workers
-        Processes on the CPU; None: the engine's choice.
-    progress
-        Called with the engine's progress.
+    device, workers, progress
+        As of `dem_warp.simulate`.
 
     Returns
     -------
@@ -92,9 +88,8 @@ def run_cases(
 
 def _check_columns(table: pd.DataFrame) -> None:
     if "seed" not in table.columns:
-        raise ValueError(
-            f"a table of cases needs the column 'seed', has {', '.join(map(str, table.columns))}"
-        )
+        has = ", ".join(map(str, table.columns))
+        raise ValueError(f"a table of cases needs the column 'seed', has {has}")
     if taken := [name for name in RESULT_COLUMNS if name in table.columns]:
         raise ValueError(f"a table of cases must not have the columns of its results: {', '.join(taken)}")
 

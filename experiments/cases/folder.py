@@ -27,17 +27,6 @@ def open_folder(
 ) -> tuple[Store, list[str]]:
     """Make a campaign's folder, or go on in an existing one.
 
-    Parameters
-    ----------
-    folder
-        The output folder.
-    study
-        The study that will run.
-    resume
-        Go on in a folder that an earlier run left.
-    engine
-        What simulates; None: `dem_warp.simulate`.
-
     Returns
     -------
     store

@@ -68,7 +68,10 @@ class Heap:
             "reason": self.reason,
             "fit": self.study.measurement.fit,
             "angle": {"mean": angle.mean, "se": angle.se} if angle else None,
-            "views": _views(angle) if angle else [],
+            "views": [
+                {"azimuth": math.degrees(azimuth), "left": view.left, "right": view.right}
+                for azimuth, view in (zip(angle.azimuths, angle.views, strict=True) if angle else ())
+            ],
             "observables": self.observed.observables,
             "observable_units": self.units,
             "provenance": self.result.provenance,
@@ -83,22 +86,7 @@ def simulate_heap(
     progress: Callable[[Progress], None] | None = None,
     scene: str = TARGET_SCENE,
 ) -> Heap:
-    """Simulate one case and measure its heap.
-
-    Parameters
-    ----------
-    study
-        Study that the case is made from.
-    settings
-        Values by factor name in natural units; a factor that is not named is at its middle.
-    seed
-        Seed of everything random in the case.
-    device
-        ``"cpu"``, ``"cuda"``, ``"cuda:1"``; None: the engine's choice.
-    progress
-        Called with the engine's progress.
-    scene
-        Name of the scene: the study's own, or a further one that its responses are measured in.
+    """Simulate one case and measure its heap; settings, seed and scene are those of `Study.case`.
 
     Raises
     ------
@@ -112,18 +100,7 @@ def simulate_heap(
 
 
 def heap_picture(study: Study, result: CaseResult, angle: HeapAngle | None, view: int = 0) -> np.ndarray:
-    """Draw a heap, with the flanks that were fitted in one of its views.
-
-    Parameters
-    ----------
-    study
-        The study whose measurement gave the angle.
-    result
-        The case.
-    angle
-        Its measured angle; None: no flanks are drawn.
-    view
-        Which of the angle's views.
+    """Draw a heap, with the flanks that were fitted in one of its views; without an angle, without flanks.
 
     Returns
     -------
@@ -163,10 +140,3 @@ def write_spheres(path: Path, result: CaseResult) -> None:
     points["grain"] = result.sphere_grain
     points["shape"] = result.shapes[result.sphere_grain]
     points.save(path)
-
-
-def _views(angle: HeapAngle) -> list[dict[str, float]]:
-    return [
-        {"azimuth": math.degrees(azimuth), "left": view.left, "right": view.right}
-        for azimuth, view in zip(angle.azimuths, angle.views, strict=True)
-    ]

@@ -22,14 +22,8 @@ A clump's centre of mass is a sum whose last bits differ between processors, by 
 def case_key(case: Case, engine: Engine | None = None, **more: object) -> str:
     """Key of a case: a hash of all that determines its result, the engine's own code included.
 
-    Parameters
-    ----------
-    case
-        The case. Spheres of its shapes that agree to `SHAPE_DIGITS` count as the same.
-    engine
-        What simulates it; None: `dem_warp.simulate`.
-    more
-        Whatever else determines what is kept under the key, as JSON-able data.
+    Spheres of its shapes that agree to `SHAPE_DIGITS` count as the same. ``more`` is whatever else determines
+    what is kept under the key, as JSON-able data.
     """
     outside = [] if engine is None else [engine]
     if engine is not None:

@@ -25,14 +25,8 @@ _RECORD = "record"
 class Store:
     """Results of cases in a folder.
 
-    A case's file is written whole or not at all, and its checksums are verified when it is read.
-
-    Parameters
-    ----------
-    folder
-        The folder; it is made when the first case is saved.
-    engine
-        What makes the results; None: `dem_warp.simulate`.
+    A case's file is written whole or not at all, and its checksums are verified when it is read. The folder
+    is made when the first case is saved; without an engine, results are those of `dem_warp.simulate`.
     """
 
     def __init__(self, folder: str | Path, engine: Engine | None = None) -> None:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
-from types import TracebackType
 from typing import TYPE_CHECKING
 
 import typer
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn
 
 if TYPE_CHECKING:
@@ -31,13 +31,7 @@ messages = Console(stderr=True, highlight=False, soft_wrap=True)
 
 @contextmanager
 def clear_errors(resume: str | None = None) -> Iterator[None]:
-    """Turn errors into a message and an exit code: 2 for bad input, 130 for Ctrl-C.
-
-    Parameters
-    ----------
-    resume
-        Command that goes on after an interruption.
-    """
+    """Turn errors into a message and an exit code: 2 for bad input, 130 for Ctrl-C, with how to resume."""
     from doe import DesignError
     from experiments.errors import InputError
     from imaging import PictureError
@@ -53,25 +47,13 @@ def clear_errors(resume: str | None = None) -> Iterator[None]:
 
 
 def fail(message: str, code: int = BAD_INPUT) -> None:
-    """Say what is wrong and end the command.
-
-    Raises
-    ------
-    typer.Exit
-        Always.
-    """
-    messages.print(f"[bold red]Error:[/] {_plain(message)}")
+    """Say what is wrong and end the command by typer.Exit."""
+    messages.print(f"[bold red]Error:[/] {escape(message)}")
     raise typer.Exit(code)
 
 
 class CaseProgress:
-    """Shows how far a batch of cases is: a bar on a terminal, a line now and then elsewhere.
-
-    Parameters
-    ----------
-    title
-        What is being run.
-    """
+    """Shows how far a batch of cases is: a bar on a terminal, a line now and then elsewhere."""
 
     def __init__(self, title: str) -> None:
         self._title = title
@@ -92,9 +74,7 @@ class CaseProgress:
             self._bar.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         if messages.is_terminal:
             self._bar.stop()
 
@@ -112,13 +92,9 @@ class CaseProgress:
 
 
 def describe_progress(progress: BatchProgress, first: BatchProgress | None = None) -> str:
-    """Say how long it will take, how many cases are done, and what those that run are doing.
+    """Say how long it will take and what runs, as ``1 min 20 s left, 3 of 12 cases, 2 lift``.
 
     The speed is that since the `first` progress: what an earlier run had done is not this one's speed.
-
-    Examples
-    --------
-    ``1 min 20 s left, 3 of 12 cases, 2 lift``
     """
     parts = [f"{progress.done} of {progress.total} cases"]
     parts += [f"{count} {phase}" for phase, count in progress.phase_counts.items() if phase != "waiting"]
@@ -139,8 +115,3 @@ def duration(seconds: float) -> str:
     if whole < 3600:
         return f"{whole // 60} min {whole % 60} s"
     return f"{whole // 3600} h {whole % 3600 // 60} min"
-
-
-def _plain(text: str) -> str:
-    """Keep square brackets of a message from being read as markup."""
-    return text.replace("[", r"\[")

@@ -8,30 +8,13 @@ from typing import Any
 
 from experiments.errors import InputError
 from experiments.files import replacing
-from imaging import (
-    FitSettings,
-    PictureError,
-    ReposeAngle,
-    measure_photograph,
-    overlay,
-    read_picture,
-    save_picture,
-)
+from imaging import FitSettings, PictureError, measure_photograph, overlay, read_picture, save_picture
 
 
 def measure_pictures(
     pictures: Sequence[Path], fit: str = "flank", overlay_folder: Path | None = None
 ) -> list[dict[str, Any]]:
-    """Measure the repose angle of each picture.
-
-    Parameters
-    ----------
-    pictures
-        Picture files.
-    fit
-        Name of a fit, one of ``imaging.FITS``.
-    overlay_folder
-        Where copies with the fitted flanks are drawn: ``NAME-angle.png`` for each picture.
+    """Measure the repose angle of each picture, and draw the fitted flanks on copies, ``NAME-angle.png``.
 
     Returns
     -------
@@ -52,18 +35,14 @@ def measure_pictures(
         raise InputError("pictures to be drawn on need different names", ", ".join(twice), "--overlay")
     rows = []
     for picture, name in zip(pictures, names, strict=True):
+        angle, reason = None, ""
         try:
             angle = measure_photograph(picture, fit)
         except PictureError as error:
-            rows.append(_row(picture, fit, None, str(error)))
-            continue
-        rows.append(_row(picture, fit, angle, ""))
-        if overlay_folder:
+            reason = str(error)
+        values = {each: getattr(angle, each, None) for each in ("left", "right", "mean", "se")}
+        rows.append({"picture": str(picture), "fit": fit, **values, "reason": reason})
+        if overlay_folder and angle:
             with replacing(overlay_folder / name) as temporary:
                 save_picture(temporary, overlay(read_picture(picture), angle))
     return rows
-
-
-def _row(picture: Path, fit: str, angle: ReposeAngle | None, reason: str) -> dict[str, Any]:
-    values = {name: getattr(angle, name, None) for name in ("left", "right", "mean", "se")}
-    return {"picture": str(picture), "fit": fit, **values, "reason": reason}

@@ -26,13 +26,7 @@ class Clump:
     """How well it fits; None for spheres that were given."""
 
     def to_dict(self, density: float | None = None) -> dict[str, Any]:
-        """Describe the clump as JSON-able data, in mm and mg.
-
-        Parameters
-        ----------
-        density
-            Density of the solid [kg/m3], for the mass; None: without mass.
-        """
+        """Describe the clump as JSON-able data, in mm and mg; with a density [kg/m3], its mass too."""
         shape, fit = self.shape, self.fit
         spheres = [
             [1e3 * value for value in (*center, radius)]
@@ -51,17 +45,10 @@ class Clump:
 
 
 def make_clump(source: str, sphere_count: int | None = None, protrusion: float = 0.0) -> Clump:
-    """Read a clump, or fit one to a solid.
+    """Read a clump from a file of spheres (``x y z r`` in mm), or fit one to a solid.
 
-    Parameters
-    ----------
-    source
-        A file of spheres (``x y z r`` in mm), a mesh file in mm, or a solid by its dimensions in mm
-        (``tri-pyramid:5.90x3.93``).
-    sphere_count
-        Spheres to fill a solid with.
-    protrusion
-        How far a sphere may pass the solid's surface [m].
+    A solid is a mesh file in mm, or named by its dimensions in mm (``tri-pyramid:5.90x3.93``). A sphere may
+    pass its surface by the ``protrusion`` [m].
 
     Raises
     ------
@@ -70,9 +57,8 @@ def make_clump(source: str, sphere_count: int | None = None, protrusion: float =
     """
     given = ":" not in source and Path(source).suffix.lower() in SPHERE_FILES
     if given != (sphere_count is None):
-        rule = (
-            "spheres that are given are not fitted" if given else "a solid is filled with a number of spheres"
-        )
+        rule = "a solid is filled with a number of spheres"
+        rule = "spheres that are given are not fitted" if given else rule
         raise InputError(rule, sphere_count or "none", "--spheres")
     try:
         if sphere_count is None:

@@ -6,13 +6,7 @@ from dem_warp.device import resolve_device
 
 
 def resolve_devices(names: str | None) -> list[str]:
-    """Names of the devices to run on, as asked, or the GPU if there is one.
-
-    Parameters
-    ----------
-    names
-        ``"cpu"``, ``"cuda"``, ``"cuda:1"``, or several GPUs, as ``"cuda:0,cuda:1"``; None: the engine's
-        choice.
+    """Names of the devices to run on: as asked, several GPUs as ``"cuda:0,cuda:1"``, or the engine's choice.
 
     Raises
     ------

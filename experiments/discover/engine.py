@@ -34,14 +34,8 @@ class EngineSimulator:
         Mechanisms that points may name, from its `library_for`.
     table
         Where outcomes are kept; what is there already is not simulated again.
-    device
-        One, or several GPUs, as `devices.resolve_devices` reads them; None: the engine's choice.
-    workers
-        Processes that simulate, on the CPU, and that measure; None: one a core.
-    worlds, drivers
-        Worlds of one launch, and launches at once; None: the choice of `WaveRunner`.
-    progress
-        Called with the progress of all points of a call that are not kept yet.
+    device, workers, worlds, drivers, progress
+        As of `WaveRunner`, a wave being all points of a call that are not kept yet.
     """
 
     observables = NAMES

@@ -114,28 +114,16 @@ class Mechanism:
     def factor(self, low: float | None = None, high: float | None = None) -> dict[str, Any]:
         """Write it as a ``[[factor]]`` of a study, its range this one or the whole."""
         ends = (self.null if low is None else low, self.maximum if high is None else high)
-        written = [end if self.unit == "1" else str(Quantity(end, self.unit)) for end in ends]
-        return {
-            "name": self.name,
-            "label": self.title,
-            "parameter": list(self.parameters),
-            "low": written[0],
-            "high": written[1],
-        }
+        low_end, high_end = (end if self.unit == "1" else str(Quantity(end, self.unit)) for end in ends)
+        places = list(self.parameters)
+        return {"name": self.name, "label": self.title, "parameter": places, "low": low_end, "high": high_end}
 
 
 def library_for(study: Study, files: Mapping[str, Path] = FILES) -> tuple[Mechanism, ...]:
-    """Read the mechanisms that a study may lack, in alphabetical order.
+    """Read the mechanisms that a study may lack from files by their names, in alphabetical order.
 
     One that the study cannot have is left out: its test has no such setting, a factor varies it already, it
     stands at the maximum, or something else in the study excludes it.
-
-    Parameters
-    ----------
-    study
-        The study; it says where each mechanism starts from, and how large its grains are.
-    files
-        The library: files by the names of the mechanisms.
 
     Raises
     ------
@@ -165,16 +153,9 @@ def with_mechanisms(
     mechanisms: Sequence[Mechanism],
     ranges: Mapping[str, tuple[float, float]] | None = None,
 ) -> Study:
-    """Add mechanisms to a study, each as one more factor.
+    """Add mechanisms of its `library_for` to a study, each as one more factor.
 
-    Parameters
-    ----------
-    study
-        The study.
-    mechanisms
-        Some of its `library_for`.
-    ranges
-        Ends of the factor's range by mechanism; left out: from its null to its maximum.
+    A mechanism without ends of its own in ``ranges`` goes from its null to its maximum.
 
     Raises
     ------

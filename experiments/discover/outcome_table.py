@@ -26,11 +26,7 @@ class OutcomeTable:
     """A table of outcomes in a file.
 
     Rows are written in transactions: a run that is killed loses none that it has saved, and leaves none half.
-
-    Parameters
-    ----------
-    path
-        The file; it is made when the first row is saved.
+    The file is made when the first row is saved.
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -71,9 +67,7 @@ class OutcomeTable:
             When the file is no such table.
         """
         self.path.parent.mkdir(parents=True, exist_ok=True)
-        rows = [
-            (key, np.asarray(values, "<f8").tobytes(), reason) for key, (values, reason) in outcomes.items()
-        ]
+        rows = [(key, np.asarray(row, "<f8").tobytes(), reason) for key, (row, reason) in outcomes.items()]
         with closing(self._open()) as file, file:
             file.executemany("INSERT OR REPLACE INTO outcome VALUES (?, ?, ?)", rows)
 

@@ -85,15 +85,7 @@ class Search:
         return hashlib.sha256(text.encode()).hexdigest()
 
     def make_bank(self, simulator: Simulator, maker: Mapping[str, str] | None = None) -> Bank:
-        """Run the library waves, all in one call.
-
-        Parameters
-        ----------
-        simulator
-            Answers them.
-        maker
-            Engine behind it; None for what is no engine.
-        """
+        """Run the library waves, all in one call; ``maker`` tells of the engine behind the simulator."""
         points = bank_points(self.space, self.settings)
         outcomes = simulator(points)
         return make_bank(self.space, simulator.observables, points, outcomes, self.fingerprint, maker)
@@ -107,18 +99,14 @@ class Search:
             When the file is no bank, or that of another study.
         """
         bank = load_bank(path).renamed(FORMER_NAMES)
-        mine = self.space
-        if bank.study not in ("", self.fingerprint) or bank.space.without(*bank.space.names) != mine.without(
-            *mine.names
-        ):
+        mine, its = self.space, bank.space
+        if bank.study not in ("", self.fingerprint) or its.without(*its.names) != mine.without(*mine.names):
             rule = (
                 "must be the bank of this study, at this scale: the same grain, test, factors and conditions"
             )
             raise InputError(rule, "another study's", str(path))
-        if not any(mechanism in mine.mechanisms for mechanism in bank.space.mechanisms):
-            raise InputError(
-                "must hold a mechanism that is looked for", ", ".join(bank.space.names), str(path)
-            )
+        if not any(mechanism in mine.mechanisms for mechanism in its.mechanisms):
+            raise InputError("must hold a mechanism that is looked for", ", ".join(its.names), str(path))
         return bank
 
     def analysis(self, measured: Measured, bank: Bank, seed: int) -> Analysis:

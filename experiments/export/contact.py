@@ -39,14 +39,9 @@ class Contact:
 
 
 def contacts_of(case: Case[Any], radius: float, mass: float) -> tuple[Contact, Contact]:
-    """Contacts of a case: of grains with grains, and with walls.
+    """Contacts of a case whose walls are of one material: of grains with grains, and with walls.
 
-    Parameters
-    ----------
-    case
-        Any test whose walls are of one material.
-    radius, mass
-        Radius of a grain's largest sphere [m], and mass of a grain [kg].
+    The radius is that of a grain's largest sphere [m], the mass that of a grain [kg].
 
     Raises
     ------

@@ -7,7 +7,6 @@ import math
 import numpy as np
 from scipy.optimize import brentq
 
-from dem_warp import Material
 from experiments.export.contact import Contact, Exporter, Term, values
 
 TSUJI = (4.8218, -18.022, 27.467, -22.348, 11.087, -4.2783, 1.2728)
@@ -17,11 +16,6 @@ ROLLING_OVERLAP = 0.01
 """The spring that resists rolling is as stiff as a tangential one at this overlap, in radii."""
 
 _SOURCE = "LAMMPS documentation, pair_style granular"
-
-
-def material_terms(material: Material) -> tuple[Term, ...]:
-    """Nothing: LAMMPS has all terms by contact."""
-    return ()
 
 
 def contact_terms(contact: Contact) -> tuple[Term, ...]:
@@ -83,6 +77,6 @@ LAMMPS = Exporter(
     "LAMMPS",
     "pair_style granular: hertz/material, tangential mindlin, rolling sds, damping tsuji",
     "Its resistance to rolling is a spring of its own with a slider; only the limit is the case's.",
-    material_terms,
+    lambda material: (),  # LAMMPS has all terms by contact
     contact_terms,
 )

@@ -39,14 +39,7 @@ NEEDED = COLUMNS[:3]
 
 
 def read_measured(path: Path, study: Study) -> Measured:
-    """Read measured heaps.
-
-    Parameters
-    ----------
-    path
-        The file; its columns stand at the head of this module.
-    study
-        Whose conditions were tested, and whose measurement angles of pictures are read with.
+    """Read heaps measured under the conditions of a study, as its measurement says; columns: see above.
 
     Raises
     ------
@@ -94,8 +87,7 @@ class _Found:
         """Raise an error with all that is wrong if a row cannot be read, or wrong units leave no value."""
         if self.problems or (self.doubts and not any(self.heaps.values())):
             wrong = sorted([*self.problems, *self.doubts], key=itemgetter(0))
-            first, *more = (problem for _, problem in wrong)
-            raise InputError(first.rule, first.value, first.place, tuple(more))
+            raise InputError.of(problem for _, problem in wrong)
 
 
 def _heap_of(row: Row, conditions: Collection[str]) -> tuple[str, str]:
@@ -136,21 +128,13 @@ def _gather(
     if not found:
         raise InputError("needs at least one measured value", "none", str(path))
     observables = tuple(name for name in NAMES if name in found)
-    groups = {
-        condition.name: [heap for (name, _), heap in settled.items() if name == condition.name]
-        for condition in conditions
-    }
-    groups = {name: group for name, group in groups.items() if group}
-    measured = Measured(
-        tuple(groups),
-        observables,
-        {
-            name: np.array([[(heap or {}).get(column, np.nan) for column in observables] for heap in group])
-            for name, group in groups.items()
-        },
-        {name: tuple(CLOGGED if heap is None else "" for heap in group) for name, group in groups.items()},
-        _pictures(path.parent, heaps),
-    )
+    values, reasons = {}, {}
+    for condition in conditions:
+        if group := [heap for (name, _), heap in settled.items() if name == condition.name]:
+            rows = [[(heap or {}).get(column, np.nan) for column in observables] for heap in group]
+            values[condition.name] = np.array(rows)
+            reasons[condition.name] = tuple(CLOGGED if heap is None else "" for heap in group)
+    measured = Measured(tuple(values), observables, values, reasons, _pictures(path.parent, heaps))
     held_out = {condition.name: condition.held_out for condition in conditions}
     return replace(measured, notes=(*notes, *data_notes(measured, held_out)))
 
@@ -192,9 +176,9 @@ def _drop_inversions(heap: str, values: dict[str, float], notes: list[str]) -> N
 
 def _pictures(folder: Path, heaps: Mapping[tuple[str, str], list[Reading]]) -> dict[str, tuple[Path, ...]]:
     """Pictures of each condition, each once."""
-    found: dict[str, dict[Path, None]] = {}
+    found: dict[str, list[Path]] = {}
     for (condition, _), readings in heaps.items():
-        for reading in readings:
-            if reading.row["picture"]:
-                found.setdefault(condition, {})[folder / reading.row["picture"]] = None
-    return {condition: tuple(paths) for condition, paths in found.items()}
+        named = [folder / reading.row["picture"] for reading in readings if reading.row["picture"]]
+        if named:
+            found.setdefault(condition, []).extend(named)
+    return {condition: tuple(dict.fromkeys(paths)) for condition, paths in found.items()}

@@ -20,22 +20,9 @@ SUSPICION = 0.01
 
 
 def data_notes(measured: Measured, held_out: Mapping[str, bool]) -> tuple[str, ...]:
-    """Look measured data over.
-
-    Parameters
-    ----------
-    measured
-        The data.
-    held_out
-        Conditions of the study, and whether each is kept out of the fit.
-    """
-    return (
-        *_missing(measured, held_out),
-        *_scarce(measured),
-        *_constant(measured),
-        *_copied(measured),
-        *_contradictory(measured),
-    )
+    """Look measured data over; every condition of the study is held out of the fit, or is not."""
+    looks = (_scarce, _constant, _copied, _contradictory)
+    return (*_missing(measured, held_out), *(note for look in looks for note in look(measured)))
 
 
 def _missing(measured: Measured, held_out: Mapping[str, bool]) -> Iterator[str]:

@@ -197,18 +197,10 @@ VERSION = 2
 
 
 def observables_of(told: Mapping[str, Told], leaves_a_heap: bool) -> dict[str, Observable]:
-    """Collect the observables of a scene by their columns in a table of cases.
-
-    Parameters
-    ----------
-    told
-        What the engine's scene tells of.
-    leaves_a_heap
-        Whether the scene ends in a heap, which pictures show.
-    """
+    """Collect what a scene tells of, and what pictures of its heap show, by columns in a table of cases."""
     heap = {each.column: each for each in OBSERVABLES} if leaves_a_heap else {}
-    rest = {
+    return heap | {
         name: Observable(name, name.replace("_", " "), unit, meaning)
         for name, (unit, meaning) in told.items()
+        if name not in heap
     }
-    return heap | {name: each for name, each in rest.items() if name not in heap}

@@ -26,16 +26,7 @@ class _Stated:
 
 
 def require_same_fit(fit: str, own: str, place: str) -> None:
-    """Refuse measured angles that were fitted to another part of the flank than simulated ones.
-
-    Parameters
-    ----------
-    fit
-        Name of the fit of the measured angles.
-    own
-        Name of the fit of the study.
-    place
-        Where the first stands.
+    """Refuse angles of a ``fit``, measured at a ``place``, other than the study's ``own``.
 
     Raises
     ------
@@ -49,16 +40,7 @@ def require_same_fit(fit: str, own: str, place: str) -> None:
 
 
 def find_pictures(pattern: str, folder: Path, place: str) -> list[Path]:
-    """Find the pictures that a pattern or a folder names.
-
-    Parameters
-    ----------
-    pattern
-        A folder, a file, or a pattern as ``photos/*.jpg``.
-    folder
-        Folder that it is relative to.
-    place
-        Where it stands, for error messages.
+    """Find the pictures that a folder or a pattern as ``photos/*.jpg``, relative to ``folder``, names.
 
     Raises
     ------
@@ -91,6 +73,5 @@ def measure_pictures(paths: Sequence[Path], fit: str) -> list[ReposeAngle]:
         except PictureError as error:
             problems.append(Problem("must show a heap that can be measured", str(error), str(path)))
     if problems:
-        first, *more = problems
-        raise InputError(first.rule, first.value, first.place, tuple(more))
+        raise InputError.of(problems)
     return angles

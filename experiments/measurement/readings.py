@@ -39,16 +39,7 @@ class Reading:
 
 
 def readings_of(row: Row, size: SizeOfTest, fit: str) -> Iterator[Reading]:
-    """Read everything that a row says of its heap.
-
-    Parameters
-    ----------
-    row
-        Of the columns observable, value, unit, fit, picture and pixel.
-    size
-        Of the test, which bounds the values.
-    fit
-        Part of the flank that angles of pictures are fitted to.
+    """Read everything that a row says of its heap, in a test of a size; pictures by a fit of the flanks.
 
     Raises
     ------

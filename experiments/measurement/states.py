@@ -43,17 +43,7 @@ def measure_heap(settings: MeasurementSection, result: CaseResult) -> HeapAngle:
 
 
 def observe(settings: MeasurementSection, result: CaseResult, leaves_a_heap: bool = True) -> Observed:
-    """Measure a case.
-
-    Parameters
-    ----------
-    settings
-        How pictures are taken and read.
-    result
-        How the case ended.
-    leaves_a_heap
-        Whether its scene ends in a heap; of another, what the scene tells of is all.
-    """
+    """Measure a case; of a scene that leaves no heap, what it tells of is all."""
     told = result.observables
     if result.status != "finished" or not leaves_a_heap:
         return Observed(told, reason=result.reason)
@@ -73,13 +63,6 @@ def observe(settings: MeasurementSection, result: CaseResult, leaves_a_heap: boo
 
 def measure(settings: MeasurementSection, result: CaseResult) -> tuple[np.ndarray, str]:
     """Measure all `OBSERVABLES` of a heap, or none.
-
-    Parameters
-    ----------
-    settings
-        How pictures are taken and read.
-    result
-        How the case ended.
 
     Returns
     -------

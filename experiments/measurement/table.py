@@ -29,16 +29,9 @@ class Row:
 
 
 def read_rows(path: Path, needed: Collection[str], known: Collection[str]) -> Iterator[Row]:
-    """Read the rows of a CSV file; empty rows, and rows that begin with ``#``, are skipped.
+    """Read the rows of a CSV file in UTF-8; empty rows, and rows that begin with ``#``, are skipped.
 
-    Parameters
-    ----------
-    path
-        The file, UTF-8, separated by commas. The first row names the columns.
-    needed
-        Columns that it must have.
-    known
-        Columns that it may have.
+    The first row names the columns: all that are needed, and of the known ones as many as it likes.
 
     Raises
     ------
@@ -51,9 +44,8 @@ def read_rows(path: Path, needed: Collection[str], known: Collection[str]) -> It
             header = cells
             _check_header(path, line, header, needed, known)
         elif any(cells[len(header) :]):
-            rule = (
-                f"a row has a cell for each of the {len(header)} columns (a comma inside a text needs quotes)"
-            )
+            rule = f"a row has a cell for each of the {len(header)} columns"
+            rule += " (a comma inside a text needs quotes)"
             raise InputError(rule, f"{len(cells)} cells", f"{path}:{line}")
         else:
             yield Row(path, line, dict(zip(header, cells, strict=False)))

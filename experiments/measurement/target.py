@@ -28,12 +28,7 @@ class Replicated:
 
 
 def with_measurements(study: Study) -> tuple[Study, tuple[str, ...]]:
-    """Take the numbers of a target from its pictures or its file.
-
-    Parameters
-    ----------
-    study
-        Whose ``[target]`` may name them.
+    """Take the numbers of a study's ``[target]`` from its pictures or its file.
 
     Returns
     -------
@@ -74,21 +69,9 @@ def with_measurements(study: Study) -> tuple[Study, tuple[str, ...]]:
 
 
 def target_tables(study: Study, measured: Iterable[Replicated]) -> dict[str, Any]:
-    """Write measurements as ``[target]`` and ``[[response]]`` tables of a study.
+    """Write measurements as ``[target]`` and ``[[response]]`` tables; none where none can take part in a fit.
 
     The angle of the first condition that takes part in the fit leads, or else its first observable.
-
-    Parameters
-    ----------
-    study
-        Whose conditions were measured.
-    measured
-        What was measured of them.
-
-    Returns
-    -------
-    dict
-        Empty where nothing was measured that can take part in a fit.
     """
     held_out = {condition.name for condition in study.conditions if condition.held_out}
     order = [TARGET_SCENE, *(condition.name for condition in study.conditions)]
@@ -117,26 +100,15 @@ def _given(study: Study, measured: list[Replicated], note: str) -> Study:
 def _table(study: Study, one: Replicated) -> dict[str, Any]:
     """Write one as the table of a response: numbers that read back as the same floats."""
     unit, column = BY_NAME[one.observable].unit, _column(one)
-    quantities = {
+    numbers: dict[str, Any] = {
         key: value if unit == "1" else f"{value!r} {unit}"
         for key, value in (("mean", float(one.sample.mean)), ("sd", float(one.sample.sd)))
-    }
-    own = one.condition == TARGET_SCENE or not _changes(study, one.condition)
-    if own:
-        return {"observable": column, **quantities, "n": one.sample.n}
+    } | {"n": one.sample.n}
+    # A condition that changes nothing is the study as it is written.
+    if not any(condition.changes for condition in study.conditions if condition.name == one.condition):
+        return {"observable": column, **numbers}
     name = f"{column}_{one.condition}".replace("-", "_")
-    return {
-        "name": name,
-        "observable": column,
-        "scene": one.condition,
-        **quantities,
-        "n": one.sample.n,
-    }
-
-
-def _changes(study: Study, condition: str) -> bool:
-    """Tell if a condition differs from the study as it is written."""
-    return any(one.changes for one in study.conditions if one.name == condition)
+    return {"name": name, "observable": column, "scene": one.condition, **numbers}
 
 
 def _column(one: Replicated) -> str:

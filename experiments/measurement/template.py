@@ -45,19 +45,7 @@ study's; left out, it is taken to be that."""
 
 
 def write_measured_template(study: Study, folder: Path | None = None) -> Path:
-    """Write a commented file for the measured heaps of a study.
-
-    Parameters
-    ----------
-    study
-        Whose conditions are to be measured.
-    folder
-        Where it is written; None: the current folder.
-
-    Returns
-    -------
-    Path
-        The file, ``NAME-measured.csv`` for ``NAME.toml``.
+    """Write a commented file for the measured heaps of a study, ``NAME-measured.csv`` for ``NAME.toml``.
 
     Raises
     ------
@@ -85,10 +73,9 @@ def write_measured_template(study: Study, folder: Path | None = None) -> Path:
 
 def _described(condition: Condition) -> str:
     """One condition, and what it changes."""
-    changes = (
-        "; ".join(f"{place} = {value}" for place, value in _flat(condition.changes)) or "the test as it is"
-    )
-    return f"    {condition.name}: {changes}{' (held out: it only judges)' if condition.held_out else ''}"
+    changes = "; ".join(f"{place} = {value}" for place, value in _flat(condition.changes))
+    held_out = " (held out: it only judges)" if condition.held_out else ""
+    return f"    {condition.name}: {changes or 'the test as it is'}{held_out}"
 
 
 def _flat(table: Mapping[str, Any], place: str = "") -> Iterator[tuple[str, Any]]:

@@ -8,7 +8,6 @@ from typing import Any
 from experiments.calibrate.results import STAGES, Campaign, Outcome
 from experiments.report.companion import Replay, companion_of
 from experiments.report.kit import html
-from experiments.report.kit.html import flat
 from experiments.report.pictures import HeapPicture
 from experiments.report.sections import TITLES, Context, chapter, failed_chapter, stage_chapters
 from experiments.report.study_facts import study_facts
@@ -66,8 +65,8 @@ def render_page(
         "labels": labels,
         "facts": study_facts(study),
         "pictures": pictures,
-        "provenance": flat(provenance or {}),
-        "settings": flat(campaign.settings.model_dump()),
-        "document": flat(study.document),
+        "provenance": html.flat(provenance or {}),
+        "settings": html.flat(campaign.settings.model_dump()),
+        "document": html.flat(study.document),
     }
     return html.render_page("calibration report", study.name, "sections/summary.html.j2", chapters, drawn_on)

@@ -13,7 +13,7 @@ from doe.palette import BLUE, GREEN, INK, MUTED, ORANGE, VERMILION
 from doe.plot_data import half_normal_points, pareto_points
 from experiments.calibrate.cases import measured
 from experiments.calibrate.results import ClimbResult, NoiseFloorResult, TargetResult, VerificationResult
-from experiments.report.kit.chart import Chart, add_line, add_points, add_target, new_figure
+from experiments.report.kit.chart import Chart, add_bars, add_line, add_points, add_target, new_figure
 from experiments.report.kit.numbers import axis_title, capital, hover, quantity
 from experiments.studyfile.campaign import Response
 
@@ -39,15 +39,9 @@ def pareto_chart(screen: ScreenResult, alpha: float, response: Response) -> Char
         (f"raises the {response.name}", BLUE, points[rises]),
         (f"lowers the {response.name}", ORANGE, points[~rises]),
     ):
-        figure.add_bar(
-            x=rows["abs_t"],
-            y=rows.index,
-            orientation="h",
-            name=name,
-            marker={"color": color},
-            customdata=rows[["effect"]],
-            hovertemplate=f"%{{y}}: effect {effect}, |t| = %{{x:.2f}}<extra></extra>",
-        )
+        sizes, shown = rows["abs_t"], f"%{{y}}: effect {effect}, |t| = %{{x:.2f}}"
+        more = {"orientation": "h", "customdata": rows[["effect"]]}
+        add_bars(figure, sizes, rows.index, name, color, shown, **more)
     ends = [points.index[0], points.index[-1]]
     levels = _critical_values(screen, alpha)
     for (name, value), dash in zip(levels.items(), ("dot", "dash", "solid"), strict=False):
@@ -58,9 +52,8 @@ def pareto_chart(screen: ScreenResult, alpha: float, response: Response) -> Char
     )
     figure.update_xaxes(range=[0.0, 1.06 * max(points["abs_t"].max(), *levels.values())])
     figure.update_layout(bargap=0.35)
-    return Chart(
-        "pareto-chart", "Pareto chart: effects in standard errors, with the critical values.", figure
-    )
+    caption = "Pareto chart: effects in standard errors, with the critical values."
+    return Chart("pareto-chart", caption, figure)
 
 
 def half_normal_chart(screen: ScreenResult, alpha: float, response: Response) -> Chart:
@@ -68,9 +61,8 @@ def half_normal_chart(screen: ScreenResult, alpha: float, response: Response) ->
     points = half_normal_points(screen.effects)
     figure = new_figure("half-normal quantile", f"|effect| on {axis_title(response)}")
     top = float(points["quantile"].max()) * 1.08
-    add_line(
-        figure, [0.0, top], [0.0, top * float(screen.standard_error.mean())], "noise alone", MUTED, "dot"
-    )
+    noise = [0.0, top * float(screen.standard_error.mean())]
+    add_line(figure, [0.0, top], noise, "noise alone", MUTED, "dot")
     dummy = points.index.isin(screen.design.dummies)
     active = points.index.isin(screen.significant(alpha))
     for name, rows, symbol, color in (
@@ -93,26 +85,16 @@ def climb_chart(climb: ClimbResult, target: TargetResult, response: Response) ->
     cases = measured(climb.cases, response)
     add_points(figure, cases["run"], cases[response.observable], "case", BLUE, size=7, opacity=0.6)
     kept = "<br>".join(f"{name} = %{{customdata[{i}]:.4g}}" for i, name in enumerate(climb.kept))
-    add_points(
-        figure,
-        path.index,
-        path["mean"],
-        "mean of the step",
-        BLUE,
-        mode="lines+markers",
-        line={"color": BLUE, "width": 2},
-        customdata=path[list(climb.kept)],
-        hovertemplate=f"step %{{x}}: {hover('y', response)}<br>{kept}<extra></extra>",
-    )
+    line: dict[str, Any] = {"mode": "lines+markers", "line": {"color": BLUE, "width": 2}}
+    line["hovertemplate"] = f"step %{{x}}: {hover('y', response)}<br>{kept}<extra></extra>"
+    line["customdata"] = path[list(climb.kept)]
+    add_points(figure, path.index, path["mean"], "mean of the step", BLUE, **line)
     if climb.crossing_step is not None:
         crossing = [climb.crossing_step], [target.leading.mean]
         add_points(figure, *crossing, "crosses the target", VERMILION, "diamond", 13)
     figure.update_xaxes(dtick=1)
-    return Chart(
-        "climb-chart",
-        f"{capital(response.name)} along the climb; the green band is the target ± 1 sd.",
-        figure,
-    )
+    caption = f"{capital(response.name)} along the climb; the green band is the target ± 1 sd."
+    return Chart("climb-chart", caption, figure)
 
 
 def verification_chart(result: VerificationResult, response: Response) -> Chart:
@@ -126,17 +108,10 @@ def verification_chart(result: VerificationResult, response: Response) -> Chart:
     figure.add_vline(x=0.0, line={"color": GREEN, "width": 2})
     heights = np.full(len(deviations), "cases")
     add_points(figure, deviations, heights, "single case", BLUE, opacity=0.7)
-    sides = {"array": [high - comparison.difference], "arrayminus": [comparison.difference - low]}
-    add_points(
-        figure,
-        [comparison.difference],
-        ["mean"],
-        f"mean and its {100.0 * (1.0 - comparison.alpha):g} % interval",
-        VERMILION,
-        "diamond",
-        12,
-        error_x={"type": "data", "symmetric": False, "thickness": 2, **sides},
-    )
+    mean, name = comparison.difference, f"mean and its {100.0 * (1.0 - comparison.alpha):g} % interval"
+    sides = {"symmetric": False, "array": [high - mean], "arrayminus": [mean - low]}
+    error = {"type": "data", "thickness": 2, **sides}
+    add_points(figure, [mean], ["mean"], name, VERMILION, "diamond", 12, error_x=error)
     reach = 1.2 * max(margin, abs(low), abs(high), float(np.abs(deviations).max()))
     figure.update_xaxes(range=[-reach, reach])
     figure.update_yaxes(ticks="", ticklabelstandoff=6, range=[-0.7, 1.7])
@@ -154,19 +129,8 @@ def _add_effects(
     figure: go.Figure, points: pd.DataFrame, name: str, symbol: str, color: str, response: Response
 ) -> None:
     """Draw effects; those that matter carry their names, the others tell them under the pointer."""
-    written: dict[str, Any] = {
-        "mode": "markers+text",
-        "textposition": "middle left",
-        "textfont": {"color": color},
-    }
-    add_points(
-        figure,
-        points["quantile"],
-        points["abs_effect"],
-        name,
-        color,
-        symbol,
-        text=list(points.index),
-        hovertemplate=f"%{{text}}: {hover('y', response)}<extra></extra>",
-        **(written if name == "significant" else {}),
-    )
+    more: dict[str, Any] = {"text": list(points.index)}
+    more["hovertemplate"] = f"%{{text}}: {hover('y', response)}<extra></extra>"
+    if name == "significant":
+        more |= {"mode": "markers+text", "textposition": "middle left", "textfont": {"color": color}}
+    add_points(figure, points["quantile"], points["abs_effect"], name, color, symbol, **more)

@@ -6,10 +6,10 @@ import itertools
 from collections.abc import Sequence
 
 from doe import JointFit
-from doe.palette import BLUE, GREEN, MUTED, ORANGE, PURPLE, SKY, VERMILION
+from doe.palette import BLUE, GREEN, MUTED, ORANGE, PURPLE, SKY
 from experiments.calibrate.results import OptimumResult, SurfaceResult, TargetResult
-from experiments.report.kit.chart import Chart, add_points, new_figure
-from experiments.report.surfaces import REGION_FILL, Slice, add_contours, add_design, add_region, point_in
+from experiments.report.kit.chart import Chart, add_bars, new_figure
+from experiments.report.surfaces import REGION_FILL, Slice, add_design, add_level, add_region, add_settings
 from experiments.studyfile.campaign import Response
 
 COLORS = (BLUE, ORANGE, PURPLE, SKY, MUTED)
@@ -35,17 +35,10 @@ def _shares_chart(joint: JointFit) -> Chart:
     figure = new_figure("", "share of the region explored [%]")
     names = [str(name) if place == 0 else f"+ {name}" for place, name in enumerate(table.index)]
     for title, column, color in (("alone", "alone", MUTED), ("with those before", "share", GREEN)):
-        figure.add_bar(
-            x=names,
-            y=100.0 * table[column],
-            name=title,
-            marker={"color": color},
-            hovertemplate="%{x}: %{y:.2f} %<extra></extra>",
-        )
+        add_bars(figure, names, 100.0 * table[column], title, color, "%{x}: %{y:.2f} %")
     figure.update_xaxes(title={"text": "response added"})
-    return Chart(
-        "joint-shares", "What is compatible with each response alone, and with those before it too.", figure
-    )
+    caption = "What is compatible with each response alone, and with those before it too."
+    return Chart("joint-shares", caption, figure)
 
 
 def _plane_chart(
@@ -57,25 +50,18 @@ def _plane_chart(
     target: TargetResult,
     responses: Sequence[Response],
 ) -> Chart:
-    fits = [
-        (response, surface.responses[response.name].reduced)
-        for response in responses
-        if not response.held_out
-    ]
+    fits = [(one, surface.responses[one.name].reduced) for one in responses if not one.held_out]
     plane = Slice(fits[0][1], x, y, optimum.point, fits[0][0])
     figure = new_figure(surface.design.factor(x).label, surface.design.factor(y).label)
     for (response, fit), color in zip(fits, itertools.cycle(COLORS)):
         name = response.name
         level = joint.goals[name].target.mean
         add_region(figure, plane, joint.band(name), f"{name} agrees", _translucent(color))
-        at_target = {"coloring": "none", "start": level, "end": level, "size": 1.0}
         grid = Slice(fit, x, y, optimum.point, response).grid()
-        add_contours(figure, grid, f"{name} at its target", at_target, color, 2, hoverinfo="skip")
+        add_level(figure, grid, f"{name} at its target", level, color, 2)
     add_region(figure, plane, joint.region(), "all agree", REGION_FILL.replace("0.28", "0.75"))
     add_design(figure, plane, surface.design)
-    if target.truth is not None:
-        add_points(figure, *point_in(plane, target.truth), "hidden truth", PURPLE, "star", 16)
-    add_points(figure, *point_in(plane, optimum.point), "chosen", VERMILION, "diamond", 13)
+    add_settings(figure, plane, target.truth, optimum.point, "chosen")
     caption = "Where each response agrees with its target, and where all do (green)."
     return Chart(f"joint-{x}-{y}", caption + plane.held_text, figure, height="tall")
 

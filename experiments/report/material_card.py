@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import shutil
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +10,7 @@ import numpy as np
 
 from doe import Region, Sample
 from experiments.calibrate.results import Campaign, OptimumResult
-from experiments.files import replacing, write_text
+from experiments.files import copy_file, write_text
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import Response
 from experiments.studyfile.card import MATERIAL, SECTIONS, shapes_of
@@ -35,28 +34,14 @@ HEAD = """\
 
 
 def write_material_card(campaign: Campaign, study: Study, folder: Path) -> Path | None:
-    """Write the card of a campaign that chose a point, and its clump files beside it.
-
-    Parameters
-    ----------
-    campaign, study
-        What was run.
-    folder
-        Where ``material.toml`` goes.
-
-    Returns
-    -------
-    Path or None
-        The card; None where the campaign chose no point.
-    """
+    """Write ``material.toml`` and its clump files into a folder; None where the campaign chose no point."""
     if campaign.optimum is None:
         return None
     card = material_card(campaign, campaign.optimum, study)
     for shape in shapes_of(card[MATERIAL]):
         source = study.file.parent / shape["clump"]
         shape["clump"] = f"material-{source.name}"
-        with replacing(folder / shape["clump"]) as temporary:
-            shutil.copyfile(source, temporary)
+        copy_file(source, folder / shape["clump"])
     write_text(folder / CARD, HEAD.format(card=CARD) + toml_text(card))
     return folder / CARD
 
@@ -101,9 +86,9 @@ def _response(campaign: Campaign, response: Response) -> dict[str, Any]:
         facts |= _written(campaign.target.responses[response.name], response.unit)
     if campaign.verification is not None:
         test, unit = campaign.verification.responses[response.name], response.unit
-        facts["fresh"] = _written(test.a, unit)
-        facts["fresh"] |= {"difference": _quantity(test.difference, unit)}
-        facts["fresh"] |= {"interval": [_quantity(end, unit) for end in test.interval]}
+        interval = [_quantity(end, unit) for end in test.interval]
+        difference = {"difference": _quantity(test.difference, unit), "interval": interval}
+        facts["fresh"] = _written(test.a, unit) | difference
     return facts
 
 

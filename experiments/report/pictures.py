@@ -77,19 +77,9 @@ def _spread(cases: pd.DataFrame, count: int) -> pd.DataFrame:
 
 
 def heap_row(study: Study, heaps: Mapping[str, CaseResult]) -> np.ndarray:
-    """Draw heaps next to each other at one scale, on one plate.
+    """Draw heaps next to each other at one scale, on one plate: (rows, columns, 3), blue-green-red.
 
-    Parameters
-    ----------
-    study
-        The study whose measurement gives the angles.
-    heaps
-        Finished cases by what is written above them (ASCII).
-
-    Returns
-    -------
-    numpy.ndarray
-        Picture (rows, columns, 3), blue-green-red.
+    The study's measurement gives the angles; heaps come by what is written above them (ASCII).
     """
     drawn = [drawn_heap(study, result) for result in heaps.values()]
     coarsest = max(picture.meters_per_pixel for _, picture, _ in drawn)
@@ -106,9 +96,8 @@ def heap_row(study: Study, heaps: Mapping[str, CaseResult]) -> np.ndarray:
     for (image, ground), title in zip(panels, heaps, strict=True):
         top, bottom = above - ground, below - (len(image) - ground)
         panel = cv2.copyMakeBorder(image, top, bottom, 0, 0, cv2.BORDER_REPLICATE)
-        cv2.putText(
-            panel, title, (12, ROW_HEAD - 12), cv2.FONT_HERSHEY_DUPLEX, 0.6, (40, 32, 28), 1, cv2.LINE_AA
-        )
+        place, font = (12, ROW_HEAD - 12), cv2.FONT_HERSHEY_DUPLEX
+        cv2.putText(panel, title, place, font, 0.6, (40, 32, 28), 1, cv2.LINE_AA)
         row.append(panel)
     return np.hstack(row)
 

@@ -9,8 +9,20 @@ import pandas as pd
 
 from doe import Sample, Surface
 
-QUALITY = ("r2", "r2_adjusted", "r2_predicted", "cv_percent", "adequate_precision")
-"""Measures of a fit, by their names in ``Surface``."""
+QUALITY = {
+    "r2": "R²",
+    "r2_adjusted": "R² adjusted",
+    "r2_predicted": "R² predicted",
+    "cv_percent": "coefficient of variation [%]",
+    "adequate_precision": "adequate precision (above 4 is wanted)",
+}
+"""Measures of a fit by their names in ``Surface``, in words."""
+
+
+def quality_of(models: Mapping[str, Surface]) -> pd.DataFrame:
+    """Measures of fits, one column a model."""
+    values = {model: [getattr(fit, name) for name in QUALITY] for model, fit in models.items()}
+    return pd.DataFrame(values, index=list(QUALITY))
 
 
 @dataclass(frozen=True)
@@ -39,9 +51,3 @@ class Published:
         """Analysis of variance of a model, with interactions written in the order of `names`."""
         swapped = {f"{b}:{a}": f"{a}:{b}" for i, a in enumerate(names) for b in names[i + 1 :]}
         return self.surfaces[model].anova.rename(index=swapped)
-
-    @property
-    def quality(self) -> pd.DataFrame:
-        """Measures of the fit, one column a model."""
-        values = {model: [getattr(fit, name) for name in QUALITY] for model, fit in self.surfaces.items()}
-        return pd.DataFrame(values, index=QUALITY)

@@ -10,9 +10,9 @@ from markupsafe import Markup
 
 from doe import JointFit
 from experiments.calibrate.joint import direction_text, open_directions
-from experiments.calibrate.results import Campaign
+from experiments.calibrate.results import Campaign, ScreeningResult, SurfaceResult
 from experiments.report.kit.numbers import term, unit_sign
-from experiments.report.kit.table import Column, Table, make_table
+from experiments.report.kit.table import Column, Layout, Table, columns, make_table
 from experiments.studyfile.campaign import TARGET_SCENE, OptimumSettings, Response
 
 
@@ -27,35 +27,28 @@ def goals_table(campaign: Campaign) -> Table:
         table = table.join(tests[["t", "p"]])
         apart = tests.index[~tests["agrees"]]
         marks = ["failed" if name in apart else "" for name in table.index]
-    columns = [
-        Column("response", "response"),
-        Column("scene", "scene"),
-        Column("unit", "unit"),
-        Column("target", "target", "free"),
-        Column("sd", "sd", "free"),
-        Column("n", "n", "label"),
-        Column("target_se", "se", "free"),
-        Column("noise", "sd of one case", "free"),
-        Column("fitted", "fit at the chosen point", "free"),
+    shown: Layout = [
+        *("response", "scene", "unit"),
+        *columns("free", target="target", sd="sd"),
+        "n",
+        *columns("free", target_se="se", noise="sd of one case", fitted="fit at the chosen point"),
         Column("t", "errors off", "ratio"),
-        Column("p", "p", "p"),
+        "p",
         Column("fresh", "fresh cases", "free"),
         Column("fresh_p", "p, no difference", "p"),
     ]
     note = "Scene: the study's own, or a further one by its name. The first response leads the climb."
     if "t" in table:
         note += " Errors off: the difference of fit and target, over the errors of both together."
-    return make_table("responses", table, columns, "Every response and its target.", note, marks)
+    return make_table("responses", table, shown, "Every response and its target.", note, marks)
 
 
 def _goal(campaign: Campaign, response: Response) -> dict[str, Any]:
     """Facts about a response; what is not known yet is left out."""
     name = response.name
     scene = "own" if response.scene == TARGET_SCENE else response.scene
-    facts: dict[str, Any] = {
-        "scene": f"{scene}, held out" if response.held_out else scene,
-        "unit": unit_sign(response.unit),
-    }
+    scene += ", held out" if response.held_out else ""
+    facts: dict[str, Any] = {"scene": scene, "unit": unit_sign(response.unit)}
     if campaign.target is not None:
         sample = campaign.target.responses[name]
         facts |= {"target": sample.mean, "sd": sample.sd, "n": sample.n, "target_se": sample.se}
@@ -72,15 +65,16 @@ def _goal(campaign: Campaign, response: Response) -> dict[str, Any]:
 
 def response_tables(campaign: Campaign) -> dict[str, Table]:
     """Lay out what several responses buy together; empty where there is one, or none was fitted."""
-    if campaign.optimum is None or campaign.optimum.joint is None:
+    screening, surface = campaign.screening, campaign.surface
+    joint = campaign.optimum.joint if campaign.optimum else None
+    if joint is None or screening is None or surface is None:
         return {}
-    joint = campaign.optimum.joint
     return {
         "responses": goals_table(campaign),
         "shrinkage": _shrinkage_table(campaign, joint),
         "directions": _directions_table(joint, campaign.settings.optimum),
-        "effects": _effects_table(campaign),
-        "surfaces": _surfaces_table(campaign),
+        "effects": _effects_table(screening, campaign.settings.selection.alpha),
+        "surfaces": _surfaces_table(surface),
     }
 
 
@@ -98,12 +92,11 @@ def _shrinkage_table(campaign: Campaign, joint: JointFit) -> Table:
         for column in ("cases", "simulated_time", "work"):
             table.loc[name, column] = 0.0 if scene in paid else costs.loc[scene, column]
         paid.add(scene)
-    columns = [
+    shown: Layout = [
         Column("response", "response added"),
         Column("share", "compatible with all so far", "free", "%"),
         Column("ratio", "over the row above", "free"),
-        Column("alone", "with it alone", "free", "%"),
-        Column("with_first", f"with the {table.index[0]} and it", "free", "%"),
+        *columns("free", "%", alone="with it alone", with_first=f"with the {table.index[0]} and it"),
         Column("cases", "cases for it", "label"),
         Column("simulated_time", "simulated", "count", "s"),
         Column("work", "share of the work", "percent", "%"),
@@ -113,7 +106,7 @@ def _shrinkage_table(campaign: Campaign, joint: JointFit) -> Table:
         "most; one that is measured in a scene that is simulated anyway takes no cases. Work: grains times "
         "simulated time."
     )
-    return make_table("shrinkage", table, columns, "What each response buys, and what it takes.", note)
+    return make_table("shrinkage", table, shown, "What each response buys, and what it takes.", note)
 
 
 def _directions_table(joint: JointFit, settings: OptimumSettings) -> Table:
@@ -123,9 +116,9 @@ def _directions_table(joint: JointFit, settings: OptimumSettings) -> Table:
     names = [factor.name for factor in joint.factors]
     table["moves"] = [direction_text(row) for _, row in joint.directions.iterrows()]
     table["open"] = np.where(table.index.isin(left), "open", "pinned down")
-    columns = [
+    shown: Layout = [
         Column("direction", "", "label"),
-        Column("moves", "moves"),
+        "moves",
         *(Column(name, f"{name} coded", "coded") for name in names),
         Column("half_width", "half width, coded", "free"),
         Column("span", "compatible span", "percent", "%"),
@@ -139,29 +132,24 @@ def _directions_table(joint: JointFit, settings: OptimumSettings) -> Table:
     )
     marks = ["chosen" if direction in left else "" for direction in table.index]
     caption = "Directions of the factors, the best known first."
-    return make_table("directions", table, columns, caption, note, marks)
+    return make_table("directions", table, shown, caption, note, marks)
 
 
-def _effects_table(campaign: Campaign) -> Table:
+def _effects_table(result: ScreeningResult, alpha: float) -> Table:
     """Lay out what every factor does to every response, in the screening."""
-    if (result := campaign.screening) is None:
-        raise ValueError("a campaign with an optimum has a screening")
-    alpha = campaign.settings.selection.alpha
     screens = {name: found.screen for name, found in result.responses.items()}
     frames = {name: screen.table[["effect", "p"]].add_prefix(f"{name} ") for name, screen in screens.items()}
     table = pd.concat(frames.values(), axis=1).rename_axis("factor")
-    columns = [Column("factor", "factor")]
+    shown: Layout = ["factor"]
     for name in screens:
-        columns += [Column(f"{name} effect", name, "free"), Column(f"{name} p", "p", "p")]
+        shown += [Column(f"{name} effect", name, "free"), Column(f"{name} p", "p", "p")]
     marks = ["strong" if row.filter(like=" p").min() < alpha else "" for _, row in table.iterrows()]
     note = f"Marked: p < {alpha:g} for one of them. Effects from low to high, in the response's unit."
-    return make_table("response-effects", table, columns, "Effects on every response.", note, marks)
+    return make_table("response-effects", table, shown, "Effects on every response.", note, marks)
 
 
-def _surfaces_table(campaign: Campaign) -> Table:
+def _surfaces_table(result: SurfaceResult) -> Table:
     """Lay out how well a quadratic describes every response."""
-    if (result := campaign.surface) is None:
-        raise ValueError("a campaign with an optimum has a surface")
     fits = {name: (fit.full, fit.reduced) for name, fit in result.responses.items()}
     rows = {
         name: {
@@ -175,16 +163,14 @@ def _surfaces_table(campaign: Campaign) -> Table:
         for name, (full, reduced) in fits.items()
     }
     table = pd.DataFrame.from_dict(rows, orient="index").rename_axis("response")
-    columns = [
-        Column("response", "response"),
+    shown: Layout = [
+        "response",
         Column("cases", "cases", "label"),
         Column("terms", "terms kept", write=_terms),
-        Column("r2", "R²", "ratio"),
-        Column("r2_predicted", "R² predicted", "ratio"),
-        Column("p_model", "p of the model", "p"),
-        Column("p_lack", "p of lack of fit", "p"),
+        *columns("ratio", r2="R²", r2_predicted="R² predicted"),
+        *columns("p", p_model="p of the model", p_lack="p of lack of fit"),
     ]
-    return make_table("response-surfaces", table, columns, "Surfaces of the responses.")
+    return make_table("response-surfaces", table, shown, "Surfaces of the responses.")
 
 
 def _terms(names: str) -> Markup:

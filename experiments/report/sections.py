@@ -142,15 +142,12 @@ def _surface(context: Context, result: SurfaceResult) -> Chapter:
     if published is not None and set(published.kept) != set(names):
         published = None
     paper = {model: published.anova(model, names) if published else None for model in ("full", "reduced")}
+    full, reduced, anova_table = fit.full.anova, fit.reduced.anova, stage_tables.anova_table
     tables = {
         "design": stage_tables.surface_design_table(result, campaign.responses),
-        "full": stage_tables.anova_table(
-            "anova-full", fit.full.anova, "Full quadratic model.", paper["full"]
-        ),
-        "reduced": stage_tables.anova_table(
-            "anova-reduced", fit.reduced.anova, "Reduced model.", paper["reduced"]
-        ),
-        "quality": stage_tables.quality_table(fit, published.quality if published else None),
+        "full": anova_table("anova-full", full, "Full quadratic model.", paper["full"]),
+        "reduced": anova_table("anova-reduced", reduced, "Reduced model.", paper["reduced"]),
+        "quality": stage_tables.quality_table(fit, published),
         "coefficients": stage_tables.coefficients_table(fit.reduced, response),
     }
     outside = stage_tables.outside_table(result)

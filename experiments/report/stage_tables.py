@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pandas as pd
 
-from doe import Factor, ScreenResult, Surface, compare_means
+from doe import Comparison, Factor, ScreenResult, Surface, compare_means
 from experiments.calibrate.results import (
     Campaign,
     ClimbResult,
@@ -19,23 +19,14 @@ from experiments.calibrate.results import (
     VerificationResult,
     failed,
 )
-from experiments.report.kit.numbers import term, unit_sign
-from experiments.report.kit.table import Column, Table, make_table
-from experiments.report.published import QUALITY, Published
+from experiments.report.kit.numbers import unit_sign
+from experiments.report.kit.table import Column, Layout, Table, columns, make_table
+from experiments.report.published import QUALITY, Published, quality_of
 from experiments.studyfile.campaign import Response
 
 SIGNIFICANT = 0.05
 """Rows of an analysis of variance with p below this are marked."""
 
-QUALITY_NAMES = (
-    "R²",
-    "R² adjusted",
-    "R² predicted",
-    "coefficient of variation [%]",
-    "adequate precision (above 4 is wanted)",
-)
-
-RUN = Column("run", "run", "label")
 ERROR_PERCENT = Column("error_percent", "relative error", "ratio", "%")
 PAPER_TEST = (Column("paper_F", "paper, F", "ratio"), Column("paper_p", "paper, p", "p"))
 
@@ -50,33 +41,19 @@ def factors_table(
     factors: Sequence[Factor], labels: Mapping[str, str], truth: Mapping[str, float] | None
 ) -> Table:
     """Lay out what the campaign may vary, and in a twin study the hidden values."""
-    frame = pd.DataFrame(
-        {
-            "factor": [factor.name for factor in factors],
-            "label": [labels.get(factor.name, "") for factor in factors],
-            "unit": [factor.unit for factor in factors],
-            "low": [factor.low for factor in factors],
-            "center": [factor.center for factor in factors],
-            "high": [factor.high for factor in factors],
-        }
-    )
+    levels = {f.name: {"low": f.low, "center": f.center, "high": f.high, "unit": f.unit} for f in factors}
+    frame = pd.DataFrame.from_dict(levels, orient="index").rename_axis("factor")
+    frame["label"] = [labels.get(name, "") for name in frame.index]
     if truth is not None:
-        frame["truth"] = frame["factor"].map(truth)
-    columns = [
-        Column("factor", "factor"),
-        Column("label", "parameter"),
-        Column("low", "low (−1)", "level"),
-        Column("center", "middle (0)", "level"),
-        Column("high", "high (+1)", "level"),
-        Column("truth", "hidden truth", "level"),
-        Column("unit", "unit"),
-    ]
-    return make_table("factors", frame, columns, "Factors and their levels.")
+        frame["truth"] = pd.Series(truth)
+    heads = columns("level", low="low (−1)", center="middle (0)", high="high (+1)", truth="hidden truth")
+    shown: Layout = ["factor", Column("label", "parameter"), *heads, "unit"]
+    return make_table("factors", frame, shown, "Factors and their levels.")
 
 
 def cases_table(name: str, cases: pd.DataFrame, responses: Sequence[Response], caption: str) -> Table:
     """Lay out replicated cases of one setting."""
-    shown = {response.observable: response for response in responses}
+    measured = {response.observable: response for response in responses}
     several = len(cases["scene"].unique()) > 1
     facts = (
         Column("grain_count", "grains", "count"),
@@ -84,27 +61,26 @@ def cases_table(name: str, cases: pd.DataFrame, responses: Sequence[Response], c
         Column("solid_fraction", "solid fraction", "share"),
         Column("time_to_rest", "time to rest", "ratio", "s"),
     )
-    columns = [
-        *([Column("scene", "scene")] if several else []),
-        Column("replicate", "case", "label"),
-        Column("seed", "seed", "label"),
-        *(column for column in facts if column.key not in shown),
-        *(response_column(response, key) for key, response in shown.items()),
-        Column("angle_se", "se of the angle over views", "angle", "°"),
-        Column("status", "status"),
+    shown: Layout = [
+        *(["scene"] if several else []),
+        *columns("label", replicate="case", seed="seed"),
+        *(column for column in facts if column.key not in measured),
+        *(response_column(response, key) for key, response in measured.items()),
+        *columns("angle", "°", angle_se="se of the angle over views"),
+        "status",
     ]
     lost = cases.index.isin(failed(cases, responses).index)
-    return make_table(name, cases, columns, caption, marks=["failed" if each else "" for each in lost])
+    return make_table(name, cases, shown, caption, marks=["failed" if each else "" for each in lost])
 
 
 def screening_design_table(result: ScreeningResult, responses: Sequence[Response]) -> Table:
     """Lay out the coded design with its responses."""
     values = {name: found.measured for name, found in result.responses.items()}
-    frame, columns = _with_responses(result.design.coded, values, responses)
+    frame, measured = _with_responses(result.design.coded, values, responses)
     coded = [Column(name, name, "coded") for name in result.design.coded.columns]
     note = f"Dummy columns, which stand for no factor: {', '.join(result.design.dummies) or 'none'}."
     caption = "Screening design (coded) and responses."
-    return make_table("screening-design", frame, [RUN, *coded, *columns], caption, note)
+    return make_table("screening-design", frame, ["run", *coded, *measured], caption, note)
 
 
 def effects_table(
@@ -119,41 +95,23 @@ def effects_table(
     frame.insert(0, "label", [labels.get(str(name), "") for name in frame.index])
     if published is not None:
         frame = frame.join(published[["F", "p"]].add_prefix("paper_"))
-    columns = [
-        Column("rank", "rank", "label"),
-        Column("factor", "factor"),
-        Column("label", "parameter"),
-        response_column(response, "effect", "effect"),
-        Column("sum_sq", "sum of squares", "sum"),
-        Column("percent", "share", "percent", "%"),
-        Column("F", "F", "ratio"),
-        Column("t", "t", "ratio"),
-        Column("p", "p", "p"),
-        *PAPER_TEST,
-    ]
+    effect, share = response_column(response, "effect", "effect"), Column("percent", "share", "percent", "%")
+    parameter = Column("label", "parameter")
+    shown: Layout = ["rank", "factor", parameter, effect, "sum_sq", share, "F", "t", "p", *PAPER_TEST]
     note = f"Marked: p < {alpha:g}. The effect is the change of the mean {response.name} from low to high."
     if published is not None:
         note += " The paper's columns are recomputed from its printed runs."
     caption = f"Effects of the factors on the {response.name}."
-    return make_table("effects", frame, columns, caption, note, _p_marks(frame["p"], alpha))
+    return make_table("effects", frame, shown, caption, note, p_marks(frame["p"], alpha))
 
 
 def anova_table(name: str, anova: pd.DataFrame, caption: str, published: pd.DataFrame | None = None) -> Table:
     """Lay out an analysis of variance, the paper's F and p beside it."""
     if published is not None:
         anova = anova.join(published[["F", "p"]].add_prefix("paper_")).rename_axis("source")
-    columns = [
-        Column("source", "source", write=term),
-        Column("df", "df", "label"),
-        Column("sum_sq", "sum of squares", "sum"),
-        Column("mean_sq", "mean square", "sum"),
-        Column("F", "F", "ratio"),
-        Column("p", "p", "p"),
-        *PAPER_TEST,
-    ]
-    return make_table(
-        name, anova, columns, caption, f"Marked: p < {SIGNIFICANT}.", _p_marks(anova["p"], SIGNIFICANT)
-    )
+    shown: Layout = ["source", "df", "sum_sq", "mean_sq", "F", "p", *PAPER_TEST]
+    note, marks = f"Marked: p < {SIGNIFICANT}.", p_marks(anova["p"])
+    return make_table(name, anova, shown, caption, note, marks)
 
 
 def selection_table(result: SelectionResult, response: Response) -> Table:
@@ -161,23 +119,21 @@ def selection_table(result: SelectionResult, response: Response) -> Table:
     frame = result.table.rename_axis("factor").copy()
     frame["kept"] = np.where(frame["kept"], "kept", "left at its middle")
     frame["visible"] = np.where(frame["visible"], "yes", "no")
-    columns = [
-        Column("factor", "factor"),
+    shown: Layout = [
+        "factor",
         response_column(response, "effect", "effect"),
-        Column("p", "p", "p"),
+        "p",
         *(Column(key, f"p, {key[2:]}", "p") for key in frame.columns if key.startswith("p_")),
-        Column("visible", "beyond the noise floor"),
-        Column("kept", "decision"),
-        Column("reason", "reason"),
+        *columns(visible="beyond the noise floor", kept="decision", reason="reason"),
     ]
     marks = ["strong" if kept else "" for kept in result.table["kept"]]
-    return make_table("selection", frame, columns, "Which factors the later stages vary.", marks=marks)
+    return make_table("selection", frame, shown, "Which factors the later stages vary.", marks=marks)
 
 
 def climb_table(result: ClimbResult, response: Response) -> Table:
     """Lay out the steps of the climb, the nearest to the target marked."""
-    columns = [
-        Column("step", "step", "label"),
+    shown: Layout = [
+        "step",
         *(Column(name, name, "value") for name in result.kept),
         response_column(response, "predicted", "predicted"),
         response_column(response, "mean"),
@@ -187,26 +143,15 @@ def climb_table(result: ClimbResult, response: Response) -> Table:
         ERROR_PERCENT,
     ]
     marks = ["chosen" if step == result.best_step else "" for step in result.path.index]
-    return make_table(
-        "climb",
-        result.path,
-        columns,
-        "The climb, step by step.",
-        "Marked: the step nearest to the target.",
-        marks,
-    )
+    note = "Marked: the step nearest to the target."
+    return make_table("climb", result.path, shown, "The climb, step by step.", note, marks)
 
 
 def paper_climb_table(path: pd.DataFrame) -> Table:
     """Lay out the paper's climb."""
-    names = [name for name in path.columns if name not in ("angle", "error_percent")]
-    columns = [
-        Column("step", "step", "label"),
-        *(Column(name, name, "value") for name in names),
-        Column("angle", "angle", "angle", "°"),
-        ERROR_PERCENT,
-    ]
-    return make_table("paper-climb", path, columns, "The paper's climb.")
+    factors = [Column(name, name, "value") for name in path.columns.drop(["angle", "error_percent"])]
+    shown: Layout = ["step", *factors, *columns("angle", "°", angle="angle"), ERROR_PERCENT]
+    return make_table("paper-climb", path, shown, "The paper's climb.")
 
 
 def surface_design_table(result: SurfaceResult, responses: Sequence[Response]) -> Table:
@@ -215,24 +160,18 @@ def surface_design_table(result: SurfaceResult, responses: Sequence[Response]) -
     natural = design.natural.join(design.points.add_suffix("_coded"))
     values = {name: found.measured for name, found in result.responses.items()}
     frame, measured = _with_responses(natural, values, responses)
-    columns = [
-        RUN,
-        *(Column(factor.name, factor.name, "value", factor.unit) for factor in design.factors),
-        *(Column(f"{name}_coded", f"{name} coded", "coded") for name in design.names),
-        *measured,
-    ]
-    return make_table("surface-design", frame, columns, "Composite design and responses.")
+    values_of = [Column(factor.name, factor.name, "value", factor.unit) for factor in design.factors]
+    coded = [Column(f"{name}_coded", f"{name} coded", "coded") for name in design.names]
+    shown: Layout = ["run", *values_of, *coded, *measured]
+    return make_table("surface-design", frame, shown, "Composite design and responses.")
 
 
 def outside_table(result: SurfaceResult) -> Table | None:
     """Lay out the runs that leave the stated ranges; None when none does."""
     if result.outside.empty:
         return None
-    columns = [RUN, Column("factor", "factor")]
-    columns += [
-        Column(key, head, "level") for key, head in (("value", "value"), ("low", "low"), ("high", "high"))
-    ]
-    return make_table("outside", result.outside, columns, "Runs outside the factors' stated ranges.")
+    shown: Layout = ["run", "factor", *columns("level", value="value", low="low", high="high")]
+    return make_table("outside", result.outside, shown, "Runs outside the factors' stated ranges.")
 
 
 def coefficients_table(surface: Surface, response: Response) -> Table:
@@ -246,62 +185,37 @@ def coefficients_table(surface: Surface, response: Response) -> Table:
             "p": surface.fit.pvalues,
         }
     ).rename_axis("term")
-    columns = [
-        Column("term", "term", write=term),
-        Column("natural", "natural units", "free", sign),
-        Column("coded", "coded", "sum", sign),
-        Column("coded_se", "se (coded)", "sum", sign),
-        Column("p", "p", "p"),
-    ]
-    return make_table(
-        "coefficients", frame.loc[surface.coefficients.index], columns, "Coefficients of the reduced model."
-    )
+    coded = columns("sum", sign, coded="coded", coded_se="se (coded)")
+    shown: Layout = ["term", *columns("free", sign, natural="natural units"), *coded, "p"]
+    frame = frame.loc[surface.coefficients.index]
+    return make_table("coefficients", frame, shown, "Coefficients of the reduced model.")
 
 
-def quality_table(result: FittedResponse, published: pd.DataFrame | None) -> Table:
+def quality_table(result: FittedResponse, published: Published | None) -> Table:
     """Lay out how well both models fit, the paper's beside them."""
-    names = dict(zip(QUALITY, QUALITY_NAMES, strict=True))
-    models = {"full": result.full, "reduced": result.reduced}
-    frame = pd.DataFrame(
-        {key: [getattr(model, name) for name in names] for key, model in models.items()}, index=names
-    )
+    frame = quality_of({"full": result.full, "reduced": result.reduced}).assign(measure=pd.Series(QUALITY))
     if published is not None:
-        frame = frame.join(published.add_prefix("paper_"))
-    frame.insert(0, "measure", list(names.values()))
-    columns = [
-        Column("measure", "measure"),
-        Column("full", "full", "share"),
-        Column("reduced", "reduced", "share"),
-    ]
-    columns += [Column(f"paper_{key}", f"paper, {key}", "share") for key in models]
-    return make_table("quality", frame, columns, "Quality of the fits.")
+        frame = frame.join(quality_of(published.surfaces).add_prefix("paper_"))
+    paper = {"paper_full": "paper, full", "paper_reduced": "paper, reduced"}
+    shown: Layout = ["measure", *columns("share", full="full", reduced="reduced", **paper)]
+    return make_table("quality", frame, shown, "Quality of the fits.")
 
 
 def ranges_table(optimum: OptimumResult) -> Table:
     """Lay out the chosen point with the values that are as good."""
-    ranges = optimum.region.ranges
-    frame = pd.DataFrame({"chosen": optimum.point, "low": ranges["low"], "high": ranges["high"]}).rename_axis(
-        "factor"
-    )
     factors = optimum.region.factors
-    frame = frame.loc[[factor.name for factor in factors]]
-    frame["unit"] = [factor.unit for factor in factors]
+    frame = optimum.region.ranges[["low", "high"]].loc[[factor.name for factor in factors]]
+    frame = frame.assign(chosen=pd.Series(optimum.point), unit=[factor.unit for factor in factors])
     frame["pinned"] = ["no" if name in optimum.unidentified else "yes" for name in frame.index]
     if optimum.truth is not None:
         frame["truth"] = pd.Series(optimum.truth.values)
-    columns = [
-        Column("factor", "factor"),
-        Column("chosen", "chosen", "free"),
-        Column("low", "compatible from", "free"),
-        Column("high", "to", "free"),
-        Column("truth", "hidden truth", "free"),
-        Column("unit", "unit"),
-        Column("pinned", "pinned down by the target"),
-    ]
+    heads = columns("free", chosen="chosen", low="compatible from", high="to", truth="hidden truth")
+    shown: Layout = ["factor", *heads, "unit", Column("pinned", "pinned down by the target")]
+    frame, caption = frame.rename_axis("factor"), "Chosen values and compatible ranges."
     note = (
         "The factors trade off against one another: not every combination inside these ranges is compatible."
     )
-    return make_table("ranges", frame, columns, "Chosen values and compatible ranges.", note)
+    return make_table("ranges", frame, shown, caption, note)
 
 
 def tests_table(
@@ -313,44 +227,31 @@ def tests_table(
         own = compare_means(published.heaps, published.measured, result.leading.margin)
         tests.insert(1, ("the paper", own, "deg"))
     rows = [
-        {
-            "response": name,
-            "unit": unit_sign(unit),
-            "mean": test.a.mean,
-            "sd": test.a.sd,
-            "n": test.a.n,
-            "difference": test.difference,
-            "low": test.interval[0],
-            "high": test.interval[1],
-            "t": test.t,
-            "df": test.df,
-            "p": test.p,
-            "margin": test.margin,
-            "equivalence_p": test.equivalence_p,
-            "smallest_margin": test.smallest_margin,
-        }
-        for name, test, unit in tests
+        {"response": name, "unit": unit_sign(unit), **comparison_facts(test)} for name, test, unit in tests
     ]
     level = f"{100.0 * (1.0 - result.leading.alpha):.3g} %"
     kind = "angle" if {unit for _, _, unit in tests} == {"deg"} else "free"
-    columns = [
-        Column("response", "response"),
-        Column("unit", "unit"),
-        Column("mean", "mean", kind),
-        Column("sd", "sd", kind),
-        Column("n", "n", "label"),
-        Column("difference", "less target", kind),
-        Column("low", f"{level} from", kind),
-        Column("high", "to", kind),
-        Column("t", "t", "ratio"),
-        Column("df", "df", "level"),
-        Column("p", "p, no difference", "p"),
-        Column("margin", "margin ±", kind),
-        Column("equivalence_p", "p, equivalent within it", "p"),
-        Column("smallest_margin", "smallest margin shown", kind),
+    shown: Layout = [
+        *("response", "unit"),
+        *columns(kind, mean="mean", sd="sd"),
+        "n",
+        *columns(kind, difference="less target", low=f"{level} from", high="to"),
+        "t",
+        *columns("level", df="df"),
+        *columns("p", p="p, no difference"),
+        *columns(kind, margin="margin ±"),
+        *columns("p", equivalence_p="p, equivalent within it"),
+        *columns(kind, smallest_margin="smallest margin shown"),
     ]
     note = "A large p of no difference is weak evidence with few cases; equivalence says how near is shown."
-    return make_table("tests", pd.DataFrame(rows), columns, "Tests of the difference from the target.", note)
+    return make_table("tests", pd.DataFrame(rows), shown, "Tests of the difference from the target.", note)
+
+
+def comparison_facts(test: Comparison) -> dict[str, float | None]:
+    """Numbers of a comparison of two means, by name; mean, sd and n are those of the first sample."""
+    low, high = test.interval
+    names = ("difference", "t", "df", "p", "margin", "equivalence_p", "smallest_margin")
+    return vars(test.a) | {"low": low, "high": high} | {name: getattr(test, name) for name in names}
 
 
 def failed_table(campaign: Campaign) -> Table | None:
@@ -359,17 +260,9 @@ def failed_table(campaign: Campaign) -> Table | None:
     if lost.empty:
         return None
     several = len(campaign.scene_costs) > 1
-    columns = [
-        Column("stage", "stage"),
-        *([Column("scene", "scene")] if several else []),
-        RUN,
-        Column("replicate", "replicate", "label"),
-        Column("seed", "seed", "label"),
-        Column("status", "status"),
-        Column("reason", "reason"),
-    ]
+    shown: Layout = ["stage", *(["scene"] if several else []), "run", "replicate", "seed", "status", "reason"]
     caption = f"{len(lost)} of {len(campaign.cases)} cases failed, or lack a response."
-    return make_table("failed", lost, columns, caption)
+    return make_table("failed", lost, shown, caption)
 
 
 def _with_responses(
@@ -377,15 +270,16 @@ def _with_responses(
 ) -> tuple[pd.DataFrame, list[Column]]:
     """Add responses to a design's settings: one column each, or one a replicate."""
     added: dict[str, np.ndarray] = {}
-    columns = []
+    heads = []
     for response in (one for one in responses if one.name in values):
         replicates = values[response.name].reshape(len(settings), -1)
         for i, column in enumerate(replicates.T, start=1):
             head = response.name if replicates.shape[1] == 1 else f"{response.name} {i}"
             added[f"response {head}"] = column
-            columns.append(response_column(response, f"response {head}", head))
-    return settings.assign(**added).rename_axis("run"), columns
+            heads.append(response_column(response, f"response {head}", head))
+    return settings.assign(**added).rename_axis("run"), heads
 
 
-def _p_marks(p: pd.Series, alpha: float) -> list[str]:
+def p_marks(p: pd.Series, alpha: float = SIGNIFICANT) -> list[str]:
+    """Marks of rows whose p value is below a level."""
     return ["strong" if value < alpha else "" for value in p]

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from dem_warp import GrainPopulation
 from experiments.studyfile import Study
 
 
@@ -14,14 +13,13 @@ def study_facts(study: Study) -> dict[str, str]:
     tube, numerics, measurement = study.scene.given.get("lifted-cylinder"), study.numerics, study.measurement
     count = tube.grain_count if tube else study.case({}, seed=0).scene.grain_count
     grains = f"{count} grains" if count else "as many grains as fill it"
-    spheres = _sphere_counts(study.grain.population())
+    counts = sorted({shape.sphere_count for shape in study.grain.population().mixture.shapes})
+    spheres = f"{' or '.join(map(str, counts))} sphere{'' if counts == [1] else 's'}"
     softened = "real" if numerics.modulus_scale == 1.0 else f"divided by {numerics.modulus_scale:g}"
     test = {"Test": _scene_text(study.document["scene"])}
     if tube is not None:
-        test = {
-            "Tube": f"{1e3 * tube.diameter:g} mm wide, {1e3 * tube.height:g} mm high",
-            "Lift": f"{tube.lift_speed:g} m/s",
-        }
+        size = f"{1e3 * tube.diameter:g} mm wide, {1e3 * tube.height:g} mm high"
+        test = {"Tube": size, "Lift": f"{tube.lift_speed:g} m/s"}
     further = study.document.get("response-scene", {})
     return {
         "Scale": study.scale or "the study as written",
@@ -37,9 +35,3 @@ def _scene_text(scene: Mapping[str, Any]) -> str:
     """Describe a scene as the study writes it."""
     [(kind, settings)] = scene.items()
     return ", ".join([kind, *(f"{key.replace('_', ' ')} {value}" for key, value in settings.items())])
-
-
-def _sphere_counts(grains: GrainPopulation) -> str:
-    """Say of how many spheres the grains are: ``9 spheres``, or ``1 or 9 spheres`` of several shapes."""
-    counts = sorted({shape.sphere_count for shape in grains.mixture.shapes})
-    return f"{' or '.join(map(str, counts))} sphere{'' if counts == [1] else 's'}"

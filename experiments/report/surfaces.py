@@ -15,14 +15,7 @@ from doe import Design, Region, Surface
 from doe.palette import BLUE, GREEN, MUTED, PURPLE, VERMILION
 from doe.plot_data import SurfaceGrid, normal_points, surface_grid
 from experiments.calibrate.results import OptimumResult, SurfaceResult, TargetResult
-from experiments.report.kit.chart import (
-    LANDSCAPE,
-    Chart,
-    add_line,
-    add_points,
-    add_target,
-    new_figure,
-)
+from experiments.report.kit.chart import LANDSCAPE, Chart, add_line, add_points, add_target, new_figure
 from experiments.report.kit.numbers import axis_title, hover, quantity
 from experiments.studyfile.campaign import Response
 
@@ -83,24 +76,15 @@ def residual_charts(surface: Surface, response: Response) -> list[Chart]:
     """Draw the four usual checks of a fit."""
     fitted, residuals = surface.fitted, surface.studentized_residuals
     order, title = np.arange(1, len(fitted) + 1), axis_title(response)
-    points = normal_points(residuals)
+    points, funnel = normal_points(residuals), "Against the fit: no trend, no funnel."
+    ordered = points["quantile"], points["value"]
     charts = [
-        _residual_chart(
-            "normal",
-            "normal quantile",
-            points["quantile"],
-            points["value"],
-            "Normal plot: points along a line.",
-        ),
-        _residual_chart(
-            "fitted", f"fitted {title}", fitted, residuals, "Against the fit: no trend, no funnel."
-        ),
+        _residual_chart("normal", "normal quantile", *ordered, "Normal plot: points along a line."),
+        _residual_chart("fitted", f"fitted {title}", fitted, residuals, funnel),
         _residual_chart("order", "row of the design", order, residuals, "Against the row: no drift."),
     ]
-    line = [
-        float(min(fitted.min(), surface.response.min())),
-        float(max(fitted.max(), surface.response.max())),
-    ]
+    both = np.r_[fitted, surface.response]
+    line = [float(both.min()), float(both.max())]
     figure = new_figure(f"simulated {title}", f"fitted {title}", legend=False)
     figure.add_scatter(x=line, y=line, mode="lines", line={"color": MUTED, "dash": "dot"}, hoverinfo="skip")
     _add_runs(figure, surface.response, fitted)
@@ -161,29 +145,13 @@ def _contour_chart(
     if optimum is not None:
         add_region(figure, plane, optimum.region, "compatible region", REGION_FILL)
     lines = {"coloring": "none", "showlabels": True, "labelfont": {"size": 11, "color": MUTED}}
-    add_contours(
-        figure,
-        grid,
-        f"fitted {plane.response.name}",
-        lines,
-        "#9aa3af",
-        1,
-        ncontours=12,
-        hovertemplate=plane.hover,
-    )
-    at_target = {"coloring": "none", "start": level, "end": level, "size": 1.0}
-    add_contours(
-        figure, grid, f"target {quantity(level, plane.response.unit)}", at_target, GREEN, 3, hoverinfo="skip"
-    )
+    name, hovered = f"fitted {plane.response.name}", {"hovertemplate": plane.hover}
+    _add_contours(figure, grid, name, lines, "#9aa3af", 1, ncontours=12, **hovered)
+    add_level(figure, grid, f"target {quantity(level, plane.response.unit)}", level, GREEN, 3)
     add_design(figure, plane, result.design)
-    if target.truth is not None:
-        add_points(figure, *point_in(plane, target.truth), "hidden truth", PURPLE, "star", 16)
-    if optimum is not None:
-        add_points(figure, *point_in(plane, optimum.point), "optimum", VERMILION, "diamond", 13)
-    caption = (
-        f"Fitted {plane.response.name}, target curve and compatible region (green); the dotted box is coded "
-        "−1 to +1."
-    )
+    add_settings(figure, plane, target.truth, optimum.point if optimum else None, "optimum")
+    shown = "target curve and compatible region (green); the dotted box is coded −1 to +1."
+    caption = f"Fitted {plane.response.name}, {shown}"
     return Chart(f"contour-{plane.x}-{plane.y}", caption + plane.held_text, figure, height="tall")
 
 
@@ -196,14 +164,9 @@ def _curve_chart(
     figure = new_figure(factor.label, axis_title(response))
     add_target(figure, target.leading.mean, target.leading.se)
     around = np.r_[fit["confidence_low"], fit["confidence_high"][::-1]]
-    shade = {"fill": "toself", "fillcolor": "rgba(0,114,178,0.15)", "hoverinfo": "skip"}
+    shade = {"fill": "toself", "fillcolor": "rgba(0,114,178,0.15)", "hoverinfo": "skip", "line": {"width": 0}}
     figure.add_scatter(
-        x=np.r_[x, x[::-1]],
-        y=around,
-        line={"width": 0},
-        mode="lines",
-        name="95 % confidence of the fit",
-        **shade,
+        x=np.r_[x, x[::-1]], y=around, mode="lines", name="95 % confidence of the fit", **shade
     )
     add_line(figure, x, fit["mean"], "fit", BLUE)
     full = result.leading.full
@@ -219,13 +182,7 @@ def _curve_chart(
 
 
 def _add_points_3d(
-    figure: go.Figure,
-    plane: Slice,
-    rows: pd.DataFrame,
-    z: Any,
-    name: str,
-    color: str,
-    symbol: str = "circle",
+    figure: go.Figure, plane: Slice, rows: pd.DataFrame, z: Any, name: str, color: str, symbol: str = "circle"
 ) -> None:
     marker = {"size": 4, "color": color, "symbol": symbol, "line": {"color": "#ffffff", "width": 1}}
     figure.add_scatter3d(x=rows[plane.x], y=rows[plane.y], z=z, mode="markers", name=name, marker=marker)
@@ -244,21 +201,18 @@ def _add_target_curve(figure: go.Figure, plane: Slice, optimum: OptimumResult, l
         )
 
 
-def add_contours(
+def add_level(figure: go.Figure, grid: SurfaceGrid, name: str, level: float, color: str, width: int) -> None:
+    """Draw the line along which the fitted response has one value."""
+    lines = {"coloring": "none", "start": level, "end": level, "size": 1.0}
+    _add_contours(figure, grid, name, lines, color, width, hoverinfo="skip")
+
+
+def _add_contours(
     figure: go.Figure, grid: SurfaceGrid, name: str, lines: dict, color: str, width: int, **more: Any
 ) -> None:
     """Draw lines of equal fitted response."""
-    figure.add_contour(
-        x=grid.x,
-        y=grid.y,
-        z=grid.mean,
-        name=name,
-        showscale=False,
-        showlegend=True,
-        contours=lines,
-        line={"color": color, "width": width},
-        **more,
-    )
+    more |= {"showscale": False, "showlegend": True, "line": {"color": color, "width": width}}
+    figure.add_contour(x=grid.x, y=grid.y, z=grid.mean, name=name, contours=lines, **more)
 
 
 def add_region(figure: go.Figure, plane: Slice, region: Region, name: str, fill: str) -> None:
@@ -286,9 +240,18 @@ def add_design(figure: go.Figure, plane: Slice, design: Design) -> None:
     figure.add_shape(type="rect", x0=x.low, x1=x.high, y0=y.low, y1=y.high, line=border)
 
 
-def point_in(plane: Slice, point: Mapping[str, float]) -> tuple[list[float], list[float]]:
-    """Coordinates of a point in the plane, as columns of one."""
-    return [point[plane.x]], [point[plane.y]]
+def add_settings(
+    figure: go.Figure,
+    plane: Slice,
+    truth: Mapping[str, float] | None,
+    chosen: Mapping[str, float] | None,
+    name: str,
+) -> None:
+    """Draw the hidden truth and the chosen point, as far as they are known; `name` is that of the latter."""
+    if truth is not None:
+        add_points(figure, [truth[plane.x]], [truth[plane.y]], "hidden truth", PURPLE, "star", 16)
+    if chosen is not None:
+        add_points(figure, [chosen[plane.x]], [chosen[plane.y]], name, VERMILION, "diamond", 13)
 
 
 def _residual_chart(name: str, x_title: str, x: Any, y: pd.Series, caption: str) -> Chart:

@@ -9,6 +9,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
+
 from dem_warp import __version__
 from experiments.calibrate.export import jsonable
 from experiments.calibrate.results import Campaign
@@ -19,16 +21,10 @@ from experiments.report.material_card import write_material_card
 from experiments.report.pictures import HeapPicture
 from experiments.studyfile import Study
 
-LIBRARIES = (
-    "warp-lang",
-    "numpy",
-    "scipy",
-    "pandas",
-    "statsmodels",
-    "scikit-learn",
-    "opencv-python-headless",
-)
+LIBRARIES = ("warp-lang", "numpy", "scipy", "pandas", "statsmodels", "scikit-learn", "opencv-python-headless")
 """Packages whose version may change a number."""
+
+PAGE = "report.html"
 
 
 def write_report(
@@ -43,16 +39,12 @@ def write_report(
 
     Parameters
     ----------
-    campaign, study
-        What was run.
+    campaign, study, pictures, replay
+        As of `render_page`.
     out_dir
         Folder of the files; it is made when it is missing.
-    pictures
-        Heaps to show, from `heap_pictures`.
     provenance
         What the caller knows of the run (device, seconds, ...), nested as it comes; versions are added.
-    replay
-        Published runs simulated again, to be shown beside.
 
     Returns
     -------
@@ -62,25 +54,28 @@ def write_report(
     folder = Path(out_dir)
     made_by = {**(provenance or {}), "versions": library_versions()}
     page = render_page(campaign, study, pictures, made_by, replay)
-    frames = campaign.tables() | (replay.tables() if replay else {})
-    tables = {name: table.to_csv(index=False) for name, table in frames.items()}
-    results = {
-        "study": {
-            "name": study.name,
-            "file": study.file.name,
-            "scale": study.scale,
-            "document": study.document,
-        },
-        "campaign": campaign.to_dict(),
-        "provenance": jsonable(made_by),
-    }
-    text = json.dumps(results, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
-    for name, table in tables.items():
-        write_text(folder / "tables" / f"{name}.csv", table)
-    write_text(folder / "results.json", text)
-    write_text(folder / "report.html", page)
+    tables = campaign.tables() | (replay.tables() if replay else {})
+    write_files(folder, study, page, {"campaign": campaign.to_dict()}, made_by, tables)
     write_material_card(campaign, study, folder)
-    return folder / "report.html"
+    return folder / PAGE
+
+
+def write_files(
+    folder: Path,
+    study: Study,
+    page: str,
+    results: Mapping[str, Any],
+    made_by: Mapping[str, Any],
+    tables: Mapping[str, pd.DataFrame],
+) -> None:
+    """Write a page, and beside it its results, between the study and what made them, and its tables."""
+    about = {"name": study.name, "file": study.file.name, "scale": study.scale, "document": study.document}
+    whole = {"study": about, **results, "provenance": jsonable(made_by)}
+    text = json.dumps(whole, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
+    for name, table in tables.items():
+        write_text(folder / "tables" / f"{name}.csv", table.to_csv(index=False))
+    write_text(folder / "results.json", text)
+    write_text(folder / PAGE, page)
 
 
 def library_versions() -> dict[str, str]:

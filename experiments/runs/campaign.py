@@ -63,24 +63,7 @@ class Desk:
         watch: Watch = lambda title: nullcontext(),
         engine: Engine | None = None,
     ) -> Desk:
-        """Make the folder of a study, or go on in it.
-
-        Parameters
-        ----------
-        study
-            What is simulated.
-        folder
-            Where everything goes.
-        device
-            ``"cpu"``, ``"cuda"``, ``"cuda:1"``; None: the engine's choice.
-        workers
-            Processes on the CPU; None: the engine's choice.
-        resume
-            Go on in the folder of an earlier run: what it has simulated is not simulated again.
-        watch
-            Display of each batch of cases.
-        engine
-            What simulates; None: `dem_warp.simulate`.
+        """Make the folder of a study, or go on in it; parameters as of `experiments.api.calibrate`.
 
         Raises
         ------
@@ -105,9 +88,8 @@ class Desk:
     def wall_times(self) -> pd.DataFrame:
         """Wall times so far: stage, simulated (cases), seconds."""
         path = self.folder / WALL_TIMES_FILE
-        return (
-            pd.read_csv(path) if path.is_file() else pd.DataFrame(columns=["stage", "simulated", "seconds"])
-        )
+        none = pd.DataFrame(columns=["stage", "simulated", "seconds"])
+        return pd.read_csv(path) if path.is_file() else none
 
     def _note_wall_time(self, title: str, simulated: int, seconds: float) -> None:
         row = {"stage": title, "simulated": simulated, "seconds": round(seconds, 1)}
@@ -116,27 +98,12 @@ class Desk:
 
 
 def run_campaign(desk: Desk, on_stage: StageHook | None = None, replay: Replay | None = None) -> Campaign:
-    """Calibrate a study and write its report, its tables and its material card.
-
-    Parameters
-    ----------
-    desk
-        The study, and where it is run.
-    on_stage
-        Called with the name and the result of every finished stage.
-    replay
-        Published runs simulated again, to be shown beside.
-
-    Returns
-    -------
-    Campaign
-        What every stage found, and how the campaign ended.
-    """
-    started = time.perf_counter()
+    """Calibrate a study and write its report, its tables and its material card, a replay set beside."""
 
     def runner(table: pd.DataFrame) -> pd.DataFrame:
         return desk.run(table, ", ".join(str(stage).replace("_", " ") for stage in table["stage"].unique()))
 
+    started = time.perf_counter()
     campaign = calibrate(desk.study, runner, on_stage)
     provenance = {
         **_source_and_day(),
@@ -152,13 +119,6 @@ def run_campaign(desk: Desk, on_stage: StageHook | None = None, replay: Replay |
 
 def replay_published(desk: Desk, replicates: int) -> Replay:
     """Simulate the published runs of a study again, each of their stages as one batch.
-
-    Parameters
-    ----------
-    desk
-        A study with published runs, and where it is run.
-    replicates
-        Heaps of every run.
 
     Raises
     ------
@@ -187,21 +147,9 @@ def found_by(campaign: Campaign | None, replay: Replay | None) -> dict[str, Any]
 
 
 def check_runs(study: Study, campaign: bool = True, paper: bool = False) -> Study:
-    """Check that what is wanted can be run, before a folder is made, and take the target's measurements.
+    """Check that a campaign or the paper's runs can be run, before a folder is made; return the study to run.
 
-    Parameters
-    ----------
-    study
-        The study.
-    campaign
-        Whether it is to be calibrated.
-    paper
-        Whether published runs are to be simulated.
-
-    Returns
-    -------
-    Study
-        The study to run: pictures or a file of its target are numbers now.
+    In it, pictures or a file of the target are numbers.
 
     Raises
     ------

@@ -10,22 +10,8 @@ from experiments.errors import InputError
 from experiments.studyfile import Study, StudyError, load_study, study_scales
 
 
-def chosen_device(device: str | None) -> str:
-    """Name of the device to run on: the one asked for, or the GPU if there is one.
-
-    Raises
-    ------
-    InputError
-        When there is no such device.
-    """
-    try:
-        return resolve_device(device)
-    except ValueError as error:
-        raise InputError(str(error), device, "--device") from None
-
-
-def chosen_devices(devices: str | None) -> str:
-    """Names of the devices to run on, between commas: those asked for, or the GPU if there is one.
+def chosen_device(device: str | None, several: bool = False) -> str:
+    """Name of the device to run on, or of several between commas: as asked, or the GPU if there is one.
 
     Raises
     ------
@@ -33,9 +19,9 @@ def chosen_devices(devices: str | None) -> str:
         When one is not there or is named twice, or the CPU stands beside a GPU.
     """
     try:
-        return ",".join(resolve_devices(devices))
+        return ",".join(resolve_devices(device)) if several else resolve_device(device)
     except ValueError as error:
-        raise InputError(str(error), devices, "--device") from None
+        raise InputError(str(error), device, "--device") from None
 
 
 def chosen_study(study: Study | str | Path | None, scale: str | None, device: str) -> Study:

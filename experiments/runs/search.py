@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -25,10 +25,8 @@ from experiments.report import HeapPicture
 from experiments.report.companion import companion_of
 from experiments.report.discovery import Terms, write_discovery
 from experiments.report.discovery.pictures import photograph, simulated_heaps
+from experiments.runs.campaign import Watch
 from experiments.studyfile import Study
-
-Watch = Callable[[str], AbstractContextManager[Callable[[Progress], None] | None]]
-"""Opens the display of one wave, by its title, and hands out what its progress is reported to."""
 
 OUTCOMES, BANK, SETTINGS = "outcomes.sqlite", "bank.npz", "settings.json"
 """Files of a search's folder beside the report: what was simulated, the library waves, the rules."""
@@ -38,24 +36,7 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Job:
-    """What a command was asked for.
-
-    Attributes
-    ----------
-    study : Study
-    measured : Path or None
-        File of the measured heaps; None: only the bank is made.
-    folder : Path
-        Where everything goes.
-    bank : Path or None
-        A bank made earlier; None: that of the folder, or a new one.
-    photographs_only : bool
-        Whether only what photographs show is looked at.
-    device, workers
-        Of the simulator; several devices stand between commas.
-    seed : int
-        Of the bootstraps and of the fresh runs.
-    """
+    """What a command was asked for; its parts are parameters of `experiments.api.discover`."""
 
     study: Study
     measured: Path | None
@@ -79,15 +60,7 @@ class SearchResult:
 
 
 class _Watched:
-    """The engine, with a display for every wave.
-
-    Parameters
-    ----------
-    search, job
-        What is simulated, and where.
-    watch
-        Opens the display of a wave.
-    """
+    """The engine, with a display for every wave."""
 
     observables = EngineSimulator.observables
 
@@ -100,12 +73,6 @@ class _Watched:
         self.waves: list[dict[str, Any]] = []
         self._watch = watch
         self._listener: Callable[[Progress], None] | None = None
-
-    def __enter__(self) -> _Watched:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.engine.close()
 
     def __call__(self, points: Sequence[Point]) -> Outcomes:
         """Observables of every point."""
@@ -126,15 +93,6 @@ def run_search(job: Job, resume: bool = False, watch: Watch = lambda title: null
 
     Nothing is written before study, data and bank have been read without an error.
 
-    Parameters
-    ----------
-    job
-        What is wanted.
-    resume
-        Go on in the folder of an earlier run: what it has simulated is not simulated again.
-    watch
-        Display of each wave.
-
     Raises
     ------
     InputError
@@ -146,13 +104,13 @@ def run_search(job: Job, resume: bool = False, watch: Watch = lambda title: null
     terms = Terms.of(search.library, OBSERVABLES, job.study.factor_sections)
     bank = _known_bank(job, search)
     measured = _measured(job)
-    _, changes = open_folder(job.folder, job.study, resume)
-    for change in changes:
+    for change in open_folder(job.folder, job.study, resume)[1]:
         _log.warning("The study has changed since the earlier run: %s", change)
     for note in measured.notes if measured else ():
         _log.warning("The data: %s", note)
     search.settings.write(job.folder / SETTINGS)
-    with _Watched(search, job, watch) as simulator:
+    simulator = _Watched(search, job, watch)
+    with simulator.engine:
         if bank is None:
             bank = search.make_bank(simulator, maker_of_today(source_commit()))
             bank.save(job.folder / BANK)
@@ -163,16 +121,8 @@ def run_search(job: Job, resume: bool = False, watch: Watch = lambda title: null
         waves = [*simulator.waves, {"wave": "analysis, its waves included", "seconds": _since(started)}]
         pictures = heaps_side_by_side(simulator.engine, found, terms, measured, job)
     further = companion.discovery_chapters(found, terms, job.measured) if job.measured else ()
-    page = write_discovery(
-        found,
-        job.study,
-        terms,
-        search.settings,
-        job.folder,
-        pictures,
-        _provenance(job, bank, waves),
-        further,
-    )
+    made = _provenance(job, bank, waves)
+    page = write_discovery(found, job.study, terms, search.settings, job.folder, pictures, made, further)
     return SearchResult(found, terms, page)
 
 
@@ -182,7 +132,8 @@ def heaps_side_by_side(
     """Draw a measured heap, where there is a photograph, that of the base, and that with the mechanism."""
     if found.base is None:
         return []
-    training = [name for name in measured.conditions if name in _training(job.study)]
+    fitted = [condition.name for condition in job.study.conditions if not condition.held_out]
+    training = [name for name in measured.conditions if name in fitted]
     condition = next((name for name in training if measured.pictures.get(name)), training[0])
     models = {"Calibrated base": found.base}
     if found.chosen is not None:
@@ -207,10 +158,6 @@ def _measured(job: Job) -> Measured | None:
         return None
     measured = read_measured(job.measured, job.study)
     return measured.only(PHOTOGRAPHED) if job.photographs_only else measured
-
-
-def _training(study: Study) -> list[str]:
-    return [condition.name for condition in study.conditions if not condition.held_out]
 
 
 def _point(fit: Fit, condition: str, seed: int) -> Point:

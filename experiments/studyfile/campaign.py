@@ -8,16 +8,16 @@ at its high level.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Literal, Protocol
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
 
 from experiments.studyfile.schema import Angle, Section, nested_error
 
 if TYPE_CHECKING:
-    from doe import Factor, Sample
+    from doe import Sample
 
 
 def _in_natural_units(values: object, info: ValidationInfo) -> object:
@@ -259,23 +259,3 @@ class Target:
 def scenes_of(responses: Iterable[Response]) -> tuple[str, ...]:
     """Names of the scenes that measure responses, in the order of use."""
     return tuple(dict.fromkeys(response.scene for response in responses))
-
-
-class CampaignStudy(Protocol):
-    """Part of a study that ``calibrate`` reads."""
-
-    @property
-    def factors(self) -> Sequence[Factor]:
-        """Factors of the screening, in order."""
-
-    @property
-    def campaign(self) -> CampaignSettings:
-        """The decisions."""
-
-    @property
-    def target(self) -> Target:
-        """Responses that the cases must match."""
-
-    @property
-    def limits(self) -> Mapping[str, tuple[float, float]]:
-        """Hard physical limits of every factor in its natural unit (friction >= 0, ...); may be infinite."""

@@ -23,14 +23,7 @@ SECTIONS = ("grain", "wall", "contact", "mechanism")
 
 
 def with_material(document: Mapping[str, Any], folder: Path) -> dict[str, Any]:
-    """Lay a study document over the card that it names; without one it is returned as it is.
-
-    Parameters
-    ----------
-    document
-        The study as written.
-    folder
-        Folder that the card's file name is relative to.
+    """Lay a study document over the card that it names, relative to a folder, if it names one.
 
     Raises
     ------

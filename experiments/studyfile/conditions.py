@@ -65,14 +65,7 @@ Conditions = Annotated[dict[str, Condition], AfterValidator(_named)]
 def under_condition(
     document: Mapping[str, Any], condition: Condition
 ) -> tuple[dict[str, Any], frozenset[str]]:
-    """Merge a condition over a study document.
-
-    Parameters
-    ----------
-    document
-        A study document.
-    condition
-        One of its conditions.
+    """Merge one of a study's conditions over its document.
 
     Returns
     -------

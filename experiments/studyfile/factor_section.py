@@ -164,14 +164,7 @@ def with_factor_values(
 ) -> dict[str, Any]:
     """Copy a document and write a value into every factor's parameter: the setting, or the factor's middle.
 
-    Parameters
-    ----------
-    document
-        A study document, or its physical sections.
-    sections
-        Factors of the study.
-    settings
-        Values by factor name, natural units.
+    Settings are values by factor name, in natural units.
     """
     written = dict(document)
     for section in sections:

@@ -90,9 +90,8 @@ def _number(kind: Any, parameter: Parameter, plain: bool) -> Any:
     number, *optional = get_args(bare) or (bare,)
     turned = parameter.unit == "rad"
     limits = ((Gt, parameter.above), (Ge, parameter.at_least), (Lt, parameter.below), (Le, parameter.at_most))
-    marks: list[Any] = [
-        mark(math.degrees(limit) if turned else limit) for mark, limit in limits if limit is not None
-    ]
+    told = [(mark, limit) for mark, limit in limits if limit is not None]
+    marks: list[Any] = [mark(math.degrees(limit) if turned else limit) for mark, limit in told]
     if number is float:
         unit = parameter.unit if plain and parameter.unit != "1" else ""
         marks.insert(0, Dimension(dimension_of_unit(parameter.unit), unit))

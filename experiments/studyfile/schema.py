@@ -175,18 +175,7 @@ def nearest_name(name: str, known: list[str]) -> str:
 def validated(
     model: type[SectionT], document: Mapping[str, Any], places: Places, **context: object
 ) -> SectionT:
-    """Validate a document.
-
-    Parameters
-    ----------
-    model
-        The section.
-    document
-        Its values by key.
-    places
-        Where they stand.
-    context
-        Further facts that validators want.
+    """Validate the values of a section by key; ``context`` has further facts that validators want.
 
     Raises
     ------
@@ -196,8 +185,8 @@ def validated(
     try:
         return model.model_validate(document, context={"folder": places.folder, **context})
     except ValidationError as error:
-        first, *more = (_problem(model, document, places, *each) for each in _flat(error.errors()))
-        raise StudyError(first.rule, first.value, first.place, tuple(more)) from None
+        problems = (_problem(model, document, places, *each) for each in _flat(error.errors()))
+        raise StudyError.of(problems) from None
 
 
 def nested_error(errors: Any) -> PydanticCustomError:

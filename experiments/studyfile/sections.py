@@ -31,9 +31,7 @@ class MaterialSection(Section):
 
     def material(self) -> Material:
         """Build the engine's material."""
-        return Material(
-            density=self.density, shear_modulus=self.shear_modulus, poisson_ratio=self.poisson_ratio
-        )
+        return Material(self.density, self.shear_modulus, self.poisson_ratio)
 
 
 class ShapeSection(Section):
@@ -137,14 +135,8 @@ def _read_clump(path: Path, modified: int) -> ClumpShape:
     return ClumpShape.read(path)
 
 
-@lru_cache(maxsize=32)
-def _elongated(shape: ClumpShape, elongation: float) -> ClumpShape:
-    return shape.elongated(elongation)
-
-
-@lru_cache(maxsize=32)
-def _sphere(radius: float) -> ClumpShape:
-    return ClumpShape.sphere(radius)
+_elongated = lru_cache(maxsize=32)(ClumpShape.elongated)
+_sphere = lru_cache(maxsize=32)(ClumpShape.sphere)
 
 
 class InteractionSection(Section):
@@ -159,11 +151,7 @@ class InteractionSection(Section):
 
     def interaction(self) -> Interaction:
         """Build the engine's interaction."""
-        return Interaction(
-            restitution=self.restitution,
-            static_friction=self.static_friction,
-            rolling_friction=self.rolling_friction,
-        )
+        return Interaction(**dict(self))
 
 
 class ContactSection(Section):

@@ -18,11 +18,7 @@ from pydantic import Field, PrivateAttr, field_validator
 from dem_warp import Case
 from doe import Factor
 from experiments.errors import StudyError
-from experiments.studyfile.campaign import (
-    TARGET_SCENE,
-    CampaignSettings,
-    Target,
-)
+from experiments.studyfile.campaign import TARGET_SCENE, CampaignSettings, Target
 from experiments.studyfile.card import with_material
 from experiments.studyfile.conditions import BASE, Condition, Conditions, under_condition
 from experiments.studyfile.factor_section import (
@@ -130,9 +126,7 @@ class Study(Physics):
             When the study has none, or they are still to be measured.
         """
         if self._target is None and self.target_section is not None:
-            rule = (
-                "names pictures or a file: measurement.target.with_measurements takes the numbers from them"
-            )
+            rule = "names pictures or a file: measurement.target.with_measurements takes numbers from them"
             raise StudyError(rule, "no numbers", f"{self.file}: target")
         if self._target is None:
             raise StudyError("a calibration needs a [target] or a [[response]]", "none", str(self.file))
@@ -189,14 +183,7 @@ class Study(Physics):
         return _build(dict(document), self._places)
 
     def natural_settings(self, settings: Mapping[str, object], source: str = "settings") -> dict[str, float]:
-        """Read factor values with their units as numbers in natural units.
-
-        Parameters
-        ----------
-        settings
-            Quantities by factor name, as ``{"B": "34 MPa", "E": 0.46}``.
-        source
-            Where they come from, for error messages.
+        """Read factor values with their units, as ``{"B": "34 MPa", "E": 0.46}``, in natural units.
 
         Raises
         ------
@@ -212,16 +199,9 @@ class Study(Physics):
         return natural
 
     def case(self, settings: Mapping[str, float], seed: int, scene: str = TARGET_SCENE) -> Case:
-        """Build one case.
+        """Build one case of a scene or a condition; its seed is that of everything random.
 
-        Parameters
-        ----------
-        settings
-            Values by factor name in natural units; a factor that is not named is at its middle.
-        seed
-            Seed of everything random in the case.
-        scene
-            Name of the scene, or of the condition.
+        Settings are values by factor name in natural units; a factor that is not named is at its middle.
 
         Raises
         ------
@@ -304,9 +284,8 @@ def _build(document: dict[str, Any], places: Places) -> Study:
             rule = f"a further scene has a name of its own: {name!r} is the study's own, or a condition"
             raise StudyError(rule, name, places.of(("response-scene", name)))
     held_out = [condition.name for condition in study.conditions if condition.held_out]
-    study._target = build_target(
-        study.target_section, study.response_sections, study.scenes, held_out, places
-    )
+    target, responses = study.target_section, study.response_sections
+    study._target = build_target(target, responses, study.scenes, held_out, places)
     return study
 
 

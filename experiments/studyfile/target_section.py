@@ -54,16 +54,9 @@ class ResponseSection(Section):
         return self.name or self.observable
 
     def response(self, unit: str, measured: bool, path: KeyPath, places: Places) -> Response:
-        """Build the response of the campaign.
+        """Build the response of the campaign; ``unit`` is that of its observable.
 
-        Parameters
-        ----------
-        unit
-            Unit of the observable.
-        measured
-            Whether it comes with its measurements; a twin study simulates them.
-        path, places
-            Where it stands.
+        Where it is not ``measured``, a twin study simulates it, or its measurements are still to be taken.
 
         Raises
         ------
@@ -123,23 +116,9 @@ def build_target(
     held_out: Collection[str],
     places: Places,
 ) -> Target | None:
-    """Build the responses that a campaign must match.
+    """Build the responses that a campaign must match, in scenes some of which are held out of any fit.
 
-    Parameters
-    ----------
-    target, responses
-        As written, in order.
-    scenes
-        Scenes by name, the study's own as ``TARGET_SCENE``.
-    held_out
-        Names of those whose measurements take no part in any fit.
-    places
-        Where they stand.
-
-    Returns
-    -------
-    Target or None
-        None where nothing is to be matched, or its measurements have not been taken yet.
+    None where nothing is to be matched, or its measurements have not been taken yet.
 
     Raises
     ------

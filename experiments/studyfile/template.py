@@ -11,19 +11,7 @@ TEMPLATE = Path(__file__).parents[1] / "studies" / "template.toml"
 
 
 def write_template(name: str, folder: Path | None = None) -> Path:
-    """Write a commented study file.
-
-    Parameters
-    ----------
-    name
-        Name of the grain; the file is ``NAME.toml``.
-    folder
-        Folder that it is written to; None: the current one.
-
-    Returns
-    -------
-    Path
-        The file.
+    """Write a commented study file for a grain, ``NAME.toml`` in a folder or in the current one.
 
     Raises
     ------

@@ -13,14 +13,7 @@ from experiments.errors import StudyError
 
 
 def read_toml(path: Path, what: str = "the study") -> tuple[str, dict[str, Any]]:
-    """Read a TOML file: its text, and what it says.
-
-    Parameters
-    ----------
-    path
-        The file.
-    what
-        Name of its kind, for the error message.
+    """Read a TOML file, of a kind named for the error message: its text, and what it says.
 
     Raises
     ------

@@ -104,11 +104,9 @@ def unit_size(unit: str, dimension: str) -> float:
     ValueError
         When the unit is not one of the dimension's; the message names those.
     """
-    if not dimension:
-        if unit:
-            raise ValueError(f"must be a plain number without the unit {unit!r}")
-        return 1.0
-    known = UNITS[dimension]
+    if not dimension and unit:
+        raise ValueError(f"must be a plain number without the unit {unit!r}")
+    known = UNITS[dimension] if dimension else {"": 1.0}
     if unit not in known:
         example = f'"1.5 {next(iter(known))}"'
         raise ValueError(f"needs a unit of {dimension} ({', '.join(known)}), for example {example}")

@@ -36,18 +36,8 @@ class Camera:
 
         A roll by a small angle w moves the apex of a heap of height h by w h and leaves its base, so that the
         area right of the apex less that left of it changes by w h^2, the lean by w tan(flank angle); the mean
-        of both flanks changes in second order only.
-
-        Parameters
-        ----------
-        heaps : (n, observables) array
-            True values in the order of `OBSERVABLES`; NaN stays.
-        rng
-            Draws the errors of reading.
-
-        Returns
-        -------
-        (n, observables) array
+        of both flanks changes in second order only. Heaps are rows, (n, observables), in the order of
+        `OBSERVABLES`; NaN stays.
         """
         seen = heaps.copy()
         names = [observable.name for observable in OBSERVABLES]

@@ -17,42 +17,22 @@ _LIKELY_RIVALS = 2
 
 
 def planned_cases(sealed: Sequence[Sealed], declared: Declaration, bank: Bank) -> pd.DataFrame:
-    """Cases of the bank, of the trials' heaps, and of their analyses.
+    """Cases of the bank, of the trials' heaps, and of their analyses, and the GPU seconds of these.
 
-    Parameters
-    ----------
-    sealed
-        The trials.
-    declared
-        Their declaration.
-    bank
-        Of the study.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Columns: what, trials, cases, and the most that there can be where it depends on what is found; GPU
-        seconds of these. An analysis without a gap asks for no case; one with a gap is taken to run the base
-        and two rivals once, and at the most the whole shortlist in every round, of singles and of pairs.
+    They depend on what is found: "at most" has the most that there can be. An analysis without a gap asks for
+    no case; one with a gap is taken to run the base and two rivals once, and at the most the whole shortlist
+    in every round, of singles and of pairs.
     """
-    conditions = len(bank.space.conditions)
-    cases = len(bank.reasons)
-    rows = [{"what": "bank", "trials": 0, "cases": cases, "at most": cases}]
+    conditions, cases = len(bank.space.conditions), len(bank.reasons)
+    rows = [("bank", 0, cases, cases)]
     likely, most = search_cases(declared.settings, conditions)
     for part in dict.fromkeys(trial.part for trial in sealed):
         count = sum(trial.part == part for trial in sealed)
         heaps = count * declared.plan.replicates * conditions
         with_gap = count - (declared.plan.nulls if part == "alone" else 0)
-        rows.append({"what": f"heaps, {part}", "trials": count, "cases": heaps, "at most": heaps})
-        rows.append(
-            {
-                "what": f"analyses, {part}",
-                "trials": count,
-                "cases": with_gap * likely,
-                "at most": with_gap * most,
-            }
-        )
-    table = pd.DataFrame(rows)
+        rows.append((f"heaps, {part}", count, heaps, heaps))
+        rows.append((f"analyses, {part}", count, with_gap * likely, with_gap * most))
+    table = pd.DataFrame(rows, columns=["what", "trials", "cases", "at most"])
     return table.assign(seconds=table["cases"] * PER_CASE, **{"seconds at most": table["at most"] * PER_CASE})
 
 

@@ -80,10 +80,9 @@ def read_declaration(path: Path) -> Declaration:
 
 def _effect(record: dict[str, Any]) -> Declared:
     # Declarations of the first six trials call it gamma80.
-    found = record.pop("gamma80") if "gamma80" in record else record.pop("detectable")
-    return Declared(
-        **record | {"detectable": math.inf if found is None else found, "kin": tuple(record["kin"])}
-    )
+    found = record.pop("gamma80" if "gamma80" in record else "detectable")
+    detectable = math.inf if found is None else found
+    return Declared(**record | {"detectable": detectable, "kin": tuple(record["kin"])})
 
 
 def declared_effects(emulator: Emulator, settings: Settings, replicates: int) -> tuple[Declared, ...]:
@@ -110,17 +109,7 @@ def declared_effects(emulator: Emulator, settings: Settings, replicates: int) ->
 def declared_effect(
     span: MechanismRange, powers: np.ndarray, settings: Settings, kin: tuple[str, ...] = ()
 ) -> Declared:
-    """Declare a mechanism of some power at several points in the ranges of the factors.
-
-    Parameters
-    ----------
-    span : MechanismRange
-    powers : (points, sizes) array
-        At `power.CODED_SIZES`.
-    settings : Settings
-    kin : tuple of str
-        Mechanisms that look like it.
-    """
+    """Declare a mechanism of some power, (points, `power.CODED_SIZES`), in the ranges of the factors."""
     detectable = detectable_coded_size(powers.mean(axis=0), settings) * abs(span.maximum - span.null)
     told = math.isfinite(detectable_coded_size(np.quantile(powers, BLIND, axis=0), settings))
     return Declared(span.name, span.null, span.maximum, detectable, told, kin)
@@ -132,24 +121,11 @@ def with_names(settings: Settings, library: Sequence[Declared]) -> Settings:
 
 
 def perfect_means(emulator: Emulator, theta: np.ndarray, replicates: int) -> tuple[Block, ...]:
-    """Means of so many replicates in every training condition that are exactly the model's.
-
-    Parameters
-    ----------
-    emulator : Emulator
-    theta : (factors,) array
-        Coded.
-    replicates : int
-    """
+    """Means of so many replicates in every training condition that are exactly the model's at coded theta."""
     count = len(emulator.observables)
+    numbers, weights, ones = np.arange(count), np.full((count, count), 1.0 / replicates), np.ones(count)
     return tuple(
-        Block(
-            condition,
-            np.arange(count),
-            surfaces.predict(theta[None], ())[0],
-            np.full((count, count), 1.0 / replicates),
-            np.ones(count),
-        )
+        Block(condition, numbers, surfaces.predict(theta[None], ())[0], weights, ones)
         for condition, surfaces in emulator.surfaces.items()
         if not emulator.space.is_held_out(condition)
     )

@@ -29,13 +29,7 @@ from experiments.files import write_text
 from experiments.measurement.measured_file import read_measured
 from experiments.measurement.observables import PHOTOGRAPHED
 from experiments.studyfile import Study
-from experiments.trials.findings import (
-    PHOTOGRAPHS,
-    Finding,
-    findings_table,
-    read_findings,
-    write_findings,
-)
+from experiments.trials.findings import PHOTOGRAPHS, Finding, findings_table, read_findings, write_findings
 from experiments.trials.folder import Folder
 from experiments.trials.lockstep import Crash
 from experiments.trials.truth import Sealed
@@ -49,17 +43,7 @@ class OutOfTime(Exception):  # noqa: N818  (an ending that is foreseen, not an e
 
 
 class TimedSimulator:
-    """A simulator that stops between two batches when its time is up.
-
-    Parameters
-    ----------
-    simulator
-        Runs the batches; keeps what it has run.
-    deadline
-        On the clock of ``time.monotonic`` [s].
-    batch
-        Points at a time.
-    """
+    """A simulator that stops between two batches when the deadline [s] on ``time.monotonic`` has passed."""
 
     def __init__(self, simulator: Simulator, deadline: float, batch: int = BATCH) -> None:
         self.observables = simulator.observables
@@ -102,7 +86,7 @@ class Desk:
 
     def __call__(self, job: str) -> Analysis:
         """Begin an analysis."""
-        trial, _, view = job.partition(".")
+        trial, view = parted(job)
         measured = self.measured[trial]
         if view == PHOTOGRAPHS:
             measured = measured.only(PHOTOGRAPHED)
@@ -113,6 +97,12 @@ class Desk:
 def job_name(trial: str, view: str) -> str:
     """Name of the analysis of a trial in a view."""
     return f"{trial}.{view}"
+
+
+def parted(job: str) -> tuple[str, str]:
+    """Trial and view of a `job_name`."""
+    trial, _, view = job.partition(".")
+    return trial, view
 
 
 def read_data(
@@ -135,11 +125,6 @@ def keep(folder: Folder, ended: Mapping[str, Discovery | Crash]) -> None:
     for job, end in ended.items():
         if isinstance(end, Discovery):
             write_text(folder.discovery(job), json.dumps(jsonable(end), allow_nan=False) + "\n")
-    fresh = findings_table(_finding(job, end) for job, end in ended.items())
+    fresh = findings_table(Finding.of(*parted(job), end) for job, end in ended.items())
     known = read_findings([folder.findings]) if folder.findings.exists() else fresh.iloc[:0]
     write_findings(folder.findings, pd.concat([known, fresh]) if len(known) else fresh)
-
-
-def _finding(job: str, end: Discovery | Crash) -> Finding:
-    trial, _, view = job.partition(".")
-    return Finding.of(trial, view, end)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
+from itertools import combinations
 
 import numpy as np
 
@@ -85,10 +86,6 @@ class Declared:
         """Size of so many detectable ones."""
         return self.null + math.copysign(multiple * self.detectable, self.maximum - self.null)
 
-    def size_at(self, share: float) -> float:
-        """Size at a part of the range."""
-        return self.null + share * (self.maximum - self.null)
-
 
 @dataclass(frozen=True)
 class _Draft:
@@ -112,25 +109,8 @@ def draw(
     """Draw every trial.
 
     Theta is uniform in the ranges of the factors, the size of a mechanism in its own part of its range.
-    Within each part ("alone", "outside", "pairs") the trials are shuffled, so that a name says nothing.
-
-    Parameters
-    ----------
-    plan
-        How many of each.
-    factors
-        Factors of the study.
-    library, strangers
-        Mechanisms that the analysis knows, and those that it never does.
-    rng
-        Draws truths and seeds.
-    salt
-        Gives the salt of a seal.
-
-    Returns
-    -------
-    tuple of (Label, Sealed)
-        By part.
+    Within each part ("alone", "outside", "pairs") the trials are shuffled, so that a name says nothing. The
+    analysis knows the mechanisms of the library, and never the strangers.
 
     Raises
     ------
@@ -167,13 +147,11 @@ def _alone(plan: Plan, library: Sequence[Declared], rng: np.random.Generator) ->
     for effect in library:
         if effect.resolvable:
             yield from (_strong("alone", Kind.SINGLE, effect, rng) for _ in range(plan.strong))
-            yield from (
-                _of("alone", Kind.SINGLE, effect, rng.uniform(WEAK, STRONG)) for _ in range(plan.weak)
-            )
+            for _ in range(plan.weak):
+                yield _of("alone", Kind.SINGLE, effect, rng.uniform(WEAK, STRONG))
         else:
-            yield from (
-                _somewhere("alone", Kind.UNRESOLVED, effect, rng, 0.0) for _ in range(plan.unresolved)
-            )
+            for _ in range(plan.unresolved):
+                yield _somewhere("alone", Kind.UNRESOLVED, effect, rng, 0.0)
 
 
 def _outside(
@@ -191,18 +169,12 @@ def _outside(
 
 def _pairs(plan: Plan, resolvable: Sequence[Declared], rng: np.random.Generator) -> Iterator[_Draft]:
     """Two mechanisms that can be told apart."""
-    partners = [
-        (first, second)
-        for i, first in enumerate(resolvable)
-        for second in resolvable[i + 1 :]
-        if second.name not in first.kin
-    ]
+    partners = [(one, other) for one, other in combinations(resolvable, 2) if other.name not in one.kin]
     if plan.pairs and not partners:
         raise InputError("pairs need two resolvable mechanisms", [e.name for e in resolvable], "Plan.pairs")
     for _ in range(plan.pairs):
-        halves = [
-            _strong("pairs", Kind.PAIR, effect, rng) for effect in partners[rng.integers(len(partners))]
-        ]
+        chosen = partners[rng.integers(len(partners))]
+        halves = [_strong("pairs", Kind.PAIR, effect, rng) for effect in chosen]
         drawn = sorted((half.sizes[0], half.multiples[0]) for half in halves)
         yield _Draft("pairs", Kind.PAIR, tuple(size for size, _ in drawn), tuple(s for _, s in drawn))
 
@@ -213,10 +185,9 @@ def _strong(part: str, kind: Kind, effect: Declared, rng: np.random.Generator) -
 
 
 def _somewhere(part: str, kind: Kind, effect: Declared, rng: np.random.Generator, least: float) -> _Draft:
-    size = effect.size_at(rng.uniform(least, 1.0))
-    return _Draft(
-        part, kind, ((effect.name, float(size)),), (float(abs(size - effect.null) / effect.detectable),)
-    )
+    size = effect.null + rng.uniform(least, 1.0) * (effect.maximum - effect.null)
+    multiple = abs(size - effect.null) / effect.detectable
+    return _Draft(part, kind, ((effect.name, float(size)),), (float(multiple),))
 
 
 def _of(part: str, kind: Kind, effect: Declared, multiple: float) -> _Draft:

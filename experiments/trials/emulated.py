@@ -81,9 +81,8 @@ def draw_trials(world: World, count: int, seed: int) -> tuple[Trial, ...]:
 def run_trial(world: World, observables: Sequence[str], trial: Trial) -> Finding:
     """Analyse one trial, of which some observables are measured."""
     (label, sealed), settings = trial, world.settings
-    measured = emulated_heaps(
-        world.truth, label.theta, dict(label.sizes), REPLICATES, label.seed, settings.systematic
-    ).only(observables)
+    truth = (world.truth, label.theta, dict(label.sizes))
+    measured = emulated_heaps(*truth, REPLICATES, label.seed, settings.systematic).only(observables)
     known = world.known.without(*sealed.withheld)
     found = drive(analyse(measured, known, settings, label.seed), world.truth)
     return Finding.of(label.trial, EVERYTHING, found)
@@ -93,46 +92,6 @@ def judged(findings: Iterable[Finding], trials: Iterable[Trial]) -> pd.DataFrame
     """Set findings of one world against its truths, as `scored` does."""
     labels, sealed = zip(*trials, strict=True)
     return scored(findings_table(findings), {label.trial: label for label in labels}, sealed)
-
-
-def emulated_trials(
-    truth: EmulatedSimulator,
-    settings: Settings,
-    count: int,
-    banks: int = 1,
-    observables: Sequence[str] = NAMES,
-    seed: int = 0,
-    workers: int | None = None,
-) -> pd.DataFrame:
-    """Run trials side by side.
-
-    Parameters
-    ----------
-    truth : EmulatedSimulator
-    settings : Settings
-        Of the banks that are drawn from it, and of the analyses.
-    count : int
-        Trials of each mechanism with every bank.
-    banks : int
-    observables : sequence of str
-        Those that are measured.
-    seed : int
-        Of the banks and of the trials.
-    workers : int, optional
-        Processes; None: one a core.
-
-    Returns
-    -------
-    pandas.DataFrame
-        A row a trial, as `scored` has it.
-    """
-    tables = []
-    with ProcessPoolExecutor(workers) as pool:
-        for number in range(banks):
-            world = World.of(truth, settings, seed + number)
-            trials = draw_trials(world, count, 1000 * (seed + number))
-            tables.append(judged(pool.map(partial(run_trial, world, observables), trials), trials))
-    return pd.concat(tables, ignore_index=True)
 
 
 def size_errors(table: pd.DataFrame) -> pd.Series:
@@ -153,14 +112,18 @@ def main(
     """Try the decision rules on banks drawn from the emulator of the trial study."""
     search = Search.of(load_study(STUDY, scale or None))
     truth = EmulatedSimulator(fit_emulator(search.read_bank(bank_beside(scale))), bend)
-    seen = PHOTOGRAPHED if photographs else NAMES
-    table = emulated_trials(truth, search.settings, count, banks, seen, seed, workers)
+    seen, tables = PHOTOGRAPHED if photographs else NAMES, []
+    with ProcessPoolExecutor(workers) as pool:
+        for number in range(seed, seed + banks):
+            world = World.of(truth, search.settings, number)
+            trials = draw_trials(world, count, 1000 * number)
+            tables.append(judged(pool.map(partial(run_trial, world, seen), trials), trials))
+    table = pd.concat(tables, ignore_index=True)
     print(confusion(table).to_string())
     print(pd.DataFrame(aims(table, ())).to_string(index=False))
     z = size_errors(table)
-    print(
-        f"sizes: z {z.mean():.2f} +- {z.std():.2f}; {table['fresh_cases'].mean():.0f} fresh cases an analysis"
-    )
+    cases = f"{table['fresh_cases'].mean():.0f} fresh cases an analysis"
+    print(f"sizes: z {z.mean():.2f} +- {z.std():.2f}; {cases}")
 
 
 if __name__ == "__main__":

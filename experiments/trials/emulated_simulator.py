@@ -102,16 +102,8 @@ def emulated_heaps(
 ) -> Measured:
     """Measured heaps of every condition in an emulated world.
 
-    Parameters
-    ----------
-    simulator : EmulatedSimulator
-    theta : sequence of float
-        Factors in natural units.
-    sizes : mapping
-        Mechanisms with their sizes in natural units.
-    replicates, seed : int
-    systematic : float
-        Standard deviation, in units of that of one run, of what shifts all replicates of a condition alike.
+    Factors `theta` and `sizes` of mechanisms are in natural units. `systematic` is the standard deviation, in
+    units of that of one run, of what shifts all replicates of a condition alike.
     """
     emulator = simulator.emulator
     rng, shifts = np.random.default_rng(seed), np.random.default_rng([seed, 1])

@@ -4,66 +4,30 @@ from __future__ import annotations
 
 import csv
 import time
-from dataclasses import dataclass
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from types import TracebackType
 
 from experiments.discover.devices import resolve_devices
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.report.kit.machine import machine
 
-DECLARED, SEALED, LABELS, FINDINGS, RUNS, NOTES, PAGE = (
-    "declared.json",
-    "sealed.csv",
-    "labels.json",
-    "findings.csv",
-    "runs.csv",
-    "notes.md",
-    "README.md",
-)
+DECLARED, SEALED, LABELS = "declared.json", "sealed.csv", "labels.json"
+FINDINGS, RUNS, NOTES, PAGE = "findings.csv", "runs.csv", "notes.md", "README.md"
 """Files of a record; labels are there when all is found, notes where something is to be said beside."""
 
 
-@dataclass(frozen=True)
 class Folder:
     """A folder of trials."""
 
-    root: Path
-
-    @property
-    def record(self) -> Path:
-        """Folder of all that may be seen."""
-        return self.root / "record"
-
-    @property
-    def hidden(self) -> Path:
-        """Folder that only the generator sees."""
-        return self.root / "hidden"
-
-    @property
-    def data(self) -> Path:
-        """Files of measured heaps."""
-        return self.root / "data"
-
-    @property
-    def declared(self) -> Path:
-        """File of the declaration."""
-        return self.record / DECLARED
-
-    @property
-    def sealed(self) -> Path:
-        """Seals of the truths."""
-        return self.record / SEALED
-
-    @property
-    def hidden_labels(self) -> Path:
-        """The truths."""
-        return self.hidden / LABELS
-
-    @property
-    def findings(self) -> Path:
-        """Table of what the analyses found."""
-        return self.record / FINDINGS
+    def __init__(self, root: Path) -> None:
+        self.root = root
+        self.record, self.hidden, self.data = root / "record", root / "hidden", root / "data"
+        """All that may be seen, what only the generator sees, and files of measured heaps."""
+        self.declared, self.sealed = self.record / DECLARED, self.record / SEALED
+        """The declaration, and the seals of the truths."""
+        self.hidden_labels, self.findings = self.hidden / LABELS, self.record / FINDINGS
+        """The truths, and the table of what the analyses found."""
 
     def measured(self, trial: str) -> Path:
         """Measured heaps of a trial."""
@@ -74,41 +38,24 @@ class Folder:
         return self.root / "discoveries" / f"{job}.json"
 
 
-class Run:
-    """A row of the record's table of runs: what ran, where, when, how many cases and how long.
+@contextmanager
+def noted_run(folder: Folder, what: str, device: str | None, table: OutcomeTable) -> Iterator[None]:
+    """Add a row to the record's table of runs, however the block ends: what ran, where, when, how long.
 
-    Used as a context; the row is written however the block ends.
-
-    Parameters
-    ----------
-    folder
-        Of the trials.
-    what
-        Ran.
-    device
-        Of the simulator.
-    table
-        Whose new rows are the cases that were run.
+    Its cases are the rows that `table` gets meanwhile.
     """
-
-    def __init__(self, folder: Folder, what: str, device: str | None, table: OutcomeTable) -> None:
-        self._path, self._what, self._device, self._table = folder.record / RUNS, what, device, table
-
-    def __enter__(self) -> Run:
-        self._started, self._before = time.perf_counter(), len(self._table)
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        seconds, cases = time.perf_counter() - self._started, len(self._table) - self._before
-        devices = resolve_devices(self._device)
+    started, before = time.perf_counter(), len(table)
+    try:
+        yield
+    finally:
+        seconds, cases = time.perf_counter() - started, len(table) - before
+        devices = resolve_devices(device)
         name, warp, date = machine(devices[0]).rsplit(", ", 2)
         name = f"{len(devices)} x {name}" if len(devices) > 1 else name
-        new = not self._path.exists()
-        self._path.parent.mkdir(parents=True, exist_ok=True)
-        with self._path.open("a", newline="", encoding="utf-8") as file:
+        path = folder.record / RUNS
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with path.open("a", newline="", encoding="utf-8") as file:
             writer = csv.writer(file, lineterminator="\n")
-            if new:
+            if not file.tell():
                 writer.writerow(("what", "machine", "warp", "date", "cases", "seconds"))
-            writer.writerow((self._what, name, warp, date, cases, f"{seconds:.1f}"))
+            writer.writerow((what, name, warp, date, cases, f"{seconds:.1f}"))

@@ -18,33 +18,22 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from doe.discrepancy import Bank, Outcomes, Simulator, fit_emulator
+from doe.discrepancy import Bank, Simulator, fit_emulator
 from experiments.commands.console import clear_errors
 from experiments.discover.engine import EngineSimulator
 from experiments.discover.library import library_for
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.search import Search
 from experiments.errors import InputError
-from experiments.runs.choices import chosen_devices
+from experiments.runs.choices import chosen_device
 from experiments.studyfile import Study, load_study
 from experiments.studyfile.toml_files import read_toml
-from experiments.trials.declaration import (
-    Declaration,
-    declared_effects,
-    read_declaration,
-    with_names,
-)
+from experiments.trials.declaration import Declaration, declared_effects, read_declaration, with_names
 from experiments.trials.drawing import Declared, Plan, draw
-from experiments.trials.folder import Folder, Run
+from experiments.trials.folder import Folder, noted_run
 from experiments.trials.heaps import cases_of, write_heaps
-from experiments.trials.truth import (
-    Label,
-    read_labels,
-    read_sealed,
-    revealed,
-    write_labels,
-    write_sealed,
-)
+from experiments.trials.lockstep import dealt
+from experiments.trials.truth import Label, read_labels, read_sealed, revealed, write_labels, write_sealed
 
 STUDY = Path(__file__).parents[1] / "studies" / "trial" / "study.toml"
 """The study that the trials are about."""
@@ -79,18 +68,7 @@ def generators_study(scale: str) -> Study:
 def seal_trials(folder: Folder, search: Search, bank: Bank, plan: Plan, seed: int) -> None:
     """Declare what the trials should show, draw the truths, and write seals and labels.
 
-    Parameters
-    ----------
-    folder
-        Of the trials.
-    search
-        Of the trial study, at some scale.
-    bank
-        Of that study.
-    plan
-        Numbers of trials.
-    seed
-        Of the drawing, which must not be known to whoever knows the plan.
+    The seed of the drawing must not be known to whoever knows the plan.
 
     Raises
     ------
@@ -98,21 +76,13 @@ def seal_trials(folder: Folder, search: Search, bank: Bank, plan: Plan, seed: in
         When the folder has sealed trials.
     """
     if folder.sealed.exists():
-        raise InputError(
-            "trials are sealed once: name a folder without any", "sealed trials", str(folder.sealed)
-        )
+        rule = "trials are sealed once: name a folder without any"
+        raise InputError(rule, "sealed trials", str(folder.sealed))
     study = search.study
     library = declared_effects(fit_emulator(bank), search.settings, plan.replicates)
     strangers = tuple(Declared(m.name, m.null, m.maximum) for m in library_for(study, STRANGERS))
-    declaration = Declaration(
-        study=study.name,
-        scale=study.scale or "",
-        drawn_on=time.strftime("%Y-%m-%d"),
-        plan=plan,
-        settings=with_names(search.settings, library),
-        library=library,
-        strangers=strangers,
-    )
+    today, settings = time.strftime("%Y-%m-%d"), with_names(search.settings, library)
+    declaration = Declaration(study.name, study.scale or "", today, plan, settings, library, strangers)
     rng = np.random.default_rng(seed)
     trials = draw(plan, study.factors, library, strangers, rng, lambda: rng.bytes(16).hex())
     declaration.write(folder.declared)
@@ -125,26 +95,12 @@ def measure_trials(
 ) -> None:
     """Simulate all heaps of some trials in one call, and write each trial's file.
 
-    Parameters
-    ----------
-    folder
-        Of the trials.
-    labels
-        Truths of the trials.
-    declaration
-        What was declared.
-    simulator
-        Knows the library and the strangers.
+    The simulator knows the library and the strangers.
     """
     conditions = [condition.name for condition in load_study(STUDY, declaration.scale or None).conditions]
     waves = [cases_of(label, conditions, declaration.plan.replicates) for label in labels]
-    outcomes = simulator([point for wave in waves for point in wave])
-    start = 0
-    for label, wave in zip(labels, waves, strict=True):
-        end = start + len(wave)
-        own = Outcomes(outcomes.values[start:end], outcomes.reasons[start:end])
-        write_heaps(folder.measured(label.trial), label, wave, own)
-        start = end
+    for label, wave, outcomes in zip(labels, waves, dealt(waves, simulator), strict=True):
+        write_heaps(folder.measured(label.trial), label, wave, outcomes)
 
 
 @app.command()
@@ -173,7 +129,7 @@ def measure(
 ) -> None:
     """Simulate and measure the heaps of the trials."""
     with clear_errors("the same command"):
-        place, device = Folder(folder), chosen_devices(device)
+        place, device = Folder(folder), chosen_device(device, several=True)
         declaration = read_declaration(place.declared)
         sealed = [trial for trial in read_sealed(place.sealed) if part in (None, trial.part)]
         labels = list(revealed(read_labels(place.hidden_labels), sealed).values())
@@ -182,7 +138,7 @@ def measure(
         table = OutcomeTable(place.hidden / "outcomes.sqlite")
         with (
             EngineSimulator(study, library, table, device, workers) as simulator,
-            Run(place, f"heaps, {part or 'all'}", device, table),
+            noted_run(place, f"heaps, {part or 'all'}", device, table),
         ):
             measure_trials(place, labels, declaration, simulator)
         print(f"{len(labels)} trials measured: {place.data}")

@@ -31,16 +31,7 @@ def write_heaps(path: Path, label: Label, points: Sequence[Point], outcomes: Out
     """Photograph and measure the heaps of a trial, and write them as a file of measured heaps.
 
     A tube that held its grains is written down as clogged; a case that failed in another way leaves no row,
-    as a test that went wrong in a laboratory.
-
-    Parameters
-    ----------
-    path
-        The CSV file.
-    label
-        Draws the camera.
-    points, outcomes
-        The cases and what came out.
+    as a test that went wrong in a laboratory. The label's seed draws the camera.
     """
     rng = np.random.default_rng([label.seed, 1])
     values = Camera.drawn(rng).read(outcomes.values, rng)

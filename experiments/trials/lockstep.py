@@ -11,11 +11,11 @@ import multiprocessing
 import os
 import sys
 import traceback
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
-from typing import Protocol
+from itertools import accumulate, pairwise
 
 from dem_warp.processes import end_with_parent
 from doe.discrepancy import Analysis, Discovery, Outcomes, Point, Simulator
@@ -35,31 +35,19 @@ Step = list[Point] | Discovery | Crash
 """Answer of an analysis: a wave that it wants, or how it ended."""
 
 
-class Crew(Protocol):
-    """Whoever runs the analyses."""
-
-    def send(self, answers: Mapping[str, Outcomes | None]) -> None:
-        """Send every named analysis the outcomes of its wave, or None to begin."""
-
-    def collect(self) -> dict[str, Step]:
-        """Wait for what those say that were sent something last."""
+Answers = Mapping[str, Outcomes | None]
+"""Outcomes of the waves of named analyses; None begins one."""
 
 
 class LocalCrew:
-    """Runs analyses in this process.
-
-    Parameters
-    ----------
-    begin
-        Starts the analysis of a name.
-    """
+    """Runs analyses in this process; `begin` starts the one of a name."""
 
     def __init__(self, begin: Callable[[str], Analysis]) -> None:
         self._begin = begin
         self._running: dict[str, Analysis] = {}
         self._said: dict[str, Step] = {}
 
-    def send(self, answers: Mapping[str, Outcomes | None]) -> None:
+    def send(self, answers: Answers) -> None:
         """Take one analysis after the other."""
         self._said = {name: self._step(name, answer) for name, answer in answers.items()}
 
@@ -83,13 +71,7 @@ class LocalCrew:
 
 
 class ProcessCrew:
-    """Spreads analyses over processes; an analysis stays where it began.
-
-    Parameters
-    ----------
-    homes
-        Pools of one process each, with a crew in it.
-    """
+    """Spreads analyses over pools of one process with a crew each; an analysis stays where it began."""
 
     def __init__(self, homes: Sequence[ProcessPoolExecutor]) -> None:
         self._homes = homes
@@ -97,7 +79,7 @@ class ProcessCrew:
         self._asked: list[str] = []
         self._waiting: list[Future[dict[str, Step]]] = []
 
-    def send(self, answers: Mapping[str, Outcomes | None]) -> None:
+    def send(self, answers: Answers) -> None:
         """Send each process what its analyses wait for; new analyses are dealt in turn."""
         shares: dict[int, dict[str, Outcomes | None]] = {}
         for name, answer in answers.items():
@@ -114,19 +96,7 @@ class ProcessCrew:
 
 @contextmanager
 def process_crew(begin: Callable[[str], Analysis], workers: int) -> Iterator[ProcessCrew]:
-    """Start processes for analyses, and end them with the block.
-
-    Parameters
-    ----------
-    begin
-        Starts the analysis of a name; must be picklable.
-    workers
-        Number of processes.
-
-    Yields
-    ------
-    ProcessCrew
-    """
+    """Start processes for analyses, and end them with the block; `begin` must be picklable."""
     # Not forked: the parent may hold a CUDA context and threads, which do not survive a fork.
     context = multiprocessing.get_context("spawn")
     with ExitStack() as stack:
@@ -149,7 +119,7 @@ def _settle(begin: Callable[[str], Analysis]) -> None:
     _here.append(LocalCrew(begin))
 
 
-def _take(answers: Mapping[str, Outcomes | None]) -> dict[str, Step]:
+def _take(answers: Answers) -> dict[str, Step]:
     """Take every named analysis to its next wave."""
     _here[0].send(answers)
     return _here[0].collect()
@@ -171,31 +141,18 @@ class Round:
     def of(cls, number: int, steps: Mapping[str, Step]) -> Round:
         """Count what the analyses of a shift said."""
         ended = {name: step for name, step in steps.items() if not isinstance(step, list)}
-        return cls(number, ended, len(steps) - len(ended), len(_points(steps)))
+        return cls(number, ended, len(steps) - len(ended), sum(map(len, _waves(steps).values())))
 
 
-def in_step(names: Sequence[str], crew: Crew, simulator: Simulator) -> Iterator[Round]:
+def in_step(names: Sequence[str], crew: LocalCrew | ProcessCrew, simulator: Simulator) -> Iterator[Round]:
     """Run analyses round by round until all have ended.
 
     A round is yielded before its cases run, so that whoever iterates may stop there; the simulator keeps what
     it has run, and the same analyses then come to the same point again. Where the simulator raises, what the
     other shift has found by then is yielded first.
-
-    Parameters
-    ----------
-    names
-        Analyses to begin.
-    crew
-        Runs them.
-    simulator
-        Answers their waves.
-
-    Yields
-    ------
-    Round
     """
-    answers: dict[str, Outcomes | None] = dict.fromkeys(names[0::2])
-    waiting: dict[str, Outcomes | None] = dict.fromkeys(names[1::2])
+    answers: Answers = dict.fromkeys(names[0::2])
+    waiting: Answers = dict.fromkeys(names[1::2])
     number = 0
     crew.send(answers)
     while answers:
@@ -203,7 +160,8 @@ def in_step(names: Sequence[str], crew: Crew, simulator: Simulator) -> Iterator[
         yield Round.of(number, steps)
         crew.send(waiting)
         try:
-            answers = _answered(steps, simulator)
+            waves = _waves(steps)
+            answers = dict(zip(waves, dealt(waves.values(), simulator), strict=True))
         except BaseException:
             yield Round.of(number + 1, crew.collect())
             raise
@@ -213,21 +171,14 @@ def in_step(names: Sequence[str], crew: Crew, simulator: Simulator) -> Iterator[
             crew.send(answers)
 
 
-def _points(steps: Mapping[str, Step]) -> list[Point]:
-    """The waves that are wanted, one after the other."""
-    return [point for step in steps.values() if isinstance(step, list) for point in step]
+def _waves(steps: Mapping[str, Step]) -> dict[str, list[Point]]:
+    return {name: step for name, step in steps.items() if isinstance(step, list)}
 
 
-def _answered(steps: Mapping[str, Step], simulator: Simulator) -> dict[str, Outcomes | None]:
-    """Run the waves of a round in one call."""
-    waves = {name: step for name, step in steps.items() if isinstance(step, list)}
-    return dict(_dealt(waves, simulator(_points(steps)))) if waves else {}
-
-
-def _dealt(waves: Mapping[str, list[Point]], outcomes: Outcomes) -> Iterator[tuple[str, Outcomes]]:
-    """Give each wave its part of the outcomes."""
-    start = 0
-    for name, wave in waves.items():
-        end = start + len(wave)
-        yield name, Outcomes(outcomes.values[start:end], outcomes.reasons[start:end])
-        start = end
+def dealt(waves: Collection[list[Point]], simulator: Simulator) -> list[Outcomes]:
+    """Run waves in one call, and give each its part of the outcomes."""
+    if not waves:
+        return []
+    outcomes = simulator([point for wave in waves for point in wave])
+    ends = list(accumulate(map(len, waves), initial=0))
+    return [Outcomes(outcomes.values[a:b], outcomes.reasons[a:b]) for a, b in pairwise(ends)]

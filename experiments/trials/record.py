@@ -9,7 +9,6 @@ files of the record.
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 from typing import Annotated
 
@@ -17,7 +16,7 @@ import typer
 
 from experiments.commands.console import clear_errors
 from experiments.errors import InputError
-from experiments.files import replacing
+from experiments.files import copy_file
 from experiments.trials.folder import DECLARED, FINDINGS, LABELS, RUNS, SEALED, Folder
 from experiments.trials.trials_page import write_trials_page
 
@@ -35,8 +34,7 @@ def gather(folder: Folder, record: Path) -> None:
         if not source.is_file():
             raise InputError("trials that are revealed have run", "no such file", str(source))
     for source in files:
-        with replacing(record / source.name) as temporary:
-            shutil.copyfile(source, temporary)
+        copy_file(source, record / source.name)
 
 
 def main(

@@ -26,15 +26,15 @@ from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.search import Search
 from experiments.errors import InputError
 from experiments.report.kit.markdown import markdown_table
-from experiments.runs.choices import chosen_devices
+from experiments.runs.choices import chosen_device
 from experiments.studyfile import load_study
 from experiments.trials.cost import planned_cases
 from experiments.trials.declaration import read_declaration
 from experiments.trials.desk import Desk, OutOfTime, TimedSimulator, job_name, keep, read_data
 from experiments.trials.findings import VIEWS, read_findings
-from experiments.trials.folder import Folder, Run
+from experiments.trials.folder import Folder, noted_run
 from experiments.trials.generate import STUDY, bank_beside
-from experiments.trials.lockstep import Round, in_step, process_crew
+from experiments.trials.lockstep import in_step, process_crew
 from experiments.trials.truth import Sealed, read_sealed
 
 UNFINISHED = 3
@@ -58,22 +58,10 @@ def run_trials(
     workers: int | None = None,
     seconds: float = math.inf,
 ) -> None:
-    """Run the analyses of trials that have not ended; report every round.
+    """Run the analyses of some sealed trials that have not ended, one in each view; report every round.
 
-    Parameters
-    ----------
-    folder
-        Of the trials.
-    trials
-        Some of those that were sealed.
-    bank
-        File of the bank of the trial study; None: its own.
-    views
-        What the analyses get to see: one of each trial in each.
-    device, workers
-        Of the simulator; there are as many processes for analyses.
-    seconds
-        Time before no further batch is begun.
+    There are as many processes for analyses as `workers` of the simulator. After so many seconds no further
+    batch is begun.
 
     Raises
     ------
@@ -94,11 +82,12 @@ def run_trials(
     with (
         EngineSimulator(search.study, search.library, table, device, workers) as engine,
         process_crew(desk, workers or os.cpu_count() or 1) as crew,
-        Run(folder, f"analyses, {' and '.join(views)}", device, table),
+        noted_run(folder, f"analyses, {' and '.join(views)}", device, table),
     ):
         for turn in in_step(names, crew, TimedSimulator(engine, deadline)):
             keep(folder, turn.ended)
-            _report(turn)
+            ended = f"round {turn.number}: {len(turn.ended)} analyses ended"
+            print(f"{ended}, {turn.running} want {turn.cases} cases", flush=True)
 
 
 def chosen(trials: Sequence[Sealed], part: str | None = None, every: int = 1) -> list[Sealed]:
@@ -112,11 +101,6 @@ def plan_page(folder: Folder, bank: Path | None) -> str:
     declaration = read_declaration(folder.declared)
     waves = load_bank(bank or bank_beside(declaration.scale))
     return markdown_table(planned_cases(read_sealed(folder.sealed), declaration, waves))
-
-
-def _report(turn: Round) -> None:
-    ended = f"round {turn.number}: {len(turn.ended)} analyses ended"
-    print(f"{ended}, {turn.running} want {turn.cases} cases", flush=True)
 
 
 def main(
@@ -140,7 +124,7 @@ def main(
             return
         trials = chosen(read_sealed(place.sealed), part, every)
         try:
-            run_trials(place, trials, bank, views, chosen_devices(device), workers, seconds)
+            run_trials(place, trials, bank, views, chosen_device(device, several=True), workers, seconds)
         except OutOfTime:
             print(f"time is up; {len(open_jobs(place, trials, views))} analyses have not ended: run it again")
             raise typer.Exit(UNFINISHED) from None

@@ -69,21 +69,9 @@ class Aim:
 def scored(findings: pd.DataFrame, labels: Mapping[str, Label], sealed: Sequence[Sealed]) -> pd.DataFrame:
     """Set every finding against the truth.
 
-    Parameters
-    ----------
-    findings
-        As `findings_table` builds it.
-    labels
-        Revealed labels by trial.
-    sealed
-        What was known beforehand.
-
-    Returns
-    -------
-    pandas.DataFrame
-        The findings with ``part``, ``kind``, ``truth`` (names parted by blanks), ``true_size`` and
-        ``multiple`` (of a pair the smaller), and the judgement: ``right`` (that name, or both, and no
-        other), ``tied`` (a tie with the truth in it), ``wrong`` (a name that is not in the truth).
+    The findings get the columns ``part``, ``kind``, ``truth`` (names parted by blanks), ``true_size`` and
+    ``multiple`` (of a pair the smaller), and the judgement: ``right`` (that name, or both, and no other),
+    ``tied`` (a tie with the truth in it), ``wrong`` (a name that is not in the truth).
     """
     parts = {trial.trial: trial.part for trial in sealed}
     rows = [_judged(row, labels[row["trial"]]) for row in findings.to_dict("records")]
@@ -141,11 +129,8 @@ def _names_first(labels: Iterable[str]) -> list[str]:
 def power_curve(table: pd.DataFrame) -> pd.DataFrame:
     """Shares of alarms and of right names by effect, over all trials of one resolvable mechanism.
 
-    Returns
-    -------
-    pandas.DataFrame
-        One row a class of size: its ends ``least`` and ``most`` (in detectable ones), ``trials``, and for
-        ``alarm`` and ``right`` the share with the ends of its interval.
+    A row is a class of size: its ends ``least`` and ``most`` (in detectable ones), ``trials``, and for
+    ``alarm`` and ``right`` the share with the ends of its interval.
     """
     singles = table[(table["kind"] == Kind.SINGLE) & (table["multiple"] > 0)]
     rows = []
@@ -155,31 +140,26 @@ def power_curve(table: pd.DataFrame) -> pd.DataFrame:
         row = {"least": least, "most": most, "trials": len(members)}
         for name in ("alarm", "right"):
             counted = share(members[name])
-            row |= {
-                name: counted.value,
-                f"{name}_low": counted.interval[0],
-                f"{name}_high": counted.interval[1],
-            }
+            row |= zip((name, f"{name}_low", f"{name}_high"), (counted.value, *counted.interval), strict=True)
         rows.append(row)
     return pd.DataFrame(rows)
 
 
 def by_mechanism(table: pd.DataFrame) -> pd.DataFrame:
     """For each mechanism of the library: its strong trials and how they ended, each in one column."""
-    rows = {}
-    for name, members in strong_singles(table).groupby("truth"):
-        verdicts = members["verdict"]
-        rows[name] = {
-            "trials": len(members),
-            "right": int(members["right"].sum()),
-            "tied": int(members["tied"].sum()),
-            "tie of others": int(((verdicts == Verdict.TIE) & ~members["tied"]).sum()),
-            "wrong": int(members["wrong"].sum()),
-            "unknown": int((verdicts == Verdict.UNKNOWN).sum()),
-            "unseen": int((verdicts == Verdict.NONE).sum()),
-            "crash": int((verdicts == CRASH).sum()),
-        }
-    return pd.DataFrame.from_dict(rows, orient="index").rename_axis("mechanism")
+    strong = strong_singles(table)
+    verdicts, tied = strong["verdict"], strong["tied"]
+    ends = {
+        "trials": verdicts.notna(),
+        "right": strong["right"],
+        "tied": tied,
+        "tie of others": (verdicts == Verdict.TIE) & ~tied,
+        "wrong": strong["wrong"],
+        "unknown": verdicts == Verdict.UNKNOWN,
+        "unseen": verdicts == Verdict.NONE,
+        "crash": verdicts == CRASH,
+    }
+    return pd.DataFrame(ends).groupby(strong["truth"]).sum().rename_axis("mechanism")
 
 
 def by_outsider(table: pd.DataFrame) -> pd.DataFrame:
@@ -201,43 +181,45 @@ def removed(table: pd.DataFrame) -> np.ndarray:
     return np.asarray(1.0 - after[there] / before[there], dtype=np.float64)
 
 
-def covered(table: pd.DataFrame) -> Share:
-    """Count the stated 90 % intervals that hold the true size, over right names of single mechanisms."""
+def covered(table: pd.DataFrame) -> pd.Series:
+    """True where the stated 90 % interval holds the true size, of each right name of a single mechanism."""
     right = table[table["right"] & (table["kind"] == Kind.SINGLE)]
-    inside = (right["size_low"] <= right["true_size"]) & (right["true_size"] <= right["size_high"])
-    return share(inside)
+    return right["true_size"].between(right["size_low"], right["size_high"])
 
 
 def aims(table: pd.DataFrame, unresolvable: Sequence[str]) -> tuple[Aim, ...]:
-    """Hold one view's trials against what was aimed at.
+    """Hold one view's trials, rows of `scored`, against what was aimed at.
 
-    Parameters
-    ----------
-    table
-        Rows of `scored` of one view.
-    unresolvable
-        Mechanisms that were declared not resolvable beforehand.
+    `unresolvable` are the mechanisms that were declared not resolvable beforehand.
     """
-    strong = strong_singles(table)
-    crashes = share(table["verdict"] == CRASH)
+    kind, verdict = table["kind"], table["verdict"]
+    nulls, pairs, strong = table[kind == Kind.NULL], table[kind == Kind.PAIR], strong_singles(table)
+    unknown = verdict[kind.isin([Kind.WITHHELD, Kind.STRANGER])] == Verdict.UNKNOWN
+    names = table.loc[verdict == Verdict.NAMED, "named"].str.split()
+    forbidden = names.map(lambda these: bool(set(these) & set(unresolvable))).astype(bool)
+    above, outside, two = "one mechanism above 1.5 gamma80", "outside the library", "two mechanisms"
+    enough, each = _mechanism_aims(above, by_mechanism(strong))
     return (
-        *_null_aims(table[table["kind"] == Kind.NULL]),
-        *_naming_aims(strong),
-        *_honesty_aims(table, unresolvable),
-        *_size_aims(table),
-        *_pair_aims(table[table["kind"] == Kind.PAIR]),
-        Aim("analyses that crashed", "none", str(crashes), crashes.count == 0 if len(table) else None),
+        _limit("nothing hidden: alarms", "at most 5 in 100", nulls["alarm"], most=0.05),
+        _limit("nothing hidden: wrong names", "at most 1 in 100", nulls["wrong"], most=0.01),
+        enough,
+        _limit(f"{above}: the right name", "at least 80 %", strong["right"], least=0.80),
+        each,
+        _limit(f"{above}: right or in a tie", "at least 90 %", strong["right"] | strong["tied"], least=0.90),
+        _limit(f"{above}: a wrong name", "at most 3 %", strong["wrong"], most=0.03),
+        _limit(f"{outside}: unknown", "at least 90 % of 60", unknown, least=0.90),
+        _none("names that were declared not resolvable", forbidden),
+        _removed_aim(removed(table)),
+        _limit("named: size within its 90 % interval", "82 to 96 %", covered(table), least=0.82, most=0.96),
+        _limit(f"{two}: both named", "at least half", pairs["right"], least=0.50),
+        _limit(f"{two}: no wrong name", "at least 95 %", ~pairs["wrong"].astype(bool), least=0.95),
+        _none("analyses that crashed", verdict == CRASH),
     )
 
 
 MUST_RESOLVE = (
-    "contact_adhesion",
-    "liquid_bridges",
-    "size_spread",
-    "plate_tilt",
-    "vibration",
-    "rolling_torque",
-)
+    "contact_adhesion", "liquid_bridges", "size_spread", "plate_tilt", "vibration", "rolling_torque",
+)  # fmt: skip
 """Mechanisms that must be resolvable at half of their range; that of rolling is missing from the base."""
 
 
@@ -253,78 +235,35 @@ def declared_aim(library: Sequence[Declared]) -> Aim:
     return Aim(question, "every one", found, not missing)
 
 
-def _null_aims(nulls: pd.DataFrame) -> tuple[Aim, ...]:
-    alarms, wrong = share(nulls["alarm"]), share(nulls["wrong"])
-    return (
-        _limit("nothing hidden: alarms", "at most 5 in 100", alarms, most=0.05),
-        _limit("nothing hidden: wrong names", "at most 1 in 100", wrong, most=0.01),
-    )
-
-
-def _naming_aims(strong: pd.DataFrame) -> tuple[Aim, ...]:
-    above = "one mechanism above 1.5 gamma80"
-    counts = by_mechanism(strong)
+def _mechanism_aims(above: str, counts: pd.DataFrame) -> tuple[Aim, Aim]:
+    """Aims of strong trials, as `by_mechanism` counts them: that there are enough, and of each mechanism."""
+    some = len(counts) > 0
     enough = len(counts) >= 8 and bool((counts["trials"] >= 15).all())
-    least = f"{len(counts)} mechanisms, {counts['trials'].min()} trials at least" if len(counts) else "none"
+    least = f"{len(counts)} mechanisms, {counts['trials'].min()} trials at least" if some else "none"
     each = [f"{name} {row.right} of {row.trials}" for name, row in counts.iterrows()]
+    right = bool((counts["right"] >= 11 / 15 * counts["trials"]).all()) if some else None
+    question = f"{above}: the right name, each mechanism"
     return (
         Aim("mechanisms with strong trials", "8 mechanisms, 15 trials each", least, enough),
-        _limit(f"{above}: the right name", "at least 80 %", share(strong["right"]), least=0.80),
-        Aim(
-            f"{above}: the right name, each mechanism",
-            "at least 11 of 15",
-            ", ".join(each) or "no trials",
-            bool((counts["right"] >= 11 / 15 * counts["trials"]).all()) if len(counts) else None,
-        ),
-        _limit(
-            f"{above}: right or in a tie",
-            "at least 90 %",
-            share(strong["right"] | strong["tied"]),
-            least=0.90,
-        ),
-        _limit(f"{above}: a wrong name", "at most 3 %", share(strong["wrong"]), most=0.03),
+        Aim(question, "at least 11 of 15", ", ".join(each) or "no trials", right),
     )
 
 
-def _honesty_aims(table: pd.DataFrame, unresolvable: Sequence[str]) -> tuple[Aim, ...]:
-    outside = table[table["kind"].isin([Kind.WITHHELD, Kind.STRANGER])]
-    named = table.loc[table["verdict"] == Verdict.NAMED, "named"].str.split()
-    forbidden = share(named.map(lambda names: bool(set(names) & set(unresolvable))).astype(bool))
-    unknown = share(outside["verdict"] == Verdict.UNKNOWN)
-    return (
-        _limit("outside the library: unknown", "at least 90 % of 60", unknown, least=0.90),
-        Aim(
-            "names that were declared not resolvable",
-            "none",
-            str(forbidden),
-            forbidden.count == 0 if forbidden.trials else None,
-        ),
-    )
+def _removed_aim(gone: np.ndarray) -> Aim:
+    question, wanted = "named: held-out excess removed, median", "at least 80 %"
+    if not len(gone):
+        return Aim(question, wanted, "no trials", None)
+    median = float(np.median(gone))
+    return Aim(question, wanted, f"{100 * median:.0f} %, {len(gone)} trials", median >= 0.80)
 
 
-def _size_aims(table: pd.DataFrame) -> tuple[Aim, ...]:
-    gone, inside = removed(table), covered(table)
-    median = float(np.median(gone)) if len(gone) else math.nan
-    return (
-        Aim(
-            "named: held-out excess removed, median",
-            "at least 80 %",
-            f"{100 * median:.0f} %, {len(gone)} trials" if len(gone) else "no trials",
-            median >= 0.80 if len(gone) else None,
-        ),
-        _limit("named: size within its 90 % interval", "82 to 96 %", inside, least=0.82, most=0.96),
-    )
+def _none(question: str, column: pd.Series) -> Aim:
+    counted = share(column)
+    return Aim(question, "none", str(counted), counted.count == 0 if counted.trials else None)
 
 
-def _pair_aims(pairs: pd.DataFrame) -> tuple[Aim, ...]:
-    clean = share(~pairs["wrong"].astype(bool))
-    return (
-        _limit("two mechanisms: both named", "at least half", share(pairs["right"]), least=0.50),
-        _limit("two mechanisms: no wrong name", "at least 95 %", clean, least=0.95),
-    )
-
-
-def _limit(question: str, wanted: str, found: Share, least: float = 0.0, most: float = 1.0) -> Aim:
+def _limit(question: str, wanted: str, column: pd.Series, least: float = 0.0, most: float = 1.0) -> Aim:
+    found = share(column)
     passed = least <= found.value <= most if found.trials else None
     value = f"{100 * found.value:.0f} % ({found})" if found.trials else str(found)
     return Aim(question, wanted, value, passed)

@@ -54,16 +54,6 @@ and nothing else; it is wrong as soon as it names one that is not there. Interva
 def write_trials_page(folder: Path) -> Path:
     """Write the page and the pictures of a record from its files, its notes after the introduction.
 
-    Parameters
-    ----------
-    folder
-        The record.
-
-    Returns
-    -------
-    Path
-        The page.
-
     Raises
     ------
     InputError

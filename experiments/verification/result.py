@@ -1,7 +1,7 @@
 """Results of a verification problem for the page: rows with a verdict, curves, and words."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -32,37 +32,29 @@ class Row:
         return None if self.tolerance is None else bool(self.error <= self.tolerance)
 
 
-def relative_row(
-    labels: tuple[str, str, str, str],
-    expected: ArrayLike,
-    simulated: ArrayLike,
-    tolerance: float | None,
-    scale: float | None = None,
-) -> Row:
-    """Row of the worst of several values, relative to each expected value or to one `scale`.
-
-    `labels` are the problem, the case, the quantity and the reference.
-    """
-    want, got = np.broadcast_arrays(
-        *(np.atleast_1d(np.asarray(a, dtype=float)) for a in (expected, simulated))
-    )
-    errors = np.abs(got - want) / (np.abs(want) if scale is None else scale)
-    worst = _worst(errors)
-    return Row(*labels, float(want[worst]), float(got[worst]), float(errors[worst]), tolerance)
+Labels = tuple[str, str, str, str]
+"""Problem, case, quantity and reference of a row."""
 
 
-def absolute_row(
-    labels: tuple[str, str, str, str], expected: ArrayLike, simulated: ArrayLike, tolerance: float | None
-) -> Row:
+def relative_row(labels: Labels, expected: ArrayLike, simulated: ArrayLike, tolerance: float | None) -> Row:
+    """Row of the worst of several values, relative to each expected value."""
+    return _worst_row(labels, expected, simulated, tolerance, np.abs(expected))
+
+
+def absolute_row(labels: Labels, expected: ArrayLike, simulated: ArrayLike, tolerance: float | None) -> Row:
     """Row of the worst of several values, whose error is in the quantity's own unit."""
-    want, got = np.broadcast_arrays(
-        *(np.atleast_1d(np.asarray(a, dtype=float)) for a in (expected, simulated))
-    )
-    errors = np.abs(got - want)
-    worst = _worst(errors)
-    return Row(
-        *labels, float(want[worst]), float(got[worst]), float(errors[worst]), tolerance, relative=False
-    )
+    return replace(_worst_row(labels, expected, simulated, tolerance, 1.0), relative=False)
+
+
+def _worst_row(
+    labels: Labels, expected: ArrayLike, simulated: ArrayLike, tolerance: float | None, scale: ArrayLike
+) -> Row:
+    """Row of the largest error over a scale; one that is not a number is worse than any."""
+    arrays = (np.atleast_1d(np.asarray(values, dtype=float)) for values in (expected, simulated, scale))
+    want, got, scales = np.broadcast_arrays(*arrays)
+    errors = np.abs(got - want) / scales
+    worst = np.unravel_index(int(np.argmax(np.where(np.isnan(errors), np.inf, errors))), errors.shape)
+    return Row(*labels, float(want[worst]), float(got[worst]), float(errors[worst]), tolerance)
 
 
 def order_row(
@@ -82,11 +74,6 @@ def detection_row(problem: str, case: str, quantity: str, least: float, simulate
     """Row of something that must be seen, as a wrong law: the simulated number must reach `least`."""
     short = max(least - simulated, 0.0)
     return Row(problem, case, quantity, "at the least", least, simulated, short, 0.0, relative=False)
-
-
-def _worst(errors: np.ndarray) -> tuple[np.intp, ...]:
-    """Index of the largest error; one that is not a number is worse than any."""
-    return np.unravel_index(int(np.argmax(np.where(np.isnan(errors), np.inf, errors))), errors.shape)
 
 
 @dataclass(frozen=True)
@@ -123,7 +110,7 @@ class Result:
     text: str
     """Markdown: what is asked, by which sources, and how an error is to be read."""
     rows: tuple[Row, ...]
-    plots: tuple[Plot, ...] = field(default=())
+    plots: tuple[Plot, ...] = ()
 
 
 Problem = Callable[[str], Result]

@@ -7,14 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 from matplotlib.ticker import NullLocator
 
 from doe.palette import SERIES
 from experiments.files import write_text
 from experiments.report.kit.figure import new_axes, save_figure
 from experiments.report.kit.markdown import markdown_table, write_page
-from experiments.verification.result import Curve, Plot, Result, Row
+from experiments.verification.result import Plot, Result, Row
 
 VERDICTS = {True: "pass", False: "**FAIL**", None: "stated"}
 
@@ -60,41 +59,24 @@ class StoredResult:
 def write_result(name: str, result: Result, machine: str, folder: Path) -> None:
     """Write rows, plots and their data of one problem into a folder, for `write_verification`.
 
-    Parameters
-    ----------
-    name
-        Of the problem.
-    result
-        Everything that it gave.
-    machine
-        Machine that it ran on, in words.
-    folder
-        Made if missing; files of the same names are written over.
+    The folder is made if missing; files of the same names are written over.
     """
     for plot in result.plots:
         _draw(plot, folder / f"{plot.name}.png")
-        _write_data(plot, folder / f"{plot.name}.csv")
+        curves = [pd.DataFrame({"curve": one.label, plot.x: one.x, plot.y: one.y}) for one in plot.curves]
+        data = pd.concat(curves).to_csv(index=False, float_format="%.7g")
+        write_text(folder / f"{plot.name}.csv", data)
     pictures = tuple((plot.name, plot.title) for plot in result.plots)
     stored = StoredResult(result.title, result.text, machine, result.rows, pictures)
-    write_text(_file(folder, name), json.dumps(asdict(stored), indent=1) + "\n")
+    write_text(folder / f"{name}.json", json.dumps(asdict(stored), indent=1) + "\n")
 
 
 def write_verification(folder: Path, names: Iterable[str]) -> Path:
-    """Write the page and the table of rows from the results that a folder has.
+    """Write the page and the table of rows from the results that `write_result` left, and return the page.
 
-    Parameters
-    ----------
-    folder
-        Folder that `write_result` wrote to, perhaps on several machines.
-    names
-        Of the problems, in the order of the page; one without a result is left out.
-
-    Returns
-    -------
-    Path
-        The page.
+    Problems stand in the order of their names; one without a result is left out.
     """
-    files = [_file(folder, name) for name in names]
+    files = [folder / f"{name}.json" for name in names]
     results = [StoredResult.read(file) for file in files if file.exists()]
     rows = [row for result in results for row in result.rows]
     table = [
@@ -108,10 +90,6 @@ def write_verification(folder: Path, names: Iterable[str]) -> Path:
         pictures = "\n".join(f"![{title}]({stem}.png)" for stem, title in result.pictures)
         parts += [f"## {result.title}", result.text, f"*{result.machine}*", pictures, *_tables(result.rows)]
     return write_page(folder / "README.md", *parts)
-
-
-def _file(folder: Path, name: str) -> Path:
-    return folder / f"{name}.json"
 
 
 def summary(rows: Iterable[Row]) -> str:
@@ -158,15 +136,12 @@ def _error(value: float, relative: bool) -> str:
     return f"{100.0 * value:.2g} %" if relative else f"{value:.2g}"
 
 
-def _write_data(plot: Plot, path: Path) -> None:
-    curves = [pd.DataFrame({"curve": curve.label, plot.x: curve.x, plot.y: curve.y}) for curve in plot.curves]
-    write_text(path, pd.concat(curves).to_csv(index=False, float_format="%.7g"))
-
-
 def _draw(plot: Plot, path: Path) -> None:
     figure, axes = new_axes()
     for k, curve in enumerate(plot.curves):
-        _draw_curve(axes, curve, SERIES[(k if curve.colour is None else curve.colour) % len(SERIES)])
+        colour = SERIES[(k if curve.colour is None else curve.colour) % len(SERIES)]
+        (line,) = axes.plot(np.asarray(curve.x), np.asarray(curve.y), STYLES[curve.style], label=curve.label)
+        line.set(color=colour, markersize=4, linewidth=1.5)
     if plot.logarithmic:
         axes.set(xscale="log", yscale="log")
         ticks = np.unique(np.concatenate([curve.x for curve in plot.curves]))
@@ -175,8 +150,3 @@ def _draw(plot: Plot, path: Path) -> None:
     axes.set(title=plot.title, xlabel=plot.x, ylabel=plot.y)
     axes.legend(fontsize="small", frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
     save_figure(figure, path)
-
-
-def _draw_curve(axes: Axes, curve: Curve, colour: str) -> None:
-    x, y = np.asarray(curve.x), np.asarray(curve.y)
-    axes.plot(x, y, STYLES[curve.style], color=colour, markersize=4, linewidth=1.5, label=curve.label)

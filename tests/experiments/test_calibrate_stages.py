@@ -54,7 +54,8 @@ def test_seeds_differ_over_stages_runs_and_replicates() -> None:
 
 def test_a_plan_holds_every_factor_and_its_replicates() -> None:
     points = pd.DataFrame({"x1": [0.2, 0.9]}, index=[1, 2])
-    plan = plan_cases(factors(3), "climb", points, {1: 2, 2: 1}, seed=1)
+    study = SimpleNamespace(factors=factors(3), campaign=CampaignSettings())
+    plan = plan_cases(study, "climb", points, {1: 2, 2: 1}, [ANGLE])
     assert plan[["run", "replicate"]].to_numpy().tolist() == [[1, 1], [1, 2], [2, 1]]
     assert plan["x1"].tolist() == [0.2, 0.2, 0.9]
     assert plan[["x0", "x2"]].eq(0.5).all(axis=None)

@@ -14,6 +14,7 @@ from experiments.benchmarks.columns import Columns, Moment
 from experiments.benchmarks.contacts import placed_centers
 from experiments.benchmarks.peers.library import PEERS, PeerName
 from experiments.benchmarks.peers.peer import PeerRun, Plan
+from experiments.benchmarks.results import Part
 from experiments.benchmarks.roofline import world_contacts
 from experiments.benchmarks.timing import STRETCHES, Timing, run_in, start, time_steps
 
@@ -26,19 +27,8 @@ REST_AFTER = 0.1
 SPEED = "million sphere-steps/s"
 
 
-def compare(name: PeerName, columns: Columns, steps: int, folder: Path) -> tuple[str, str, pd.DataFrame]:
-    """Time a settled column here, in another code, and here again.
-
-    Parameters
-    ----------
-    name : PeerName
-        Also that of the table.
-    columns : Columns
-    steps : int
-        Of a stretch.
-    folder : Path
-        For the peer's files.
-    """
+def compare(name: PeerName, columns: Columns, steps: int, folder: Path) -> Part:
+    """Time a settled column here, in another code with its files in a folder, and here again."""
     case = columns.cases[0]
     moment = _below_rim(columns.moments("settled", 1)[0], case.scene)
     default = moment.setup.skin

@@ -8,7 +8,7 @@ a spring of its own with a slider, whose limit is the case's. The tube is an end
 its curvature into the radius of the contacts, half of it being counted.
 """
 
-import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,24 +16,8 @@ from scipy.spatial.transform import Rotation
 
 from dem_warp import Case, LiftedCylinder
 from experiments.benchmarks.columns import Moment
-from experiments.benchmarks.peers.lammps_files import (
-    END,
-    INPUT,
-    START,
-    read_energy,
-    read_spheres,
-    read_timings,
-    run_input,
-    timed_runs,
-)
-from experiments.benchmarks.peers.peer import (
-    MARGIN,
-    PeerRun,
-    Plan,
-    grain_of_sphere,
-    judged,
-    spheres_in_place,
-)
+from experiments.benchmarks.peers.lammps_files import END, INPUT, START, run_input, timed_runs
+from experiments.benchmarks.peers.peer import MARGIN, PeerRun, Plan, grain_of_sphere, spheres_in_place
 from experiments.export import contacts_of
 from experiments.export.lammps import granular_words
 
@@ -90,12 +74,9 @@ Clumps
 def simulate(program: str, folder: Path, case: Case[LiftedCylinder], moment: Moment, plan: Plan) -> PeerRun:
     """Run a settled column of grains of one shape; see `Peer.run`."""
     write_input(folder, case, moment, plan)
-    log = run_input(program, folder)
-    start, end = read_spheres(folder / START), read_spheres(folder / END)
-    version = re.findall(r"^LAMMPS \((.*)\)$", log, re.MULTILINE)[0]
     # before the stretches: the state for the first dump, and the running in
-    timings = read_timings(log, plan, len(end), before=2)
-    return judged(moment, f"LAMMPS {version}", timings, read_energy(log), start, end)
+    done = run_input(program, folder, moment, plan, r"^LAMMPS \((.*)\)$", before=2)
+    return replace(done, version=f"LAMMPS {done.version}")
 
 
 def write_input(folder: Path, case: Case[LiftedCylinder], moment: Moment, plan: Plan) -> None:
@@ -143,9 +124,8 @@ def _bodies(moment: Moment) -> str:
     turns = Rotation.from_quat(setup.grains.orientations).as_matrix()
     inertias = np.einsum("nij,nj,nkj->nik", turns, setup.inertias, turns)
     rows = [str(setup.grains.count)]
-    for i, (mass, position, inertia) in enumerate(
-        zip(setup.masses, setup.grains.positions, inertias, strict=True), 1
-    ):
+    bodies = zip(setup.masses, setup.grains.positions, inertias, strict=True)
+    for i, (mass, position, inertia) in enumerate(bodies, 1):
         moments = inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
         numbers = " ".join(f"{value:.15g}" for value in (mass, *position, *moments))
         rows.append(f"{i} {numbers} 0 0 0 0 0 0 0 0 0")

@@ -5,7 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.benchmarks.peers.peer import Plan, execute
+from experiments.benchmarks.columns import Moment
+from experiments.benchmarks.peers.peer import PeerRun, Plan, execute, judged
 from experiments.benchmarks.timing import Timing
 
 INPUT, LOG = "column.in", "column.log"
@@ -14,8 +15,10 @@ START, END = "start.txt", "end.txt"
 """Dumps of the spheres: number, centre and radius."""
 
 
-def run_input(program: str, folder: Path) -> str:
-    """Run the input of a folder and return the log.
+def run_input(program: str, folder: Path, moment: Moment, plan: Plan, version: str, before: int) -> PeerRun:
+    """Run the input of a folder.
+
+    `version` is its pattern in the log; the stretches come after a number of runs `before` them.
 
     Raises
     ------
@@ -27,7 +30,11 @@ def run_input(program: str, folder: Path) -> str:
     error = re.search(r"^ERROR.*", log, re.MULTILINE)
     if status or error:
         raise RuntimeError(f"{program} failed in {folder}: {error[0] if error else status}")
-    return log
+    start, end = read_spheres(folder / START), read_spheres(folder / END)
+    name = re.findall(version, log, re.MULTILINE)[0]
+    # the second and last column of the last line of thermodynamic output
+    energy = float(re.findall(r"^ +\d+ +(\S+) *\nLoop time", log, re.MULTILINE)[-1])
+    return judged(moment, name, _timings(log, plan, len(end), before), energy, start, end)
 
 
 def timed_runs(plan: Plan) -> str:
@@ -35,7 +42,7 @@ def timed_runs(plan: Plan) -> str:
     return "".join(f"neighbor {skin} bin\n" + f"run {plan.steps}\n" * plan.stretches for skin in plan.skins)
 
 
-def read_timings(log: str, plan: Plan, spheres: int, before: int) -> dict[float, Timing]:
+def _timings(log: str, plan: Plan, spheres: int, before: int) -> dict[float, Timing]:
     """Loop times of the stretches by skin, after a number of other runs."""
     loops = re.findall(r"^Loop time of (\S+) on 1 procs for \d+ steps", log, re.MULTILINE)[before:]
     builds = re.findall(r"^Neighbor list builds = (\d+)", log, re.MULTILINE)[before:]
@@ -46,11 +53,6 @@ def read_timings(log: str, plan: Plan, spheres: int, before: int) -> dict[float,
         rebuilds = sum(map(int, builds[rows])) / (plan.steps * plan.stretches)
         timings[skin] = Timing(plan.steps, seconds, spheres, rebuilds)
     return timings
-
-
-def read_energy(log: str) -> float:
-    """The second and last column of the last line of thermodynamic output."""
-    return float(re.findall(r"^ +\d+ +(\S+) *\nLoop time", log, re.MULTILINE)[-1])
 
 
 def read_spheres(path: Path) -> np.ndarray:

@@ -8,24 +8,14 @@ endless, so no grain may reach over its rim. Neither code knows the contacts' hi
 in until the column is at rest.
 """
 
-import re
 from pathlib import Path
 
 import numpy as np
 
 from dem_warp import Case, LiftedCylinder
 from experiments.benchmarks.columns import Moment
-from experiments.benchmarks.peers.lammps_files import (
-    END,
-    INPUT,
-    START,
-    read_energy,
-    read_spheres,
-    read_timings,
-    run_input,
-    timed_runs,
-)
-from experiments.benchmarks.peers.peer import MARGIN, PeerRun, Plan, common_size, judged
+from experiments.benchmarks.peers.lammps_files import INPUT, run_input, timed_runs
+from experiments.benchmarks.peers.peer import MARGIN, PeerRun, Plan, common_size
 from experiments.export import contacts_of, values
 from experiments.export.liggghts import LAWS, contact_terms, material_terms
 
@@ -80,12 +70,8 @@ undump {name}
 def simulate(program: str, folder: Path, case: Case[LiftedCylinder], moment: Moment, plan: Plan) -> PeerRun:
     """Run a settled column of grains of one shape and size; see `Peer.run`."""
     write_input(folder, case, moment, plan)
-    log = run_input(program, folder)
-    start, end = read_spheres(folder / START), read_spheres(folder / END)
-    version = re.findall(r"LIGGGHTS-\w+ [\d.]+", log)[0]
     # before the stretches: the insertion, its dump and the running in
-    timings = read_timings(log, plan, len(end), before=3)
-    return judged(moment, version, timings, read_energy(log), start, end)
+    return run_input(program, folder, moment, plan, r"LIGGGHTS-\w+ [\d.]+", before=3)
 
 
 def write_input(folder: Path, case: Case[LiftedCylinder], moment: Moment, plan: Plan) -> None:
@@ -130,11 +116,9 @@ def _head(case: Case[LiftedCylinder], moment: Moment, skin: float) -> str:
         skin=skin,
         laws=LAWS,
         properties="\n".join(
-            [f"fix {name} all property/global {name} peratomtype {text}" for name, text in by_type.items()]
-            + [
-                f"fix {name} all property/global {name} peratomtypepair 2 {text}"
-                for name, text in by_pair.items()
-            ]
+            f"fix {name} all property/global {name} {kind} {text}"
+            for kind, terms in (("peratomtype", by_type), ("peratomtypepair 2", by_pair))
+            for name, text in terms.items()
         ),
         radius=case.scene.diameter / 2,
         gravity=-setup.gravity[2],

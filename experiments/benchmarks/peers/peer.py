@@ -68,12 +68,10 @@ class Peer:
         ValueError
             If there is none.
         """
-        path = shutil.which(self.program)
-        if path is None:
-            raise ValueError(
-                f"peer: {self.program} must be installed (Debian package {self.package}), found none"
-            )
-        return path
+        if path := shutil.which(self.program):
+            return path
+        wanted = f"{self.program} must be installed (Debian package {self.package})"
+        raise ValueError(f"peer: {wanted}, found none")
 
     def run(self, folder: Path, case: Case[LiftedCylinder], moment: Moment, plan: Plan) -> PeerRun:
         """Run a settled column; `folder` is made for the files.

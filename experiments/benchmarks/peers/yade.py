@@ -141,17 +141,13 @@ def write_input(folder: Path, case: Case[LiftedCylinder], moment: Moment, plan: 
     grains, shape, scene = setup.grains, setup.shapes[0], case.scene
     size = common_size(moment)
     centers, radii = shape.centers * size, shape.radii * size
-    contacts = [
-        values(contact_terms(contact))
-        for contact in contacts_of(case, float(radii.max()), float(setup.masses[0]))
-    ]
+    contacts = contacts_of(case, float(radii.max()), float(setup.masses[0]))
+    turns = grains.orientations / np.linalg.norm(grains.orientations, axis=1)[:, None]
     given = {
         "time_step": setup.time_step,
         "gravity": setup.gravity,
-        "materials": [
-            values(material_terms(material)) for material in (case.grain_material, scene.wall_material)
-        ],
-        "contacts": contacts,
+        "materials": [values(material_terms(one)) for one in (case.grain_material, scene.wall_material)],
+        "contacts": [values(contact_terms(contact)) for contact in contacts],
         "facets": _prism(scene.diameter / 2, scene.height + MARGIN).tolist(),
         "centers": centers.tolist(),
         "radii": radii.tolist(),
@@ -159,7 +155,7 @@ def write_input(folder: Path, case: Case[LiftedCylinder], moment: Moment, plan: 
         "mass": float(setup.masses[0]),
         "inertia": setup.inertias[0].tolist(),
         "positions": grains.positions.tolist(),
-        "orientations": (grains.orientations / np.linalg.norm(grains.orientations, axis=1)[:, None]).tolist(),
+        "orientations": turns.tolist(),
         "skins": plan.skins,
         "run_in": plan.run_in,
         "steps": _steps(plan),
@@ -174,16 +170,9 @@ def _steps(plan: Plan) -> int:
 
 
 def part_densities(centers: np.ndarray, radii: np.ndarray, mass: float) -> np.ndarray:
-    """Densities of overlapping spheres whose masses add up to the grain's, about its centre [kg/m3].
+    """Densities of overlapping spheres whose masses add up to the grain's [kg], about its centre [kg/m3].
 
-    Of all that do, those nearest to equal densities, by the masses.
-
-    Parameters
-    ----------
-    centers, radii : (S, 3) and (S,) arrays
-        About the grain's centre of mass [m].
-    mass : float
-        Of the grain [kg].
+    Of all that do, those nearest to equal densities, by the masses. Centres are from that of mass [m].
     """
     volumes = 4.0 / 3.0 * np.pi * radii**3
     equal = volumes * (mass / volumes.sum())

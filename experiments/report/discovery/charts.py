@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
-
 import numpy as np
 import plotly.graph_objects as go
 
@@ -12,7 +9,7 @@ from doe.discrepancy import Confounding, Discovery, Fit
 from doe.palette import BLUE, GREEN, INK, MUTED, ORANGE, VERMILION
 from experiments.report.discovery.tables import shown_candidates
 from experiments.report.discovery.terms import Terms, condition_name, spaced
-from experiments.report.kit.chart import Chart, add_points, new_figure
+from experiments.report.kit.chart import Chart, add_bars, add_points, new_figure
 from experiments.report.kit.numbers import MISSING, capital, fixed
 
 DIVERGING = [[0.0, "#b35806"], [0.25, "#fdb863"], [0.5, "#f7f7f7"], [0.75, "#92c5de"], [1.0, "#2166ac"]]
@@ -56,14 +53,8 @@ def explained_chart(found: Discovery, terms: Terms) -> Chart:
         rows = [at for at, candidate in enumerate(ordered) if candidate.admitted is wanted]
         if not rows:
             continue
-        figure.add_bar(
-            x=[100.0 * max(ordered[at].explained, 0.0) for at in rows],
-            y=[names[at] for at in rows],
-            orientation="h",
-            name=label,
-            marker={"color": color},
-            hovertemplate="%{y}: %{x:.1f} %<extra></extra>",
-        )
+        shares, titles = [100.0 * max(ordered[at].explained, 0.0) for at in rows], [names[at] for at in rows]
+        add_bars(figure, shares, titles, label, color, "%{y}: %{x:.1f} %", orientation="h")
     figure.update_yaxes(categoryorder="array", categoryarray=names, ticks="", ticklabelstandoff=6)
     figure.update_xaxes(range=[0.0, 100.0])
     figure.update_layout(bargap=0.35)
@@ -94,19 +85,14 @@ def gap_chart(found: Discovery) -> Chart:
     ):
         places = [at + aside for at in range(len(rows))]
         ends = [getattr(both, name) for both in found.before_after]
-        error = {
-            "type": "data",
-            "symmetric": False,
-            "array": [end.high - end.value for end in ends],
-            "arrayminus": [end.value - end.low for end in ends],
-            "color": color,
-        }
-        add_points(figure, [end.value for end in ends], places, label, color, size=11, error_x=error)
+        values = [end.value for end in ends]
+        up, down = [end.high - end.value for end in ends], [end.value - end.low for end in ends]
+        error = {"type": "data", "symmetric": False, "array": up, "arrayminus": down, "color": color}
+        add_points(figure, values, places, label, color, size=11, error_x=error)
     for at, both in enumerate(found.before_after):
         df = both.degrees_of_freedom
-        figure.add_shape(
-            type="line", x0=df, x1=df, y0=at - 0.35, y1=at + 0.35, line={"color": GREEN, "width": 3}
-        )
+        line = {"color": GREEN, "width": 3}
+        figure.add_shape(type="line", x0=df, x1=df, y0=at - 0.35, y1=at + 0.35, line=line)
     figure.update_xaxes(type="log", dtick=1 if _decades(found) > 1.0 else "D2")
     figure.update_yaxes(
         ticks="",
@@ -122,12 +108,8 @@ def gap_chart(found: Discovery) -> Chart:
 
 def comparison_charts(found: Discovery, terms: Terms) -> list[Chart]:
     """Draw predicted against measured, one chart an observable that was measured."""
-    measured = np.isfinite(found.data.means)
-    return [
-        _comparison(found, terms, column)
-        for column in range(len(found.data.observables))
-        if measured[:, column].any()
-    ]
+    measured = np.isfinite(found.data.means).any(axis=0)
+    return [_comparison(found, terms, int(column)) for column in np.flatnonzero(measured)]
 
 
 def _comparison(found: Discovery, terms: Terms, column: int) -> Chart:
@@ -136,9 +118,7 @@ def _comparison(found: Discovery, terms: Terms, column: int) -> Chart:
     factor = terms.scale(observable)[0]
     rows = np.flatnonzero(np.isfinite(data.means[:, column]))
     figure = new_figure("", terms.axis(observable), legend=False)
-    series: list[tuple[str, str, str, np.ndarray, np.ndarray]] = [
-        ("measured", MEASURED, "circle", data.means, data.standard_errors)
-    ]
+    series = [("measured", MEASURED, "circle", data.means, data.standard_errors)]
     if found.base:
         series.append(("base", BASE, "diamond", found.base.predicted, found.base.predicted_se))
     if found.chosen:
@@ -146,29 +126,14 @@ def _comparison(found: Discovery, terms: Terms, column: int) -> Chart:
         series.append(("with the mechanism", ADDED, "square", fit.predicted, fit.predicted_se))
     for position, (name, color, symbol, values, errors) in enumerate(series):
         place = np.arange(len(rows)) + DODGE * (position - 0.5 * (len(series) - 1))
-        bars = {
-            "type": "data",
-            "array": 1.96 * factor * errors[rows, column],
-            "color": color,
-            "thickness": 1.5,
-        }
+        shown, reach = factor * values[rows, column], 1.96 * factor * errors[rows, column]
+        bars = {"type": "data", "array": reach, "color": color, "thickness": 1.5}
         hover = f"{name}: %{{y:.4g}}<extra></extra>"
-        add_points(
-            figure,
-            place,
-            factor * values[rows, column],
-            name,
-            color,
-            symbol,
-            8,
-            error_y=bars,
-            hovertemplate=hover,
-        )
+        add_points(figure, place, shown, name, color, symbol, 8, error_y=bars, hovertemplate=hover)
     for at, row in enumerate(rows):
         if data.held_out[row]:
-            figure.add_vrect(
-                x0=at - 0.45, x1=at + 0.45, fillcolor=MUTED, opacity=0.10, line_width=0, layer="below"
-            )
+            ends = {"x0": at - 0.45, "x1": at + 0.45}
+            figure.add_vrect(**ends, fillcolor=MUTED, opacity=0.10, line_width=0, layer="below")
     figure.update_xaxes(
         tickvals=list(range(len(rows))),
         ticktext=[data.conditions[row] for row in rows],
@@ -196,15 +161,15 @@ def _residual_map(name: str, found: Discovery, fit: Fit, caption: str) -> Chart:
 def _add_map(
     figure: go.Figure,
     values: np.ndarray,
-    rows: Sequence[str],
-    columns: Sequence[str],
+    rows: list[str],
+    columns: list[str],
     reach: float,
-    texts: Any,
+    texts: np.ndarray,
 ) -> None:
     figure.add_heatmap(
         z=np.where(np.isfinite(values), values, np.nan),
-        x=list(columns),
-        y=list(rows),
+        x=columns,
+        y=rows,
         zmin=-reach,
         zmax=reach,
         colorscale=DIVERGING,

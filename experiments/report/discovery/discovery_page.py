@@ -40,9 +40,7 @@ TITLES = {
 
 
 def _chapter(
-    name: str,
-    tables: Mapping[str, Table] | None = None,
-    charts: Mapping[str, Sequence[Chart]] | None = None,
+    name: str, tables: Mapping[str, Table] | None = None, charts: Mapping[str, Sequence[Chart]] | None = None
 ) -> Chapter:
     """Build a chapter that a template of its name fills."""
     return Chapter(name, TITLES[name], tables or {}, charts or {}, template=f"discovery/{name}.html.j2")
@@ -62,14 +60,10 @@ def render_discovery(
 
     Parameters
     ----------
-    found
-        What the analysis found.
-    study
-        The study that was analysed.
-    terms
-        What the names mean.
-    settings
-        The rules of the analysis.
+    found, study
+        What the analysis found, and the study that it analysed.
+    terms, settings
+        The meaning of the names, and the rules of the analysis.
     pictures
         Heaps to show side by side.
     files
@@ -103,10 +97,8 @@ def render_discovery(
         "rules": flat(asdict(settings)),
         "document": flat(study.document),
     }
-    chapters = [*shown, *further, last]
-    return render_page(
-        "report on a disagreement", study.name, "discovery/summary.html.j2", chapters, drawn_on
-    )
+    summary, chapters = "discovery/summary.html.j2", [*shown, *further, last]
+    return render_page("report on a disagreement", study.name, summary, chapters, drawn_on)
 
 
 @dataclass(frozen=True)
@@ -121,9 +113,8 @@ class Card:
 def _cards(found: Discovery, terms: Terms) -> list[Card]:
     cards = []
     if found.base:
-        more = (
-            f"{found.base.degrees_of_freedom:.0f} degrees of freedom, limit {trimmed(found.base.q_limit, 3)}"
-        )
+        df, limit = found.base.degrees_of_freedom, trimmed(found.base.q_limit, 3)
+        more = f"{df:.0f} degrees of freedom, limit {limit}"
         cards.append(Card("Q of the calibrated base", trimmed(found.base.q, 3), more))
     if found.gap and found.gap.drop_mechanism and not found.chosen:
         more = f"{terms.title(found.gap.drop_mechanism)}; limit {trimmed(found.gap.drop_limit, 3)}"
@@ -141,11 +132,12 @@ def _cards(found: Discovery, terms: Terms) -> list[Card]:
 
 def _chapters(found: Discovery, terms: Terms) -> list[Chapter]:
     """Build the chapters that this discovery has something for."""
+    compared = charts.comparison_charts(found, terms)
     built = {
         "gap": _gap(found, terms),
         "candidates": _candidates(found, terms),
         "before_after": _before_after(found),
-        "compared": _compared(found, terms),
+        "compared": _chapter("compared", charts={"compared": compared}) if found.base else None,
         "heaps": _chapter("heaps"),
         "power": _chapter("power", {"power": tables.power_table(found, terms)}) if found.power else None,
         "changes": _chapter("changes"),
@@ -178,12 +170,5 @@ def _candidates(found: Discovery, terms: Terms) -> Chapter | None:
 def _before_after(found: Discovery) -> Chapter | None:
     if not found.before_after:
         return None
-    return _chapter(
-        "before_after", {"gaps": tables.before_after_table(found)}, {"gaps": [charts.gap_chart(found)]}
-    )
-
-
-def _compared(found: Discovery, terms: Terms) -> Chapter | None:
-    if found.base is None:
-        return None
-    return _chapter("compared", charts={"compared": charts.comparison_charts(found, terms)})
+    gaps = {"gaps": tables.before_after_table(found)}
+    return _chapter("before_after", gaps, {"gaps": [charts.gap_chart(found)]})

@@ -47,23 +47,15 @@ def photograph(path: Path, condition: str, fit: str) -> HeapPicture | None:
         angle = measure_photograph(path, fit)
     except PictureError:
         return None
-    caption = (
-        f"“{condition}”, {path.name}: {angle.mean:.1f}°; left {angle.left:.1f}°, right {angle.right:.1f}°."
-    )
+    sides = f"left {angle.left:.1f}°, right {angle.right:.1f}°"
+    caption = f"“{condition}”, {path.name}: {angle.mean:.1f}°; {sides}."
     return HeapPicture("Measured", caption, _shown(read_picture(path), angle, _Window.around(*_size(angle))))
 
 
 def simulated_heaps(models: Mapping[str, CaseResult], condition: str, study: Study) -> list[HeapPicture]:
     """Draw heaps as a photograph would show them, x to the right, all at one scale.
 
-    Parameters
-    ----------
-    models
-        Results of models by their titles; one that left no heap is left out.
-    condition
-        Name of the condition.
-    study
-        The study under that condition.
+    They come from models by their titles, with the study under the condition; one without a heap is left out.
     """
     heaps = {}
     for title, result in models.items():
@@ -72,10 +64,8 @@ def simulated_heaps(models: Mapping[str, CaseResult], condition: str, study: Stu
                 heaps[title] = drawn_heap(_in_large(study), result, view=0)
         except PictureError:
             continue
-    sizes = [
-        picture.meters_per_pixel * np.array(_size(angle.views[view]))
-        for (angle, view), picture, _ in heaps.values()
-    ]
+    drawn = heaps.values()
+    sizes = [seen.meters_per_pixel * np.array(_size(angle.views[view])) for (angle, view), seen, _ in drawn]
     pictures = []
     for title, ((angle, view), picture, _) in heaps.items():
         seen = angle.views[view]

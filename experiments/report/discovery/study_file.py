@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,7 @@ import numpy as np
 from doe import Sample
 from doe.discrepancy import Candidate, Data, Discovery, Fit, Interval, Verdict
 from experiments.discover.library import Mechanism, with_mechanisms
-from experiments.files import replacing, write_text
+from experiments.files import copy_file, write_text
 from experiments.measurement.target import Replicated, target_tables
 from experiments.report.discovery.terms import Terms
 from experiments.report.discovery.verdict import tied
@@ -34,21 +33,7 @@ DIGITS = 4
 def write_study_files(found: Discovery, study: Study, terms: Terms, folder: Path) -> list[Path]:
     """Write a study file for each model that the verdict leaves standing, and its clumps beside it.
 
-    Parameters
-    ----------
-    found
-        What the analysis found. A tie gives a file a mechanism, a pair one file.
-    study
-        The study that was analysed.
-    terms
-        The mechanisms by name.
-    folder
-        Where ``study-with-NAME.toml`` goes.
-
-    Returns
-    -------
-    list of Path
-        The files; none where nothing was named.
+    A tie gives a file ``study-with-NAME.toml`` a mechanism, a pair one file, nothing named none.
     """
     written = []
     for candidate in _standing(found):
@@ -57,8 +42,7 @@ def write_study_files(found: Discovery, study: Study, terms: Terms, folder: Path
         for shape in shapes_of(document):
             source = study.file.parent / shape["clump"]
             shape["clump"] = source.name
-            with replacing(folder / source.name) as temporary:
-                shutil.copyfile(source, temporary)
+            copy_file(source, folder / source.name)
         path = folder / f"study-with-{'-and-'.join(name for name, _ in candidate)}.toml"
         title = terms.titles(name for name, _ in candidate)
         head = HEAD.format(name=study.name, title=title, file=path.name)
@@ -73,14 +57,6 @@ def extended_document(study: Study, added: Mapping[Mechanism, Interval], data: D
     Every observable that was measured more than once under a condition is to be matched; what was measured
     under a held-out condition only judges.
 
-    Parameters
-    ----------
-    study
-        The study that was analysed.
-    added
-        Mechanisms with their sizes.
-    data
-        Means that the analysis used.
     """
     ranges = {mechanism.name: _range(mechanism, size) for mechanism, size in added.items()}
     document = with_mechanisms(study, list(added), ranges).document
@@ -108,9 +84,8 @@ def _replicated(data: Data) -> Iterator[Replicated]:
     """Every mean of more than one measurement, with the scatter that the analysis gave it."""
     for row, condition in enumerate(data.conditions):
         for column, observable in enumerate(data.observables):
-            mean, se, count = (
-                table[row, column] for table in (data.means, data.standard_errors, data.replicates)
-            )
+            read = (data.means, data.standard_errors, data.replicates)
+            mean, se, count = (table[row, column] for table in read)
             if count >= 2 and np.isfinite(se) and se > 0.0:
                 mean, sd = (float(f"{value:.6g}") for value in (mean, se * np.sqrt(count)))
                 yield Replicated(condition, observable, Sample(mean, sd, int(count)))

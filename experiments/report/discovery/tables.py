@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import TypeVar
 
 import numpy as np
 import pandas as pd
 
-from doe.discrepancy import BeforeAfter, Candidate, Discovery, Fit, Interval, Power
+from doe.discrepancy import BeforeAfter, Candidate, Discovery, Drift, Fit, Interval, Power
 from experiments.report.discovery.terms import GAP, Terms, condition_name
-from experiments.report.kit.numbers import MISSING, fixed, interval, trimmed
-from experiments.report.kit.table import Column, Table, make_table
+from experiments.report.kit.numbers import MISSING, estimate, trimmed
+from experiments.report.kit.table import Column, Table, columns, make_table
 
 T = TypeVar("T")
 Entries = dict[Column, Callable[[T], object]]
@@ -33,7 +33,7 @@ def frames(found: Discovery) -> dict[str, pd.DataFrame]:
             [
                 {"factor": drift.factor, "condition": name, "value": value, "se": se, "p": drift.p_value}
                 for drift in found.drifts
-                for name, value, se in zip(drift.conditions, drift.values, drift.standard_errors, strict=True)
+                for name, value, se in _by_condition(drift)
             ]
         ),
     }
@@ -60,12 +60,8 @@ def compared_frame(found: Discovery) -> pd.DataFrame:
             "measured_se": data.standard_errors[at],
         }
         for name, fit in _models(found).items():
-            row |= {
-                f"{name}": fit.predicted[at],
-                f"{name}_se": fit.predicted_se[at],
-                f"{name}_residual": fit.residuals[at],
-                f"{name}_adjusted_p": fit.adjusted_p[at],
-            }
+            row |= {name: fit.predicted[at], f"{name}_se": fit.predicted_se[at]}
+            row |= {f"{name}_residual": fit.residuals[at], f"{name}_adjusted_p": fit.adjusted_p[at]}
         rows.append(row)
     return pd.DataFrame(rows)
 
@@ -105,26 +101,22 @@ def candidates_table(found: Discovery, terms: Terms) -> Table:
         Column("gain", "held-out gain"): lambda one: _interval(one.held_out_gain, 1),
         Column("judged", "judgement"): lambda one: "admitted" if one.admitted else one.objection,
     }
+    share = (
+        "" if excess else " There is no share of an excess: Q of the base is within its degrees of freedom."
+    )
     note = (
         "Q: squared residuals in standard deviations, after factors and size were fitted together to the"
         " training conditions; held-out conditions count by how far their forecast misses them."
         " p: of Q and of what is off alike in all conditions, among data sets that the model itself makes;"
         " fit_level is the least. Held-out gain: rise of the log score of the conditions that took no part in"
-        " any fit, with its 90 % interval."
-        + (
-            ""
-            if excess
-            else " There is no share of an excess: Q of the base is within its degrees of freedom."
-        )
-        + " What was too far behind was judged by the emulator, the others by fresh runs."
+        f" any fit, with its 90 % interval.{share} What was too far behind was judged by the emulator, the"
+        " others by fresh runs."
     )
     if left_out := len(found.candidates) - len(shown):
         note += f" {left_out} pairs further behind stand in tables/candidates.csv."
-    marks = [
-        "chosen" if candidate.admitted and set(candidate.mechanisms) <= set(found.named) else ""
-        for candidate in shown
-    ]
-    pairs = any(len(candidate.mechanisms) > 1 for candidate in shown)
+    named = set(found.named)
+    marks = ["chosen" if one.admitted and set(one.mechanisms) <= named else "" for one in shown]
+    pairs = any(len(one.mechanisms) > 1 for one in shown)
     title = f"Mechanisms of the library{', and pairs of them, each' if pairs else ','} best first."
     return _laid_out("candidates", shown, entries, title, note, marks)
 
@@ -134,13 +126,9 @@ def power_table(found: Discovery, terms: Terms) -> Table:
     entries: Entries[Power] = {
         Column("mechanism", "mechanism"): lambda one: terms.title(one.mechanism),
         Column("what", "what it does"): lambda one: terms.mechanisms[one.mechanism].sentence,
-        Column("detectable", "smallest size named"): lambda one: terms.value(
-            one.mechanism, one.detectable_size
-        ),
+        Column("least", "smallest size named"): lambda one: terms.value(one.mechanism, one.detectable_size),
         Column("maximum", "end of its range"): lambda one: terms.value(one.mechanism, one.maximum),
-        Column("share", "of the range", "percent", "%"): lambda one: (
-            100.0 * one.detectable_size / one.maximum
-        ),
+        Column("share", "of the range", "percent", "%"): lambda one: 100 * one.detectable_size / one.maximum,
         Column("visible", "left after calibration", "percent", "%"): lambda one: 100.0 * one.visible_share,
         Column("resolvable", "resolvable"): lambda one: "yes" if one.resolvable else "no",
     }
@@ -174,49 +162,34 @@ def parameters_table(found: Discovery, terms: Terms) -> Table:
     frame = parameters_frame(found)
     frame["label"] = [terms.factors[name].label for name in frame["factor"]]
     frame["unit"] = [terms.factors[name].unit for name in frame["factor"]]
-    bounds = {name: fit.at_bounds for name, fit in _models(found).items()}
+    models = _models(found).items()
     frame["bound"] = [
-        ", ".join(model for model, names in bounds.items() if factor in names) for factor in frame["factor"]
+        ", ".join(model for model, fit in models if factor in fit.at_bounds) for factor in frame["factor"]
     ]
-    columns = [
-        Column("factor", "factor"),
-        Column("label", "what it is"),
-        Column("base", "base", "level"),
-        Column("base_se", "se", "level"),
-        Column("chosen", "with the mechanism", "level"),
-        Column("chosen_se", "se", "level"),
-        Column("unit", "unit"),
-        Column("bound", "at an end of its range"),
-    ]
-    shown = [column for column in columns if column.key not in ("unit", "bound") or frame[column.key].any()]
-    frame[[c for c in frame if str(c).startswith(("base", "chosen"))]] = frame[
-        [c for c in frame if str(c).startswith(("base", "chosen"))]
-    ].map(lambda number: float(f"{number:.3g}"))
-    return make_table("parameters", frame, shown, "The fitted factors.")
+    numbers = columns("level", base="base", base_se="se", chosen="with the mechanism", chosen_se="se")
+    for number in (column.key for column in numbers if column.key in frame):
+        frame[number] = [float(f"{value:.3g}") for value in frame[number]]
+    frame = frame.drop(columns=[name for name in ("unit", "bound") if not frame[name].any()])
+    words = columns(label="what it is", unit="unit", bound="at an end of its range")
+    return make_table("parameters", frame, ["factor", words[0], *numbers, *words[1:]], "The fitted factors.")
 
 
 def drifts_table(found: Discovery) -> Table:
     """Lay out the factors fitted to one condition at a time."""
-    frame = pd.DataFrame(
-        [
-            {"factor": drift.factor, "p": drift.p_value}
-            | {
-                name: _estimate(value, se)
-                for name, value, se in zip(drift.conditions, drift.values, drift.standard_errors, strict=True)
-            }
-            for drift in found.drifts
-        ]
-    )
+    rows = [
+        {"factor": drift.factor}
+        | {name: _estimate(value, se) for name, value, se in _by_condition(drift)}
+        | {"p": drift.p_value}
+        for drift in found.drifts
+    ]
     names = dict.fromkeys(name for drift in found.drifts for name in drift.conditions)
-    columns = [Column("factor", "factor"), *(Column(name, name) for name in names), Column("p", "p", "p")]
     note = (
         "A parameter of a true model is the same wherever it is fitted (Box and Hunter 1962). Small p: it had"
         " to change to follow the condition. This describes; the verdict does not rest on it."
     )
     marks = ["strong" if drift.p_value < 0.05 else "" for drift in found.drifts]
-    return make_table(
-        "drifts", frame, columns, "Factors of the base, fitted condition by condition.", note, marks
-    )
+    caption, shown = "Factors of the base, fitted condition by condition.", ["factor", *names, "p"]
+    return make_table("drifts", pd.DataFrame(rows), shown, caption, note, marks)
 
 
 def data_table(found: Discovery, terms: Terms) -> Table:
@@ -236,8 +209,8 @@ def data_table(found: Discovery, terms: Terms) -> Table:
         Column(data.conditions[at], condition_name(data.conditions[at], data.held_out[at]))
         for at in np.flatnonzero(measured.any(axis=1))
     ]
-    columns = [Column("observable", "observable"), *heads]
-    return make_table("data", pd.DataFrame(rows), columns, "Measured means and their standard errors.")
+    caption = "Measured means and their standard errors."
+    return make_table("data", pd.DataFrame(rows), ["observable", *heads], caption)
 
 
 def _laid_out(
@@ -253,35 +226,31 @@ def _models(found: Discovery) -> dict[str, Fit]:
 
 
 def _candidate_row(candidate: Candidate) -> dict[str, object]:
-    gain = candidate.held_out_gain
-    row: dict[str, object] = {
-        "mechanisms": "+".join(candidate.mechanisms),
-        "explained": candidate.explained,
-        "score": candidate.score,
-        "visible_share": candidate.visible_share,
-        "q": candidate.q,
-        "degrees_of_freedom": candidate.degrees_of_freedom,
-        "p_value": candidate.p_value,
-    }
+    first = ("explained", "score", "visible_share", "q", "degrees_of_freedom", "p_value")
+    row: dict[str, object] = {"mechanisms": "+".join(candidate.mechanisms)}
+    row |= {name: getattr(candidate, name) for name in first}
     for position, (size, over) in enumerate(zip(candidate.sizes, candidate.size_over_se, strict=True), 1):
-        row |= {f"size_{position}": size.value, f"size_{position}_low": size.low}
-        row |= {f"size_{position}_high": size.high, f"size_{position}_over_se": over}
-    return row | {
-        "held_out_gain": gain.value if gain else None,
-        "held_out_gain_low": gain.low if gain else None,
-        "held_out_gain_high": gain.high if gain else None,
-        "simulated": candidate.simulated,
-        "admitted": candidate.admitted,
-        "objection": candidate.objection,
-    }
+        row |= _ends(f"size_{position}", size) | {f"size_{position}_over_se": over}
+    row |= _ends("held_out_gain", candidate.held_out_gain)
+    return row | {name: getattr(candidate, name) for name in ("simulated", "admitted", "objection")}
 
 
 def _before_after_row(both: BeforeAfter) -> dict[str, object]:
     row: dict[str, object] = {"held_out": both.held_out, "degrees_of_freedom": both.degrees_of_freedom}
     for name in ("before", "after", "removed"):
-        ends: Interval = getattr(both, name)
-        row |= {name: ends.value, f"{name}_low": ends.low, f"{name}_high": ends.high}
+        row |= _ends(name, getattr(both, name))
     return row | {"runs": both.runs}
+
+
+def _ends(name: str, ends: Interval | None) -> dict[str, float | None]:
+    """Value, low and high end of an interval as columns; empty ones where there is none."""
+    value, low, high = (ends.value, ends.low, ends.high) if ends else (None, None, None)
+    return {name: value, f"{name}_low": low, f"{name}_high": high}
+
+
+def _by_condition(drift: Drift) -> Iterator[tuple[str, float, float]]:
+    """Condition, fitted value and standard error."""
+    return zip(drift.conditions, drift.values, drift.standard_errors, strict=True)
 
 
 def _sizes(candidate: Candidate, terms: Terms) -> str:
@@ -290,11 +259,9 @@ def _sizes(candidate: Candidate, terms: Terms) -> str:
 
 
 def _interval(ends: Interval | None, decimals: int) -> str:
-    return (
-        MISSING
-        if ends is None
-        else f"{fixed(ends.value, decimals)} {interval((ends.low, ends.high), decimals)}".replace(" ", GAP)
-    )
+    if ends is None:
+        return MISSING
+    return estimate(ends.value, ends.low, ends.high, decimals).replace(" ", GAP)
 
 
 def _estimate(value: float, se: float) -> str:

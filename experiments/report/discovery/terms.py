@@ -32,10 +32,7 @@ class Terms:
 
     @classmethod
     def of(
-        cls,
-        library: Sequence[Mechanism],
-        observables: Sequence[Observable],
-        factors: Sequence[FactorSection],
+        cls, library: Sequence[Mechanism], observables: Sequence[Observable], factors: Sequence[FactorSection]
     ) -> Terms:
         """Collect the vocabulary by name."""
         return cls(
@@ -50,8 +47,7 @@ class Terms:
 
     def titles(self, names: Iterable[str], joined: str = "and") -> str:
         """Name mechanisms in words: "A", "A and B", "A, B and C"."""
-        *first, last = [self.title(name) for name in names] or [""]
-        return f"{', '.join(first)} {joined} {last}" if first else last
+        return enumeration(map(self.title, names), joined)
 
     def value(self, name: str, value: float) -> str:
         """Write the size of a mechanism with its unit; `MISSING` where there is none."""

@@ -18,7 +18,7 @@ from doe.discrepancy import (
     Verdict,
 )
 from experiments.report.discovery.terms import Terms, percent, spaced
-from experiments.report.kit.numbers import capital, fixed, p_value, trimmed
+from experiments.report.kit.numbers import capital, fixed, p_clause, trimmed
 
 SETTLED = (Verdict.NONE, Verdict.NAMED)
 """Verdicts that leave no question open."""
@@ -63,7 +63,8 @@ def tied(found: Discovery) -> list[Candidate]:
 
 def changes(found: Discovery, terms: Terms, settings: Settings) -> list[str]:
     """Say what would change the verdict, a sentence each."""
-    return [sentence for part in _CHANGES[found.verdict] for sentence in part(found, terms, settings)]
+    parts = _CHANGES[found.verdict]
+    return [s for part in parts for s in ([part] if isinstance(part, str) else part(found, terms, settings))]
 
 
 def next_step(found: Discovery, terms: Terms) -> str:
@@ -71,9 +72,8 @@ def next_step(found: Discovery, terms: Terms) -> str:
     step = found.next_experiment
     if step is None:
         return ""
-    pair = " from ".join(
-        "the base" if name == "base" else f"the model with {terms.title(name)}" for name in step.separates
-    )
+    models = {name: f"the model with {terms.title(name)}" for name in step.separates} | {"base": "the base"}
+    pair = " from ".join(models[name] for name in step.separates)
     how = ", ".join(f"{place} = {value}" for place, value in step.changes)
     setting = f"“{step.condition}”" + (f" ({how})" if how else "")
     return (
@@ -89,7 +89,7 @@ def _none(found: Discovery, terms: Terms) -> str:
     return (
         "Fitted as well as it can be, the model agrees with the data within their noise:"
         f" Q = {trimmed(found.base.q, 3)} at {fixed(found.base.degrees_of_freedom, 0)} degrees of freedom,"
-        f" p {_p(found.base.p_value)}."
+        f" p {p_clause(found.base.p_value)}."
     )
 
 
@@ -111,10 +111,10 @@ def _added(found: Discovery, terms: Terms) -> str:
 
 
 def _tie(found: Discovery, terms: Terms) -> str:
-    sizes = [terms.sizes(one.mechanisms, one.sizes) for one in tied(found)]
     each = "; ".join(
-        f"{terms.titles(one.mechanisms)} at {size} leaves Q = {trimmed(one.q, 3)}"
-        for one, size in zip(tied(found), sizes, strict=True)
+        f"{terms.titles(one.mechanisms)} at {terms.sizes(one.mechanisms, one.sizes)} leaves Q ="
+        f" {trimmed(one.q, 3)}"
+        for one in tied(found)
     )
     return f"The model disagrees with the data, and these explain it alike: {each}."
 
@@ -126,16 +126,13 @@ def _unknown(found: Discovery, terms: Terms) -> str:
     how = f", not by Q alone but in that {_beyond(found.base.clearest, terms)}" if within else ""
     text = (
         f"The model disagrees with the data (Q = {trimmed(found.base.q, 3)} at"
-        f" {fixed(found.base.degrees_of_freedom, 0)} degrees of freedom, p {_p(found.base.p_value)}){how},"
-        " and nothing in the library explains it"
+        f" {fixed(found.base.degrees_of_freedom, 0)} degrees of freedom, p"
+        f" {p_clause(found.base.p_value)}){how}, and nothing in the library explains it"
     )
     if found.candidates:
         best = found.candidates[0]
-        does = (
-            f"removes {percent(best.explained)} of the excess"
-            if found.base.excess
-            else f"leaves Q = {trimmed(best.q, 3)}"
-        )
+        share = f"removes {percent(best.explained)} of the excess"
+        does = share if found.base.excess else f"leaves Q = {trimmed(best.q, 3)}"
         text += f"; the best, {terms.titles(best.mechanisms)}, {does}"
     return text + "."
 
@@ -149,10 +146,6 @@ def _beyond(answer: Answer, terms: Terms) -> str:
     }[answer.question]
     limit = "limit of such a fall" if answer.question is Question.FALL else "limit"
     return f"{statistic} {trimmed(answer.value, 3)} ({limit} {trimmed(answer.limit, 3)})"
-
-
-def _not_identifiable(found: Discovery, terms: Terms) -> str:
-    return reason_sentence(found)
 
 
 def _smaller_effects(found: Discovery, terms: Terms, settings: Settings) -> Iterator[str]:
@@ -175,9 +168,8 @@ def _margins(found: Discovery, terms: Terms, settings: Settings) -> Iterator[str
         return
     weakest = min(chosen.size_over_se)
     least = settings.least_ratio if len(model) == 1 else settings.pair_ratio
-    text = (
-        f"Data that took the size ({fixed(weakest, 1)} standard errors from its null) below {least:g} of them"
-    )
+    size = f"({fixed(weakest, 1)} standard errors from its null)"
+    text = f"Data that took the size {size} below {least:g} of them"
     if chosen.held_out_gain:
         gain = _gain(chosen.held_out_gain)
         text += f", or the held-out gain (now {gain}) to nothing"
@@ -205,23 +197,9 @@ def _unresolved(found: Discovery, terms: Terms, settings: Settings) -> Iterator[
         yield f"{_cannot_be_seen(hidden, terms)}, so they can neither name nor exclude it."
 
 
-def _outside(found: Discovery, terms: Terms, settings: Settings) -> Iterator[str]:
-    yield (
-        "An effect outside the library that moves the same observables in the same proportions would be taken"
-        " for this one: its further experiment, below, is what tells them apart."
-    )
-
-
 def _settle_by_experiment(found: Discovery, terms: Terms, settings: Settings) -> Iterator[str]:
     if found.next_experiment:
         yield f"The condition “{found.next_experiment.condition}” would settle it (see the next experiment)."
-
-
-def _widen(found: Discovery, terms: Terms, settings: Settings) -> Iterator[str]:
-    yield (
-        "A mechanism that is added to the library (one file) and explains the map of residuals would be named"
-        " from the same data."
-    )
 
 
 def _more_data(found: Discovery, terms: Terms, settings: Settings) -> Iterator[str]:
@@ -238,14 +216,22 @@ _SENTENCES: dict[Verdict, Callable[[Discovery, Terms], str]] = {
     Verdict.NAMED: _added,
     Verdict.TIE: _tie,
     Verdict.UNKNOWN: _unknown,
-    Verdict.NOT_IDENTIFIABLE: _not_identifiable,
+    Verdict.NOT_IDENTIFIABLE: lambda found, terms: reason_sentence(found),
 }
 
-_CHANGES: dict[Verdict, tuple[Callable[[Discovery, Terms, Settings], Iterator[str]], ...]] = {
+_OUTSIDE = (
+    "An effect outside the library that moves the same observables in the same proportions would be taken for"
+    " this one: its further experiment, below, is what tells them apart."
+)
+_WIDEN = (
+    "A mechanism that is added to the library (one file) and explains the map of residuals would be named"
+    " from the same data."
+)
+_CHANGES: dict[Verdict, tuple[str | Callable[[Discovery, Terms, Settings], Iterator[str]], ...]] = {
     Verdict.NONE: (_smaller_effects,),
-    Verdict.NAMED: (_margins, _room, _rivals, _unresolved, _outside),
+    Verdict.NAMED: (_margins, _room, _rivals, _unresolved, _OUTSIDE),
     Verdict.TIE: (_settle_by_experiment, _rivals, _unresolved),
-    Verdict.UNKNOWN: (_rivals, _widen, _unresolved),
+    Verdict.UNKNOWN: (_rivals, _WIDEN, _unresolved),
     Verdict.NOT_IDENTIFIABLE: (_more_data,),
 }
 
@@ -269,8 +255,3 @@ def _q(interval: Interval) -> str:
 
 def _gain(gain: Interval) -> str:
     return f"{fixed(gain.value, 1)}, 90 % interval {fixed(gain.low, 1)} to {fixed(gain.high, 1)}"
-
-
-def _p(value: float) -> str:
-    text = p_value(value)
-    return text if text.startswith("<") else f"= {text}"

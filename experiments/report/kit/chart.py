@@ -32,35 +32,19 @@ class Chart:
 
 def new_figure(x: str = "", y: str = "", legend: bool = True) -> go.Figure:
     """Start an empty figure with axis titles."""
-    axis = {
-        "showline": True,
-        "linecolor": MUTED,
-        "gridcolor": GRID,
-        "zeroline": False,
-        "ticks": "outside",
-        "tickcolor": MUTED,
-        "automargin": True,
-    }
+    lines = {"showline": True, "linecolor": MUTED, "gridcolor": GRID, "zeroline": False}
+    axis = lines | {"ticks": "outside", "tickcolor": MUTED, "automargin": True}
+    above = {"orientation": "h", "x": 0.0, "y": 1.0, "xanchor": "left", "yanchor": "bottom"}
+    family = "system-ui, Segoe UI, Roboto, Helvetica, Arial, sans-serif"
     figure = go.Figure()
     figure.update_layout(
         template="none",
-        font={
-            "family": "system-ui, Segoe UI, Roboto, Helvetica, Arial, sans-serif",
-            "size": 13,
-            "color": INK,
-        },
+        font={"family": family, "size": 13, "color": INK},
         paper_bgcolor="#ffffff",
         plot_bgcolor="#ffffff",
         margin={"l": 56, "r": 18, "t": 36 if legend else 14, "b": 48},
         showlegend=legend,
-        legend={
-            "orientation": "h",
-            "x": 0.0,
-            "y": 1.0,
-            "xanchor": "left",
-            "yanchor": "bottom",
-            "itemsizing": "constant",
-        },
+        legend=above | {"itemsizing": "constant"},
         dragmode=False,  # a finger that scrolls the page must not zoom the chart
         xaxis=axis | {"title": {"text": x, "standoff": 8}},
         yaxis=axis | {"title": {"text": y, "standoff": 8}},
@@ -79,10 +63,7 @@ def add_points(
     **more: Any,
 ) -> None:
     """Draw points as one entry of the legend; `more` goes to plotly's scatter."""
-    edge = {
-        "width": 2 if symbol.endswith("open") else 1,
-        "color": color if symbol.endswith("open") else "#ffffff",
-    }
+    edge = {"width": 2, "color": color} if symbol.endswith("open") else {"width": 1, "color": "#ffffff"}
     marker = {"color": color, "symbol": symbol, "size": size, "line": edge}
     figure.add_scatter(x=x, y=y, name=name, marker=marker, **{"mode": "markers", **more})
 
@@ -93,6 +74,13 @@ def add_line(
     """Draw a line as one entry of the legend; `more` goes to plotly's scatter."""
     figure.add_scatter(
         x=x, y=y, name=name, mode="lines", line={"color": color, "dash": dash, "width": 2}, **more
+    )
+
+
+def add_bars(figure: go.Figure, x: Any, y: Any, name: str, color: str, hover: str, **more: Any) -> None:
+    """Draw bars as one entry of the legend; `more` goes to plotly's bar."""
+    figure.add_bar(
+        x=x, y=y, name=name, marker={"color": color}, hovertemplate=f"{hover}<extra></extra>", **more
     )
 
 

@@ -12,14 +12,9 @@ from experiments.files import replacing
 
 
 def new_axes(width: float = 7.2, height: float = 4.2, grid: str | None = "both") -> tuple[Figure, Axes]:
-    """Start a figure of one pair of axes.
+    """Start a figure of one pair of axes [inches].
 
-    Parameters
-    ----------
-    width, height
-        Inches.
-    grid
-        "both", "x" or "y": lines behind the data; None: neither lines nor a frame.
+    A grid of "both", "x" or "y" draws lines behind the data; None neither lines nor a frame.
     """
     figure = Figure(figsize=(width, height), layout="constrained")
     axes = figure.subplots()

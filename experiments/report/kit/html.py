@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -54,15 +55,8 @@ def render_page(
         What the templates of summary and chapters draw on.
     """
     page = environment().get_template("page.html.j2")
-    return page.render(
-        kind=kind,
-        heading=heading,
-        summary=summary,
-        chapters=chapters,
-        palette=palette,
-        plotly=Markup(get_plotlyjs()),
-        **context,
-    )
+    shared = {"palette": palette, "plotly": Markup(get_plotlyjs())}
+    return page.render(kind=kind, heading=heading, summary=summary, chapters=chapters, **shared, **context)
 
 
 def flat(settings: Mapping[str, Any], prefix: str = "") -> dict[str, str]:
@@ -82,30 +76,14 @@ def flat(settings: Mapping[str, Any], prefix: str = "") -> dict[str, str]:
 
 
 def environment() -> jinja2.Environment:
-    """Open the templates, with the filters that they use."""
+    """Open the templates; every function of `numbers` is a filter."""
+    folders = [jinja2.PackageLoader(name) for name in ("experiments.report.kit", "experiments.report")]
     opened = jinja2.Environment(
-        loader=jinja2.ChoiceLoader(
-            [jinja2.PackageLoader("experiments.report.kit"), jinja2.PackageLoader("experiments.report")]
-        ),
+        loader=jinja2.ChoiceLoader(folders),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    opened.filters |= {
-        "fixed": numbers.fixed,
-        "trimmed": numbers.trimmed,
-        "p_value": numbers.p_value,
-        "interval": numbers.interval,
-        "plain": numbers.plain,
-        "named_number": numbers.named_number,
-        "prose": numbers.prose,
-        "quantity": numbers.quantity,
-        "span": numbers.span,
-        "unit_sign": numbers.unit_sign,
-        "capital": numbers.capital,
-        "enumeration": numbers.enumeration,
-        "equation": numbers.equation,
-        "term": numbers.term,
-    }
+    opened.filters |= dict(inspect.getmembers(numbers, inspect.isfunction))
     return opened

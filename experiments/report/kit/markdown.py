@@ -49,25 +49,17 @@ WALL_TIMES = "wall_times"
 
 
 def wall_times_table(facts: Mapping[str, Any], what: str) -> str:
-    """Lay out the wall times among some facts; empty where there are none.
-
-    Parameters
-    ----------
-    facts
-        What made some numbers.
-    what
-        What was simulated, in the plural.
-    """
+    """Lay out the wall times among some facts (empty without any); `what` names, in the plural, the cases."""
     rows = pd.DataFrame(facts.get(WALL_TIMES, []))
     if rows.empty:
         return ""
-    columns = [
+    shown = [
         Column("stage", "batch"),
         Column("simulated", f"{what} simulated", "label"),
         Column("seconds", "wall time", "count", "s"),
     ]
     total = f"In all {fixed(rows['simulated'].sum(), 0)} {what} in {fixed(rows['seconds'].sum(), 0)} s."
-    return markdown_table(make_table("wall-times", rows, columns, "Wall times.", total))
+    return markdown_table(make_table("wall-times", rows, shown, "Wall times.", total))
 
 
 def _texts(row: Row) -> list[str]:

@@ -86,6 +86,12 @@ def p_value(value: float | None) -> str:
     return fixed(value, 4)
 
 
+def p_clause(value: float) -> str:
+    """Write a p value behind its sign: "= 0.0312" or "< 0.0001"."""
+    text = p_value(value)
+    return text if text.startswith("<") else f"= {text}"
+
+
 def shortest_decimals(values: Iterable[float], tolerance: float = COLUMN_TOLERANCE) -> int:
     """Count the decimals that a column needs: rounding stays below `tolerance` of its largest value."""
     numbers = np.array([value for value in values if math.isfinite(value)], dtype=np.float64)
@@ -175,10 +181,10 @@ def prose(text: str) -> str:
     return re.sub(r"(?<![\w.])-(?=\d)", "−", re.sub(r" deg\b", "°", text))
 
 
-def enumeration(names: Iterable[str]) -> str:
-    """Write names as "B", "B and E" or "B, E and F"."""
-    *first, last = names
-    return f"{', '.join(first)} and {last}" if first else last
+def enumeration(names: Iterable[str], joined: str = "and") -> str:
+    """Write names as "B", "B and E" or "B, E and F"; nothing for none."""
+    *first, last = [*names] or [""]
+    return f"{', '.join(first)} {joined} {last}" if first else last
 
 
 def capital(text: str) -> str:
@@ -189,6 +195,11 @@ def capital(text: str) -> str:
 def interval(ends: Iterable[float], decimals: int = 2) -> str:
     """Write an interval as "[low, high]"."""
     return f"[{', '.join(fixed(end, decimals) for end in ends)}]"
+
+
+def estimate(value: float, low: float, high: float, decimals: int = 2) -> str:
+    """Write an estimate before its interval."""
+    return f"{fixed(value, decimals)} {interval((low, high), decimals)}"
 
 
 def span(ends: Iterable[float], unit: str) -> str:

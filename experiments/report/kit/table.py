@@ -12,7 +12,7 @@ import pandas as pd
 from markupsafe import Markup, escape
 from pandas.api.types import is_numeric_dtype
 
-from experiments.report.kit.numbers import KINDS
+from experiments.report.kit.numbers import KINDS, term
 
 
 @dataclass(frozen=True)
@@ -28,6 +28,30 @@ class Column:
     unit: str = ""
     write: Callable[[str], str | Markup] = escape
     """Typesets a text."""
+
+
+Layout = list[Column | str]
+"""Columns of a table in order, those of `KNOWN` and those that need no more than their name by their key."""
+
+
+def columns(kind: str = "text", unit: str = "", /, **heads: str) -> list[Column]:
+    """Columns of one kind and unit: by key, the text above each."""
+    return [Column(key, head, kind, unit) for key, head in heads.items()]
+
+
+KNOWN = {
+    column.key: column
+    for column in (
+        *columns(
+            "label", run="run", step="step", rank="rank", n="n", df="df", replicate="replicate", seed="seed"
+        ),
+        *columns("ratio", F="F", t="t"),
+        *columns("sum", sum_sq="sum of squares", mean_sq="mean square"),
+        *columns("p", p="p"),
+        *(Column(key, key, write=term) for key in ("source", "term")),
+    )
+}
+"""Columns that mean the same in every table, by key."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +88,7 @@ class Table:
 def make_table(
     name: str,
     frame: pd.DataFrame,
-    columns: Sequence[Column],
+    columns: Sequence[Column | str],
     caption: str,
     note: str = "",
     marks: Sequence[str] | pd.Series | None = None,
@@ -78,7 +102,8 @@ def make_table(
     frame
         One row a row. A named index is a column like any other.
     columns
-        What to show, in order; a column that the frame lacks is left out.
+        What to show, in order; a column that the frame lacks is left out. A key alone stands for the column
+        of `KNOWN`, else for a text below its own name.
     caption, note
         Above and below the table.
     marks
@@ -86,7 +111,8 @@ def make_table(
     """
     if frame.index.name is not None:
         frame = frame.reset_index()
-    shown = tuple(column for column in columns if column.key in frame.columns)
+    full = (KNOWN.get(each, Column(each, each)) if isinstance(each, str) else each for each in columns)
+    shown = tuple(column for column in full if column.key in frame.columns)
     cells = [_cells(column, frame[column.key]) for column in shown]
     styles = [""] * len(frame) if marks is None else list(marks)
     rows = tuple(Row(tuple(entries), style) for *entries, style in zip(*cells, styles, strict=True))
@@ -114,6 +140,4 @@ def _cells(column: Column, values: pd.Series) -> list[Cell]:
 
 
 def _absent(value: Any) -> bool:
-    return (
-        value is None or value == "" or (isinstance(value, float | np.floating) and not math.isfinite(value))
-    )
+    return value in (None, "") or (isinstance(value, float | np.floating) and not math.isfinite(value))

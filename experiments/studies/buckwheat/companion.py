@@ -14,7 +14,7 @@ from doe import Sample
 from experiments.calibrate.results import Campaign
 from experiments.report.companion import Companion
 from experiments.report.kit.html import Chapter
-from experiments.report.kit.table import Column, Table, make_table
+from experiments.report.kit.table import Table, make_table
 from experiments.report.published import Published
 from experiments.studies.buckwheat import paper
 from experiments.studies.buckwheat.records.paper_page import draw_heaps, write_record
@@ -88,8 +88,7 @@ class BuckwheatCompanion(Companion):
 def misprints_table() -> Table:
     """Lay out what the paper's own numbers contradict."""
     frame = pd.DataFrame([asdict(misprint) for misprint in paper.misprints()])
-    columns = [Column(name, name) for name in ("place", "item", "printed", "recomputed", "reason")]
-    return make_table("misprints", frame, columns, "Where the print and its own numbers differ.")
+    return make_table("misprints", frame, list(frame), "Where the print and its own numbers differ.")
 
 
 COMPANION = BuckwheatCompanion()

@@ -44,17 +44,9 @@ class Misprint:
 
 
 def printed(name: str) -> pd.DataFrame:
-    """Return a published table as printed.
+    """Return a published table as text, digits as printed, empty where nothing is; by its first column.
 
-    Parameters
-    ----------
-    name
-        A file of the folder ``paper`` without its ending, see the README there.
-
-    Returns
-    -------
-    DataFrame
-        Text, digits as printed, empty where nothing is; indexed by the first column.
+    Its name is that of a file of the folder ``paper`` without the ending, see the README there.
 
     Raises
     ------
@@ -117,17 +109,9 @@ def screening() -> ScreenResult:
 
 @cache
 def surface(model: str = "quadratic") -> Surface:
-    """Fit the published central composite runs.
+    """Fit the published central composite runs, star points at 1.414 half ranges as the paper has them.
 
-    Parameters
-    ----------
-    model
-        ``"quadratic"``, equation (8), or ``"reduced"``, equation (9), which lacks the square of F.
-
-    Returns
-    -------
-    Surface
-        The fit, with the star points at 1.414 half ranges as the paper's own analysis has them.
+    The model is ``"quadratic"``, equation (8), or ``"reduced"``, equation (9), which lacks the square of F.
 
     Raises
     ------
@@ -143,12 +127,9 @@ def surface(model: str = "quadratic") -> Surface:
 def comparison() -> pd.DataFrame:
     """Set every recomputable number that the paper prints beside its recomputed value.
 
-    Returns
-    -------
-    DataFrame
-        A row a printed number: place, item, printed (text), recomputed, slack (how far the recomputed value
-        may move within the rounding of the printed numbers that it is made of; 0 where those are runs) and
-        agrees (the two are the same within the last printed digit and the slack).
+    A row a printed number: place, item, printed (text), recomputed, slack (how far the recomputed value may
+    move within the rounding of the printed numbers that it is made of; 0 where those are runs) and agrees
+    (the two are the same within the last printed digit and the slack).
     """
     rows = [
         (place, f"{row}, {column}", text, value, 0.0)
@@ -168,35 +149,24 @@ def misprints() -> list[Misprint]:
     """List what the paper's own numbers contradict: printed numbers first, then formulas and statements."""
     table = comparison()
     wrong = table[~table["agrees"]]
-    numbers = [
-        Misprint(
-            row.place,
-            row.item,
-            row.printed,
-            f"{row.recomputed:.{_decimals(row.printed)}f}",
-            _REASONS.get((row.place, row.item), "does not follow from the printed runs"),
-        )
-        for row in wrong.itertuples()
-    ]
+    numbers = []
+    for place, item, text, recomputed, *_ in wrong.itertuples(index=False):
+        reason = _REASONS.get((place, item), "does not follow from the printed runs")
+        numbers.append(Misprint(place, item, text, f"{recomputed:.{_decimals(text)}f}", reason))
     return [*numbers, _modulus_name(), _climb_step(), *_points_outside(), *_FORMULAS]
 
 
 _TEST_KEPT = "mean square over that of the residual, 0.2354; the printed p belongs to the recomputed F"
+_ORTHOGONAL = "the partial sum of squares is that of Table 7: the coded design is orthogonal"
 _REASONS = {
     ("Table 5", "4, relative_error_pct"): "|29.766 - 30.148| / 30.148 is 1.267 %: cut off, not rounded",
     ("Table 7", "E, F"): "6.3129 over the residual's 0.2675; the printed p belongs to the recomputed F",
     ("Table 8", "model, mean_sq"): "the sum of squares 18.9413 over 4 degrees of freedom",
     ("Table 8", "model, F"): _TEST_KEPT,
     ("Table 8", "E, F"): _TEST_KEPT,
-    (
-        "Table 8",
-        "F, mean_sq",
-    ): "the partial sum of squares is that of Table 7: the coded design is orthogonal",
+    ("Table 8", "F, mean_sq"): _ORTHOGONAL,
     ("Table 8", "F, F"): _TEST_KEPT,
-    (
-        "Table 8",
-        "E:F, mean_sq",
-    ): "the partial sum of squares is that of Table 7: the coded design is orthogonal",
+    ("Table 8", "E:F, mean_sq"): _ORTHOGONAL,
     ("Table 8", "E:F, F"): _TEST_KEPT,
     ("text", "mean angle at the optimum"): "the mean of the three printed angles",
 }
@@ -259,24 +229,17 @@ def _points_outside() -> Iterator[Misprint]:
             # Coded values of a range's ends come back with rounding.
             for run, value in table[factor.name].items():
                 if not factor.low - 1e-9 <= value <= factor.high + 1e-9:
-                    yield Misprint(
-                        place,
-                        f"{run}, {factor.name}",
-                        f"{value:g}",
-                        f"{factor.low:g} to {factor.high:g}",
-                        "outside the range that Tables 1 and 2 give",
-                    )
+                    stated = f"{factor.low:g} to {factor.high:g}"
+                    reason = "outside the range that Tables 1 and 2 give"
+                    yield Misprint(place, f"{run}, {factor.name}", f"{value:g}", stated, reason)
 
 
 def _recomputed_tables() -> Iterator[tuple[str, str, pd.DataFrame]]:
     """Yield place, name of the published table and the recomputed values of some of its cells."""
     yield "Table 4", "screening_anova", screening().table[["sum_sq", "F", "p", "rank"]]
     angles, target = published("steepest_climb")[RESPONSE], measured().mean
-    yield (
-        "Table 5",
-        "steepest_climb",
-        (100.0 * (angles - target).abs() / target).to_frame("relative_error_pct"),
-    )
+    errors = 100.0 * (angles - target).abs() / target
+    yield "Table 5", "steepest_climb", errors.to_frame("relative_error_pct")
     yield "Table 6", "central_composite", _composite_settings()
     surfaces = {model: surface(model) for model in _MODELS}
     coefficients = pd.DataFrame({model: fit.coefficients for model, fit in surfaces.items()})

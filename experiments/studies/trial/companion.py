@@ -12,8 +12,8 @@ from doe.discrepancy import Discovery
 from experiments.report.companion import Companion
 from experiments.report.discovery.terms import Terms
 from experiments.report.kit.html import Chapter
-from experiments.report.kit.numbers import MISSING, fixed, interval, trimmed
-from experiments.report.kit.table import Column, Table, make_table
+from experiments.report.kit.numbers import MISSING, estimate, trimmed
+from experiments.report.kit.table import Layout, Table, columns, make_table
 
 NORMAL_90 = 1.645
 """Standard errors to either side that hold a normal value with 90 %."""
@@ -34,9 +34,7 @@ class Truth:
     """Sizes of the effects that the study lacks."""
 
 
-TRUTHS = {
-    "tilted-bench.csv": Truth({"mu_gg": 0.55, "mu_gw": 0.45, "e_gg": 0.35}, {"plate_tilt": 5.0}),
-}
+TRUTHS = {"tilted-bench.csv": Truth({"mu_gg": 0.55, "mu_gw": 0.45, "e_gg": 0.35}, {"plate_tilt": 5.0})}
 """By the file beside this one that the heaps are in, whose head says the same."""
 
 
@@ -70,22 +68,11 @@ def truth_table(truth: Truth, found: Discovery, terms: Terms) -> Table:
         )
     thetas = zip(found.factors, fit.theta, fit.theta_se, strict=True) if fit else ()
     for name, value, error in thetas:
-        low, high = value - NORMAL_90 * error, value + NORMAL_90 * error
-        rows.append(
-            {
-                "what": terms.factors[name].label,
-                "hidden": trimmed(truth.factors[name], 3),
-                "found": f"{fixed(value, 3)} {interval((low, high), 3)}",
-                "within": _within(truth.factors[name], low, high),
-            }
-        )
-    columns = [
-        Column("what", "what"),
-        Column("hidden", "hidden"),
-        Column("found", "found, 90 % interval"),
-        Column("within", "interval holds it"),
-    ]
-    return make_table("hidden", pd.DataFrame(rows), columns, "Truth and findings.")
+        hidden, low, high = truth.factors[name], value - NORMAL_90 * error, value + NORMAL_90 * error
+        row = {"what": terms.factors[name].label, "hidden": trimmed(hidden, 3)}
+        rows.append(row | {"found": estimate(value, low, high, 3), "within": _within(hidden, low, high)})
+    shown: Layout = ["what", "hidden", *columns(found="found, 90 % interval", within="interval holds it")]
+    return make_table("hidden", pd.DataFrame(rows), shown, "Truth and findings.")
 
 
 def _within(value: float, low: float, high: float) -> str:

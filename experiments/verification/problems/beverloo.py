@@ -109,12 +109,10 @@ def _rows(flows: Mapping[float, Sequence[Flow]]) -> list[Row]:
             power, constant = exponent(each, k), rate_constant(each, k)
             bounds = (0.15, LARGEST_CONSTANT - middle if friction == realistic else None)
             power_bound, constant_bound = bounds if k == K else (None, None)
-            rows.append(
-                absolute_row((PROBLEM, case, f"exponent, k = {k:.1f}", law), EXPONENT, power, power_bound)
-            )
-            rows.append(
-                absolute_row((PROBLEM, case, f"C, k = {k:.1f}", law), middle, constant, constant_bound)
-            )
+            labels = (PROBLEM, case, f"exponent, k = {k:.1f}", law)
+            rows.append(absolute_row(labels, EXPONENT, power, power_bound))
+            labels = (PROBLEM, case, f"C, k = {k:.1f}", law)
+            rows.append(absolute_row(labels, middle, constant, constant_bound))
         constants.append(rate_constant(each, K))
     for (friction, name), fall in zip(list(FRICTIONS.items())[1:], -np.diff(constants), strict=True):
         rows.append(detection_row(PROBLEM, f"{name}, friction {friction:g}", "fall of C to it", 0.01, fall))

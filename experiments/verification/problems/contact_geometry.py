@@ -69,22 +69,10 @@ class ContactFinder:
         overlap = reach[hit] - distance
         ra, rb = self.radii[a], self.radii[b]
         ma, mb = self.masses[self.owner[a]], self.masses[self.owner[b]]
-        levers = np.stack(
-            [
-                arms[a] + normal * (0.5 * overlap - ra)[:, None],
-                arms[b] + normal * (rb - 0.5 * overlap)[:, None],
-            ]
-        )
-        return Touching(
-            hit,
-            self.owner[a],
-            self.owner[b],
-            normal,
-            overlap,
-            ra * rb / (ra + rb),
-            ma * mb / (ma + mb),
-            levers,
-        )
+        inwards = arms[a] + normal * (0.5 * overlap - ra)[:, None]
+        levers = np.stack([inwards, arms[b] + normal * (rb - 0.5 * overlap)[:, None]])
+        radius, mass = ra * rb / (ra + rb), ma * mb / (ma + mb)
+        return Touching(hit, self.owner[a], self.owner[b], normal, overlap, radius, mass, levers)
 
     def _on_wall(self, wall: object, offset: int, centers: np.ndarray, arms: np.ndarray) -> Touching:
         if isinstance(wall, Plane):
@@ -96,20 +84,12 @@ class ContactFinder:
             normals = -out / np.maximum(distance, 1e-300)[:, None]
             gap = wall.radius - distance
         else:
-            raise ValueError(
-                f"ContactFinder: walls are planes and upright cylinders from inside, got {wall!r}"
-            )
+            rule = "walls are planes and upright cylinders from inside"
+            raise ValueError(f"ContactFinder: {rule}, got {wall!r}")
         hit = np.flatnonzero(gap < self.radii)
         overlap, normal = self.radii[hit] - gap[hit], normals[hit]
         lever = arms[hit] + normal * (0.5 * overlap - self.radii[hit])[:, None]
-        wall_body = np.full(len(hit), self.wall_body)
-        return Touching(
-            offset + hit,
-            self.owner[hit],
-            wall_body,
-            normal,
-            overlap,
-            self.radii[hit],
-            self.masses[self.owner[hit]],
-            np.stack([lever, np.zeros_like(lever)]),
-        )
+        owner, wall_body = self.owner[hit], np.full(len(hit), self.wall_body)
+        levers = np.stack([lever, np.zeros_like(lever)])
+        radius, mass = self.radii[hit], self.masses[owner]
+        return Touching(offset + hit, owner, wall_body, normal, overlap, radius, mass, levers)

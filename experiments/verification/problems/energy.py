@@ -18,15 +18,7 @@ from experiments.verification.problems.setups import (
     contact,
     world,
 )
-from experiments.verification.result import (
-    Curve,
-    Plot,
-    Result,
-    Row,
-    absolute_row,
-    detection_row,
-    order_row,
-)
+from experiments.verification.result import Curve, Plot, Result, Row, absolute_row, detection_row, order_row
 
 SOFT = Material(BUCKWHEAT.density, BUCKWHEAT.shear_modulus / 400.0, BUCKWHEAT.poisson_ratio)
 """Grain at bench scale."""
@@ -71,9 +63,8 @@ def column(shape: ClumpShape, count: int, spacing: float, step_fraction: float) 
     )
     law = contact(SOFT, SOFT, 0.3, 0.5, 0.05)
     time_step = step_fraction * rayleigh_time(float(shape.radii.min()), SOFT)
-    return world(
-        grains, shape, law, time_step, walls=(Plane(), TUBE), gravity=(0.0, 0.0, -GRAVITY), extent=0.12
-    )
+    gravity = (0.0, 0.0, -GRAVITY)
+    return world(grains, shape, law, time_step, walls=(Plane(), TUBE), gravity=gravity, extent=0.12)
 
 
 def watched(
@@ -99,16 +90,12 @@ def unaccounted(account: EnergyAccount) -> float:
 
 
 def _law_rows(problem: str, case: str, account: EnergyAccount) -> list[Row]:
-    gaps = (account.force_gap / account.largest_force, account.torque_gap / account.largest_torque)
-    return [
-        absolute_row(
-            (problem, case, f"{name} off the law, over the largest", "the law in NumPy, float64"),
-            0.0,
-            gap,
-            1e-9,
-        )
-        for name, gap in zip(("any force", "any torque"), gaps, strict=True)
-    ]
+    gaps = {
+        "any force": account.force_gap / account.largest_force,
+        "any torque": account.torque_gap / account.largest_torque,
+    }
+    quantity, law = "off the law, over the largest", "the law in NumPy, float64"
+    return [absolute_row((problem, case, f"{k} {quantity}", law), 0.0, gap, 1e-9) for k, gap in gaps.items()]
 
 
 def _wrong_law_rows(problem: str, setup: WorldSetup, device: str) -> list[Row]:
@@ -116,16 +103,12 @@ def _wrong_law_rows(problem: str, setup: WorldSetup, device: str) -> list[Row]:
     law = setup.contacts[0]
     wrong = [replace(law, **{name: 1.02 * getattr(law, name)}) for name in CONSTANTS]
     accounts = watched(setup, 0.3 * SETTLING, wrong, device)
-    return [
-        detection_row(
-            problem,
-            f"account by a law with 2 % more {name.replace('_', ' ')}",
-            "any torque off the law, over the largest",
-            1e-3,
-            account.torque_gap / account.largest_torque,
-        )
-        for name, account in zip(CONSTANTS, accounts, strict=True)
-    ]
+    rows, quantity = [], "any torque off the law, over the largest"
+    for name, account in zip(CONSTANTS, accounts, strict=True):
+        case = f"account by a law with 2 % more {name.replace('_', ' ')}"
+        gap = account.torque_gap / account.largest_torque
+        rows.append(detection_row(problem, case, quantity, 1e-3, gap))
+    return rows
 
 
 def _parts_plot(account: EnergyAccount) -> Plot:
@@ -153,23 +136,13 @@ def energy(device: str) -> Result:
         case = f"{100 * fraction:g} % of the Rayleigh time, float64"
         tolerance = 5e-3 * (fraction / FRACTIONS[0]) ** 2 * 1.2
         rows.append(absolute_row((problem, case, quantity, "closed account"), 0.0, gap, tolerance))
-    rows.append(
-        order_row(
-            problem,
-            "float64",
-            "order of the unaccounted energy",
-            1.0 / np.array(FRACTIONS),
-            left[:, 0],
-            2.0,
-            1.7,
-        )
-    )
+    steps, order = 1.0 / np.array(FRACTIONS), "order of the unaccounted energy"
+    rows.append(order_row(problem, "float64", order, steps, left[:, 0], 2.0, 1.7))
     mixed = unaccounted(watched(setups[0], SETTLING, [law], device, "mixed")[0])
     case = "25 % of the Rayleigh time, production precision"
     rows.append(absolute_row((problem, case, quantity, "closed account"), 0.0, mixed, 6e-3))
     case = f"{100 * FRACTIONS[-1]:g} % of the Rayleigh time, account with 2 % more damping"
-    rows.append(
-        detection_row(problem, case, f"{quantity}, over the true law's", 5.0, left[-1, 1] / left[-1, 0])
-    )
+    more = left[-1, 1] / left[-1, 0]
+    rows.append(detection_row(problem, case, f"{quantity}, over the true law's", 5.0, more))
     rows += _wrong_law_rows(problem, setups[0], device)
     return Result("Energy", TEXT, tuple(rows), (_parts_plot(books[-1][0]),))

@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from dem_warp.model import ContactCoefficients, WorldSetup
 from experiments.verification.problems.contact_geometry import ContactFinder, Touching
+from experiments.verification.problems.setups import Motion
 
 STORED = ("kinetic", "height", "normal springs", "tangential springs")
 LOST = (
@@ -26,26 +27,6 @@ LOST = (
     "turning of tangential springs",
 )
 PARTS = (*STORED, *LOST)
-
-
-@dataclass(frozen=True)
-class Snapshot:
-    """Poses and twists of the grains at one step: (n, 3) and (n, 4) arrays in SI units."""
-
-    positions: np.ndarray
-    orientations: np.ndarray
-    velocities: np.ndarray
-    spins: np.ndarray
-
-    @classmethod
-    def of(cls, state: Any) -> "Snapshot":
-        """Copy of a solver's state."""
-        return cls(
-            state.position.numpy().copy(),
-            state.orientation.numpy().copy(),
-            state.velocity.numpy()[:, :3].astype(float),
-            state.spin.numpy()[:, :3].astype(float),
-        )
 
 
 @dataclass(frozen=True)
@@ -74,22 +55,11 @@ class Moment:
 
 
 class EnergyAccount:
-    """Energies [J] of a world, step by step.
+    """Energies [J] of a world with one contact law for all and walls at rest, step by step.
 
-    Parameters
-    ----------
-    setup
-        A world with one contact law for all, and walls at rest.
-    law
-        What the account books by; by default the law of the world.
-
-    Attributes
-    ----------
-    force_gap, torque_gap : float
-        Largest difference between a force or torque of the law and what moved a grain, over all steps and
-        grains [N], [N m].
-    largest_force, largest_torque : float
-        [N], [N m]
+    The account books by a law of its own, by default that of the world. `force_gap` [N] and `torque_gap`
+    [N m] are the largest differences between a force or torque of the law and what moved a grain, over all
+    steps and grains; `largest_force` and `largest_torque` are the largest of these themselves.
     """
 
     def __init__(self, setup: WorldSetup, law: ContactCoefficients | None = None) -> None:
@@ -102,7 +72,7 @@ class EnergyAccount:
         self.force_gap = self.torque_gap = self.largest_force = self.largest_torque = 0.0
         self._displacements = np.zeros((self.finder.candidate_count, 3))
         self._stiffnesses = np.zeros(self.finder.candidate_count)
-        self._last: tuple[Snapshot, Moment, list[float]] | None = None
+        self._last: tuple[Motion, Moment, list[float]] | None = None
         self._rows: list[list[float]] = []
 
     @property
@@ -113,7 +83,7 @@ class EnergyAccount:
 
     def see(self, state: Any) -> None:
         """Book the step that ends in a state of the solver."""
-        now = Snapshot.of(state)
+        now = Motion.of(state, self.setup.grains.count)
         moment = self._moment(now)
         if self._last:
             before, earlier, stored = self._last
@@ -129,14 +99,14 @@ class EnergyAccount:
 
     # ---- the law -------------------------------------------------------------------------------------------
 
-    def _slip_velocities(self, touching: Touching, now: Snapshot) -> np.ndarray:
+    def _slip_velocities(self, touching: Touching, now: Motion) -> np.ndarray:
         """Velocity of the first surface against the second at each contact [m/s]; walls are at rest."""
         velocities = np.vstack([now.velocities, np.zeros(3)])
         spins = np.vstack([now.spins, np.zeros(3)])
         first = velocities[touching.first] + np.cross(spins[touching.first], touching.levers[0])
         return first - velocities[touching.second] - np.cross(spins[touching.second], touching.levers[1])
 
-    def _moment(self, now: Snapshot) -> Moment:
+    def _moment(self, now: Motion) -> Moment:
         law, dt = self.law, self.setup.time_step
         touching = self.finder.find(now.positions, now.orientations)
         normal, overlap = touching.normal, touching.overlap
@@ -194,7 +164,7 @@ class EnergyAccount:
             np.add.at(most, grains, resisted * np.linalg.norm(levers, axis=1))
         return forces[:-1], torques[:-1], most[:-1]
 
-    def _rolling(self, now: Snapshot, torques: np.ndarray, most: np.ndarray) -> np.ndarray:
+    def _rolling(self, now: Motion, torques: np.ndarray, most: np.ndarray) -> np.ndarray:
         """Torque [N m] by which rolling resistance, `most` at the most, changes each spin; it may stop it."""
         dt, inertias = self.setup.time_step, self.setup.inertias
         turns = Rotation.from_quat(now.orientations)
@@ -207,7 +177,7 @@ class EnergyAccount:
 
     # ---- the books -----------------------------------------------------------------------------------------
 
-    def _compare(self, before: Snapshot, after: Snapshot, moment: Moment) -> None:
+    def _compare(self, before: Motion, after: Motion, moment: Moment) -> None:
         """Keep the largest gap between the law's forces and what changed the grains' momenta."""
         dt, masses = self.setup.time_step, self.setup.masses[:, None]
         pushes = masses * ((after.velocities - before.velocities) / dt - np.array(self.setup.gravity))
@@ -215,57 +185,47 @@ class EnergyAccount:
         gaps = np.abs(pushes - moment.forces).max(), np.abs(twists - moment.torques - moment.rolling).max()
         largest = np.abs(moment.forces).max(), np.abs(moment.torques).max()
         self.force_gap, self.torque_gap = np.maximum((self.force_gap, self.torque_gap), gaps)
-        self.largest_force, self.largest_torque = np.maximum(
-            (self.largest_force, self.largest_torque), largest
-        )
+        before_it = self.largest_force, self.largest_torque
+        self.largest_force, self.largest_torque = np.maximum(before_it, largest)
 
-    def _kinetic(self, before: Snapshot, after: Snapshot) -> float:
+    def _kinetic(self, before: Motion, after: Motion) -> float:
         """Kinetic energy [J] at a step, from the velocities half a step before it and after."""
         linear = 0.5 * self.setup.masses * np.einsum("ij,ij->i", before.velocities, after.velocities)
         momenta = [self._spin_momenta(at) for at in (before, after)]
         turning = 0.25 * np.sum(before.spins * momenta[1] + after.spins * momenta[0])
         return float(linear.sum() + turning)
 
-    def _spin_momenta(self, at: Snapshot) -> np.ndarray:
+    def _spin_momenta(self, at: Motion) -> np.ndarray:
         turns = Rotation.from_quat(at.orientations)
         return turns.apply(self.setup.inertias * turns.inv().apply(at.spins))
 
-    def _potentials(self, now: Snapshot, moment: Moment) -> tuple[float, float, float]:
+    def _potentials(self, now: Motion, moment: Moment) -> tuple[float, float, float]:
         height = -float(self.setup.masses @ (now.positions @ np.array(self.setup.gravity)))
         touching = moment.touching
         normal = 8.0 / 15.0 * self.law.modulus * np.sqrt(touching.radius) * touching.overlap**2.5
-        return (
-            height,
-            float(normal.sum()),
-            float(_spring_energies(moment.stiffness, moment.displacement).sum()),
-        )
+        tangential = _spring_energies(moment.stiffness, moment.displacement)
+        return height, float(normal.sum()), float(tangential.sum())
 
-    def _book(self, now: Snapshot, earlier: Moment, moment: Moment) -> None:
+    def _book(self, now: Motion, earlier: Moment, moment: Moment) -> None:
         """Add what was lost between two steps, by the trapezoidal rule."""
         half = 0.5 * self.setup.time_step
-        velocities = [self._slip_velocities(at.touching, now) for at in (earlier, moment)]
-        for name, part in (
-            ("normal damping", "normal_damping"),
-            ("tangential damping", "tangential_damping"),
-        ):
-            works = [
-                np.sum(getattr(at, part) * v) for at, v in zip((earlier, moment), velocities, strict=True)
-            ]
-            self.lost[name] -= half * float(works[0] + works[1])
+        first, last = (self._slip_velocities(at.touching, now) for at in (earlier, moment))
+        works = np.sum(earlier.normal_damping * first) + np.sum(moment.normal_damping * last)
+        self.lost["normal damping"] -= half * float(works)
+        works = np.sum(earlier.tangential_damping * first) + np.sum(moment.tangential_damping * last)
+        self.lost["tangential damping"] -= half * float(works)
         self.lost["rolling friction"] -= half * float(np.sum((earlier.rolling + moment.rolling) * now.spins))
         at = moment.touching.candidate
         stiffness = self._stiffnesses[at]
         pulls = moment.spring - stiffness[:, None] * moment.unturned
         self.lost["sliding"] -= 0.5 * float(np.sum(pulls * moment.slipped))
         energies = _spring_energies(stiffness, moment.unturned)
-        self.lost["turning of tangential springs"] += float(
-            (energies - _spring_energies(stiffness, moment.turned)).sum()
-        )
+        turned = (energies - _spring_energies(stiffness, moment.turned)).sum()
+        self.lost["turning of tangential springs"] += float(turned)
         squares = np.sum(moment.displacement**2 + moment.unturned**2, axis=1)
         parted = _spring_energies(self._stiffnesses, self._displacements).sum() - energies.sum()
-        self.lost["tangential stiffness change"] += float(
-            parted - 0.25 * np.sum((moment.stiffness - stiffness) * squares)
-        )
+        changed = parted - 0.25 * np.sum((moment.stiffness - stiffness) * squares)
+        self.lost["tangential stiffness change"] += float(changed)
 
 
 def _share(size: np.ndarray, limit: np.ndarray) -> np.ndarray:

@@ -12,6 +12,7 @@ from experiments.verification.problems.setups import (
     BUCKWHEAT,
     CLUMP,
     GRAVITY,
+    PRECISIONS,
     bodies,
     contact,
     downhill,
@@ -25,7 +26,7 @@ SUBSTANCE = Material(density=1000.0, shear_modulus=10e6, poisson_ratio=0.25)
 SPEED = 0.1
 ROLLING = 0.05
 STEP = 0.25 * rayleigh_time(RADIUS, SUBSTANCE)
-PRECISIONS = {"double": "float64", "mixed": "production precision"}
+
 CLUMP_FRICTION = 0.2
 SLOPES = np.array([-2.0, -0.2, -0.1, -0.05, 0.05, 0.1, 0.2, 2.0])
 """Slopes of the plane under the clump, from the friction angle [deg]."""

@@ -35,21 +35,11 @@ Half the skin of the neighbour lists needs no statistics: it gives the same bits
 """
 
 
-@dataclass(frozen=True)
-class Trial:
-    """Scale of the heaps that are compared, and their number of each kind."""
-
-    scale: str
-    replicates: int
-    words: str
-
-
 TRIALS = {
-    "cpu": Trial("bench", 64, "Here at bench scale: 400 grains, shear modulus / 400, {} heaps of each kind."),
-    "cuda": Trial(
-        "soft", 20, "Here at the paper's size with its shear modulus / 100, {} heaps of each kind."
-    ),
+    "cpu": ("bench", 64, "Here at bench scale: 400 grains, shear modulus / 400, {} heaps of each kind."),
+    "cuda": ("soft", 20, "Here at the paper's size with its shear modulus / 100, {} heaps of each kind."),
 }
+"""Scale of the heaps that are compared, their number of each kind, and both in words."""
 
 
 @dataclass(frozen=True)
@@ -66,33 +56,26 @@ def with_numerics(case: Case, **changes: Any) -> Case:
     return replace(case, numerics=replace(case.numerics, **changes))
 
 
-def _half_step(case: Case) -> Case:
-    return with_numerics(case, time_step_fraction=0.5 * case.numerics.time_step_fraction)
-
-
-def _double(case: Case) -> Case:
-    return with_numerics(case, precision="double")
-
-
 def _from_mesh(case: Case) -> Case:
     scene = case.scene
     return replace(case, scene=LiftedMesh(**{f.name: getattr(scene, f.name) for f in fields(scene)}))
 
 
 KINDS: Mapping[str, Callable[[Case], Case]] = {
-    "half the time step": _half_step,
-    "float64": _double,
+    "half the time step": lambda case: with_numerics(
+        case, time_step_fraction=0.5 * case.numerics.time_step_fraction
+    ),
+    "float64": lambda case: with_numerics(case, precision="double"),
     "tube of triangles": _from_mesh,
 }
 BASE = "production"
 
 
-def heaps(trial: Trial, device: str) -> tuple[Study, dict[str, list[CaseResult]]]:
-    """Results of every kind of heap, `trial.replicates` of each."""
-    study = load_study(scale=trial.scale)
-    base = [study.case({}, FIRST_SEED + number) for number in range(trial.replicates)]
+def heaps(study: Study, replicates: int, device: str) -> dict[str, list[CaseResult]]:
+    """Results of every kind of heap, so many of each."""
+    base = [study.case({}, FIRST_SEED + number) for number in range(replicates)]
     cases = {BASE: base} | {name: [change(case) for case in base] for name, change in KINDS.items()}
-    return study, {name: finished_cases(kind, device) for name, kind in cases.items()}
+    return {name: finished_cases(kind, device) for name, kind in cases.items()}
 
 
 def changed_arrays(study: Study, device: str) -> int:
@@ -133,29 +116,24 @@ def _plot(angles: Mapping[str, np.ndarray]) -> Plot:
     for name, values in angles.items():
         seen = np.sort(values[np.isfinite(values)])
         curves.append(Curve(name, seen, (np.arange(len(seen)) + 0.5) / len(seen)))
-    return Plot(
-        "heap-angle", "Heaps by angle", "repose angle [deg]", "part of the heaps below", tuple(curves)
-    )
+    labels = ("Heaps by angle", "repose angle [deg]", "part of the heaps below")
+    return Plot("heap-angle", *labels, tuple(curves))
 
 
 def heap_angle(device: str) -> Result:
     """Shift of the angle under other numerics."""
     problem = "Heaps of buckwheat"
-    trial = TRIALS["cpu" if device == "cpu" else "cuda"]
-    study, results = heaps(trial, device)
+    scale, replicates, words = TRIALS["cpu" if device == "cpu" else "cuda"]
+    study = load_study(scale=scale)
+    results = heaps(study, replicates, device)
     angles = {name: repose_angles(study, kind) for name, kind in results.items()}
-    rows = [
-        absolute_row(
-            (problem, name, "heaps without an angle", "every one is measured"),
-            0.0,
-            np.count_nonzero(np.isnan(values)),
-            0.0,
-        )
-        for name, values in angles.items()
-    ]
+    rows = []
+    for name, values in angles.items():
+        labels = (problem, name, "heaps without an angle", "every one is measured")
+        rows.append(absolute_row(labels, 0.0, np.count_nonzero(np.isnan(values)), 0.0))
     for name in KINDS:
         rows += shift_rows(problem, name, shift(angles[name], angles[BASE]))
     labels = (problem, f"half the skin, {SKIN_SEEDS} heaps", "arrays of a heap that differ", "the same bits")
     rows.append(absolute_row(labels, 0.0, changed_arrays(study, device), 0.0))
-    text = TEXT + trial.words.format(trial.replicates)
+    text = TEXT + words.format(replicates)
     return Result("Heap angle and numerics", text, tuple(rows), (_plot(angles),))

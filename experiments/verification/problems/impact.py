@@ -173,20 +173,11 @@ def simulate_impacts(
     for k, world_ in enumerate(worlds):
         impact, dt = impacts[k // len(phases)], world_.time_step
         z, v = motion.positions[:, k, :, 2], motion.velocities[:, k, :, 2]
-        reach, below = (
-            (impact.radius + impact.partner.radius, z[:, 1]) if impact.partner else (impact.radius, 0.0)
-        )
+        reach = impact.radius + (impact.partner.radius if impact.partner else 0.0)
+        overlap = reach - (z[:, 0] - (z[:, 1] if impact.partner else 0.0))
         separation = v[:, 0] - (v[:, 1] if impact.partner else 0.0)
-        courses.append(
-            Course(
-                impact,
-                dt,
-                reach - (z[:, 0] - below),
-                impact.effective_mass * np.diff(separation) / dt,
-                separation,
-                motion.velocities[:, k],
-                motion.spins[:, k],
-            )
-        )
+        force = impact.effective_mass * np.diff(separation) / dt
+        states = motion.velocities[:, k], motion.spins[:, k]
+        courses.append(Course(impact, dt, overlap, force, separation, *states))
     each = len(phases)
     return [courses[i : i + each] for i in range(0, len(courses), each)]

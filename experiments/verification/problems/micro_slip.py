@@ -18,15 +18,7 @@ from experiments.verification.problems.kicks import (
 )
 from experiments.verification.problems.one_spring import LAWS, one_spring_rebound
 from experiments.verification.problems.partial_slip import rebound_slip
-from experiments.verification.result import (
-    Curve,
-    Plot,
-    Result,
-    Row,
-    absolute_row,
-    order_row,
-    relative_row,
-)
+from experiments.verification.result import Curve, Plot, Result, Row, absolute_row, order_row, relative_row
 
 PROBLEM = "Chung and Ooi test 5: micro-slip"
 THEORY = "Maw, Barber and Fawcett (1976)"
@@ -161,21 +153,15 @@ def _plots(ratio: float, got: np.ndarray, ring: np.ndarray) -> tuple[Plot, ...]:
         "micro-slip": ("slip of the contact point", "slip after / (mu v)"),
         "micro-slip-impulse": ("tangential impulse", "tangential impulse / (mu m v)"),
     }
-    plots = [
-        Plot(
-            name,
-            f"Test 5: {title}",
-            "slip before / (mu v)",
-            label,
-            (
-                Curve("base law, simulated", SLIPS, _rebound(got)[k], "points"),
-                Curve("base law, differential equation", dense, solved[k]),
-                Curve("with micro_slip, simulated", SLIPS, _rebound(ring)[k], "points"),
-                Curve(THEORY, dense, theory[k], "dashed"),
-            ),
+    plots = []
+    for k, (name, (title, label)) in enumerate(names.items()):
+        curves = (
+            Curve("base law, simulated", SLIPS, _rebound(got)[k], "points"),
+            Curve("base law, differential equation", dense, solved[k]),
+            Curve("with micro_slip, simulated", SLIPS, _rebound(ring)[k], "points"),
+            Curve(THEORY, dense, theory[k], "dashed"),
         )
-        for k, (name, (title, label)) in enumerate(names.items())
-    ]
+        plots.append(Plot(name, f"Test 5: {title}", "slip before / (mu v)", label, curves))
     return *plots, _laws_plot(ratio, ring)
 
 
@@ -189,10 +175,5 @@ def _laws_plot(ratio: float, ring: np.ndarray) -> Plot:
         Curve(law.name, dense, (one_spring_rebound(law, ratio, dense)[0] - theory) / dense) for law in LAWS
     ]
     curves.append(Curve("with micro_slip, simulated", SLIPS[inside], (gap / SLIPS)[inside], "points"))
-    return Plot(
-        "micro-slip-laws",
-        "Test 5: gap to theory",
-        "slip before / (mu v)",
-        "(slip after - theory) / slip before",
-        tuple(curves),
-    )
+    labels = ("Test 5: gap to theory", "slip before / (mu v)", "(slip after - theory) / slip before")
+    return Plot("micro-slip-laws", *labels, tuple(curves))

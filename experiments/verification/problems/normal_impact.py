@@ -10,15 +10,7 @@ from dem_warp.walls import Plane
 from experiments.verification.problems import chung_ooi
 from experiments.verification.problems.impact import HERTZ_DURATION, Course, Impact, simulate_impacts
 from experiments.verification.problems.setups import BUCKWHEAT, CLUMP, STEEL, bodies, contact, record, world
-from experiments.verification.result import (
-    Curve,
-    Plot,
-    Result,
-    Row,
-    absolute_row,
-    order_row,
-    relative_row,
-)
+from experiments.verification.result import Curve, Plot, Result, Row, absolute_row, order_row, relative_row
 
 PHASES = (0.0, 0.25, 0.5, 0.75)
 """Parts of a step at which the surfaces meet; what is seen of an impact depends on it: the worst counts."""
@@ -71,25 +63,18 @@ def hertz_force(impact: Impact, times: np.ndarray) -> np.ndarray:
     """Force [N] of an elastic impact at times [s] since the surfaces met, from its equation of motion."""
     unit = impact.peak_overlap / impact.normal_speed
     spans = np.clip(times / unit, 0.0, HERTZ_DURATION)
-    path = solve_ivp(
-        lambda _, y: [y[1], -1.25 * max(y[0], 0.0) ** 1.5],
-        (0.0, HERTZ_DURATION),
-        [0.0, 1.0],
-        "DOP853",
-        dense_output=True,
-        rtol=1e-12,
-        atol=1e-14,
-    )
+
+    def rates(_: float, y: np.ndarray) -> list[float]:
+        return [y[1], -1.25 * max(y[0], 0.0) ** 1.5]
+
+    span, start = (0.0, HERTZ_DURATION), [0.0, 1.0]
+    path = solve_ivp(rates, span, start, "DOP853", dense_output=True, rtol=1e-12, atol=1e-14)
     return impact.peak_force * np.maximum(path.sol(spans)[0], 0.0) ** 1.5
 
 
 def _seen(course: Course) -> tuple[float, float, float, float]:
-    return (
-        float(course.overlap.max()),
-        float(course.force.max()),
-        course.duration,
-        course.restitution * course.impact.normal_speed,
-    )
+    after = course.restitution * course.impact.normal_speed
+    return float(course.overlap.max()), float(course.force.max()), course.duration, after
 
 
 def _hertz(impact: Impact) -> tuple[float, float, float, float]:
@@ -127,21 +112,11 @@ def _drop_on_tip(restitution: float, device: str) -> tuple[float, np.ndarray, np
     time_step = 0.25 * rayleigh_time(float(shape.radii.min()), BUCKWHEAT)
     reach = float((shape.centers[:, 2] + shape.radii).max())
     law = contact(BUCKWHEAT, STEEL, restitution)
-    worlds = [
-        world(
-            bodies(
-                [0.0, 0.0, reach + (1.0 + phase) * time_step * TIP_SPEED],
-                BUCKWHEAT.density,
-                velocities=[0.0, 0.0, -TIP_SPEED],
-                orientations=UPSIDE_DOWN,
-            ),
-            shape,
-            law,
-            time_step,
-            walls=(Plane(),),
-        )
-        for phase in PHASES
-    ]
+    worlds = []
+    for phase in PHASES:
+        place, fall = [0.0, 0.0, reach + (1.0 + phase) * time_step * TIP_SPEED], [0.0, 0.0, -TIP_SPEED]
+        grains = bodies(place, BUCKWHEAT.density, velocities=fall, orientations=UPSIDE_DOWN)
+        worlds.append(world(grains, shape, law, time_step, walls=(Plane(),)))
     steps = _tip_impact(shape).duration / time_step
     velocities = record(worlds, int(4.0 * steps), device, "mixed").velocities[:, :, 0, 2]
     peaks = BUCKWHEAT.density * shape.volume * np.diff(velocities, axis=0).max(axis=0) / time_step
@@ -228,9 +203,8 @@ def _order_plot(
     name: str, title: str, steps: tuple[int, ...], errors: np.ndarray, labels: tuple[str, ...], power: int = 2
 ) -> Plot:
     at = np.array(steps, dtype=float)
-    curves = [
-        Curve(label.split(" [")[0], at, error, "points") for label, error in zip(labels, errors, strict=True)
-    ]
+    pairs = zip(labels, errors, strict=True)
+    curves = [Curve(label.split(" [")[0], at, error, "points") for label, error in pairs]
     slope = Curve(f"order {power}", at, float(np.max(errors[:, 0])) * (at[0] / at) ** power, "dashed")
     return Plot(name, title, "steps an impact", "relative error", (*curves, slope), logarithmic=True)
 
@@ -238,9 +212,7 @@ def _order_plot(
 def restitution(device: str) -> Result:
     """Chung and Ooi's test 3: the restitution that was chosen comes back; the clamped form's does not."""
     problem = "Chung and Ooi test 3: restitution"
-    rows: list[Row] = []
-    chosen = np.array(RESTITUTIONS)
-    seen = {}
+    rows, seen, chosen = [], {}, np.array(RESTITUTIONS)
     for clamp in (False, True):
         # worlds of both materials together: restitution is a number without material
         impacts = [
@@ -249,27 +221,22 @@ def restitution(device: str) -> Result:
             for substance in chung_ooi.RESTITUTION_MATERIALS.values()
         ]
         courses = simulate_impacts(impacts, FINE, device, PHASES, length=4.0)
-        seen[clamp] = np.array([[c.restitution for c in phases] for phases in courses]).reshape(
-            len(chosen), -1
-        )
+        back = [[c.restitution for c in phases] for phases in courses]
+        seen[clamp] = np.array(back).reshape(len(chosen), -1)
         for e, comes in zip(chosen, seen[clamp], strict=True):
             want, source = (clamped_restitution(e), CLAMPED) if clamp else (e, AS_CHOSEN)
             case = f"e = {e:g}, {'clamped' if clamp else 'damping may attract'}, {FINE} steps, both materials"
             rows.append(relative_row((problem, case, "restitution", source), want, comes, 5e-3))
     orders, errors = _restitution_orders(problem, device)
     fine = np.linspace(0.05, 1.0, 100)
-    plot = Plot(
-        "restitution",
-        "Test 3: restitution that comes back",
-        "restitution chosen",
-        "restitution simulated",
-        (
-            Curve("damping may attract", chosen, seen[False].mean(axis=1), "points"),
-            Curve("as chosen", fine, fine, "dashed"),
-            Curve("clamped", chosen, seen[True].mean(axis=1), "points"),
-            Curve("clamped, closed form", fine, np.array([clamped_restitution(e) for e in fine])),
-        ),
+    curves = (
+        Curve("damping may attract", chosen, seen[False].mean(axis=1), "points"),
+        Curve("as chosen", fine, fine, "dashed"),
+        Curve("clamped", chosen, seen[True].mean(axis=1), "points"),
+        Curve("clamped, closed form", fine, np.array([clamped_restitution(e) for e in fine])),
     )
+    title = "Test 3: restitution that comes back"
+    plot = Plot("restitution", title, "restitution chosen", "restitution simulated", curves)
     labels = tuple(f"e = {e:g}" for e in (0.1, 0.18, 0.5))
     order = _order_plot("restitution-order", "Test 3", RESTITUTION_ORDERS, errors, labels, power=1)
     return Result("Restitution", RESTITUTION_TEXT, (*rows, *orders), (plot, order))
@@ -291,7 +258,6 @@ def _restitution_orders(problem: str, device: str) -> tuple[list[Row], np.ndarra
     ]
     for e, phases in zip(chosen, simulate_impacts(impacts, None, device, PHASES, length=4.0), strict=True):
         case = f"e = {e:g}, 25 % of the Rayleigh time ({impacts[0].production_steps:.1f} steps)"
-        rows.append(
-            relative_row((problem, case, "restitution", AS_CHOSEN), e, [c.restitution for c in phases], None)
-        )
+        labels = (problem, case, "restitution", AS_CHOSEN)
+        rows.append(relative_row(labels, e, [c.restitution for c in phases], None))
     return rows, errors

@@ -150,10 +150,5 @@ def _recoil_plot(tests: dict[str, list[Impact]], kicks: dict[str, np.ndarray]) -
         slowed = np.array([3.5 * i.friction * (1.0 + i.restitution) for i in impacts]) * kicks[test][:, 0]
         after = (before - slowed) / np.array([i.restitution for i in impacts])
         curves.append(Curve(test, before, after, "points"))
-    return Plot(
-        "spinning-recoil",
-        "Tests 6 to 8: slip of the contact point",
-        "slip before / normal speed",
-        "slip after / normal speed after",
-        tuple(curves),
-    )
+    axes = ("slip before / normal speed", "slip after / normal speed after")
+    return Plot("spinning-recoil", "Tests 6 to 8: slip of the contact point", *axes, tuple(curves))

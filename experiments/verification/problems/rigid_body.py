@@ -8,16 +8,8 @@ from scipy.spatial.transform import Rotation
 from dem_warp import ClumpShape
 from dem_warp.model import WorldSetup
 from dem_warp.solver import CHUNK, Solver
-from experiments.verification.problems.setups import BUCKWHEAT, CLUMP, bodies, contact, world
-from experiments.verification.result import (
-    Curve,
-    Plot,
-    Result,
-    Row,
-    absolute_row,
-    detection_row,
-    order_row,
-)
+from experiments.verification.problems.setups import BUCKWHEAT, CLUMP, PRECISIONS, bodies, contact, world
+from experiments.verification.result import Curve, Plot, Result, Row, absolute_row, detection_row, order_row
 
 BOOT = ClumpShape.from_spheres(
     1e-3 * np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 1.2, 0.0]]), 1e-3 * np.array([1.0, 0.8, 0.6])
@@ -59,16 +51,12 @@ def spin_momenta(setup: WorldSetup, poses: dict[str, np.ndarray]) -> np.ndarray:
 
 def euler_spins(moments: np.ndarray, times: np.ndarray) -> np.ndarray:
     """Body-frame spins [rad/s], (n, 3), of the boot at times [s]."""
-    path = solve_ivp(
-        lambda _, s: np.cross(moments * s, s) / moments,
-        (0.0, float(times[-1])),
-        SPIN,
-        "DOP853",
-        t_eval=times,
-        rtol=1e-12,
-        atol=1e-12,
-    )
-    return path.y.T
+
+    def rates(_: float, spin: np.ndarray) -> np.ndarray:
+        return np.cross(moments * spin, spin) / moments
+
+    span = (0.0, float(times[-1]))
+    return solve_ivp(rates, span, SPIN, "DOP853", t_eval=times, rtol=1e-12, atol=1e-12).y.T
 
 
 def _tumble(time_step: float, chunks: int, precision: str, device: str) -> tuple[np.ndarray, ...]:
@@ -95,26 +83,19 @@ def _top(device: str) -> tuple[list[Row], Plot]:
     moments = tumbling(STEP).inertias[0]
     rows = []
     curves: list[Curve] = []
-    for precision, name in (("double", "float64"), ("mixed", "production precision")):
+    for precision, name in PRECISIONS.items():
         times, spins, momentum, energy = _tumble(STEP, CHUNKS, precision, device)
         case = f"1e5 steps of 10 us, {name}"
         tolerance = 1e-6 if precision == "double" else None
         want = euler_spins(moments, times)
         error = np.linalg.norm(spins - want, axis=1).max() / np.linalg.norm(SPIN)
+        compared = (
+            ("drift of angular momentum, relative", POINSOT, momentum.max(), tolerance),
+            ("drift of energy, relative", POINSOT, energy.max(), tolerance),
+            ("spin in the body, over its size", EULER, error, 1e-5 if tolerance else None),
+        )
         rows += [
-            absolute_row(
-                (problem, case, "drift of angular momentum, relative", POINSOT),
-                0.0,
-                momentum.max(),
-                tolerance,
-            ),
-            absolute_row((problem, case, "drift of energy, relative", POINSOT), 0.0, energy.max(), tolerance),
-            absolute_row(
-                (problem, case, "spin in the body, over its size", EULER),
-                0.0,
-                error,
-                1e-5 if tolerance else None,
-            ),
+            absolute_row((problem, case, what, law), 0.0, gap, most) for what, law, gap, most in compared
         ]
         if precision == "double":
             fine = np.linspace(0.0, times[-1], 800)
@@ -122,10 +103,7 @@ def _top(device: str) -> tuple[list[Row], Plot]:
             for k, axis in enumerate("xyz"):
                 curves.append(Curve(f"{axis}, Euler", fine, path[:, k], colour=k))
                 curves.append(Curve(f"{axis}, simulated", times, spins[:, k], "points", colour=k))
-    plot = Plot(
-        "free-top", "Free asymmetric top", "time [s]", "spin in the body's frame [rad/s]", tuple(curves)
-    )
-    return rows, plot
+    return rows, Plot("free-top", problem, "time [s]", "spin in the body's frame [rad/s]", tuple(curves))
 
 
 def _orders(device: str) -> list[Row]:
@@ -136,11 +114,9 @@ def _orders(device: str) -> list[Row]:
         times, spins, _, energy = _tumble(coarser * STEP, 256 // coarser, "double", device)
         want = euler_spins(moments, times)
         errors.append((energy.max(), np.linalg.norm(spins - want, axis=1).max()))
-    steps = 1.0 / np.array(COARSER)
+    labels = ("Free asymmetric top", "float64")
     return [
-        order_row(
-            "Free asymmetric top", "float64", f"order of the {name}", steps, np.array(errors)[:, k], 2.0, 1.9
-        )
+        order_row(*labels, f"order of the {name}", 1.0 / np.array(COARSER), np.array(errors)[:, k], 2.0, 1.9)
         for k, name in enumerate(("energy drift", "spin in the body"))
     ]
 
@@ -160,7 +136,7 @@ def _collision_rows(device: str) -> list[Row]:
     )
     setup = world(grains, shape, contact(BUCKWHEAT, BUCKWHEAT, 0.4, 0.5), 2e-6)
     rows = []
-    for precision, name in (("double", "float64"), ("mixed", "production precision")):
+    for precision, name in PRECISIONS.items():
         solver = Solver([setup], device, precision)
         before = _momenta(setup, solver)
         solver.advance(50)
@@ -174,9 +150,8 @@ def _collision_rows(device: str) -> list[Row]:
             labels = ("Clumps collide", case, f"change of {quantity} over that of a grain", "conservation")
             rows.append(absolute_row(labels, 0.0, change, tolerance))
         share = 1.0 - after[2] / before[2]
-        rows.append(
-            detection_row("Clumps collide", case, "share of the energy lost (they did collide)", 0.2, share)
-        )
+        quantity = "share of the energy lost (they did collide)"
+        rows.append(detection_row("Clumps collide", case, quantity, 0.2, share))
     return rows
 
 

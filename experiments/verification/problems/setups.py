@@ -13,6 +13,9 @@ from dem_warp.model import ContactCoefficients, Grains, WorldSetup
 from dem_warp.solver import Solver
 from dem_warp.walls import Plane, Wall
 
+PRECISIONS = {"double": "float64", "mixed": "production precision"}
+"""Those of a solver, in words."""
+
 GRAVITY = 9.81
 WALLS = 2
 """Walls of every world, far-off planes where a problem needs none: so that worlds share compiled kernels."""
@@ -54,13 +57,17 @@ def bodies(
     """Grains of one shape at positions [m], (n, 3); what is given once holds for all of them."""
     places = np.atleast_2d(np.asarray(positions, dtype=float))
     n = len(places)
+
+    def each(values: ArrayLike, *shape: int) -> np.ndarray:
+        return np.broadcast_to(np.asarray(values, dtype=float), (n, *shape))
+
     return Grains(
         positions=places,
-        orientations=np.broadcast_to(np.asarray(orientations, dtype=float), (n, 4)),
-        velocities=np.broadcast_to(np.asarray(velocities, dtype=float), (n, 3)),
-        spins=np.broadcast_to(np.asarray(spins, dtype=float), (n, 3)),
-        sizes=np.broadcast_to(np.asarray(sizes, dtype=float), (n,)),
-        densities=np.broadcast_to(np.asarray(densities, dtype=float), (n,)),
+        orientations=each(orientations, 4),
+        velocities=each(velocities, 3),
+        spins=each(spins, 3),
+        sizes=each(sizes),
+        densities=each(densities),
         shapes=np.zeros(n, dtype=int),
         release_steps=np.zeros(n, dtype=int),
     )
@@ -106,12 +113,25 @@ def downhill(degrees: float) -> tuple[float, float, float]:
 
 @dataclass(frozen=True)
 class Motion:
-    """State after each step, the first before any: arrays (steps + 1, worlds, grains, 3 or 4) in SI units."""
+    """State after each step, the first before any: arrays (steps + 1, worlds, grains, 3 or 4) in SI units.
+
+    One state has no axis of steps, that of a single world none of worlds.
+    """
 
     positions: np.ndarray
     orientations: np.ndarray
     velocities: np.ndarray
     spins: np.ndarray
+
+    @classmethod
+    def of(cls, state: Any, *count: int) -> "Motion":
+        """Copy of a solver's state of so many worlds and grains, or of so many grains."""
+        return cls(
+            state.position.numpy().reshape(*count, 3).copy(),
+            state.orientation.numpy().reshape(*count, 4).copy(),
+            state.velocity.numpy().reshape(*count, 4)[..., :3].astype(float),
+            state.spin.numpy().reshape(*count, 4)[..., :3].astype(float),
+        )
 
 
 class WatchedSolver(Solver):
@@ -142,14 +162,7 @@ def record(worlds: Sequence[WorldSetup], steps: int, device: str, precision: str
     states: list[Motion] = []
 
     def see(state: Any) -> None:
-        states.append(
-            Motion(
-                state.position.numpy().reshape(*count, 3).copy(),
-                state.orientation.numpy().reshape(*count, 4).copy(),
-                state.velocity.numpy().reshape(*count, 4)[..., :3].astype(float),
-                state.spin.numpy().reshape(*count, 4)[..., :3].astype(float),
-            )
-        )
+        states.append(Motion.of(state, *count))
 
     see(solver.grains[0])
     solver.watch(steps, see)

@@ -57,16 +57,11 @@ def outcome(result: CaseResult) -> str:
 
 
 def _rows(problem: str, results: Sequence[CaseResult]) -> list[Row]:
-    reference = "finishes, or is flagged with time and advice"
-    return [
-        absolute_row(
-            (problem, f"run {run}, {outcome(result)}", "1: it ends in neither way", reference),
-            0.0,
-            float(not ended_in_order(result)),
-            0.0,
-        )
-        for run, result in enumerate(results, 1)
-    ]
+    rows, wanted = [], ("1: it ends in neither way", "finishes, or is flagged with time and advice")
+    for run, result in enumerate(results, 1):
+        labels = (problem, f"run {run}, {outcome(result)}", *wanted)
+        rows.append(absolute_row(labels, 0.0, float(not ended_in_order(result)), 0.0))
+    return rows
 
 
 def stability(device: str) -> Result:

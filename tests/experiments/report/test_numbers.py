@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from experiments.report.campaign_page import flat
+from experiments.report.kit.html import flat
 from experiments.report.kit.numbers import (
     enumeration,
     equation,

@@ -11,7 +11,7 @@ from synthetic import OBSERVABLES, SETTINGS, emulator, space
 from experiments.trials.drawing import STRONG
 from experiments.trials.emulated import World, draw_trials, judged, run_trial, size_errors
 from experiments.trials.emulated_simulator import EmulatedSimulator, emulated_heaps
-from experiments.trials.score import covered
+from experiments.trials.score import covered, share
 from experiments.trials.truth import Kind
 
 KNOWN = emulator().without("twin")
@@ -45,7 +45,7 @@ def test_what_is_above_one_and_a_half_detectable_sizes_is_named(table: pd.DataFr
 
 
 def test_intervals_of_sizes_cover_though_the_bank_has_noise(table: pd.DataFrame) -> None:
-    z, inside = size_errors(table), covered(table)
+    z, inside = size_errors(table), share(covered(table))
     assert len(z) == inside.trials >= 6
     assert inside.count >= stats.binom.ppf(1e-3, inside.trials, 0.9)
     assert np.sum(z**2) < stats.chi2.isf(1e-3, len(z))

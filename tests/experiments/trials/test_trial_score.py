@@ -106,7 +106,7 @@ def test_an_analysis_that_is_right_passes_every_aim() -> None:
     found = aims(table, unresolvable=["twist"])
     assert [aim.question for aim in found if aim.passed is not True] == []
     assert removed(table) == pytest.approx(0.9)
-    assert covered(table).value == pytest.approx(1.0 - 2 / 15)
+    assert covered(table).mean() == pytest.approx(1.0 - 2 / 15)
     assert confusion(table).to_numpy().sum() == len(labels)
     curve = power_curve(table)
     assert curve["trials"].sum() == 120

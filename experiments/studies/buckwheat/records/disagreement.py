@@ -22,8 +22,8 @@ from doe.discrepancy import Candidate, Discovery, Emulator, Fit, Interval, Setti
 from experiments.calibrate.export import jsonable
 from experiments.files import write_text
 from experiments.report.kit.markdown import markdown_page, markdown_table
-from experiments.report.kit.numbers import fixed, interval
-from experiments.report.kit.table import Column, make_table
+from experiments.report.kit.numbers import estimate, fixed
+from experiments.report.kit.table import Column, Layout, columns, make_table
 from experiments.studies.buckwheat.records.paper_page import Record
 from experiments.studies.buckwheat.records.paper_record import FOLDER
 from experiments.studies.buckwheat.records.published_heaps import (
@@ -64,15 +64,7 @@ both static frictions free within its square.
 
 
 def disagreement_page(tables: Discovery, physical: Discovery, emulator: Emulator, settings: Settings) -> str:
-    """Write both analyses as Markdown.
-
-    Parameters
-    ----------
-    tables, physical
-        What was found.
-    emulator, settings
-        What the tables were analysed with.
-    """
+    """Write both analyses as Markdown: of the tables, by this emulator and settings, and the physical."""
     names = [power.mechanism for power in tables.power]
     library = f"{len(names)} of them" if names else "none in the record yet"
     head = _INTRODUCTION.format(
@@ -90,18 +82,17 @@ def _verdict(found: Discovery) -> str:
 def _fits(found: Discovery) -> list[str]:
     """The calibrated base, the chosen model beside it, and where they stand against every setting."""
     fits = {"study as written": found.base, "with the effect": found.chosen}
-    shown = {name: fit for name, fit in fits.items() if fit is not None}
-    rows = [{"model": name, **_fit_row(fit)} for name, fit in shown.items()]
-    columns = [
-        Column("model", "model"),
+    rows = [{"model": name, **_fit_row(fit)} for name, fit in fits.items() if fit is not None]
+    models: Layout = [
+        "model",
         Column("shift", "shift of all angles", unit="°"),
         Column("q", "Q", "ratio"),
         Column("df", "degrees of freedom", "count"),
         Column("limit", "limit of Q", "ratio"),
-        Column("p", "p", "p"),
+        "p",
     ]
     tables = [
-        make_table("fits", pd.DataFrame(rows), columns, "The calibrated model."),
+        make_table("fits", pd.DataFrame(rows), models, "The calibrated model."),
         make_table("settings", _settings_frame(found), _SETTINGS, "Every setting.", _SETTINGS_NOTE),
     ]
     return [markdown_table(table) for table in tables]
@@ -113,8 +104,7 @@ def _fit_row(fit: Fit) -> dict[str, object]:
 
 
 _SETTINGS = [
-    Column("condition", "setting"),
-    Column("fitted", "took part in the fit"),
+    *columns(condition="setting", fitted="took part in the fit"),
     Column("published", "published", "angle", "°"),
     Column("base", "calibrated", "angle", "°"),
     Column("base_residual", "residual", "ratio", "standard deviations"),
@@ -142,32 +132,26 @@ def _candidates(candidates: Sequence[Candidate], emulator: Emulator, settings: S
         return []
     rows = [
         {
-            "mechanism": " with ".join(_title(name) for name in candidate.mechanisms),
+            "mechanism": " with ".join(variants()[name].full_title for name in candidate.mechanisms),
             "sizes": ", ".join(_interval(size) for size in candidate.sizes),
             "over_se": min(candidate.size_over_se),
-            "base": base_q(
-                emulator, candidate.mechanisms, [size.value for size in candidate.sizes], settings
-            ),
+            "base": base_q(emulator, candidate.mechanisms, [one.value for one in candidate.sizes], settings),
             "q": candidate.q,
             "gain": _interval(candidate.held_out_gain),
             "objection": candidate.objection or "none",
         }
         for candidate in candidates
     ]
-    columns = [
-        Column("mechanism", "what is added"),
-        Column("sizes", "size, 90 % interval"),
-        Column("over_se", "size / se", "ratio"),
-        Column("base", "Q without it, in the same errors", "ratio"),
-        Column("q", "Q with it", "ratio"),
-        Column("gain", "gain of the log score on Table 6"),
-        Column("objection", "objection"),
+    shown: Layout = [
+        *columns(mechanism="what is added", sizes="size, 90 % interval"),
+        *columns("ratio", over_se="size / se", base="Q without it, in the same errors", q="Q with it"),
+        *columns(gain="gain of the log score on Table 6", objection="objection"),
     ]
     note = (
         "The seed noise of a variant's heaps widens the errors that Q is measured in, whether it explains"
         " anything or not: compare the two of a row."
     )
-    table = make_table("candidates", pd.DataFrame(rows), columns, "Candidates, best first.", note)
+    table = make_table("candidates", pd.DataFrame(rows), shown, "Candidates, best first.", note)
     return [markdown_table(table)]
 
 
@@ -177,7 +161,7 @@ def _power(found: Discovery) -> list[str]:
         return []
     rows = [
         {
-            "mechanism": _title(power.mechanism),
+            "mechanism": variants()[power.mechanism].full_title,
             "detectable": fixed(power.detectable_size, 2)
             if np.isfinite(power.detectable_size)
             else "none within its range",
@@ -186,22 +170,16 @@ def _power(found: Discovery) -> list[str]:
         }
         for power in found.power
     ]
-    columns = [
-        Column("mechanism", "effect"),
-        Column("detectable", "smallest size named with 80 % probability"),
+    shown: Layout = [
+        *columns(mechanism="effect", detectable="smallest size named with 80 % probability"),
         Column("visible", "of its signature, a shift of all angles cannot imitate", "percent", "%"),
         Column("resolvable", "may be named"),
     ]
-    return [markdown_table(make_table("power", pd.DataFrame(rows), columns, "What the tables could show."))]
-
-
-def _title(name: str) -> str:
-    variant = variants()[name]
-    return f"{variant.group}: {variant.title}"
+    return [markdown_table(make_table("power", pd.DataFrame(rows), shown, "What the tables could show."))]
 
 
 def _interval(ends: Interval | None) -> str:
-    return "" if ends is None else f"{fixed(ends.value, 2)} {interval((ends.low, ends.high))}"
+    return "" if ends is None else estimate(ends.value, ends.low, ends.high)
 
 
 def main(

@@ -18,12 +18,12 @@ from experiments.calibrate.results import Campaign
 from experiments.files import replacing, write_text
 from experiments.report.kit.figure import save_figure
 from experiments.report.kit.markdown import facts_list, markdown_page, markdown_table, wall_times_table
-from experiments.report.kit.table import Column, Table, make_table
+from experiments.report.kit.table import Column, Layout, Table, columns, make_table
 from experiments.report.material_card import CARD
 from experiments.report.pictures import heap_row
 from experiments.studies.buckwheat.replay.replay import RUN, Replay
 from experiments.studies.buckwheat.replay.replay_tables import ranking_sentence, replay_tables
-from experiments.studies.buckwheat.replay.runs import DESIGNS, STAGES
+from experiments.studies.buckwheat.replay.runs import DESIGNS, TABLES
 from experiments.studies.buckwheat.sensitivity.sensitivities import Sensitivities
 from experiments.studies.buckwheat.sensitivity.sensitivity_tables import sensitivity_tables
 from experiments.studyfile import Study
@@ -36,6 +36,7 @@ SENSITIVITIES = "sensitivities"
 
 SHOWN = {"Screening 3": ("screening", 3), "Screening 12": ("screening", 12), "Optimum": ("verification", 1)}
 """Runs in the picture of heaps."""
+HEAPS_TITLE = "Screening run 3, screening run 12 and the published optimum, at one scale"
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,13 +61,7 @@ class Record:
 
     @classmethod
     def read(cls, folder: Path) -> Record:
-        """Read the tables of a record.
-
-        Raises
-        ------
-        FileNotFoundError
-            When the folder holds no record.
-        """
+        """Read the tables of a record; a folder that holds none raises `FileNotFoundError`."""
         campaign = folder / CAMPAIGN
         scales = {path.stem.removeprefix("runs-"): path for path in sorted(folder.glob("runs-*.csv"))}
         return cls(
@@ -84,23 +79,10 @@ class Record:
 def write_record(
     folder: Path, cases: pd.DataFrame, provenance: Mapping[str, Any], campaign: Campaign | None = None
 ) -> Path:
-    """Write the tables of a record, and its page.
+    """Write the tables of a record, and its page; return the page.
 
-    Parameters
-    ----------
-    folder
-        The record's folder; what stands there of a picture, of other scales or of sensitivities is taken in.
-    cases
-        The paper's runs simulated again, a row a case.
-    provenance
-        What made the numbers, by name.
-    campaign
-        A campaign of our own, to be set beside.
-
-    Returns
-    -------
-    Path
-        The page.
+    Its cases are the paper's runs simulated again; the campaign is our own, to be set beside. What stands in
+    the folder of a picture, of other scales or of sensitivities is taken in.
     """
     write_text(folder / RUNS, cases.to_csv(index=False))
     write_text(folder / PROVENANCE, _json(provenance))
@@ -112,16 +94,7 @@ def write_record(
 def draw_heaps(folder: Path, study: Study, replay: Replay, load: Callable[[str], CaseResult]) -> None:
     """Draw the first heaps of three runs next to each other, those that were measured.
 
-    Parameters
-    ----------
-    folder
-        The record's folder.
-    study
-        The study whose measurement gives the angles.
-    replay
-        The paper's runs.
-    load
-        Finds the result of a case by its ``case_key``, as ``Store.load`` does.
+    `load` finds the result of a case by its ``case_key``, as ``Store.load`` does.
     """
     cases = replay.measured
     shown = {}
@@ -142,7 +115,7 @@ def write_record_page(folder: Path) -> Path:
     """Write the page of a record, and its plot, anew from the tables beside it."""
     record = Record.read(folder)
     runs = record.replay.runs[lambda runs: runs["stage"].isin(DESIGNS) & runs["angle"].notna()]
-    groups = [STAGES[stage].partition(",")[0] for stage in runs["stage"]]
+    groups = [TABLES[stage] for stage in runs["stage"]]
     figure = agreement_plot(record.replay.agreement(), groups, "simulated angle [°]", "published angle [°]")
     save_figure(figure, folder / SCATTER, dpi=130)
     write_text(folder / PAGE, record_page(record))
@@ -179,7 +152,7 @@ def record_page(record: Record) -> str:
         markdown_table(tables["agreement"]),
         f"![Simulated against published angles]({SCATTER})",
         record.notes,
-        *_picture(record),
+        *(["## Heaps", f"![{HEAPS_TITLE}]({HEAPS})"] if record.picture else []),
         *_section("Screening", tables, "effects"),
         *([ranking_sentence(record.replay)] if "effects" in tables else []),
         *_section("Response surface", tables, "anova", "coefficients"),
@@ -197,15 +170,6 @@ def record_page(record: Record) -> str:
 def _section(title: str, tables: Mapping[str, Table], *names: str) -> list[str]:
     found = [markdown_table(tables[name]) for name in names if name in tables]
     return [f"## {title}", *found] if found else []
-
-
-def _picture(record: Record) -> list[str]:
-    if not record.picture:
-        return []
-    return [
-        "## Heaps",
-        f"![Screening run 3, screening run 12 and the published optimum, at one scale]({HEAPS})",
-    ]
 
 
 def _campaign(record: Record) -> list[str]:
@@ -232,29 +196,18 @@ def _scales(record: Record) -> list[str]:
     rows = []
     for name, replay in record.scales.items():
         cost = scale_cost(replay, record.replay)
-        rows.append(
-            {
-                "scale": name,
-                "runs": cost.runs,
-                "rmse": cost.rmse.value,
-                "without": cost.rmse_without_noise.value,
-                "bias": cost.bias.value,
-                "slope": cost.slope.value,
-                "spearman": cost.spearman.value,
-                "published": replay.agreement().rmse.value,
-            }
-        )
-    columns = [
-        Column("scale", "scale"),
+        estimates = ("rmse", "rmse_without_noise", "bias", "slope", "spearman")
+        row = {"scale": name, "runs": cost.runs, "published": replay.agreement().rmse.value}
+        rows.append(row | {estimate: getattr(cost, estimate).value for estimate in estimates})
+    shown: Layout = [
+        "scale",
         Column("runs", "runs", "label"),
-        Column("rmse", "rmse against full scale", "angle", "°"),
-        Column("without", "noise of both out", "angle", "°"),
-        Column("bias", "bias", "angle", "°"),
-        Column("slope", "slope", "ratio"),
-        Column("spearman", "Spearman", "ratio"),
-        Column("published", "rmse against the paper", "angle", "°"),
+        *columns("angle", "°", rmse="rmse against full scale", rmse_without_noise="noise of both out"),
+        *columns("angle", "°", bias="bias"),
+        *columns("ratio", slope="slope", spearman="Spearman"),
+        *columns("angle", "°", published="rmse against the paper"),
     ]
-    table = make_table("scales", pd.DataFrame(rows), columns, "The 31 runs at smaller scales.")
+    table = make_table("scales", pd.DataFrame(rows), shown, "The 31 runs at smaller scales.")
     return ["## What a smaller scale costs", markdown_table(table)]
 
 

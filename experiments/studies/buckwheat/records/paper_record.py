@@ -37,16 +37,9 @@ FOLDER = Path(paper.__file__).with_name(RECORD)
 
 
 def gather_paper(source: Path, record: Path, commit: str | None = None) -> None:
-    """Take over the paper's runs of a calibration's folder.
+    """Take over the runs of ``dem-warp calibrate --follow-paper`` or ``--only-paper`` from its folder.
 
-    Parameters
-    ----------
-    source
-        Folder of ``dem-warp calibrate --follow-paper`` or ``--only-paper``.
-    record
-        The record's folder.
-    commit
-        Commit that made them, where the machine that did had no repository.
+    Where the machine that made them had no repository, the commit is given.
     """
     for name in (RUNS, PROVENANCE):
         copy_file(source / RECORD / name, record / name)

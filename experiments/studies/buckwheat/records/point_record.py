@@ -47,27 +47,13 @@ another machine finds other last digits."""
 
 
 class KeptCases:
-    """A runner that hands out the cases of an earlier campaign.
-
-    Parameters
-    ----------
-    cases
-        A campaign's table of cases.
-    source
-        Where it comes from, for error messages.
-    """
+    """A runner that hands out the cases of an earlier campaign; error messages name their source."""
 
     def __init__(self, cases: pd.DataFrame, source: str) -> None:
         self.cases, self.source = cases.set_index(KEY), source
 
     def __call__(self, table: pd.DataFrame) -> pd.DataFrame:
-        """Find the rows of a table.
-
-        Raises
-        ------
-        InputError
-            When one was not simulated, or with other settings.
-        """
+        """Find the rows of a table; one not simulated, or with other settings, is an `InputError`."""
         wanted = table.set_index(KEY)
         missing = wanted.index.difference(self.cases.index)
         if len(missing):
@@ -84,14 +70,7 @@ class KeptCases:
 def gather(scale: str, source: Path, record: Path, commit: str | None = None) -> None:
     """Take over the cases of a campaign's folder, and what made them.
 
-    Parameters
-    ----------
-    scale, source
-        Of the campaign: its scale and its folder.
-    record
-        The record's folder.
-    commit
-        Commit that made them, where the machine that did had no repository.
+    Where the machine that made them had no repository, the commit is given.
 
     Raises
     ------

@@ -53,13 +53,9 @@ LEFT_OUT = ("base", "estimator")
 
 
 def published_settings() -> pd.DataFrame:
-    """Distinct settings of Tables 3, 5 and 6.
+    """Every run of Tables 3, 5 and 6 as `published_runs` has it, no factor left empty.
 
-    Returns
-    -------
-    DataFrame
-        A row a run of the paper: stage, run, every factor in its natural unit, published (angle [deg]), and
-        condition, the name of the setting after its first run.
+    The column condition names its setting, after the first run that has it.
     """
     runs = published_runs().fillna({factor.name: factor.center for factor in paper.factors()})
     runs = runs[runs["stage"].isin(DESIGNS)].reset_index(drop=True)
@@ -87,14 +83,9 @@ def physical_heaps() -> Measured:
 
 
 def tables_emulator(base: Replay, found: Sensitivities | None) -> Emulator:
-    """Our runs of the paper's settings as the emulator of EDEM's.
+    """Our runs of the paper's settings, with the study as written (`base`), as the emulator of EDEM's.
 
-    Parameters
-    ----------
-    base
-        The runs with the study as written.
-    found
-        The runs with its variants; None: none were simulated, and the library is empty.
+    The library holds the variants that were simulated; without any it is empty.
     """
     settings = published_settings()
     angles = _by_setting(settings, base).dropna(subset=["mean"])
@@ -106,24 +97,16 @@ def tables_emulator(base: Replay, found: Sensitivities | None) -> Emulator:
         # A mean, a shift as it is read, and no curvature.
         fitted, spread = np.array([heap["mean"], READING]), np.diag([1.0 / heap["count"], 0.0])
         surfaces[str(condition)] = _surfaces(fitted, spread, noise, additions)
-    space = SearchSpace(
-        ("reading",),
-        (-READING,),
-        (READING,),
-        tuple(surfaces),
-        tuple(condition.startswith(HELD_OUT) for condition in surfaces),
-        _ranges(library),
-    )
+    held_out = tuple(condition.startswith(HELD_OUT) for condition in surfaces)
+    box = ("reading",), (-READING,), (READING,)
+    space = SearchSpace(*box, tuple(surfaces), held_out, _ranges(library))
     return Emulator(space, (OBSERVABLE,), surfaces, (0,), _heap_count(base, found, library))
 
 
 def physical_emulator(base: Replay, found: Sensitivities | None) -> Emulator:
     """Our runs of Table 6 as the emulator of the one physical test: a quadratic of its two static frictions.
 
-    Parameters
-    ----------
-    base, found
-        See `tables_emulator`. A mechanism shifts the angle by as much at all frictions.
+    As of `tables_emulator`; a mechanism shifts the angle by as much at all frictions.
     """
     settings, noise = published_settings(), _noise(base, HELD_OUT, 2)
     table_6 = settings[settings["stage"] == HELD_OUT]
@@ -134,14 +117,8 @@ def physical_emulator(base: Replay, found: Sensitivities | None) -> Emulator:
     additions = {name: _addition(_averaged(table), noise) for name, table in library.items()}
     surfaces = _surfaces(fit.params[terms].to_numpy(), spread, noise, additions)
     factors = paper.composite_factors()
-    space = SearchSpace(
-        tuple(factor.name for factor in factors),
-        tuple(factor.low for factor in factors),
-        tuple(factor.high for factor in factors),
-        (CENTRE,),
-        (False,),
-        _ranges(library),
-    )
+    names, low, high = (tuple(getattr(one, key) for one in factors) for key in ("name", "low", "high"))
+    space = SearchSpace(names, low, high, (CENTRE,), (False,), _ranges(library))
     return Emulator(space, (OBSERVABLE,), {CENTRE: surfaces}, (0,), _heap_count(base, found, library))
 
 
@@ -209,14 +186,8 @@ def _signatures(settings: pd.DataFrame, found: Sensitivities) -> dict[str, pd.Da
         with_it = _by_setting(settings, replay)
         shift = with_it["mean"] - without["mean"]
         share = 1.0 / with_it["count"] + 1.0 / without["count"]
-        signatures[name] = pd.DataFrame(
-            {
-                "shift": shift.fillna(shift.mean()),
-                "share": share,
-                "lost": shift.isna(),
-                "spread": shift.var(ddof=1),
-            }
-        )
+        known = {"shift": shift.fillna(shift.mean()), "share": share, "lost": shift.isna()}
+        signatures[name] = pd.DataFrame(known | {"spread": shift.var(ddof=1)})
     return signatures
 
 

@@ -25,11 +25,7 @@ from doe import (
     screen,
 )
 from experiments.studies.buckwheat import paper
-from experiments.studies.buckwheat.replay.runs import (
-    DESIGNS,
-    STAGES,
-    published_runs,
-)
+from experiments.studies.buckwheat.replay.runs import DESIGNS, STAGES, published_runs
 
 RUN = ["stage", "run"]
 """Labels of a run."""
@@ -94,14 +90,9 @@ class Replay:
         return {stage: noise.mean_sq if noise.df > 0 else spare for stage, noise in own.items()}
 
     def agreement(self, stages: Iterable[str] = DESIGNS, reference_sd: float | None = None) -> Agreement:
-        """Agreement with the published angles of some stages, the seed noise of both known.
+        """Agreement with the published angles of some of `STAGES`, the seed noise of both known.
 
-        Parameters
-        ----------
-        stages
-            Of `STAGES`.
-        reference_sd
-            Standard deviation of a published angle by its seed [deg]; None: `published_noise`'s first.
+        That of a published angle is a standard deviation [deg]; None: the first of `published_noise`.
         """
         runs = self.runs[self.runs["stage"].isin(list(stages)) & self.runs["angle"].notna()]
         sd = published_noise()[0] if reference_sd is None else reference_sd

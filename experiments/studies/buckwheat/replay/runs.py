@@ -16,6 +16,9 @@ STAGES = {
 }
 """The paper's stages, in order, and where its angles stand."""
 
+TABLES = {stage: place.partition(",")[0] for stage, place in STAGES.items()}
+"""The paper's stages, in order, and the table of each."""
+
 DESIGNS = ("screening", "climb", "composite")
 """Stages whose points differ: the 31 runs that a model is held against."""
 
@@ -28,13 +31,9 @@ SEEDS_A_REPLICATE = 1_000
 
 
 def published_runs() -> pd.DataFrame:
-    """Every simulated run of the paper.
+    """Every simulated run of the paper, a row a run: stage, run (from 1), factors, published (angle [deg]).
 
-    Returns
-    -------
-    DataFrame
-        A row a run: stage, run (from 1), the factors that its stage varies in natural units (NaN: at its
-        middle), published (angle [deg]).
+    Factors are in natural units, NaN where the stage leaves them at their middle.
     """
     names = [factor.name for factor in paper.factors()]
     tables = []
@@ -48,17 +47,7 @@ def published_runs() -> pd.DataFrame:
 def planned_cases(replicates: int, stages: Iterable[str] = tuple(STAGES)) -> pd.DataFrame:
     """Lay out the cases of some stages: every run so many times, each case with its own seed.
 
-    Parameters
-    ----------
-    replicates
-        Heaps of every run.
-    stages
-        Of `STAGES`.
-
-    Returns
-    -------
-    DataFrame
-        A row a case: stage, run, replicate, every factor in its natural unit, published (angle [deg]), seed.
+    A row a case: stage, run, replicate, every factor in its natural unit, published (angle [deg]), seed.
 
     Raises
     ------

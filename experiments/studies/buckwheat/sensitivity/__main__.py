@@ -33,23 +33,10 @@ COLUMNS = (
 def run_variant(
     variant: Variant, store: Store, settings: dict[str, Any], device: str | None = None
 ) -> pd.DataFrame:
-    """Simulate the 31 runs of a variant as one batch.
+    """Simulate the 31 runs of a variant as one batch, heaps kept in the store: a row a case, `COLUMNS`.
 
-    Parameters
-    ----------
-    variant
-        What is changed.
-    store
-        Where heaps are kept.
-    settings
-        scale, modulus_scale (None: the scale's) and replicates.
-    device
-        ``"cpu"``, ``"cuda"``, ``"cuda:1"``; None: the engine's choice.
-
-    Returns
-    -------
-    DataFrame
-        A row a case, `COLUMNS`.
+    The settings are scale, modulus_scale (None: the scale's) and replicates; without a device the engine
+    chooses.
     """
     study = variant.load_study(settings["scale"], settings["modulus_scale"])
     cases = run_cases(study, variant.planned_cases(settings["replicates"]), store, device)

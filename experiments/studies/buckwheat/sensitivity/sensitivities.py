@@ -86,9 +86,8 @@ class Sensitivities:
 
     def _shift(self, name: str) -> dict[str, float]:
         found, base = (self.replays[key] for key in (name, BASE))
-        pair = found.runs.join(base.runs[["angle", "n"]].add_prefix("base_")).dropna(
-            subset=["angle", "base_angle"]
-        )
+        pair = found.runs.join(base.runs[["angle", "n"]].add_prefix("base_"))
+        pair = pair.dropna(subset=["angle", "base_angle"])
         ours, theirs = (
             pair["stage"].map(replay.heap_variance) / pair[count]
             for replay, count in ((found, "n"), (base, "base_n"))

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from experiments.report.kit.numbers import fixed
-from experiments.report.kit.table import Column, Table, make_table
-from experiments.studies.buckwheat.replay.runs import DESIGNS, STAGES
+from experiments.report.kit.table import Column, Layout, Table, columns, make_table
+from experiments.studies.buckwheat.replay.runs import DESIGNS, TABLES
 from experiments.studies.buckwheat.sensitivity.sensitivities import Sensitivities
 from experiments.studies.buckwheat.sensitivity.variants import variants
 
@@ -25,16 +25,12 @@ def shifts_table(found: Sensitivities) -> Table:
     frame = found.shifts.copy()
     states = dict.fromkeys(found.replays, "") | dict.fromkeys(found.spoilt, TOO_FEW)
     frame["state"] = [states.get(name, NOT_RUN) for name in frame.index]
-    columns = [
-        Column("group", "what"),
-        Column("title", "variant"),
-        Column("shift", "shift of the mean", "angle", "°"),
-        Column("se", "se by seeds", "angle", "°"),
-        Column("bias", "bias", "angle", "°"),
+    shown: Layout = [
+        *columns(group="what", title="variant"),
+        *columns("angle", "°", shift="shift of the mean", se="se by seeds", bias="bias"),
         Column("spearman", "Spearman", "ratio"),
-        Column("rmse", "rmse", "angle", "°"),
-        Column("change", "change", "angle", "°"),
-        *(Column(f"rmse_{stage}", _table_of(stage), "angle", "°") for stage in DESIGNS),
+        *columns("angle", "°", rmse="rmse", change="change"),
+        *(Column(f"rmse_{stage}", TABLES[stage], "angle", "°") for stage in DESIGNS),
         Column("failed", "without angle", "label"),
         Column("state", ""),
     ]
@@ -42,38 +38,32 @@ def shifts_table(found: Sensitivities) -> Table:
         f"The 31 runs of Tables 3, 5 and 6, {_how(found)}. rmse: against the published angles, our own seed "
         "noise taken out, in all and by table."
     )
-    return make_table("sensitivity-shifts", frame, columns, "One thing at a time.", note)
+    return make_table("sensitivity-shifts", frame, shown, "One thing at a time.", note)
 
 
 def effect_shifts_table(found: Sensitivities) -> Table:
     """Lay out how far each variant moves the effects of the screening."""
     frame = found.effects.drop(index="base")
-    frame.insert(0, "title", [f"{variants()[name].group}: {variants()[name].title}" for name in frame.index])
-    columns = [
-        Column("title", "variant"),
-        *(Column(name, name, "angle", "°") for name in "ABCDEFGH"),
-        Column("se", "se by seeds", "angle", "°"),
-    ]
-    return make_table("sensitivity-effects", frame, columns, "Shift of the screening's effects.")
+    frame.insert(0, "title", [variants()[name].full_title for name in frame.index])
+    effects = columns("angle", "°", **{name: name for name in "ABCDEFGH"}, se="se by seeds")
+    shown: Layout = [Column("title", "variant"), *effects]
+    return make_table("sensitivity-effects", frame, shown, "Shift of the screening's effects.")
 
 
 def left_out_table(found: Sensitivities) -> Table:
     """Lay out which variant two tables would choose, and how it does on the third."""
     frame = found.left_out.copy()
-    frame.insert(0, "left_out", [_table_of(stage) for stage in frame.index])
-    frame["chosen"] = [f"{variants()[name].group}: {variants()[name].title}" for name in frame["chosen"]]
-    columns = [
-        Column("left_out", "left out"),
-        Column("chosen", "chosen by the other two"),
-        Column("base_rest", "there: base", "angle", "°"),
-        Column("chosen_rest", "chosen", "angle", "°"),
-        Column("base_left_out", "on the one left out: base", "angle", "°"),
-        Column("chosen_left_out", "chosen", "angle", "°"),
+    frame.insert(0, "left_out", [TABLES[stage] for stage in frame.index])
+    frame["chosen"] = [variants()[name].full_title for name in frame["chosen"]]
+    left_out = {"base_left_out": "on the one left out: base", "chosen_left_out": "chosen"}
+    shown: Layout = [
+        *columns(left_out="left out", chosen="chosen by the other two"),
+        *columns("angle", "°", base_rest="there: base", chosen_rest="chosen", **left_out),
     ]
     note = (
         "rmse, our own seed noise taken out. A choice carries over where it is better on the table left out."
     )
-    return make_table("sensitivity-left-out", frame, columns, "Leave one table out.", note)
+    return make_table("sensitivity-left-out", frame, shown, "Leave one table out.", note)
 
 
 def _how(found: Sensitivities) -> str:
@@ -82,7 +72,3 @@ def _how(found: Sensitivities) -> str:
     modulus = "" if softened is None else f", shear modulus divided by {softened:g} unless the variant says"
     heaps = settings["replicates"]
     return f"{fixed(heaps, 0)} heap{'' if heaps == 1 else 's'} each, at scale {settings['scale']}{modulus}"
-
-
-def _table_of(stage: str) -> str:
-    return STAGES[stage].partition(",")[0]

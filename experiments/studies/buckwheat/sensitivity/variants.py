@@ -39,15 +39,15 @@ class Variant(Section):
     settings: dict[str, float] = Field(default_factory=dict)
     """Factors that have one value in all runs, in natural units."""
 
-    def load_study(self, scale: str | None = None, modulus_scale: float | None = None) -> Study:
-        """Load the buckwheat study with this change.
+    @property
+    def full_title(self) -> str:
+        """Property that is varied and its new value, in words."""
+        return f"{self.group}: {self.title}"
 
-        Parameters
-        ----------
-        scale
-            A scale of the study.
-        modulus_scale
-            What the shear modulus is divided by, unless the variant says; None: as the scale says.
+    def load_study(self, scale: str | None = None, modulus_scale: float | None = None) -> Study:
+        """Load the buckwheat study with this change, its shear modulus divided as the variant says.
+
+        Where it says nothing, `modulus_scale` does; None: the scale of the study.
         """
         softened = {} if modulus_scale is None else {"numerics": {"modulus_scale": modulus_scale}}
         return load_study(scale=scale, changes=merge(softened, self.study))

@@ -91,7 +91,7 @@ def test_all_that_was_measured_is_to_be_matched_under_its_condition(
 ) -> None:
     found = found_on(trial, discovered, Verdict.NAMED)
     write_discovery(found, trial, trial_terms, Settings(), tmp_path)
-    study = load_study(tmp_path / "study-with-contact_cohesion.toml")
+    study = load_study(tmp_path / "study-with-contact_adhesion.toml")
     data, responses = found.data, study.target.responses
     handed_on = {(response.scene, response.observable): response for response in responses}
     assert len(handed_on) == len(responses) == np.isfinite(data.means).sum()
