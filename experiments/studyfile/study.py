@@ -123,8 +123,11 @@ class Study(Physics):
         Raises
         ------
         StudyError
-            When the study has none, or they are still to be measured.
+            When the study has none, they are still to be measured, or its test leaves no heap to match.
         """
+        if self.target_section is not None and self.target_section.lacks_a_heap(self.scenes):
+            rule = "is the angle of a heap, which this test does not leave: name an observable of the test"
+            raise StudyError(rule, "no observable", f"{self.file}: target")
         if self._target is None and self.target_section is not None:
             rule = "names pictures or a file: measurement.target.with_measurements takes numbers from them"
             raise StudyError(rule, "no numbers", f"{self.file}: target")

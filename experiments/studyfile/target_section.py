@@ -108,6 +108,11 @@ class TargetSection(ResponseSection):
     twin: TwinSection | None = None
     """The target comes from cases simulated with settings that the campaign does not see."""
 
+    def lacks_a_heap(self, scenes: Mapping[str, SceneSection]) -> bool:
+        """Tell if it is the angle of a heap, without a word, of a test that leaves none."""
+        scene = scenes.get(self.scene)
+        return "observable" not in self.model_fields_set and scene is not None and not scene.leaves_a_heap
+
 
 def build_target(
     target: TargetSection | None,
@@ -118,13 +123,16 @@ def build_target(
 ) -> Target | None:
     """Build the responses that a campaign must match, in scenes some of which are held out of any fit.
 
-    None where nothing is to be matched, or its measurements have not been taken yet.
+    None where nothing is to be matched, its measurements have not been taken yet, or it is the angle of a
+    heap that the test does not leave: such a study simulates, and cannot be calibrated.
 
     Raises
     ------
     StudyError
         When two have one name, there is no such scene or observable, or a measurement is wrong.
     """
+    if target and target.lacks_a_heap(scenes):
+        return None
     sections: list[tuple[KeyPath, ResponseSection]] = [(("target",), target)] if target else []
     sections += [(("response", index), section) for index, section in enumerate(responses)]
     twin = target.twin if target else None

@@ -55,6 +55,9 @@ high = 0.6
 [campaign.screening]
 design = "corners"
 
+[campaign.selection]
+at_least = 1  # two corners leave nothing to tell an effect from noise by
+
 """
 TUBE = '[scene.lifted-cylinder]\ndiameter = "28 mm"\nheight = "28 mm"\ngrain_count = 30\n'
 JAR = '[scene.jar]\ndiameter = "12 mm"\nheight = "20 mm"\ngrain_count = 10\n'
