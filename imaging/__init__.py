@@ -12,7 +12,8 @@ from imaging.pictures import read_picture, save_picture
 from imaging.render import Snapshot, silhouette, snapshot
 from imaging.repose import AngleDifference, ReposeAngle, compare, measure, measure_photograph
 from imaging.shape import HeapShape, heap_shape
-from imaging.silhouette import Outline, find_outline
+from imaging.finding import find_outline
+from imaging.outline import Outline
 
 __all__ = [
     "FITS",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -27,8 +29,33 @@ LEAST_NOISE = 1.0
 """Noise [of 255] below which a background counts as even: that of rounding and compression."""
 
 
-def contrast_with_background(picture: Picture, place: str) -> tuple[FloatArray, list[float]]:
-    """Distance of each pixel's colour from the background's, and where to cut it, most likely first.
+@dataclass(frozen=True)
+class Contrast:
+    """How a picture differs from its background.
+
+    Attributes
+    ----------
+    values : (rows, columns) array
+        Distance of each pixel's colour from the background's, in the light there.
+    thresholds : tuple of float
+        Where to cut it, most likely first: one or two; what is above each differs clearly from the noise.
+    noise : float
+        Median distance of the background's own pixels.
+    colors, background : (rows, columns, channels) arrays
+        The smoothed picture and the background's surface.
+    """
+
+    values: FloatArray
+    thresholds: tuple[float, ...]
+    noise: float
+    colors: FloatArray
+    background: FloatArray
+
+
+def contrast_with_background(
+    picture: Picture, place: str, precision: type[np.float32 | np.float64] = np.float64
+) -> Contrast:
+    """Compare each pixel's colour with the background's.
 
     The background is a quadratic surface in each colour channel, fitted from the border inwards to whatever
     looks like it, so that uneven light and a coloured cloth drop out, and a heap may be darker or lighter
@@ -41,12 +68,8 @@ def contrast_with_background(picture: Picture, place: str) -> tuple[FloatArray, 
     picture : (rows, columns) or (rows, columns, 3) uint8 array
     place : str
         Names the picture in errors.
-
-    Returns
-    -------
-    contrast : (rows, columns) array
-    thresholds : list of float
-        One or two; what is above each differs clearly from the background's noise.
+    precision : type
+        Of the background's surface.
 
     Raises
     ------
@@ -55,7 +78,8 @@ def contrast_with_background(picture: Picture, place: str) -> tuple[FloatArray, 
     """
     channels = _channels(picture, place)
     smooth = cv2.GaussianBlur(channels, (0, 0), sigmaX=BLUR, sigmaY=1e-6).reshape(channels.shape)
-    background, noise = _background(np.asarray(smooth, dtype=np.float64))
+    surface, noise = _background(smooth)
+    background = _evaluated(surface, smooth.shape, precision)
     difference = smooth - background
     contrast = np.sqrt(np.einsum("ijk,ijk->ij", difference, difference)) / _light(background)
     thresholds = []
@@ -69,7 +93,7 @@ def contrast_with_background(picture: Picture, place: str) -> tuple[FloatArray, 
         values = values[values <= threshold]
     if not thresholds:
         raise PictureError("a heap stands out of the background", "a picture without contrast", place)
-    return contrast, thresholds
+    return Contrast(contrast, tuple(thresholds), noise, smooth, background)
 
 
 def otsu_threshold(values: FloatArray) -> float:
@@ -96,12 +120,12 @@ def _channels(picture: Picture, place: str) -> NDArray[np.float32]:
     return layered.astype(np.float32)
 
 
-def _background(channels: FloatArray) -> tuple[FloatArray, float]:
-    """Quadratic surface through the background's pixels, and their median distance from it."""
+def _background(channels: NDArray[np.float32]) -> tuple[FloatArray, float]:
+    """Coefficients of the quadratic surface through the background's pixels, and their median distance."""
     rows, columns, _ = channels.shape
     stride = max(1, int(np.sqrt(rows * columns / FIT_SAMPLES)))
     row, column = (axis.ravel() for axis in np.mgrid[0:rows:stride, 0:columns:stride])
-    sample = channels[row, column]
+    sample = channels[row, column].astype(np.float64)
     terms = _surface_terms(row, column, (rows, columns))
     side = (column < BORDER_SHARE * columns) | (column >= (1.0 - BORDER_SHARE) * columns)
     border = (row < BORDER_SHARE * rows) | ((row < 0.5 * rows) & side)
@@ -118,9 +142,24 @@ def _background(channels: FloatArray) -> tuple[FloatArray, float]:
         surface = _least_squares(terms[chosen, :size], sample[chosen])
         residual = np.linalg.norm(sample - terms[:, :size] @ surface, axis=1)
         noise = float(np.median(residual[chosen]))
-    grid = np.mgrid[0:rows, 0:columns]
-    fitted = _surface_terms(grid[0].ravel(), grid[1].ravel(), (rows, columns)) @ surface
-    return fitted.reshape(channels.shape), noise
+    return surface, noise
+
+
+def _evaluated(
+    surface: FloatArray, shape: tuple[int, ...], precision: type[np.float32 | np.float64]
+) -> FloatArray:
+    """A quadratic or a plane at every pixel; in single precision without its terms at every pixel."""
+    rows, columns = shape[:2]
+    if precision is np.float64:
+        row, column = (axis.ravel() for axis in np.mgrid[0:rows, 0:columns])
+        terms = _surface_terms(row, column, (rows, columns))[:, : len(surface)]
+        return np.asarray((terms @ surface).reshape(shape))
+    constant, x, y, xx, xy, yy = np.vstack([surface, np.zeros((6 - len(surface), shape[2]))])[:, None, None, :]
+    across = (2.0 * np.arange(columns) / columns - 1.0)[None, :, None]
+    down = (2.0 * np.arange(rows) / rows - 1.0)[:, None, None]
+    along = (constant + x * across + xx * across**2).astype(np.float32)
+    mixed = (xy * down).astype(np.float32) * across.astype(np.float32)
+    return np.asarray(along + mixed + (y * down + yy * down**2).astype(np.float32))
 
 
 def _light(background: FloatArray) -> FloatArray:

@@ -10,7 +10,7 @@ from scipy import optimize
 
 from imaging.errors import PictureError
 from imaging.geometry import FloatArray
-from imaging.silhouette import Outline
+from imaging.outline import Outline
 
 MINIMUM_FLANK_COLUMNS = 3
 """A line is not fitted to fewer columns."""

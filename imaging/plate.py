@@ -22,6 +22,8 @@ LINE_ROUNDS = 8
 """Rounds of leaving out columns that end above the line."""
 LEAST_SEEN = 0.25
 """A plate is seen in at least this share of the columns at either end; grains may hide the others."""
+PLATE_CLEARANCE = 0.25
+"""What rises less than this over the plate line [pixels] belongs to the plate."""
 MAXIMUM_TILT = 20.0
 """A camera that is tilted by more [degrees] has not seen a plate."""
 
@@ -41,6 +43,16 @@ class PlateLine:
     def tilt(self) -> float:
         """Angle between the plate and the picture's rows [degrees], positive where it falls to the right."""
         return float(np.degrees(np.arctan(self.slope)))
+
+    def rows_at(self, columns: FloatArray | NDArray[np.intp]) -> FloatArray:
+        """Rows of the line at some columns."""
+        return np.asarray(self.row + self.slope * columns)
+
+    def above(self, mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """The part of a picture's mask that rises over the plate."""
+        rows, columns = mask.shape
+        line = self.rows_at(np.arange(columns))
+        return np.asarray(mask & (np.arange(rows)[:, None] < line - PLATE_CLEARANCE))
 
     def in_part(self, left: int, top: int) -> PlateLine:
         """The same line in a part of the picture that begins at this column and row."""

@@ -13,7 +13,9 @@ from imaging.errors import PictureError
 from imaging.flanks import FitSettings, FlankLine, fit_flanks
 from imaging.geometry import Picture
 from imaging.pictures import read_picture
-from imaging.silhouette import Outline, find_outline
+from imaging.view import level_angle
+from imaging.finding import find_outline
+from imaging.outline import Outline
 
 
 @dataclass(frozen=True)
@@ -36,13 +38,13 @@ class ReposeAngle:
 
     @property
     def left(self) -> float:
-        """Angle of the left flank [degrees]."""
-        return self.left_line.angle
+        """Angle of the left flank [degrees], the camera's height taken out."""
+        return level_angle(self.left_line.angle, self.outline.elevation)
 
     @property
     def right(self) -> float:
-        """Angle of the right flank [degrees]."""
-        return self.right_line.angle
+        """Angle of the right flank [degrees], the camera's height taken out."""
+        return level_angle(self.right_line.angle, self.outline.elevation)
 
     @property
     def mean(self) -> float:
