@@ -25,6 +25,8 @@ SEPARATION = 5.0
 """A heap differs from the background by this many times the background's noise, on average, at the least."""
 LIGHT_RANGE = 2.0
 """Light that is brighter or dimmer than its median by more than this factor is not evened out further."""
+DEEPEST_SHADOW = 0.4
+"""Share of the light that a cast shadow keeps at the least: light comes from more than one lamp."""
 LEAST_NOISE = 1.0
 """Noise [of 255] below which a background counts as even: that of rounding and compression."""
 
@@ -96,6 +98,28 @@ def contrast_with_background(
     return Contrast(contrast, tuple(thresholds), noise, smooth, background)
 
 
+def unshaded(colors: NDArray[np.float32], own: NDArray[np.float32], reach: int) -> NDArray[np.float32]:
+    """Difference of colours from a surface's own ones that a shadow on it does not make.
+
+    A shadow dims all channels alike and leaves no grains: what counts is the colour beside the line from the
+    surface's own to black, down to `DEEPEST_SHADOW`, and the lightness's unevenness over `reach` pixels.
+    """
+    power = np.maximum(np.einsum("ijk,ijk->ij", own, own), LEAST_NOISE)
+    dimming = np.clip(np.einsum("ijk,ijk->ij", colors, own) / power, DEEPEST_SHADOW, 1.0)
+    beside = colors - dimming[:, :, None] * own
+    return np.asarray(np.sqrt(np.einsum("ijk,ijk->ij", beside, beside) + unevenness(colors, reach) ** 2))
+
+
+def unevenness(colors: NDArray[np.float32], reach: int) -> NDArray[np.float32]:
+    """Standard deviation of the lightness within `reach` pixels of each."""
+    level = colors.mean(axis=2)
+    size = (2 * reach + 1, 2 * reach + 1)
+    # Of the difference from the mean of all: squares of small numbers keep their digits.
+    level = level - level.mean()
+    mean, square = cv2.blur(level, size), cv2.blur(level * level, size)
+    return np.asarray(np.sqrt(np.maximum(square - mean * mean, 0.0)))
+
+
 def otsu_threshold(values: FloatArray) -> float:
     """Value that splits `values` in two classes with the largest variance between them (Otsu 1979)."""
     low, high = float(values.min()), float(values.max())
@@ -154,7 +178,8 @@ def _evaluated(
         row, column = (axis.ravel() for axis in np.mgrid[0:rows, 0:columns])
         terms = _surface_terms(row, column, (rows, columns))[:, : len(surface)]
         return np.asarray((terms @ surface).reshape(shape))
-    constant, x, y, xx, xy, yy = np.vstack([surface, np.zeros((6 - len(surface), shape[2]))])[:, None, None, :]
+    padded = np.vstack([surface, np.zeros((6 - len(surface), shape[2]))])
+    constant, x, y, xx, xy, yy = padded[:, None, None, :]
     across = (2.0 * np.arange(columns) / columns - 1.0)[None, :, None]
     down = (2.0 * np.arange(rows) / rows - 1.0)[:, None, None]
     along = (constant + x * across + xx * across**2).astype(np.float32)

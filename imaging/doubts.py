@@ -2,27 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
 
+import numpy as np
 
-@dataclass(frozen=True)
-class Doubt:
-    """One reason to doubt an angle.
-
-    Attributes
-    ----------
-    name : str
-        Short name, for tables: one of `DOUBTS`.
-    finding : str
-        What was found, and against which limit.
-    """
-
-    name: str
-    finding: str
-
-    def __str__(self) -> str:
-        return f"{self.name}: {self.finding}"
-
+from imaging.flanks import FlankLine
+from imaging.outline import Outline
+from imaging.reasons import Doubt
 
 LARGEST_LEAN = 4.0
 """Left and right flank [degrees]: heaps poured on a level plate stand within 2.5 of one another as a rule."""
@@ -36,8 +22,10 @@ LARGEST_ELEVATION = 15.0
 """Camera's height over the plate [degrees] up to which its effect, 3.5 degrees there, is taken out."""
 LARGEST_MISFIT = 0.05
 """Root mean square of the outline about its two lines, over its height: a parabola's dome has 0.075."""
-LARGEST_END = 0.2
-"""Height of the outline's end over the heap's: a heap runs out on its plate, a dish's wall does not."""
+LARGEST_END = 0.3
+"""Height of the outline's end over the heap's: a heap ends a grain high, a dish's wall or a board's side higher."""
+END_WIDTH = 0.02
+"""Part of the outline's columns that make its end."""
 LARGEST_GAP = 0.1
 """Part of the area under the outline that does not differ from the background."""
 LARGEST_SHIFT = 1.0
@@ -48,3 +36,49 @@ DOUBTS = (
     "border", "plate", "shadow", "objects",
 )  # fmt: skip
 """Names of all doubts."""
+
+
+def doubts_of(left: FlankLine, right: FlankLine, mean: float, se: float, outline: Outline) -> Iterator[Doubt]:
+    """Go through the rules for an angle with its fitted lines; doubts of the outline itself are not repeated.
+
+    Parameters
+    ----------
+    left, right : FlankLine
+    mean, se : float
+        Angle with its standard error [degrees].
+    outline : Outline
+    """
+    lean = abs(left.angle - right.angle)
+    if lean > LARGEST_LEAN:
+        yield Doubt("lean", f"left and right are {lean:.1f} degrees apart, over {LARGEST_LEAN:g}")
+    if se > LARGEST_ERROR:
+        yield Doubt("error", f"a standard error of {se:.2f} degrees, over {LARGEST_ERROR:g}")
+    if not LEAST_ANGLE <= mean <= GREATEST_ANGLE:
+        yield Doubt("range", f"{mean:.1f} degrees, outside {LEAST_ANGLE:g} to {GREATEST_ANGLE:g}")
+    if outline.elevation > LARGEST_ELEVATION:
+        finding = f"the camera looks down by {outline.elevation:.0f} degrees, over {LARGEST_ELEVATION:g}"
+        yield Doubt("elevation", finding)
+    misfit = relative_misfit(left, right, outline)
+    if misfit > LARGEST_MISFIT:
+        yield Doubt(
+            "straightness", f"flanks lie {misfit:.3f} heights off their lines, over {LARGEST_MISFIT:g}"
+        )
+    end = highest_end(outline)
+    if end > LARGEST_END:
+        yield Doubt(
+            "ends", f"an end {end:.2f} heights over the plate, over {LARGEST_END:g}: a dish or board?"
+        )
+
+
+def relative_misfit(left: FlankLine, right: FlankLine, outline: Outline) -> float:
+    """Root mean square of an outline about its two lines, over its height."""
+    squares = [line.rms**2 * (line.stop - line.start) for line in (left, right)]
+    covered = sum(line.stop - line.start for line in (left, right))
+    return float(np.sqrt(sum(squares) / covered) / outline.height.max())
+
+
+def highest_end(outline: Outline) -> float:
+    """Height of the higher end of an outline over the greatest height."""
+    width = max(3, round(END_WIDTH * len(outline.height)))
+    ends = [np.median(outline.height[:width]), np.median(outline.height[-width:])]
+    return float(max(ends) / outline.height.max())

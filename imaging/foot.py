@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from imaging.background import unshaded
 from imaging.geometry import FloatArray
 from imaging.plate import PlateLine
 
@@ -76,19 +77,36 @@ def below_plate(
     size = max(2, round(SIDE_SHARE * (ends[1] - ends[0])))
     sides = [flat[first:, ends[0] : ends[0] + size], flat[first:, ends[1] - size + 1 : ends[1] + 1]]
     middles = [np.median(side, axis=1) for side in sides]
-    noise = max(float(np.median(np.abs(side - middle[:, None]))) for side, middle in zip(sides, middles, strict=True))
+    noise = max(
+        float(np.median(np.abs(side - middle[:, None]))) for side, middle in zip(sides, middles, strict=True)
+    )
     share = np.clip((np.arange(columns) - ends[0]) / max(ends[1] - ends[0], 1), 0.0, 1.0).astype(np.float32)
     own = middles[0][:, None] + share[None, :, None] * (middles[1] - middles[0])[:, None]
-    difference = np.linalg.norm(flat[first:] - own, axis=2)
-    grains = np.median(colors[heap], axis=0)
-    near = own[: max(2, (rows - first) // 20), heap.any(axis=0)]
-    typical = float(np.median(np.linalg.norm(near - grains, axis=2)))
     least = max(LIKENESS * noise, LEAST_DIFFERENCE)
+    difference, typical = _told_apart(flat, own, first, heap, least)
     upper = np.zeros((rows, columns), dtype=np.float32)
     upper[first:] = difference / max(0.5 * typical, least)
     back = np.array([[1.0, 0.0, 0.0], [plate.slope, 1.0, 0.0]])
     level = cv2.warpAffine(upper, back, (columns, rows))
     return PlateTop(level, alike=typical < least)
+
+
+def _told_apart(
+    flat: NDArray[np.float32], own: NDArray[np.float32], first: int, heap: NDArray[np.bool_], least: float
+) -> tuple[NDArray[np.float32], float]:
+    """Difference below the line from the plate's own colours, and that of the heap above the line from them.
+
+    A shadow's share is left out, unless the heap then differs no more: grey powder on a grey plate.
+    """
+    covered = heap.any(axis=0)
+    reach = max(1, round(0.5 * TEXTURE_SHARE * int(covered.sum())))
+    near = np.median(own[: max(2, len(own) // 20), covered], axis=(0, 1)).astype(np.float32)
+    around = np.broadcast_to(near, flat.shape)
+    typical = float(np.median(unshaded(flat, around, reach)[heap]))
+    if typical >= least:
+        return unshaded(flat[first:], own, reach), typical
+    typical = float(np.median(np.linalg.norm(flat[heap] - near, axis=1)))
+    return np.linalg.norm(flat[first:] - own, axis=2), typical
 
 
 def joined_foot(heap: NDArray[np.bool_], level: NDArray[np.float32], plate: PlateLine) -> NDArray[np.bool_]:
@@ -112,7 +130,7 @@ def joined_foot(heap: NDArray[np.bool_], level: NDArray[np.float32], plate: Plat
 
 @dataclass(frozen=True)
 class Base:
-    """The front of the heap's base: row = `row` + `slope` * column + `depth` * (half ellipse between `ends`)."""
+    """The front of a heap's base: row = `row` + `slope` * column + `depth` * half ellipse between `ends`."""
 
     row: float
     slope: float

@@ -11,10 +11,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from imaging.doubts import Doubt
 from imaging.errors import PictureError
 from imaging.geometry import FloatArray
 from imaging.plate import PlateLine
+from imaging.reasons import Doubt
 
 MINIMUM_HEAP_WIDTH = 16
 """A narrower heap [pixels] is not measured."""
@@ -39,6 +39,8 @@ class Outline:
         Scale, where it is known.
     elevation, elevation_se : float
         Angle at which the camera looked down on the plate, and its standard error [degrees].
+    distance : float or None
+        From the camera to the heap, in widths of the heap, where it is known.
     doubts : tuple of Doubt
         What speaks against the outline; empty for a drawn silhouette.
     """
@@ -49,6 +51,7 @@ class Outline:
     meters_per_pixel: float | None = None
     elevation: float = 0.0
     elevation_se: float = 0.0
+    distance: float | None = None
     doubts: tuple[Doubt, ...] = ()
 
     def in_part(self, left: int, top: int) -> Outline:

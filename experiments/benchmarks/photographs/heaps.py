@@ -72,7 +72,9 @@ class GrainHeap:
         turn = rng.uniform(0.0, 2.0 * np.pi, self.strays)
         x, y = np.r_[x, beside * np.cos(turn)], np.r_[y, beside * np.sin(turn)]
         z = np.r_[z, np.full(self.strays, 0.4 * self.grain)]
-        kept = z > -0.3 * self.grain
+        # Grains lie on the plate, not in it.
+        kept = z > 0.1 * self.grain
+        z = np.maximum(z, 0.45 * self.grain)
         sizes = 0.5 * self.grain * np.clip(rng.normal(1.0, 0.08, len(z)), 0.7, 1.3)
         return np.column_stack([x, y, z])[kept], sizes[kept]
 

@@ -167,6 +167,7 @@ def _shadow(
         for step in np.linspace(0.02, heap_height / max(toward[2], 0.1), SHADOW_STEPS):
             point = coarse + np.float32(step) * toward
             under = point[..., 2] < heap_height * (1.0 - np.hypot(point[..., 0], point[..., 1]))
+            under &= point[..., 2] > 0.0
             hidden = np.maximum(hidden, under.astype(np.float32))
     pixels = 0.5 * camera.share * camera.columns * FINE / 4.0
     hidden = cv2.GaussianBlur(hidden, (0, 0), max(lamp.softness * pixels, 0.7))

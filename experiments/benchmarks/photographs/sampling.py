@@ -93,7 +93,7 @@ def _camera(rng: np.random.Generator, heap: GrainHeap) -> PhoneCamera:
     return PhoneCamera(
         columns=columns,
         rows=round(columns * (1.2 if upright else 0.72)),
-        distance=rng.uniform(4.0, 14.0),
+        distance=float(np.exp(rng.uniform(np.log(6.0), np.log(25.0)))),
         elevation=float(elevation),
         share=rng.uniform(0.4, 0.72),
         tilt=float(np.clip(rng.normal(0.0, 1.5), -6.0, 6.0)),
