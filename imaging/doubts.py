@@ -23,7 +23,7 @@ LARGEST_ELEVATION = 15.0
 LARGEST_MISFIT = 0.05
 """Root mean square of the outline about its two lines, over its height: a parabola's dome has 0.075."""
 LARGEST_END = 0.3
-"""Height of the outline's end over the heap's: a heap ends a grain high, a dish's wall or a board's side higher."""
+"""Height of the outline's end over the heap's: a heap ends a grain high, a dish's wall higher."""
 END_WIDTH = 0.02
 """Part of the outline's columns that make its end."""
 LARGEST_GAP = 0.1

@@ -69,7 +69,7 @@ def _check_size(size: tuple[int, int] | None, place: str) -> None:
 
 
 def _claimed_size(file: Path) -> tuple[int, int] | None:
-    """Columns and rows that a file's header names, before anything is decoded; None if it is not understood."""
+    """Columns and rows that a file's header names, before anything is decoded; None without a known one."""
     from PIL import Image, UnidentifiedImageError
 
     try:

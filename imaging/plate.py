@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from imaging.errors import PictureError
 from imaging.geometry import FloatArray
 
+MINIMUM_BODY_WIDTH = 16
+"""A narrower piece [pixels] has neither a plate nor a heap."""
 END_SHARE = 0.05
 """Share of the width, at either end, that shows whether a plate reaches beyond the heap."""
 END_TOLERANCE = 1.0
@@ -93,9 +95,12 @@ def find_plate(top: FloatArray, bottom: FloatArray, place: str) -> PlateLine:
     Raises
     ------
     PictureError
-        When the line is so steep that it is no plate.
+        When there is too little to see, or when the line is so steep that it is no plate.
     """
     columns = np.flatnonzero(np.isfinite(top))
+    if len(columns) < MINIMUM_BODY_WIDTH:
+        rule = f"what stands out of the background is at least {MINIMUM_BODY_WIDTH} pixels wide"
+        raise PictureError(rule, len(columns), place)
     upper, lower = top[columns], bottom[columns]
     spanning = len(columns) == len(top)
     line = _shelf(columns, upper, lower, spanning) or _underside(columns, upper, lower)
@@ -138,8 +143,10 @@ def _common_line(
     # The worse of both ends counts: a line along one end alone is that of anything.
     support = np.minimum(near[:, :half].sum(axis=1), near[:, half:].sum(axis=1)) + 1e-3 * near.sum(axis=1)
     kept = near[int(np.argmax(support))]
-    slope, row = np.polyfit(columns[kept], rows[kept], 1)
-    return PlateLine(float(row), float(slope), visible=False), kept
+    if min(kept[:half].sum(), kept[half:].sum()) > 0:
+        slope, row = np.polyfit(columns[kept], rows[kept], 1)
+        return PlateLine(float(row), float(slope), visible=False), kept
+    return PlateLine(float(np.median(rows)), 0.0, visible=False), np.zeros_like(kept)
 
 
 def _underside(columns: NDArray[np.intp], upper: FloatArray, lower: FloatArray) -> PlateLine:
@@ -157,5 +164,7 @@ def _lowest_line(columns: NDArray[np.intp], rows: FloatArray) -> PlateLine:
         height = row + slope * columns - rows
         limit = max(END_TOLERANCE, 2.0 * float(np.median(np.abs(height[kept]))))
         kept = height <= limit
+        if kept.sum() < 2:
+            break
         slope, row = np.polyfit(columns[kept], rows[kept], 1)
     return PlateLine(float(row), float(slope), visible=False)

@@ -56,7 +56,7 @@ class ReposeAngle:
 
     @property
     def se(self) -> float:
-        """Standard error of the mean [degrees]: how well the outline fixes two lines, and the camera's height."""
+        """Standard error of the mean [degrees]: of both lines on this outline, and of the camera's height."""
         roughness = 0.5 * float(np.hypot(self.left_line.se, self.right_line.se))
         outline = self.outline
         seen = 0.5 * (self.left_line.angle + self.right_line.angle)

@@ -3,8 +3,8 @@
 The outline of grains is correlated over about a grain, and a flank may be curved. Its residuals are averaged
 in bins; a cubic is taken for the shape, and the rest for a stationary process whose correlation ends after a
 grain or so (the spherical model of geostatistics). How far that reaches is not known: every length of a grid
-is weighed by its restricted likelihood (Patterson and Thompson, Biometrika 58, 1971), which does not count the shape's own freedom as
-smoothness, as the correlation of the residuals themselves does.
+is weighed by its restricted likelihood (Patterson and Thompson, Biometrika 58, 1971), which does not count
+the shape's own freedom as smoothness, as the correlation of the residuals themselves does.
 """
 
 from __future__ import annotations

@@ -86,8 +86,8 @@ class View:
 def seen_angle(angle: float, elevation: float, distance: float) -> float:
     """Angle at which a camera sees the outline of a cone [degrees].
 
-    The outline is the pair of tangents from the tip to the ellipse that the base's circle is seen as. From afar,
-    with the height h and the base's radius r, they go from h cos e to half axes r and r sin e, so that
+    The outline is the pair of tangents from the tip to the ellipse that the base's circle is seen as. From
+    afar, with the height h and the base's radius r, they go from h cos e to half axes r and r sin e, so that
     tan(seen)^2 = tan(angle)^2 cos(e)^2 - sin(e)^2. From nearby the tip, closer to a camera that looks down
     than the foot behind it, takes back part of that.
 
@@ -131,7 +131,7 @@ def level_angle(seen: float, elevation: float, distance: float | None = None) ->
 
 
 def level_error(seen: float, elevation: float, error: float, distance: float | None) -> float:
-    """Standard error that an elevation's own one, and an unknown distance, give to a level angle [degrees]."""
+    """Standard error [degrees] that an elevation's own one, and an unknown distance, give to an angle."""
     if elevation == 0.0:
         return 0.0
     higher = level_angle(seen, elevation + error, distance) - level_angle(seen, elevation, distance)
