@@ -216,9 +216,9 @@ def angle(
 ) -> None:
     """Measure repose angles on photographs.
 
-    How to take them: the phone level, as high as the heap's middle, five heap widths away or more (zoom in); a
-    plain wall behind that differs from the grains, no hard shadow; nothing else in view; the whole heap with
-    its foot, half the picture wide, the plate's edge beside it. Turn the heap, or go round it, for more views.
+    How to take them: the phone level, as high as the heap's middle, five heap widths away or more (zoom in);
+    a plain wall behind that differs from the grains, no hard shadow; nothing else in view; the whole heap
+    with its foot, half the picture wide, the plate's edge beside it. Go round the heap for more views of it.
 
     Doubtful angles are marked, with the reason, and left out of the mean. HEIC pictures need
     pip install 'dem-warp\\[heic]'; or save them as JPEG.

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imaging.errors import PictureError
-from imaging.geometry import FloatArray, Picture
+from imaging.geometry import FloatArray, Layer, Picture
 
 BLUR = 0.5
 """Standard deviation [pixels] of the smoothing, horizontal so that it does not lower a flat outline."""
@@ -47,11 +47,11 @@ class Contrast:
         The smoothed picture and the background's surface.
     """
 
-    values: FloatArray
+    values: Layer
     thresholds: tuple[float, ...]
     noise: float
-    colors: FloatArray
-    background: FloatArray
+    colors: Layer
+    background: Layer
 
 
 def contrast_with_background(
@@ -79,7 +79,8 @@ def contrast_with_background(
         When the array is no picture, or when nothing stands out of its background.
     """
     channels = _channels(picture, place)
-    smooth = cv2.GaussianBlur(channels, (0, 0), sigmaX=BLUR, sigmaY=1e-6).reshape(channels.shape)
+    blurred = cv2.GaussianBlur(channels, (0, 0), sigmaX=BLUR, sigmaY=1e-6)
+    smooth = np.asarray(blurred, dtype=np.float32).reshape(channels.shape)
     surface, noise = _background(smooth)
     background = _evaluated(surface, smooth.shape, precision)
     difference = smooth - background
@@ -98,7 +99,7 @@ def contrast_with_background(
     return Contrast(contrast, tuple(thresholds), noise, smooth, background)
 
 
-def unshaded(colors: NDArray[np.float32], own: NDArray[np.float32], reach: int) -> NDArray[np.float32]:
+def unshaded(colors: Layer, own: Layer, reach: int) -> Layer:
     """Difference of colours from a surface's own ones that a shadow on it does not make.
 
     A shadow dims all channels alike and leaves no grains: what counts is the colour beside the line from the
@@ -110,7 +111,7 @@ def unshaded(colors: NDArray[np.float32], own: NDArray[np.float32], reach: int) 
     return np.asarray(np.sqrt(np.einsum("ijk,ijk->ij", beside, beside) + unevenness(colors, reach) ** 2))
 
 
-def unevenness(colors: NDArray[np.float32], reach: int) -> NDArray[np.float32]:
+def unevenness(colors: Layer, reach: int) -> Layer:
     """Standard deviation of the lightness within `reach` pixels of each."""
     level = colors.mean(axis=2)
     size = (2 * reach + 1, 2 * reach + 1)
@@ -120,7 +121,7 @@ def unevenness(colors: NDArray[np.float32], reach: int) -> NDArray[np.float32]:
     return np.asarray(np.sqrt(np.maximum(square - mean * mean, 0.0)))
 
 
-def otsu_threshold(values: FloatArray) -> float:
+def otsu_threshold(values: Layer) -> float:
     """Value that splits `values` in two classes with the largest variance between them (Otsu 1979)."""
     low, high = float(values.min()), float(values.max())
     counts, edges = np.histogram(values, bins=512, range=(low, max(high, low + 1e-9)))
@@ -134,7 +135,7 @@ def otsu_threshold(values: FloatArray) -> float:
     return float(0.5 * (edges[best[0] + 1] + edges[best[-1] + 1]))
 
 
-def _channels(picture: Picture, place: str) -> NDArray[np.float32]:
+def _channels(picture: Picture, place: str) -> Layer:
     layered = picture[:, :, None] if picture.ndim == 2 else picture
     if layered.ndim != 3 or layered.shape[2] not in (1, 3) or picture.dtype != np.uint8:
         rule = "a picture is a (rows, columns) or (rows, columns, 3) array of uint8"
@@ -144,7 +145,7 @@ def _channels(picture: Picture, place: str) -> NDArray[np.float32]:
     return layered.astype(np.float32)
 
 
-def _background(channels: NDArray[np.float32]) -> tuple[FloatArray, float]:
+def _background(channels: Layer) -> tuple[FloatArray, float]:
     """Coefficients of the quadratic surface through the background's pixels, and their median distance."""
     rows, columns, _ = channels.shape
     stride = max(1, int(np.sqrt(rows * columns / FIT_SAMPLES)))
@@ -171,7 +172,7 @@ def _background(channels: NDArray[np.float32]) -> tuple[FloatArray, float]:
 
 def _evaluated(
     surface: FloatArray, shape: tuple[int, ...], precision: type[np.float32 | np.float64]
-) -> FloatArray:
+) -> Layer:
     """A quadratic or a plane at every pixel; in single precision without its terms at every pixel."""
     rows, columns = shape[:2]
     if precision is np.float64:
@@ -187,7 +188,7 @@ def _evaluated(
     return np.asarray(along + mixed + (y * down + yy * down**2).astype(np.float32))
 
 
-def _light(background: FloatArray) -> FloatArray:
+def _light(background: Layer) -> Layer:
     """Brightness of the light relative to its median: where it is dim, heap and background differ less."""
     level = np.linalg.norm(background, axis=2)
     return np.clip(level / max(float(np.median(level)), LEAST_NOISE), 1.0 / LIGHT_RANGE, LIGHT_RANGE)

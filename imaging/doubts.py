@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from imaging.flanks import FlankLine
+from imaging.flanks import MINIMUM_FLANK_COLUMNS, FlankLine
 from imaging.outline import Outline
 from imaging.reasons import Doubt
 
@@ -24,6 +24,10 @@ LARGEST_MISFIT = 0.05
 """Root mean square of the outline about its two lines, over its height: a parabola's dome has 0.075."""
 LARGEST_END = 0.3
 """Height of the outline's end over the heap's: a heap ends a grain high, a dish's wall higher."""
+LEAST_END = 3.0
+"""What rises less at its end [pixels] is the blur of an edge."""
+LEAST_FOOT_SLOPE = 0.5
+"""Slope of a flank's lowest third over the rest's, or the reverse: strays and caps make it 0.6 to 1.4."""
 END_WIDTH = 0.02
 """Part of the outline's columns that make its end."""
 LARGEST_GAP = 0.1
@@ -63,8 +67,15 @@ def doubts_of(left: FlankLine, right: FlankLine, mean: float, se: float, outline
         yield Doubt(
             "straightness", f"flanks lie {misfit:.3f} heights off their lines, over {LARGEST_MISFIT:g}"
         )
+    for line, side in ((left, "left"), (right, "right")):
+        share = foot_slope(line, outline)
+        if not LEAST_FOOT_SLOPE <= share <= 1.0 / LEAST_FOOT_SLOPE:
+            finding = f"the {side} flank's lower third is {share:.2f} times as steep as the rest"
+            yield Doubt(
+                "foot", f"{finding}, beyond a factor of {1.0 / LEAST_FOOT_SLOPE:g}: a board, a shadow?"
+            )
     end = highest_end(outline)
-    if end > LARGEST_END:
+    if end > LARGEST_END and end * outline.height.max() > LEAST_END:
         yield Doubt(
             "ends", f"an end {end:.2f} heights over the plate, over {LARGEST_END:g}: a dish or board?"
         )
@@ -75,6 +86,22 @@ def relative_misfit(left: FlankLine, right: FlankLine, outline: Outline) -> floa
     squares = [line.rms**2 * (line.stop - line.start) for line in (left, right)]
     covered = sum(line.stop - line.start for line in (left, right))
     return float(np.sqrt(sum(squares) / covered) / outline.height.max())
+
+
+def foot_slope(line: FlankLine, outline: Outline) -> float:
+    """Slope of the lowest third of a flank over that of the rest; 1 where it has too few columns."""
+    covered = (outline.position >= line.start) & (outline.position <= line.stop)
+    x, h = outline.position[covered], outline.height[covered]
+    if line.slope < 0.0:
+        x, h = -x[::-1], h[::-1]
+    third = len(x) // 3
+    if third < MINIMUM_FLANK_COLUMNS:
+        return 1.0
+    low, high = (
+        float((a - a.mean()) @ b / ((a - a.mean()) ** 2).sum())
+        for a, b in ((x[:third], h[:third]), (x[third:], h[third:]))
+    )
+    return low / high if high > 0.0 else 0.0
 
 
 def highest_end(outline: Outline) -> float:

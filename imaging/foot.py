@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imaging.background import unshaded
-from imaging.geometry import FloatArray
+from imaging.geometry import FloatArray, Layer
 from imaging.plate import PlateLine
 
 SIDE_SHARE = 0.05
@@ -44,12 +44,12 @@ class PlateTop:
         Whether heap and plate are too alike to tell where the heap ends.
     """
 
-    level: NDArray[np.float32]
+    level: Layer
     alike: bool
 
 
 def below_plate(
-    colors: NDArray[np.float32], heap: NDArray[np.bool_], body: NDArray[np.bool_], plate: PlateLine
+    colors: Layer, heap: NDArray[np.bool_], body: NDArray[np.bool_], plate: PlateLine
 ) -> PlateTop:
     """Compare what lies below the plate's line with the plate.
 
@@ -66,13 +66,13 @@ def below_plate(
     plate : PlateLine
     """
     rows, columns = heap.shape
-    level = np.zeros((rows, columns), dtype=np.float32)
+    nothing = np.zeros((rows, columns), dtype=np.float32)
     upright = np.array([[1.0, 0.0, 0.0], [-plate.slope, 1.0, 0.0]])
-    flags = {"borderMode": cv2.BORDER_REPLICATE}
-    flat = cv2.warpAffine(colors, upright, (columns, rows), **flags).reshape(colors.shape)
+    turned = cv2.warpAffine(colors, upright, (columns, rows), borderMode=cv2.BORDER_REPLICATE)
+    flat = np.asarray(turned, dtype=np.float32).reshape(colors.shape)
     first = int(np.ceil(plate.row)) + 1
     if first >= rows - 2:
-        return PlateTop(level, alike=False)
+        return PlateTop(nothing, alike=False)
     ends = np.flatnonzero(body.any(axis=0))[[0, -1]]
     size = max(2, round(SIDE_SHARE * (ends[1] - ends[0])))
     sides = [flat[first:, ends[0] : ends[0] + size], flat[first:, ends[1] - size + 1 : ends[1] + 1]]
@@ -83,17 +83,17 @@ def below_plate(
     share = np.clip((np.arange(columns) - ends[0]) / max(ends[1] - ends[0], 1), 0.0, 1.0).astype(np.float32)
     own = middles[0][:, None] + share[None, :, None] * (middles[1] - middles[0])[:, None]
     least = max(LIKENESS * noise, LEAST_DIFFERENCE)
-    difference, typical = _told_apart(flat, own, first, heap, least)
-    upper = np.zeros((rows, columns), dtype=np.float32)
+    difference, typical = _told_apart(flat[first:], own, colors, heap, least)
+    upper = nothing.copy()
     upper[first:] = difference / max(0.5 * typical, least)
     back = np.array([[1.0, 0.0, 0.0], [plate.slope, 1.0, 0.0]])
-    level = cv2.warpAffine(upper, back, (columns, rows))
+    level = np.asarray(cv2.warpAffine(upper, back, (columns, rows)), dtype=np.float32)
     return PlateTop(level, alike=typical < least)
 
 
 def _told_apart(
-    flat: NDArray[np.float32], own: NDArray[np.float32], first: int, heap: NDArray[np.bool_], least: float
-) -> tuple[NDArray[np.float32], float]:
+    below: Layer, own: Layer, colors: Layer, heap: NDArray[np.bool_], least: float
+) -> tuple[Layer, float]:
     """Difference below the line from the plate's own colours, and that of the heap above the line from them.
 
     A shadow's share is left out, unless the heap then differs no more: grey powder on a grey plate.
@@ -101,26 +101,26 @@ def _told_apart(
     covered = heap.any(axis=0)
     reach = max(1, round(0.5 * TEXTURE_SHARE * int(covered.sum())))
     near = np.median(own[: max(2, len(own) // 20), covered], axis=(0, 1)).astype(np.float32)
-    around = np.broadcast_to(near, flat.shape)
-    typical = float(np.median(unshaded(flat, around, reach)[heap]))
+    around = np.broadcast_to(near, colors.shape)
+    typical = float(np.median(unshaded(colors, around, reach)[heap]))
     if typical >= least:
-        return unshaded(flat[first:], own, reach), typical
-    typical = float(np.median(np.linalg.norm(flat[heap] - near, axis=1)))
-    return np.linalg.norm(flat[first:] - own, axis=2), typical
+        return unshaded(below, own, reach), typical
+    typical = float(np.median(np.linalg.norm(colors[heap] - near, axis=1)))
+    return np.linalg.norm(below - own, axis=2), typical
 
 
-def joined_foot(heap: NDArray[np.bool_], level: NDArray[np.float32], plate: PlateLine) -> NDArray[np.bool_]:
+def joined_foot(heap: NDArray[np.bool_], level: Layer, plate: PlateLine) -> NDArray[np.bool_]:
     """The heap above the plate's line with the foot that goes on below it."""
     rows, columns = heap.shape
     width = int(np.ptp(np.flatnonzero(heap.any(axis=0)))) + 1
     size = 2 * max(1, round(0.5 * TEXTURE_SHARE * width)) + 1
-    lower = (level > 1.0).astype(np.uint8)
-    lower = cv2.morphologyEx(lower, cv2.MORPH_CLOSE, np.ones((size, size), np.uint8))
-    lower = cv2.morphologyEx(lower, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)) > 0
+    cut = (level > 1.0).astype(np.uint8)
+    cut = np.asarray(cv2.morphologyEx(cut, cv2.MORPH_CLOSE, np.ones((size, size), np.uint8)), dtype=np.uint8)
+    lower = np.greater(cv2.morphologyEx(cut, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)), 0)
     line = plate.rows_at(np.arange(columns))
     row = np.arange(rows)[:, None]
     # The plate's edge itself, blurred, belongs to neither: the heap goes on through it where it does below.
-    seam = (row >= line - 1.5) & (row <= line + 3.0) & heap.any(axis=0)[None, :]
+    seam = (row >= line - 1.5) & (row <= line + 3.0) & heap.any(axis=0)
     whole = heap | (lower & (row > line)) | seam
     _, labels = cv2.connectedComponents(whole.astype(np.uint8), connectivity=4)
     kept = np.unique(labels[heap])

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from imaging.background import LEAST_NOISE, Contrast, otsu_threshold, unshaded
+from imaging.geometry import Layer
 from imaging.outline import largest_pieces
 
 FAINT = 6.0
@@ -65,18 +65,25 @@ def _apart_from_plate(seen: Contrast) -> Contrast:
         return replace(seen, thresholds=())
     criteria = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 20, 0.5)
     cv2.setRNGSeed(0)
-    _, label, tones = cv2.kmeans(sample, 2, None, criteria, 1, cv2.KMEANS_PP_CENTERS)
-    spread = float(np.median(np.linalg.norm(sample - tones[label.ravel()], axis=1)))
+    start = np.zeros((len(sample), 1), dtype=np.int32)
+    single = np.asarray(sample, dtype=np.float32)
+    _, label, centers = cv2.kmeans(single, 2, start, criteria, 1, cv2.KMEANS_PP_CENTERS)
+    tones = np.asarray(centers, dtype=np.float32)
+    spread = float(np.median(np.linalg.norm(single - tones[np.asarray(label).ravel()], axis=1)))
     values = seen.values
     for tone in tones:
-        own = np.broadcast_to(tone.astype(np.float32), seen.colors.shape)
-        values = np.minimum(values, unshaded(seen.colors, own, _grain_reach(seen)))
-    return replace(seen, values=values, thresholds=_cuts(values, max(seen.noise, spread)))
+        own = np.broadcast_to(tone, seen.colors.shape)
+        values = np.minimum(values, unshaded(seen.colors, own, 0))
+    # Along its rim a board blends with the wall into colours of neither.
+    size = 2 * _grain_reach(seen) + 1
+    window = np.ones((size, size), np.uint8)
+    opened = np.asarray(cv2.morphologyEx(values, cv2.MORPH_OPEN, window), dtype=np.float32)
+    return replace(seen, values=opened, thresholds=_cuts(opened, max(seen.noise, spread)))
 
 
 def _grain_reach(seen: Contrast) -> int:
     return max(2, round(GRAIN_SHARE * seen.values.shape[1]))
 
 
-def _cuts(values: NDArray[np.float32], noise: float) -> tuple[float, ...]:
+def _cuts(values: Layer, noise: float) -> tuple[float, ...]:
     return tuple(dict.fromkeys((otsu_threshold(values.ravel()), FAINT * max(noise, LEAST_NOISE))))

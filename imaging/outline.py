@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imaging.errors import PictureError
-from imaging.geometry import FloatArray
+from imaging.geometry import FloatArray, Layer
 from imaging.plate import PlateLine
 from imaging.reasons import Doubt
 
@@ -76,7 +76,7 @@ def levelled(
     return position[order], np.maximum(height[order], 0.0)
 
 
-def top_edge(mask: NDArray[np.bool_], contrast: FloatArray, threshold: float) -> FloatArray:
+def top_edge(mask: NDArray[np.bool_], contrast: Layer, threshold: float) -> FloatArray:
     """Row at which the contrast crosses the threshold above the topmost masked pixel of each column.
 
     The crossing is interpolated between two pixels, which makes the edge of an anti-aliased picture exact
@@ -91,14 +91,12 @@ def top_edge(mask: NDArray[np.bool_], contrast: FloatArray, threshold: float) ->
     return np.where(mask.any(axis=0), first - np.clip(part, 0.0, 1.0), np.nan)
 
 
-def bottom_edge(mask: NDArray[np.bool_], contrast: FloatArray, threshold: float) -> FloatArray:
+def bottom_edge(mask: NDArray[np.bool_], contrast: Layer, threshold: float) -> FloatArray:
     """The same for the lowest masked pixel of each column."""
     return mask.shape[0] - 1.0 - top_edge(mask[::-1], contrast[::-1], threshold)
 
 
-def refine_thin(
-    rows: FloatArray, heap: NDArray[np.bool_], contrast: FloatArray, plate: PlateLine
-) -> FloatArray:
+def refine_thin(rows: FloatArray, heap: NDArray[np.bool_], contrast: Layer, plate: PlateLine) -> FloatArray:
     """Upper edge whose thin columns, at most `THIN` high, are as high as their summed contrast says.
 
     No pixel of such a column need be covered whole, so that a threshold says little about its height.
@@ -113,7 +111,7 @@ def refine_thin(
     return np.where(thin, line - (total[last, columns] - total[first, columns]), rows)
 
 
-def inner_contrast(heap: NDArray[np.bool_], contrast: FloatArray) -> float:
+def inner_contrast(heap: NDArray[np.bool_], contrast: Layer) -> float:
     """Contrast of a pixel that the heap covers whole: typical of those with the heap above and below them."""
     inner = heap.copy()
     inner[1:] &= heap[:-1]

@@ -31,6 +31,8 @@ from imaging.view import View, level_angle
 
 NO_HEAP = 0.12
 """Misfit of the flanks, in heights, from which on it is no heap: half a circle, 0.087, is doubtful only."""
+AS_GOOD = 1.3
+"""Factor between misfits that are about the same: two thresholds on one heap differ by as much."""
 LEAST_STEP = 15.0
 """Difference of colours [of 255] across an edge below which it is not refined."""
 SEARCHED_PIXELS = 800_000
@@ -125,13 +127,16 @@ def find_heap(picture: Picture, given: PlateLine | None, view: View, place: str)
     """
     seen = contrast_with_background(picture, place, np.float32)
     tries, errors = _tries(with_faint(seen), given, view, place)
-    best = min(tries, key=Judged.rank, default=None)
+    best = _first_of_best(tries)
     if best is None or not best.clear or best.shift(tries) > LARGEST_SHIFT:
         others = [judged for look in other_looks(seen) for judged in _tries(look, given, view, place)[0]]
-        # Another look counts where it leaves fewer doubts, or where the plain ones disagree.
+        # Another look counts where it leaves fewer doubts, none where the plain ones refuse, or where these
+        # disagree.
+        if best is None:
+            others = [judged for judged in others if judged.clear]
         if best is None or best.clear or any(len(other.doubts) < len(best.doubts) for other in others):
             tries += others
-            best = min(tries, key=Judged.rank, default=None)
+            best = _first_of_best(tries)
     if best is None:
         raise errors[0]
     if best.crooked > NO_HEAP:
@@ -177,13 +182,17 @@ class Judged:
         """Whether there is no doubt."""
         return not self.doubts
 
-    def rank(self) -> tuple[int, float]:
-        """Place among others: few doubts first, then a good fit."""
-        return len(self.doubts), self.misfit
-
     def shift(self, others: Sequence[Judged]) -> float:
         """Greatest change of the angle [degrees] among others without a doubt."""
         return max((abs(other.mean - self.mean) for other in others if other.clear), default=0.0)
+
+
+def _first_of_best(tries: Sequence[Judged]) -> Judged | None:
+    """The first with the fewest doubts that fits about as well as the best of these."""
+    fewest = min((len(judged.doubts) for judged in tries), default=0)
+    good = [judged for judged in tries if len(judged.doubts) == fewest]
+    limit = AS_GOOD * min((judged.misfit for judged in good), default=0.0)
+    return next((judged for judged in good if judged.misfit <= limit), None)
 
 
 def _judged(sighting: Sighting, place: str) -> Judged:
@@ -194,7 +203,9 @@ def _judged(sighting: Sighting, place: str) -> Judged:
     left, right = fit_flanks(outline, FitSettings.of("flank"), place)
     mean = 0.5 * (left.angle + right.angle)
     se = 0.5 * float(np.hypot(left.se, right.se))
-    doubts = (*sighting.doubts, *doubts_of(left, right, mean, se, outline))
+    # An angle that no grain has does not say that another look would show the heap better.
+    found = (doubt for doubt in doubts_of(left, right, mean, se, outline) if doubt.name != "range")
+    doubts = (*sighting.doubts, *found)
     lean = abs(left.angle - right.angle) / LARGEST_LEAN
     crooked = relative_misfit(left, right, outline)
     misfit = crooked / LARGEST_MISFIT + lean

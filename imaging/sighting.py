@@ -12,7 +12,7 @@ from imaging.background import Contrast, unshaded
 from imaging.doubts import LARGEST_UNSEEN_TILT
 from imaging.errors import PictureError
 from imaging.foot import Base, below_plate, front_of_base, joined_foot
-from imaging.geometry import FloatArray
+from imaging.geometry import FloatArray, Layer
 from imaging.outline import bottom_edge, inner_contrast, largest_pieces, refine_thin, top_edge
 from imaging.plate import PlateLine, find_plate
 from imaging.reasons import Doubt
@@ -24,6 +24,10 @@ RIVAL_SHARE = 0.25
 """A second piece larger than this share of the largest is a second heap or an object."""
 LEAST_FOOT = 4.0
 """A foot is seen where it reaches this far below the plate's line [pixels]: a lens bends that by less."""
+DEEP_FOOT = 0.05
+"""Depth of a foot over its width, a camera 6 degrees up, from which on its colour is asked for."""
+LEAST_WIDTH = 100.0
+"""What a narrower heap [pixels] stands on is not looked at: a blurred edge is as wide as the strips below."""
 BRIMFUL_RULE = "the heap stands on a plate wider than itself"
 BESIDE_NOISE, BESIDE_DIFFERENCE = 6.0, 24.0
 """Multiple of the wall's noise, and difference [of 255], from which on two sides differ: twice a cloth's."""
@@ -82,11 +86,7 @@ def _on_plate(
     if not front.any():
         raise PictureError("a heap stands out of the background", "nothing that does", place)
     body, _ = largest_pieces(front)
-    if given is None:
-        edges = (edge(body, seen.values, threshold) for edge in (top_edge, bottom_edge))
-        plate = find_plate(*edges, place)
-    else:
-        plate = given
+    plate = _plate_of(body, seen, threshold, place) if given is None else given
     above = plate.above(front)
     if not above.any():
         raise PictureError("a heap stands on the plate", "nothing above the plate line", place)
@@ -94,9 +94,10 @@ def _on_plate(
     if given is None and plate.visible and _floats(heap, plate):
         # What was taken for the plate lies before the heap's foot: the front of a table as pale as the wall.
         body = heap
-        edges = (edge(body, seen.values, threshold) for edge in (top_edge, bottom_edge))
-        plate = find_plate(*edges, place)
+        plate = _plate_of(body, seen, threshold, place)
         heap = plate.above(heap)
+        if not heap.any():
+            raise PictureError("a heap stands on the plate", "nothing above the plate line", place)
     for border, name in ((heap[:, 0], "left"), (heap[:, -1], "right"), (heap[0], "top")):
         if border.any():
             rule = "the whole heap is in the picture"
@@ -105,6 +106,11 @@ def _on_plate(
         rule = "the heap stands on its plate, its whole foot in the picture"
         raise PictureError(rule, "something that goes on below the bottom border: no heap?", place)
     return plate, body, heap
+
+
+def _plate_of(body: NDArray[np.bool_], seen: Contrast, threshold: float, place: str) -> PlateLine:
+    upper, lower = (edge(body, seen.values, threshold) for edge in (top_edge, bottom_edge))
+    return find_plate(upper, lower, place)
 
 
 def _floats(heap: NDArray[np.bool_], plate: PlateLine) -> bool:
@@ -136,7 +142,7 @@ def _seen_whole(
     rows: FloatArray,
     body: NDArray[np.bool_],
     plate: PlateLine,
-    contrast: FloatArray,
+    contrast: Layer,
     threshold: float,
     place: str,
 ) -> Sighting:
@@ -145,14 +151,14 @@ def _seen_whole(
     bottom = bottom_edge(body, contrast, threshold)
     base = front_of_base(bottom, None)
     elevation = elevation_se = 0.0
+    depth = 0.0
     if base.seen:
         plate, elevation, elevation_se = _raised(base, rows, plate, place)
+        depth = base.row + base.depth - plate.row
     if abs(plate.tilt) > LARGEST_UNSEEN_TILT:
         finding = f"{plate.tilt:.1f} degrees without a plate seen, over {LARGEST_UNSEEN_TILT:g}"
         doubts.append(Doubt("tilt", finding))
-    depth = base.row + base.slope * 0.5 * sum(base.ends) + max(base.depth, 0.0)
-    depth -= float(plate.rows_at(np.array([0.5 * sum(base.ends)]))[0])
-    return Sighting(rows, plate, elevation, elevation_se, tuple(doubts), max(depth, 0.0))
+    return Sighting(rows, plate, elevation, elevation_se, tuple(doubts), depth)
 
 
 def _on_seen_plate(
@@ -197,14 +203,16 @@ def refuse_brimful(seen: Contrast, found: Sighting, place: str) -> None:
     position, _ = found.plate.level(columns, found.rows[columns.astype(np.intp)])
     left, right = float(position.min()), float(position.max())
     width = right - left
+    if width < LEAST_WIDTH:
+        return
     least = max(BESIDE_NOISE * seen.noise, BESIDE_DIFFERENCE)
     middle = np.linspace(left + 0.3 * width, right - 0.3 * width, 60)
-    if found.depth > LEAST_FOOT:
+    if found.depth > DEEP_FOOT * width:
         low = _sampled(seen, found.plate, middle, -found.depth * np.linspace(0.3, 0.7, 8))
         high = _sampled(seen, found.plate, middle, np.linspace(0.02, 0.06, 8) * width)
-        if low is not None and high is not None and _differ(low, high) > least:
+        if low is not None and high is not None and min(_differ(low, high), _differ(high, low)) > least:
             raise PictureError(BRIMFUL_RULE, "a dish, or an object of another colour below it", place)
-    heights = -found.depth - np.linspace(0.01, 0.04, 8) * width - 1.0
+    heights = -found.depth - np.linspace(0.02, 0.05, 8) * width - 1.0
     under = _sampled(seen, found.plate, np.linspace(left + 0.2 * width, right - 0.2 * width, 60), heights)
     sides = [
         _sampled(seen, found.plate, np.linspace(end + 0.03 * step, end + 0.08 * step, 20), heights)
@@ -216,9 +224,7 @@ def refuse_brimful(seen: Contrast, found: Sighting, place: str) -> None:
         raise PictureError(BRIMFUL_RULE, "a dish, or a narrow board", place)
 
 
-def _sampled(
-    seen: Contrast, plate: PlateLine, position: FloatArray, heights: FloatArray
-) -> NDArray[np.float32] | None:
+def _sampled(seen: Contrast, plate: PlateLine, position: FloatArray, heights: FloatArray) -> Layer | None:
     """Median colour of each height's points; None where the picture does not show them."""
     across, up = (grid.ravel() for grid in np.meshgrid(position, heights))
     columns, rows = (np.rint(value).astype(np.intp) for value in plate.picture_point(across, up))
@@ -230,10 +236,9 @@ def _sampled(
     return np.asarray(np.median(colors, axis=1), dtype=np.float32)
 
 
-def _differ(one: NDArray[np.float32], other: NDArray[np.float32]) -> float:
-    """Median difference of colours that a shadow on either does not make."""
-    shaded = [unshaded(a[None], b[None], 0)[0] for a, b in ((one, other), (other, one))]
-    return float(np.median(np.minimum(*shaded)))
+def _differ(one: Layer, other: Layer) -> float:
+    """Median difference of colours from others that a shadow on the first does not make."""
+    return float(np.median(unshaded(one[None], other[None], 0)))
 
 
 def _raised(base: Base, rows: FloatArray, plate: PlateLine, place: str) -> tuple[PlateLine, float, float]:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from imaging.background import contrast_with_background
 from imaging.errors import PictureError
-from imaging.geometry import FloatArray, Picture
+from imaging.geometry import Layer, Picture
 from imaging.outline import Outline, inner_contrast, largest_pieces, levelled, refine_thin, top_edge
 from imaging.plate import PlateLine
 
@@ -35,7 +35,7 @@ def drawn_outline(picture: Picture, ground_row: float, meters_per_pixel: float |
 
 def _outline(
     heap: NDArray[np.bool_],
-    contrast: FloatArray,
+    contrast: Layer,
     threshold: float,
     plate: PlateLine,
     meters_per_pixel: float | None,

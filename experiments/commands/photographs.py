@@ -72,8 +72,10 @@ def _four(text: str | None, option: str) -> tuple[float, float, float, float] | 
 
 def grouping_of(by: str) -> Grouping:
     """Read which pictures show one heap; raise `InputError` on anything but picture or folder."""
-    if by == "picture" or by == "folder":
-        return by
+    if by == "picture":
+        return "picture"
+    if by == "folder":
+        return "folder"
     raise InputError("is picture or folder", by, "--by")
 
 

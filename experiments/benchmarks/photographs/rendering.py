@@ -6,10 +6,9 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from experiments.benchmarks.photographs.camera import PhoneCamera
-from imaging.geometry import FloatArray, Picture
+from imaging.geometry import FloatArray, Layer, Picture
 
 FINE = 2
 """Everything is drawn this many times finer than the picture."""
@@ -107,15 +106,16 @@ def render(
     rng = np.random.default_rng(phone.seed)
     fine = _surroundings(surroundings, lamp, camera, heap_height, rng)
     _draw_grains(fine, spheres, surroundings, lamp, camera, rng)
-    image = cv2.resize(fine, (camera.columns, camera.rows), interpolation=cv2.INTER_AREA)
+    size = (camera.columns, camera.rows)
+    image: Layer = np.asarray(cv2.resize(fine, size, interpolation=cv2.INTER_AREA), dtype=np.float32)
     slope = np.linspace(-0.5, 0.5, camera.columns, dtype=np.float32)
-    image *= (1.0 + lamp.uneven * slope)[None, :, None]
+    image = image * (1.0 + lamp.uneven * slope)[None, :, None]
     return stored(image, phone, rng)
 
 
-def stored(image: NDArray[np.float32], phone: Phone, rng: np.random.Generator) -> Picture:
+def stored(image: Layer, phone: Phone, rng: np.random.Generator) -> Picture:
     """Blur, noise, sharpening and JPEG of a phone."""
-    image = cv2.GaussianBlur(image, (0, 0), max(phone.blur, 0.2))
+    image = np.asarray(cv2.GaussianBlur(image, (0, 0), max(phone.blur, 0.2)), dtype=np.float32)
     image = image + rng.normal(0.0, phone.noise, image.shape).astype(np.float32)
     if phone.sharpening > 0.0:
         image = image + phone.sharpening * (image - cv2.GaussianBlur(image, (0, 0), 1.5))
@@ -126,7 +126,7 @@ def stored(image: NDArray[np.float32], phone: Phone, rng: np.random.Generator) -
 
 def _surroundings(
     around: Surroundings, lamp: Lamp, camera: PhoneCamera, heap_height: float, rng: np.random.Generator
-) -> NDArray[np.float32]:
+) -> Layer:
     """Wall, table top and table front, with the heap's shadow, as fine pixels."""
     ray = camera.rays(FINE)
     x0, y0, z0 = (np.float32(value) for value in camera.place)
@@ -152,13 +152,10 @@ def _surroundings(
     image *= (1.0 - lamp.shadow * _shadow(place, lamp, heap_height, camera))[..., None]
     foot = np.hypot(top_x, top_y)
     near_heap = np.where(top, np.clip(1.0 - (foot - 1.0) / 0.12, 0.0, 1.0), 0.0)
-    image *= (1.0 - 0.25 * near_heap**2)[..., None]
-    return image
+    return np.asarray(image * (1.0 - 0.25 * near_heap**2)[..., None], dtype=np.float32)
 
 
-def _shadow(
-    place: NDArray[np.float32], lamp: Lamp, heap_height: float, camera: PhoneCamera
-) -> NDArray[np.float32]:
+def _shadow(place: Layer, lamp: Lamp, heap_height: float, camera: PhoneCamera) -> Layer:
     """Share of the lamp, 0 to 1, that the heap hides from each place; drawn coarsely, for it is soft."""
     coarse = place[::4, ::4]
     hidden = np.zeros(coarse.shape[:2], dtype=np.float32)
@@ -170,11 +167,11 @@ def _shadow(
             under &= point[..., 2] > 0.0
             hidden = np.maximum(hidden, under.astype(np.float32))
     pixels = 0.5 * camera.share * camera.columns * FINE / 4.0
-    hidden = cv2.GaussianBlur(hidden, (0, 0), max(lamp.softness * pixels, 0.7))
-    return np.asarray(cv2.resize(hidden, place.shape[1::-1], interpolation=cv2.INTER_LINEAR))
+    soft = cv2.GaussianBlur(hidden, (0, 0), max(lamp.softness * pixels, 0.7))
+    return np.asarray(cv2.resize(soft, place.shape[1::-1], interpolation=cv2.INTER_LINEAR))
 
 
-def _pattern(shape: tuple[int, int], rng: np.random.Generator) -> NDArray[np.float32]:
+def _pattern(shape: tuple[int, int], rng: np.random.Generator) -> Layer:
     """Random field of standard deviation 1 with a grain along the rows, as of wood or cloth."""
     small = rng.standard_normal((shape[0] // 4 + 1, shape[1] // 16 + 1)).astype(np.float32)
     field = cv2.resize(small, shape[::-1], interpolation=cv2.INTER_CUBIC)
@@ -182,7 +179,7 @@ def _pattern(shape: tuple[int, int], rng: np.random.Generator) -> NDArray[np.flo
 
 
 def _draw_grains(
-    fine: NDArray[np.float32],
+    fine: Layer,
     spheres: tuple[FloatArray, FloatArray],
     around: Surroundings,
     lamp: Lamp,

@@ -23,8 +23,8 @@ from imaging import PictureError, ReposeAngle, measure, overlay, read_picture, s
 from imaging.geometry import Picture
 
 COLUMNS = (
-    "kind", "seed", "outcome", "truth", "mean", "error", "se", "covered", "elevation", "seen_elevation", "distance",
-    "shadow", "why",
+    "kind", "seed", "outcome", "truth", "mean", "error", "se", "covered", "elevation", "seen_elevation",
+    "distance", "shadow", "why",
 )  # fmt: skip
 TILE, TILES_ACROSS, SHEET_TILES = (300, 220), 6, 36
 Row = dict[str, Any]
@@ -103,17 +103,22 @@ def summary(heaps: list[Row], others: list[Row]) -> str:
     marked = [abs(row["error"]) for row in heaps if row["outcome"] == "marked"]
     count = Counter(row["outcome"] for row in heaps)
     silent = Counter(row["outcome"] for row in others)
-    lines = [
-        f"| pictures of heaps | {len(heaps)} |",
-        f"| measured, marked as doubtful, refused | {count['measured']}, {count['marked']}, {count['refused']} |",
-        f"| error of the measured: median, 95th percentile, greatest [degrees] | {np.median(errors):.2f}, "
-        f"{np.quantile(errors, 0.95):.2f}, {errors.max():.2f} |",
-        f"| measured and wrong by more than 2 degrees | {int((errors > 2.0).sum())} |",
-        f"| marked, of these wrong by more than 1 degree | {len(marked)}, {int((np.array(marked) > 1.0).sum())} |",
-        f"| 95 % intervals that hold the truth [%] | {100.0 * np.mean([row['covered'] for row in clear]):.1f} |",
-        f"| pictures without a heap | {len(others)} |",
-        f"| of these refused, marked, measured | {silent['refused']}, {silent['marked']}, {silent['measured']} |",
-    ]
+    quantiles = f"{np.median(errors):.2f}, {np.quantile(errors, 0.95):.2f}, {errors.max():.2f}"
+    outcomes = f"{count['measured']}, {count['marked']}, {count['refused']}"
+    far = f"{len(marked)}, {int((np.array(marked) > 1.0).sum())}"
+    table = {
+        "pictures of heaps": len(heaps),
+        "measured, marked as doubtful, refused": outcomes,
+        "error of the measured: median, 95th percentile, greatest [degrees]": quantiles,
+        "measured and wrong by more than 2 degrees": int((errors > 2.0).sum()),
+        "marked, of these wrong by more than 1 degree": far,
+        "95 % intervals that hold the truth [%]": f"{100.0 * np.mean([row['covered'] for row in clear]):.1f}",
+        "pictures without a heap": len(others),
+        "of these refused, marked, measured": ", ".join(
+            str(silent[outcome]) for outcome in ("refused", "marked", "measured")
+        ),
+    }
+    lines = [f"| {name} | {value} |" for name, value in table.items()]
     return "\n".join(["| | |", "|---|---|", *lines])
 
 
@@ -133,7 +138,8 @@ def main() -> None:
         ("heaps", with_heaps(chosen.first, chosen.heaps), chosen.heaps),
         ("others", without_heaps(chosen.first, chosen.others, chosen.folder), chosen.others),
     ):
-        found, tiles = [], []
+        found: list[Row] = []
+        tiles: list[tuple[str, Picture]] = []
         for row, picture in source:
             found.append(row)
             if len(found) % max(1, total // SHEET_TILES) == 0 and len(tiles) < SHEET_TILES:

@@ -6,13 +6,12 @@ from collections.abc import Callable
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from experiments.benchmarks.photographs.rendering import Phone, stored
-from imaging.geometry import Picture
+from imaging.geometry import Layer, Picture
 
 ROWS, COLUMNS = 600, 840
-Canvas = NDArray[np.float32]
+Canvas = Layer
 Painter = Callable[[Canvas, np.random.Generator], None]
 
 
@@ -118,8 +117,8 @@ def _landscape(canvas: Canvas, rng: np.random.Generator) -> None:
 
 
 def _noise(canvas: Canvas, rng: np.random.Generator) -> None:
-    field = rng.normal(0.0, 1.0, canvas.shape).astype(np.float32)
-    field = cv2.GaussianBlur(field, (0, 0), rng.uniform(0.5, 60.0))
+    grain = rng.normal(0.0, 1.0, canvas.shape).astype(np.float32)
+    field = np.asarray(cv2.GaussianBlur(grain, (0, 0), rng.uniform(0.5, 60.0)))
     canvas += rng.uniform(5.0, 70.0) * field / field.std()
 
 
