@@ -20,8 +20,11 @@ LEAST_ANGLE, GREATEST_ANGLE = 5.0, 60.0
 """Repose angles of dry grains [degrees] lie well within."""
 LARGEST_ELEVATION = 15.0
 """Camera's height over the plate [degrees] up to which its effect, 3.5 degrees there, is taken out."""
-LARGEST_MISFIT = 0.05
-"""Root mean square of the outline about its two lines, over its height: a parabola's dome has 0.075."""
+LARGEST_MISFIT = 0.06
+"""Root mean square of the outline's shape about its two lines, over its height: heaps of only twenty grains
+across have up to 0.055, a parabola's dome 0.069, half a circle 0.075."""
+SHAPE_PARTS = 6
+"""Parts of a flank whose means are its shape; what is left is roughness."""
 LARGEST_END = 0.3
 """Height of the outline's end over the heap's: a heap ends a grain high, a dish's wall higher."""
 LEAST_END = 3.0
@@ -65,7 +68,7 @@ def doubts_of(left: FlankLine, right: FlankLine, mean: float, se: float, outline
     misfit = relative_misfit(left, right, outline)
     if misfit > LARGEST_MISFIT:
         yield Doubt(
-            "straightness", f"flanks lie {misfit:.3f} heights off their lines, over {LARGEST_MISFIT:g}"
+            "straightness", f"flanks bend {misfit:.3f} heights off their lines, over {LARGEST_MISFIT:g}"
         )
     for line, side in ((left, "left"), (right, "right")):
         share = foot_slope(line, outline)
@@ -82,10 +85,13 @@ def doubts_of(left: FlankLine, right: FlankLine, mean: float, se: float, outline
 
 
 def relative_misfit(left: FlankLine, right: FlankLine, outline: Outline) -> float:
-    """Root mean square of an outline about its two lines, over its height."""
-    squares = [line.rms**2 * (line.stop - line.start) for line in (left, right)]
-    covered = sum(line.stop - line.start for line in (left, right))
-    return float(np.sqrt(sum(squares) / covered) / outline.height.max())
+    """Root mean square of an outline's shape about its two lines, over its height."""
+    means = []
+    for line in (left, right):
+        covered = (outline.position >= line.start) & (outline.position <= line.stop)
+        residual = outline.height[covered] - line.intercept - line.slope * outline.position[covered]
+        means += [float(part.mean()) for part in np.array_split(residual, min(SHAPE_PARTS, len(residual)))]
+    return float(np.sqrt(np.mean(np.square(means))) / outline.height.max())
 
 
 def foot_slope(line: FlankLine, outline: Outline) -> float:

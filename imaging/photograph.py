@@ -29,8 +29,8 @@ from imaging.reasons import Doubt
 from imaging.sighting import Sighting, refuse_brimful, sight
 from imaging.view import View, level_angle
 
-NO_HEAP = 0.12
-"""Misfit of the flanks, in heights, from which on it is no heap: half a circle, 0.087, is doubtful only."""
+NO_HEAP = 0.1
+"""Misfit of the flanks' shape, in heights, from which on it is no heap: half a circle, 0.075, is doubtful."""
 AS_GOOD = 1.3
 """Factor between misfits that are about the same: two thresholds on one heap differ by as much."""
 LEAST_STEP = 15.0

@@ -28,7 +28,7 @@ THICK_SHARE = 0.4
 """The underside is taken from columns at least this thick, as a share of the thickest."""
 LINE_ROUNDS = 8
 """Rounds of leaving out columns that end above the line."""
-LEAST_SEEN = 0.4
+LEAST_SEEN = 0.6
 """A plate is seen in at least this share of the columns at either end; grains may hide the others."""
 PLATE_CLEARANCE = 0.25
 """What rises less than this over the plate line [pixels] belongs to the plate."""

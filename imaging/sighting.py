@@ -215,7 +215,7 @@ def refuse_brimful(seen: Contrast, found: Sighting, place: str) -> None:
     heights = -found.depth - np.linspace(0.02, 0.05, 8) * width - 1.0
     under = _sampled(seen, found.plate, np.linspace(left + 0.2 * width, right - 0.2 * width, 60), heights)
     sides = [
-        _sampled(seen, found.plate, np.linspace(end + 0.03 * step, end + 0.08 * step, 20), heights)
+        _sampled(seen, found.plate, np.linspace(end + 0.05 * step, end + 0.1 * step, 20), heights)
         for end, step in ((left, -width), (right, width))
     ]
     if under is None or any(side is None for side in sides):

@@ -77,13 +77,3 @@ class GrainHeap:
         z = np.maximum(z, 0.45 * self.grain)
         sizes = 0.5 * self.grain * np.clip(rng.normal(1.0, 0.08, len(z)), 0.7, 1.3)
         return np.column_stack([x, y, z])[kept], sizes[kept]
-
-
-def turned(centers: FloatArray, radii: FloatArray, azimuth: float) -> tuple[FloatArray, FloatArray]:
-    """A simulated heap [m] turned about its axis, in units of its radius."""
-    middle = np.median(centers[:, :2], axis=0)
-    x, y = (centers[:, :2] - middle).T
-    size = float(np.quantile(np.hypot(x, y), 0.98)) * 1.05
-    cosine, sine = np.cos(azimuth), np.sin(azimuth)
-    points = np.column_stack([x * cosine + y * sine, y * cosine - x * sine, centers[:, 2]])
-    return points / size, radii / size
