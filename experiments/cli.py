@@ -240,17 +240,53 @@ def angle(
     overlay: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Draw the fitted flanks on copies in this folder.")
     ] = None,
+    by: Annotated[
+        str, typer.Option(help="Views of one heap: each picture another heap, or one heap a folder.")
+    ] = "picture",
+    keep_doubtful: Annotated[bool, typer.Option(help="Count doubtful pictures in the mean.")] = False,
+    crop: Annotated[str | None, typer.Option(metavar="X1,Y1,X2,Y2", help="Look at this part only.")] = None,
+    plate: Annotated[
+        str | None, typer.Option(metavar="X1,Y1,X2,Y2", help="Two points where heap and plate meet [pixels].")
+    ] = None,
+    heap_number: Annotated[
+        int | None, typer.Option("--heap", help="Which of several, from the left.")
+    ] = None,
+    elevation: Annotated[float | None, typer.Option(help="How far the camera looks down [degrees].")] = None,
+    distance: Annotated[float | None, typer.Option(help="Camera to heap [widths of the heap].")] = None,
+    as_target: Annotated[bool, typer.Option("--target", help="Print a study's [target] section.")] = False,
+    as_csv: Annotated[bool, typer.Option("--csv", help="Print the rows as CSV.")] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Measure repose angles on photographs."""
-    with clear_errors():
-        from experiments.commands.photographs import measure_pictures
+    """Measure repose angles on photographs.
 
-        rows = measure_pictures(pictures, fit, overlay)
-    if as_json:
-        typer.echo(json.dumps(rows, allow_nan=False))
-    else:
-        _print_angles(rows, fit)
+    How to take them: the phone level, as high as the heap's middle, five heap widths away or more (zoom in);
+    a plain wall behind that differs from the grains, no hard shadow; nothing else in view; the whole heap
+    with its foot, half the picture wide, the plate's edge beside it. Go round the heap for more views of it.
+
+    Doubtful angles are marked, with the reason, and left out of the mean. HEIC pictures need
+    pip install 'dem-warp\\[heic]'; or save them as JPEG.
+    """
+    with clear_errors():
+        from experiments.commands import photographs
+
+        view = photographs.view_of(crop, plate, heap_number, elevation, distance)
+        grouping = photographs.grouping_of(by)
+        rows = photographs.measure_pictures(pictures, fit, overlay, view)
+        mean = photographs.mean_angle(rows, grouping, keep_doubtful)
+        if as_target:
+            typer.echo(photographs.target_section(mean, fit), nl=False)
+        elif as_csv:
+            typer.echo(photographs.csv_table(rows), nl=False)
+        elif as_json:
+            result = {"pictures": rows, "mean": mean.to_dict() if mean else None}
+            typer.echo(json.dumps(result, allow_nan=False))
+        else:
+            _print_angles(rows, fit)
+            if mean:
+                typer.echo(str(mean))
+    for row in rows:
+        for doubt in row["doubts"]:
+            messages.print(f"Doubtful: {row['picture']}: {doubt}", markup=False)
     if rejected := [row["reason"] for row in rows if row["reason"]]:
         fail("\n".join(rejected))
 
@@ -385,9 +421,11 @@ def _print_angles(rows: list[dict[str, Any]], fit: str) -> None:
     table.add_column("picture", overflow="fold")
     for name in ("left", "right", "mean", "se"):
         table.add_column(name, justify="right")
+    table.add_column("doubts", overflow="fold")
     for row in rows:
-        if not row["reason"]:
+        if row["mean"] is not None:
             values = [f"{row[name]:.2f}" for name in ("left", "right", "mean", "se")]
-            table.add_row(row["picture"], *values)
+            doubts = ", ".join(doubt.partition(":")[0] for doubt in row["doubts"])
+            table.add_row(row["picture"], *values, doubts)
     if table.row_count:
         Console().print(table)

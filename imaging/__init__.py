@@ -5,18 +5,22 @@ directions of cameras in radians, lengths in metres or, where said so, in pixels
 """
 
 from imaging.errors import PictureError
+from imaging.finding import find_outline
 from imaging.flanks import FITS, FitSettings
 from imaging.heap import HeapAngle, heap_angle
+from imaging.outline import Outline
 from imaging.overlay import overlay
 from imaging.pictures import read_picture, save_picture
+from imaging.reasons import Doubt
 from imaging.render import Snapshot, silhouette, snapshot
 from imaging.repose import AngleDifference, ReposeAngle, compare, measure, measure_photograph
 from imaging.shape import HeapShape, heap_shape
-from imaging.silhouette import Outline, find_outline
+from imaging.view import View
 
 __all__ = [
     "FITS",
     "AngleDifference",
+    "Doubt",
     "FitSettings",
     "HeapAngle",
     "HeapShape",
@@ -24,6 +28,7 @@ __all__ = [
     "PictureError",
     "ReposeAngle",
     "Snapshot",
+    "View",
     "compare",
     "find_outline",
     "heap_angle",

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from imaging.errors import PictureError
-from imaging.geometry import FloatArray, Picture
+from imaging.geometry import FloatArray, Layer, Picture
 
 BLUR = 0.5
 """Standard deviation [pixels] of the smoothing, horizontal so that it does not lower a flat outline."""
@@ -23,12 +25,33 @@ SEPARATION = 5.0
 """A heap differs from the background by this many times the background's noise, on average, at the least."""
 LIGHT_RANGE = 2.0
 """Light that is brighter or dimmer than its median by more than this factor is not evened out further."""
+DEEPEST_SHADOW = 0.4
+"""Share of the light that a cast shadow keeps at the least: light comes from more than one lamp."""
 LEAST_NOISE = 1.0
 """Noise [of 255] below which a background counts as even: that of rounding and compression."""
 
 
-def contrast_with_background(picture: Picture, place: str) -> tuple[FloatArray, list[float]]:
-    """Distance of each pixel's colour from the background's, and where to cut it, most likely first.
+@dataclass(frozen=True)
+class Contrast:
+    """How a picture differs from its background."""
+
+    values: Layer
+    """Distance of each pixel's colour from the background's, in the light there, shape (rows,
+    columns)."""
+    thresholds: tuple[float, ...]
+    """Where to cut it, most likely first: one or two; what is above each differs clearly from the
+    noise."""
+    noise: float
+    """Median distance of the background's own pixels."""
+    colors: Layer
+    background: Layer
+    """The smoothed picture and the background's surface, shape (rows, columns, channels)."""
+
+
+def contrast_with_background(
+    picture: Picture, place: str, precision: type[np.float32 | np.float64] = np.float64
+) -> Contrast:
+    """Compare each pixel's colour with the background's.
 
     The background is a quadratic surface in each colour channel, fitted from the border inwards to whatever
     looks like it, so that uneven light and a coloured cloth drop out, and a heap may be darker or lighter
@@ -41,12 +64,8 @@ def contrast_with_background(picture: Picture, place: str) -> tuple[FloatArray, 
     picture : (rows, columns) or (rows, columns, 3) uint8 array
     place : str
         Names the picture in errors.
-
-    Returns
-    -------
-    contrast : (rows, columns) array
-    thresholds : list of float
-        One or two; what is above each differs clearly from the background's noise.
+    precision : type
+        Of the background's surface.
 
     Raises
     ------
@@ -54,8 +73,10 @@ def contrast_with_background(picture: Picture, place: str) -> tuple[FloatArray, 
         When the array is no picture, or when nothing stands out of its background.
     """
     channels = _channels(picture, place)
-    smooth = cv2.GaussianBlur(channels, (0, 0), sigmaX=BLUR, sigmaY=1e-6).reshape(channels.shape)
-    background, noise = _background(np.asarray(smooth, dtype=np.float64))
+    blurred = cv2.GaussianBlur(channels, (0, 0), sigmaX=BLUR, sigmaY=1e-6)
+    smooth = np.asarray(blurred, dtype=np.float32).reshape(channels.shape)
+    surface, noise = _background(smooth)
+    background = _evaluated(surface, smooth.shape, precision)
     difference = smooth - background
     contrast = np.sqrt(np.einsum("ijk,ijk->ij", difference, difference)) / _light(background)
     thresholds = []
@@ -69,10 +90,32 @@ def contrast_with_background(picture: Picture, place: str) -> tuple[FloatArray, 
         values = values[values <= threshold]
     if not thresholds:
         raise PictureError("a heap stands out of the background", "a picture without contrast", place)
-    return contrast, thresholds
+    return Contrast(contrast, tuple(thresholds), noise, smooth, background)
 
 
-def otsu_threshold(values: FloatArray) -> float:
+def unshaded(colors: Layer, own: Layer, reach: int) -> Layer:
+    """Difference of colours from a surface's own ones that a shadow on it does not make.
+
+    A shadow dims all channels alike and leaves no grains: what counts is the colour beside the line from the
+    surface's own to black, down to `DEEPEST_SHADOW`, and the lightness's unevenness over `reach` pixels.
+    """
+    power = np.maximum(np.einsum("ijk,ijk->ij", own, own), LEAST_NOISE)
+    dimming = np.clip(np.einsum("ijk,ijk->ij", colors, own) / power, DEEPEST_SHADOW, 1.0)
+    beside = colors - dimming[:, :, None] * own
+    return np.asarray(np.sqrt(np.einsum("ijk,ijk->ij", beside, beside) + unevenness(colors, reach) ** 2))
+
+
+def unevenness(colors: Layer, reach: int) -> Layer:
+    """Standard deviation of the lightness within `reach` pixels of each."""
+    level = colors.mean(axis=2)
+    size = (2 * reach + 1, 2 * reach + 1)
+    # Of the difference from the mean of all: squares of small numbers keep their digits.
+    level = level - level.mean()
+    mean, square = cv2.blur(level, size), cv2.blur(level * level, size)
+    return np.asarray(np.sqrt(np.maximum(square - mean * mean, 0.0)))
+
+
+def otsu_threshold(values: Layer) -> float:
     """Value that splits `values` in two classes with the largest variance between them (Otsu 1979)."""
     low, high = float(values.min()), float(values.max())
     counts, edges = np.histogram(values, bins=512, range=(low, max(high, low + 1e-9)))
@@ -86,7 +129,7 @@ def otsu_threshold(values: FloatArray) -> float:
     return float(0.5 * (edges[best[0] + 1] + edges[best[-1] + 1]))
 
 
-def _channels(picture: Picture, place: str) -> NDArray[np.float32]:
+def _channels(picture: Picture, place: str) -> Layer:
     layered = picture[:, :, None] if picture.ndim == 2 else picture
     if layered.ndim != 3 or layered.shape[2] not in (1, 3) or picture.dtype != np.uint8:
         rule = "a picture is a (rows, columns) or (rows, columns, 3) array of uint8"
@@ -96,12 +139,12 @@ def _channels(picture: Picture, place: str) -> NDArray[np.float32]:
     return layered.astype(np.float32)
 
 
-def _background(channels: FloatArray) -> tuple[FloatArray, float]:
-    """Quadratic surface through the background's pixels, and their median distance from it."""
+def _background(channels: Layer) -> tuple[FloatArray, float]:
+    """Coefficients of the quadratic surface through the background's pixels, and their median distance."""
     rows, columns, _ = channels.shape
     stride = max(1, int(np.sqrt(rows * columns / FIT_SAMPLES)))
     row, column = (axis.ravel() for axis in np.mgrid[0:rows:stride, 0:columns:stride])
-    sample = channels[row, column]
+    sample = channels[row, column].astype(np.float64)
     terms = _surface_terms(row, column, (rows, columns))
     side = (column < BORDER_SHARE * columns) | (column >= (1.0 - BORDER_SHARE) * columns)
     border = (row < BORDER_SHARE * rows) | ((row < 0.5 * rows) & side)
@@ -118,12 +161,28 @@ def _background(channels: FloatArray) -> tuple[FloatArray, float]:
         surface = _least_squares(terms[chosen, :size], sample[chosen])
         residual = np.linalg.norm(sample - terms[:, :size] @ surface, axis=1)
         noise = float(np.median(residual[chosen]))
-    grid = np.mgrid[0:rows, 0:columns]
-    fitted = _surface_terms(grid[0].ravel(), grid[1].ravel(), (rows, columns)) @ surface
-    return fitted.reshape(channels.shape), noise
+    return surface, noise
 
 
-def _light(background: FloatArray) -> FloatArray:
+def _evaluated(
+    surface: FloatArray, shape: tuple[int, ...], precision: type[np.float32 | np.float64]
+) -> Layer:
+    """A quadratic or a plane at every pixel; in single precision without its terms at every pixel."""
+    rows, columns = shape[:2]
+    if precision is np.float64:
+        row, column = (axis.ravel() for axis in np.mgrid[0:rows, 0:columns])
+        terms = _surface_terms(row, column, (rows, columns))[:, : len(surface)]
+        return np.asarray((terms @ surface).reshape(shape))
+    padded = np.vstack([surface, np.zeros((6 - len(surface), shape[2]))])
+    constant, x, y, xx, xy, yy = padded[:, None, None, :]
+    across = (2.0 * np.arange(columns) / columns - 1.0)[None, :, None]
+    down = (2.0 * np.arange(rows) / rows - 1.0)[:, None, None]
+    along = (constant + x * across + xx * across**2).astype(np.float32)
+    mixed = (xy * down).astype(np.float32) * across.astype(np.float32)
+    return np.asarray(along + mixed + (y * down + yy * down**2).astype(np.float32))
+
+
+def _light(background: Layer) -> Layer:
     """Brightness of the light relative to its median: where it is dim, heap and background differ less."""
     level = np.linalg.norm(background, axis=2)
     return np.clip(level / max(float(np.median(level)), LEAST_NOISE), 1.0 / LIGHT_RANGE, LIGHT_RANGE)

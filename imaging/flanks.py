@@ -10,7 +10,8 @@ from scipy import optimize
 
 from imaging.errors import PictureError
 from imaging.geometry import FloatArray
-from imaging.silhouette import Outline
+from imaging.outline import Outline
+from imaging.roughness import slope_error
 
 MINIMUM_FLANK_COLUMNS = 3
 """A line is not fitted to fewer columns."""
@@ -22,7 +23,7 @@ TOE_ROUNDS = 10
 
 @dataclass(frozen=True)
 class FitSettings:
-    """Part of a flank that the line is fitted to: angles with different settings are not comparable."""
+    """Which part of a flank the line is fitted to: angles with different settings are not comparable."""
 
     name: str
     """Name in reports."""
@@ -75,8 +76,8 @@ class FlankLine:
     stop: float
     """Positions between which the line was fitted [pixels]."""
     dof: float
-    """Independent pieces of outline less the line's two parameters: the outline of grains is correlated
-    over about a grain, so this is far less than the number of columns."""
+    """Degrees of freedom of `se` (see `slope_error`): the outline of grains is correlated over about a
+    grain, so this is far less than the number of columns."""
     rms: float
     """Root mean square of the outline about the line [pixels]."""
 
@@ -148,16 +149,15 @@ def _fit_flank(x: FloatArray, h: FloatArray, settings: FitSettings, place: str) 
     if slope <= 0.0:
         raise PictureError("the flank rises towards the apex", f"slope {slope:.3g}", place)
     step = float(np.median(np.diff(x)))
-    dof = max(len(x) / _correlation_length(residual) - 2.0, 1.0)
-    variance = float(residual @ residual) / dof / float(((x - x.mean()) ** 2).sum())
+    error = slope_error(x, residual)
     return FlankLine(
         angle=float(np.degrees(np.arctan(slope))),
-        se=float(np.degrees(np.sqrt(variance)) / (1.0 + slope**2)),
+        se=float(np.degrees(np.sqrt(error.variance)) / (1.0 + slope**2)),
         slope=slope,
         intercept=intercept,
         start=float(x[0] - 0.5 * step),
         stop=float(x[-1] + 0.5 * step),
-        dof=dof,
+        dof=error.dof,
         rms=float(np.sqrt(residual @ residual / len(x))),
     )
 
@@ -193,17 +193,3 @@ def _fit_region(h: FloatArray, settings: FitSettings) -> NDArray[np.bool_]:
     """
     smooth = optimize.isotonic_regression(h).x
     return (smooth >= settings.lower * smooth[-1]) & (smooth <= settings.upper * smooth[-1])
-
-
-def _correlation_length(residual: FloatArray) -> float:
-    """Columns per independent piece of outline: 1 + 2 * sum of the autocorrelation up to its first zero."""
-    count = len(residual)
-    power = float(residual @ residual)
-    if power <= 1e-18 * count:
-        return 1.0
-    size = 2 * count
-    spectrum = np.abs(np.fft.rfft(residual, size)) ** 2
-    correlation = np.fft.irfft(spectrum, size)[:count] / power
-    negative = np.flatnonzero(correlation <= 0.0)
-    end = negative[0] if len(negative) else count
-    return float(1.0 + 2.0 * correlation[1:end].sum())

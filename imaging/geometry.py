@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,6 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from imaging.errors import PictureError
 
 FloatArray = NDArray[np.float64]
+Layer = NDArray[np.floating[Any]]
+"""Numbers at the pixels of a picture, in single or double precision."""
 Picture = NDArray[np.uint8]
 """A picture as OpenCV holds it: (rows, columns) grey or (rows, columns, 3) blue-green-red, top row first."""
 

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from imaging.errors import PictureError
+from imaging.finding import find_outline
 from imaging.flanks import FitSettings
 from imaging.geometry import FloatArray, Frame, Spheres
 from imaging.render import silhouette
 from imaging.repose import ReposeAngle, confidence_interval, measure
-from imaging.silhouette import find_outline
 
 LEAST_DOF = 3.0
 """Satterthwaite's formula tends to no degrees of freedom at all for a small difference of variances."""

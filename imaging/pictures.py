@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import warnings
 from pathlib import Path
 
 import cv2
@@ -10,23 +12,103 @@ import numpy as np
 from imaging.errors import PictureError
 from imaging.geometry import Picture
 
+MAXIMUM_PIXELS = 120_000_000
+"""Larger pictures are not read: 360 MB in memory; a file of a few kilobytes may claim as many."""
+HEIC_ENDINGS = (".heic", ".heif")
+FILM_DIAGONAL = math.hypot(36.0, 24.0)
+"""Of the film that cameras' focal lengths are converted to [mm]."""
+FOCAL_LENGTH_TAG, WIDTH_TAG, HEIGHT_TAG, CAMERA_TAGS = 0xA405, 0xA002, 0xA003, 0x8769
+"""EXIF: focal length on 35 mm film [mm], the picture's width and height as taken, where these stand."""
+
 
 def read_picture(path: str | Path) -> Picture:
     """Read a picture file as (rows, columns, 3) uint8 in blue-green-red, upright as its camera says (EXIF).
 
+    HEIC needs the optional package pillow-heif.
+
     Raises
     ------
     PictureError
-        When there is no such file, or when it is no picture.
+        When there is no such file, when it is no picture, or when it has more than `MAXIMUM_PIXELS`.
     """
     file = Path(path)
     if not file.is_file():
         raise PictureError("the picture is a file", "no such file", str(path))
+    if file.suffix.lower() in HEIC_ENDINGS:
+        return _read_heic(file)
+    _check_size(_claimed_size(file), str(path))
     data = np.frombuffer(file.read_bytes(), dtype=np.uint8)
-    picture = cv2.imdecode(data, cv2.IMREAD_COLOR) if len(data) else None
+    try:
+        picture = cv2.imdecode(data, cv2.IMREAD_COLOR) if len(data) else None
+    except cv2.error:
+        picture = None
     if picture is None:
         raise PictureError("the file is a picture that OpenCV can read", f"{len(data)} bytes", str(path))
     return picture.astype(np.uint8, copy=False)
+
+
+def _read_heic(file: Path) -> Picture:
+    try:
+        import pillow_heif
+    except ImportError:
+        rule = "HEIC is read with pillow-heif (pip install 'dem-warp[heic]'); or save the picture as JPEG"
+        raise PictureError(rule, file.name, str(file)) from None
+    try:
+        image = pillow_heif.open_heif(file, convert_hdr_to_8bit=True)
+        _check_size(image.size, str(file))
+        colors = np.asarray(image)[:, :, :3]
+    except (ValueError, OSError, RuntimeError, SyntaxError) as error:
+        raise PictureError("the file is a HEIC picture", str(error), str(file)) from None
+    return np.ascontiguousarray(colors[:, :, ::-1])
+
+
+def _check_size(size: tuple[int, int] | None, place: str) -> None:
+    if size is not None and size[0] * size[1] > MAXIMUM_PIXELS:
+        rule = f"a picture has at most {MAXIMUM_PIXELS // 10**6} million pixels: save it smaller"
+        raise PictureError(rule, f"{size[0]} x {size[1]}", place)
+
+
+def _claimed_size(file: Path) -> tuple[int, int] | None:
+    """Columns and rows that a file's header names, before anything is decoded; None without a known one."""
+    from PIL import Image, UnidentifiedImageError
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+            with Image.open(file) as image:
+                return image.size
+    except Image.DecompressionBombError:
+        rule = f"a picture has at most {MAXIMUM_PIXELS // 10**6} million pixels: save it smaller"
+        raise PictureError(rule, "several times as many", str(file)) from None
+    except (UnidentifiedImageError, OSError, ValueError, SyntaxError):
+        return None
+
+
+def focal_length(path: str | Path) -> float | None:
+    """Focal length [pixels] by which a camera took a picture (EXIF); None where it does not say, or was cut.
+
+    An uncut picture has the size that its camera wrote beside the focal length.
+    """
+    from PIL import Image, UnidentifiedImageError
+
+    try:
+        with Image.open(path) as image:
+            tags = image.getexif().get_ifd(CAMERA_TAGS)
+            size = sorted(image.size)
+        film = float(tags.get(FOCAL_LENGTH_TAG, 0))
+        taken = sorted(int(tags.get(tag, 0)) for tag in (WIDTH_TAG, HEIGHT_TAG))
+    except (
+        UnidentifiedImageError,
+        Image.DecompressionBombError,
+        OSError,
+        ValueError,
+        TypeError,
+        SyntaxError,
+    ):
+        return None
+    if not (5.0 <= film <= 2000.0) or taken != size:
+        return None
+    return film / FILM_DIAGONAL * math.hypot(*size)
 
 
 def save_picture(path: str | Path, image: Picture) -> Path:

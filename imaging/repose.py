@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Protocol
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
+from imaging.doubts import doubts_of
 from imaging.errors import PictureError
+from imaging.finding import find_outline
 from imaging.flanks import FitSettings, FlankLine, fit_flanks
 from imaging.geometry import Picture
-from imaging.pictures import read_picture
-from imaging.silhouette import Outline, find_outline
+from imaging.outline import Outline
+from imaging.pictures import focal_length, read_picture
+from imaging.reasons import Doubt
+from imaging.view import View, level_angle, level_error
 
 
 @dataclass(frozen=True)
@@ -29,13 +34,13 @@ class ReposeAngle:
 
     @property
     def left(self) -> float:
-        """Angle of the left flank [degrees]."""
-        return self.left_line.angle
+        """Angle of the left flank [degrees], the camera's height taken out."""
+        return self._level(self.left_line.angle)
 
     @property
     def right(self) -> float:
-        """Angle of the right flank [degrees]."""
-        return self.right_line.angle
+        """Angle of the right flank [degrees], the camera's height taken out."""
+        return self._level(self.right_line.angle)
 
     @property
     def mean(self) -> float:
@@ -44,8 +49,22 @@ class ReposeAngle:
 
     @property
     def se(self) -> float:
-        """Standard error of the mean [degrees]: how well this one outline fixes two straight lines."""
-        return 0.5 * float(np.hypot(self.left_line.se, self.right_line.se))
+        """Standard error of the mean [degrees]: of both lines on this outline, and of the camera's height."""
+        roughness = 0.5 * float(np.hypot(self.left_line.se, self.right_line.se))
+        outline = self.outline
+        seen = 0.5 * (self.left_line.angle + self.right_line.angle)
+        return float(
+            np.hypot(roughness, level_error(seen, outline.elevation, outline.elevation_se, outline.distance))
+        )
+
+    def _level(self, seen: float) -> float:
+        return level_angle(seen, self.outline.elevation, self.outline.distance)
+
+    @cached_property
+    def doubts(self) -> tuple[Doubt, ...]:
+        """What speaks against the angle; empty where nothing does, and for what was drawn."""
+        judged = doubts_of(self.left_line, self.right_line, self.mean, self.se, self.outline)
+        return (*self.outline.doubts, *judged)
 
     @property
     def dof(self) -> float:
@@ -90,7 +109,10 @@ class AngleDifference:
 
 
 def measure(
-    picture: Picture | Outline, fit: str | FitSettings = "flank", place: str = "picture"
+    picture: Picture | Outline,
+    fit: str | FitSettings = "flank",
+    place: str = "picture",
+    view: View | None = None,
 ) -> ReposeAngle:
     """Measure the repose angle of a picture, or of an outline found before.
 
@@ -106,6 +128,8 @@ def measure(
         One of `FITS` by name, or your own.
     place : str
         Names the picture in errors.
+    view : View, optional
+        What is known of a photograph beforehand (see `find_outline`).
 
     Raises
     ------
@@ -113,15 +137,23 @@ def measure(
         When there is no measurable heap, or no such fit.
     """
     settings = FitSettings.of(fit)
-    outline = picture if isinstance(picture, Outline) else find_outline(picture, place=place)
+    outline = picture if isinstance(picture, Outline) else find_outline(picture, place=place, view=view)
     left, right = fit_flanks(outline, settings, place)
     return ReposeAngle(left, right, settings, outline)
 
 
-def measure_photograph(path: str | Path, fit: str | FitSettings = "flank") -> ReposeAngle:
-    """Measure the repose angle of the heap in a picture file; raise `PictureError` when it shows none."""
+def measure_photograph(
+    path: str | Path, fit: str | FitSettings = "flank", view: View | None = None
+) -> ReposeAngle:
+    """Measure the repose angle of the heap in a picture file; raise `PictureError` when it shows none.
+
+    How near the camera was is taken from the focal length that it wrote into the file, if it did.
+    """
     settings = FitSettings.of(fit)
-    return measure(read_picture(path), settings, place=str(path))
+    known = view or View()
+    if known.focal_length is None:
+        known = replace(known, focal_length=focal_length(path))
+    return measure(read_picture(path), settings, place=str(path), view=known)
 
 
 def compare(a: Angle, b: Angle) -> AngleDifference:
@@ -140,5 +172,5 @@ def confidence_interval(angle: Angle, level: float) -> tuple[float, float]:
     """Interval that holds the true mean with probability `level` [degrees], from Student's t."""
     if not 0.0 < level < 1.0:
         raise PictureError("0 < level < 1", level, "level")
-    reach = float(stats.t.ppf(0.5 + 0.5 * level, angle.dof)) * angle.se
+    reach = float(special.stdtrit(angle.dof, 0.5 + 0.5 * level)) * angle.se
     return angle.mean - reach, angle.mean + reach

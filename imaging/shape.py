@@ -8,7 +8,7 @@ import numpy as np
 
 from imaging.flanks import apex_column
 from imaging.geometry import FloatArray
-from imaging.silhouette import Outline
+from imaging.outline import Outline
 
 
 @dataclass(frozen=True)

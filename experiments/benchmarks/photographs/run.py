@@ -1,0 +1,162 @@
+"""Measure photograph-like pictures with and without heaps, and write how well it went.
+
+    python -m experiments.benchmarks.photographs.run --first 100000 --heaps 500 --others 200 --out record
+
+Seeds below 1000 were used while the rules were made; figures are for seeds from 100000 on.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from experiments.benchmarks.photographs.sampling import photograph
+from experiments.benchmarks.photographs.without import picture_without_heap
+from imaging import PictureError, ReposeAngle, measure, overlay, read_picture, save_picture
+from imaging.geometry import Picture
+
+COLUMNS = (
+    "kind", "seed", "outcome", "truth", "mean", "error", "se", "covered", "elevation", "seen_elevation",
+    "distance", "shadow", "why",
+)  # fmt: skip
+TILE, TILES_ACROSS, SHEET_TILES = (300, 220), 6, 36
+Row = dict[str, Any]
+
+
+def measured(picture: Picture) -> tuple[str, ReposeAngle | None, str]:
+    """Outcome (measured, marked or refused), the angle, and why it is not simply measured."""
+    try:
+        angle = measure(picture)
+    except PictureError as error:
+        return "refused", None, f"{error.rule}; received {error.value}"
+    if angle.doubts:
+        return "marked", angle, ", ".join(doubt.name for doubt in angle.doubts)
+    return "measured", angle, ""
+
+
+def with_heaps(first: int, count: int) -> Iterator[tuple[Row, Picture]]:
+    """Rows of photographs of heaps, with what is to be shown of them."""
+    for seed in range(first, first + count):
+        shot = photograph(seed)
+        outcome, angle, why = measured(shot.picture)
+        row: Row = {
+            "kind": shot.setting,
+            "seed": seed,
+            "outcome": outcome,
+            "truth": shot.truth.mean,
+            "why": why,
+        }
+        row |= {
+            "elevation": shot.camera.elevation,
+            "distance": 0.5 * shot.camera.distance,
+            "shadow": shot.shadow,
+        }
+        shown = shot.picture
+        if angle is not None:
+            low, high = angle.interval()
+            row |= {"mean": angle.mean, "error": angle.mean - shot.truth.mean, "se": angle.se}
+            row |= {"covered": low <= shot.truth.mean <= high, "seen_elevation": angle.outline.elevation}
+            shown = overlay(shot.picture, angle)
+        yield row, shown
+
+
+def without_heaps(first: int, count: int, folder: Path | None) -> Iterator[tuple[Row, Picture]]:
+    """Rows of drawn pictures without a heap, and of those in a folder."""
+    pictures = ((seed, *picture_without_heap(seed)) for seed in range(first, first + count))
+    files = sorted(folder.iterdir()) if folder else []
+    found = ((number, path.name, read_picture(path)) for number, path in enumerate(files))
+    for source in (pictures, found):
+        for seed, kind, picture in source:
+            outcome, angle, why = measured(picture)
+            row: Row = {"kind": kind, "seed": seed, "outcome": outcome, "why": why}
+            if angle is not None:
+                row |= {"mean": angle.mean, "se": angle.se}
+            yield row, picture
+
+
+def contact_sheet(tiles: list[tuple[str, Picture]]) -> Picture:
+    """Small copies side by side, each with its caption."""
+    small = []
+    for caption, picture in tiles:
+        scale = min(TILE[0] / picture.shape[1], TILE[1] / picture.shape[0])
+        copy = cv2.resize(picture, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+        page = np.full((TILE[1] + 20, TILE[0] + 6, 3), 255, np.uint8)
+        page[20 : 20 + copy.shape[0], : copy.shape[1]] = copy
+        cv2.putText(page, caption, (3, 14), cv2.FONT_HERSHEY_SIMPLEX, 0.42, (0, 0, 0), 1, cv2.LINE_AA)
+        small.append(page)
+    small += [np.full_like(small[0], 255)] * (-len(small) % TILES_ACROSS)
+    rows = [np.hstack(small[i : i + TILES_ACROSS]) for i in range(0, len(small), TILES_ACROSS)]
+    return np.asarray(np.vstack(rows), dtype=np.uint8)
+
+
+def summary(heaps: list[Row], others: list[Row]) -> str:
+    """The figures, as lines of Markdown."""
+    clear = [row for row in heaps if row["outcome"] == "measured"]
+    errors = np.abs([row["error"] for row in clear])
+    marked = [abs(row["error"]) for row in heaps if row["outcome"] == "marked"]
+    count = Counter(row["outcome"] for row in heaps)
+    silent = Counter(row["outcome"] for row in others)
+    quantiles = f"{np.median(errors):.2f}, {np.quantile(errors, 0.95):.2f}, {errors.max():.2f}"
+    outcomes = f"{count['measured']}, {count['marked']}, {count['refused']}"
+    far = f"{len(marked)}, {int((np.array(marked) > 1.0).sum())}"
+    table = {
+        "pictures of heaps": len(heaps),
+        "measured, marked as doubtful, refused": outcomes,
+        "error of the measured: median, 95th percentile, greatest [degrees]": quantiles,
+        "measured and wrong by more than 2 degrees": int((errors > 2.0).sum()),
+        "marked, of these wrong by more than 1 degree": far,
+        "95 % intervals that hold the truth [%]": f"{100.0 * np.mean([row['covered'] for row in clear]):.1f}",
+        "pictures without a heap": len(others),
+        "of these refused, marked, measured": ", ".join(
+            str(silent[outcome]) for outcome in ("refused", "marked", "measured")
+        ),
+    }
+    lines = [f"| {name} | {value} |" for name, value in table.items()]
+    return "\n".join(["| | |", "|---|---|", *lines])
+
+
+def main() -> None:
+    """Run the benchmark as a command."""
+    parser = argparse.ArgumentParser(description="Measure photograph-like pictures with and without heaps.")
+    parser.add_argument("--first", type=int, default=100_000, help="first seed")
+    parser.add_argument("--heaps", type=int, default=500)
+    parser.add_argument("--others", type=int, default=200)
+    parser.add_argument("--folder", type=Path, help="more pictures without a heap")
+    parser.add_argument("--out", type=Path, required=True)
+    chosen = parser.parse_args()
+    cv2.setNumThreads(1)
+    chosen.out.mkdir(parents=True, exist_ok=True)
+    rows: list[list[Row]] = []
+    for name, source, total in (
+        ("heaps", with_heaps(chosen.first, chosen.heaps), chosen.heaps),
+        ("others", without_heaps(chosen.first, chosen.others, chosen.folder), chosen.others),
+    ):
+        found: list[Row] = []
+        tiles: list[tuple[str, Picture]] = []
+        for row, picture in source:
+            found.append(row)
+            if len(found) % max(1, total // SHEET_TILES) == 0 and len(tiles) < SHEET_TILES:
+                error = f" {row['mean']:.1f} ({row['truth']:.1f})" if "error" in row else ""
+                tiles.append((f"{row['kind']} {row['seed']}: {row['outcome']}{error}", picture))
+        rows.append(found)
+        save_picture(chosen.out / f"{name}.jpg", contact_sheet(tiles))
+        with (chosen.out / f"{name}.csv").open("w", encoding="utf-8", newline="") as file:
+            writer = csv.DictWriter(file, COLUMNS, restval="", lineterminator="\n")
+            writer.writeheader()
+            writer.writerows({key: _short(value) for key, value in row.items()} for row in found)
+    print(summary(*rows))
+
+
+def _short(value: Any) -> Any:
+    return f"{value:.4g}" if isinstance(value, float) else value
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,117 @@
+"""Reasons to doubt an angle: each a rule with its limit, what was found, and why the limit is where it is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from imaging.flanks import MINIMUM_FLANK_COLUMNS, FlankLine
+from imaging.outline import Outline
+from imaging.reasons import Doubt
+
+LARGEST_LEAN = 4.0
+"""Left and right flank [degrees]: heaps poured on a level plate stand within 2.5 of one another as a rule."""
+LARGEST_ERROR = 1.0
+"""Standard error of the mean [degrees]: twice what a heap of twenty grains across has."""
+LARGEST_UNSEEN_TILT = 5.0
+"""Tilt [degrees] that is believed without a plate in view: hands hold a phone level within 3 or 4."""
+LEAST_ANGLE, GREATEST_ANGLE = 5.0, 60.0
+"""Repose angles of dry grains [degrees] lie well within."""
+LARGEST_ELEVATION = 15.0
+"""Camera's height over the plate [degrees] up to which its effect, 3.5 degrees there, is taken out."""
+LARGEST_MISFIT = 0.06
+"""Root mean square of the outline's shape about its two lines, over its height: heaps of only twenty grains
+across have up to 0.055, a parabola's dome 0.069, half a circle 0.075."""
+SHAPE_PARTS = 6
+"""Parts of a flank whose means are its shape; what is left is roughness."""
+LARGEST_END = 0.3
+"""Height of the outline's end over the heap's: a heap ends a grain high, a dish's wall higher."""
+LEAST_END = 3.0
+"""What rises less at its end [pixels] is the blur of an edge."""
+LEAST_FOOT_SLOPE = 0.5
+"""Slope of a flank's lowest third over the rest's, or the reverse: strays and caps make it 0.6 to 1.4."""
+END_WIDTH = 0.02
+"""Part of the outline's columns that make its end."""
+LARGEST_GAP = 0.1
+"""Part of the area under the outline that does not differ from the background."""
+LARGEST_SHIFT = 1.0
+"""Change of the mean [degrees] with the threshold: an edge stays where it is, a shadow's fades."""
+
+DOUBTS = (
+    "lean", "error", "tilt", "range", "elevation", "straightness", "ends", "gaps", "threshold", "foot",
+    "border", "plate", "shadow", "objects",
+)  # fmt: skip
+"""Names of all doubts."""
+
+
+def doubts_of(left: FlankLine, right: FlankLine, mean: float, se: float, outline: Outline) -> Iterator[Doubt]:
+    """Go through the rules for an angle with its fitted lines; doubts of the outline itself are not repeated.
+
+    Parameters
+    ----------
+    left, right : FlankLine
+    mean, se : float
+        Angle with its standard error [degrees].
+    outline : Outline
+    """
+    lean = abs(left.angle - right.angle)
+    if lean > LARGEST_LEAN:
+        yield Doubt("lean", f"left and right are {lean:.1f} degrees apart, over {LARGEST_LEAN:g}")
+    if se > LARGEST_ERROR:
+        yield Doubt("error", f"a standard error of {se:.2f} degrees, over {LARGEST_ERROR:g}")
+    if not LEAST_ANGLE <= mean <= GREATEST_ANGLE:
+        yield Doubt("range", f"{mean:.1f} degrees, outside {LEAST_ANGLE:g} to {GREATEST_ANGLE:g}")
+    if outline.elevation > LARGEST_ELEVATION:
+        finding = f"the camera looks down by {outline.elevation:.0f} degrees, over {LARGEST_ELEVATION:g}"
+        yield Doubt("elevation", finding)
+    misfit = relative_misfit(left, right, outline)
+    if misfit > LARGEST_MISFIT:
+        yield Doubt(
+            "straightness", f"flanks bend {misfit:.3f} heights off their lines, over {LARGEST_MISFIT:g}"
+        )
+    for line, side in ((left, "left"), (right, "right")):
+        share = foot_slope(line, outline)
+        if not LEAST_FOOT_SLOPE <= share <= 1.0 / LEAST_FOOT_SLOPE:
+            finding = f"the {side} flank's lower third is {share:.2f} times as steep as the rest"
+            yield Doubt(
+                "foot", f"{finding}, beyond a factor of {1.0 / LEAST_FOOT_SLOPE:g}: a board, a shadow?"
+            )
+    end = highest_end(outline)
+    if end > LARGEST_END and end * outline.height.max() > LEAST_END:
+        yield Doubt(
+            "ends", f"an end {end:.2f} heights over the plate, over {LARGEST_END:g}: a dish or board?"
+        )
+
+
+def relative_misfit(left: FlankLine, right: FlankLine, outline: Outline) -> float:
+    """Root mean square of an outline's shape about its two lines, over its height."""
+    means = []
+    for line in (left, right):
+        covered = (outline.position >= line.start) & (outline.position <= line.stop)
+        residual = outline.height[covered] - line.intercept - line.slope * outline.position[covered]
+        means += [float(part.mean()) for part in np.array_split(residual, min(SHAPE_PARTS, len(residual)))]
+    return float(np.sqrt(np.mean(np.square(means))) / outline.height.max())
+
+
+def foot_slope(line: FlankLine, outline: Outline) -> float:
+    """Slope of the lowest third of a flank over that of the rest; 1 where it has too few columns."""
+    covered = (outline.position >= line.start) & (outline.position <= line.stop)
+    x, h = outline.position[covered], outline.height[covered]
+    if line.slope < 0.0:
+        x, h = -x[::-1], h[::-1]
+    third = len(x) // 3
+    if third < MINIMUM_FLANK_COLUMNS:
+        return 1.0
+    low, high = (
+        float((a - a.mean()) @ b / ((a - a.mean()) ** 2).sum())
+        for a, b in ((x[:third], h[:third]), (x[third:], h[third:]))
+    )
+    return low / high if high > 0.0 else 0.0
+
+
+def highest_end(outline: Outline) -> float:
+    """Height of the higher end of an outline over the greatest height."""
+    width = max(3, round(END_WIDTH * len(outline.height)))
+    ends = [np.median(outline.height[:width]), np.median(outline.height[-width:])]
+    return float(max(ends) / outline.height.max())

@@ -1,0 +1,212 @@
+"""Photographs to outlines: a heap before a wall, on a plate, under somebody's lamp, in somebody's hand.
+
+A large picture is searched on a reduced copy; the edge that is found there is refined at full size.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+
+from imaging.background import Contrast, contrast_with_background
+from imaging.doubts import (
+    LARGEST_LEAN,
+    LARGEST_MISFIT,
+    LARGEST_SHIFT,
+    doubts_of,
+    relative_misfit,
+)
+from imaging.errors import PictureError
+from imaging.flanks import FitSettings, fit_flanks
+from imaging.geometry import FloatArray, Picture
+from imaging.looks import other_looks, with_faint
+from imaging.outline import Outline, levelled
+from imaging.plate import PlateLine
+from imaging.reasons import Doubt
+from imaging.sighting import Sighting, refuse_brimful, sight
+from imaging.view import View, level_angle
+
+NO_HEAP = 0.1
+"""Misfit of the flanks' shape, in heights, from which on it is no heap: half a circle, 0.075, is doubtful."""
+AS_GOOD = 1.3
+"""Factor between misfits that are about the same: two thresholds on one heap differ by as much."""
+LEAST_STEP = 15.0
+"""Difference of colours [of 255] across an edge below which it is not refined."""
+SEARCHED_PIXELS = 800_000
+"""A larger picture is searched on a copy of about this many pixels."""
+
+
+def photographed_outline(picture: Picture, view: View, meters_per_pixel: float | None, place: str) -> Outline:
+    """Find the heap of a photograph (see `find_outline`)."""
+    part = view.inside(picture.shape, place)
+    cut = picture[part]
+    left, top = part[1].start, part[0].start
+    factor = max(1, round(np.sqrt(cut.shape[0] * cut.shape[1] / SEARCHED_PIXELS)))
+    sighting = find_heap(_reduced(cut, factor), _given_plate(view, left, top, factor), view, place)
+    if view.elevation is not None:
+        sighting = replace(sighting, elevation=view.elevation, elevation_se=0.0)
+    columns = np.flatnonzero(np.isfinite(sighting.rows)).astype(np.float64)
+    rows = sighting.rows[columns.astype(np.intp)]
+    plate = sighting.plate
+    if factor > 1:
+        columns, rows = _refined(cut, columns, rows, factor)
+        row = factor * (plate.row + 0.5) - 0.5 - plate.slope * (0.5 * factor - 0.5)
+        plate = replace(plate, row=row)
+    plate = replace(plate, row=plate.row - plate.slope * left + top)
+    position, height = levelled(columns + left, rows + top, plate, place)
+    return Outline(
+        position,
+        height,
+        plate,
+        meters_per_pixel,
+        sighting.elevation,
+        sighting.elevation_se,
+        view.distance_of(float(np.ptp(position))),
+        sighting.doubts,
+    )
+
+
+def _refined(
+    picture: Picture, columns: FloatArray, rows: FloatArray, factor: int
+) -> tuple[FloatArray, FloatArray]:
+    """Columns and rows of an edge at full size, from those on the reduced copy.
+
+    In each column the edge is where the colour is halfway from that above the strip of `2 * factor` pixels
+    about the coarse edge to that below it; where the two hardly differ, the coarse edge stays.
+    """
+    coarse_columns, coarse_rows = (factor * (value + 0.5) - 0.5 for value in (columns, rows))
+    fine = np.arange(np.ceil(coarse_columns[0]), np.floor(coarse_columns[-1]) + 1)
+    coarse = np.interp(fine, coarse_columns, coarse_rows)
+    reach = 2 * factor
+    middle = np.rint(coarse).astype(np.intp)
+    strip = np.clip(middle + np.arange(-reach, reach + 1)[:, None], 0, picture.shape[0] - 1)
+    colors = picture[strip, fine.astype(np.intp)].reshape(*strip.shape, -1).astype(np.float32)
+    above, below = (
+        cv2.blur(part.mean(axis=0)[None], (2 * factor + 1, 1)).reshape(len(fine), -1)
+        for part in (colors[:factor], colors[-factor:])
+    )
+    step = below - above
+    size = np.einsum("ij,ij->i", step, step)
+    share = np.einsum("kij,ij->ki", colors - above, step) / np.maximum(size, 1.0)
+    inside = share >= 0.5
+    first = np.maximum(inside.argmax(axis=0), 1)
+    column = np.arange(len(fine))
+    before, after = share[first - 1, column], share[first, column]
+    part = np.clip((after - 0.5) / np.maximum(after - before, 1e-6), 0.0, 1.0)
+    found = middle - reach + first - part
+    sure = (size >= LEAST_STEP**2) & inside.any(axis=0) & ~inside[0]
+    return fine, np.where(sure, found, coarse)
+
+
+def _reduced(picture: Picture, factor: int) -> Picture:
+    if factor == 1:
+        return picture
+    rows, columns = (size // factor for size in picture.shape[:2])
+    whole = picture[: rows * factor, : columns * factor]
+    return np.asarray(cv2.resize(whole, (columns, rows), interpolation=cv2.INTER_AREA), dtype=np.uint8)
+
+
+def _given_plate(view: View, left: int, top: int, factor: int) -> PlateLine | None:
+    """The plate's line as a person gave it, in the reduced copy of the part."""
+    if view.plate is None:
+        return None
+    x1, y1, x2, y2 = view.plate
+    slope = (y2 - y1) / (x2 - x1)
+    row = y1 - top + slope * (left - x1)
+    return PlateLine((row + 0.5 - slope * (0.5 - 0.5 * factor)) / factor - 0.5, slope, visible=True)
+
+
+def find_heap(picture: Picture, given: PlateLine | None, view: View, place: str) -> Sighting:
+    """Find the heap in a picture of moderate size: of several thresholds the one that shows it best.
+
+    An edge of a heap stays where it is whatever the threshold; where those that show a heap without a doubt
+    disagree on its angle, there is one.
+    """
+    seen = contrast_with_background(picture, place, np.float32)
+    tries, errors = _tries(with_faint(seen), given, view, place)
+    best = _first_of_best(tries)
+    if best is None or not best.clear or best.shift(tries) > LARGEST_SHIFT:
+        others = [judged for look in other_looks(seen) for judged in _tries(look, given, view, place)[0]]
+        # Another look counts where it leaves fewer doubts, none where the plain ones refuse, or where these
+        # disagree.
+        if best is None:
+            others = [judged for judged in others if judged.clear]
+        if best is None or best.clear or any(len(other.doubts) < len(best.doubts) for other in others):
+            tries += others
+            best = _first_of_best(tries)
+    if best is None:
+        raise errors[0]
+    if best.crooked > NO_HEAP:
+        rule = "two straight flanks meet at the tip of a heap"
+        raise PictureError(rule, f"no heap: an outline {best.crooked:.2f} of its height off two lines", place)
+    if given is None:
+        refuse_brimful(seen, best.sighting, place)
+    shift = best.shift(tries)
+    if not best.clear or shift <= LARGEST_SHIFT:
+        return best.sighting
+    finding = f"the angle moves by {shift:.1f} degrees with the threshold, over {LARGEST_SHIFT:g}"
+    return replace(best.sighting, doubts=(*best.sighting.doubts, Doubt("threshold", finding)))
+
+
+def _tries(
+    seen: Contrast, given: PlateLine | None, view: View, place: str
+) -> tuple[list[Judged], list[PictureError]]:
+    """Heaps at the thresholds of a contrast, and why others show none."""
+    tries, errors = [], []
+    for threshold in seen.thresholds:
+        try:
+            tries.append(_judged(sight(seen, threshold, given, view, place), place))
+        except PictureError as error:
+            errors.append(error)
+    return tries, errors
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A sighting with the angle of its whole flanks [degrees], what speaks against it, and its misfit.
+
+    `crooked` is the misfit of its flanks alone, in heights (see `relative_misfit`).
+    """
+
+    sighting: Sighting
+    mean: float
+    doubts: tuple[Doubt, ...]
+    misfit: float
+    crooked: float
+
+    @property
+    def clear(self) -> bool:
+        """Whether there is no doubt."""
+        return not self.doubts
+
+    def shift(self, others: Sequence[Judged]) -> float:
+        """Greatest change of the angle [degrees] among others without a doubt."""
+        return max((abs(other.mean - self.mean) for other in others if other.clear), default=0.0)
+
+
+def _first_of_best(tries: Sequence[Judged]) -> Judged | None:
+    """The first with the fewest doubts that fits about as well as the best of these."""
+    fewest = min((len(judged.doubts) for judged in tries), default=0)
+    good = [judged for judged in tries if len(judged.doubts) == fewest]
+    limit = AS_GOOD * min((judged.misfit for judged in good), default=0.0)
+    return next((judged for judged in good if judged.misfit <= limit), None)
+
+
+def _judged(sighting: Sighting, place: str) -> Judged:
+    columns = np.flatnonzero(np.isfinite(sighting.rows)).astype(np.float64)
+    rows = sighting.rows[columns.astype(np.intp)]
+    position, height = levelled(columns, rows, sighting.plate, place)
+    outline = Outline(position, height, sighting.plate, elevation=sighting.elevation)
+    left, right = fit_flanks(outline, FitSettings.of("flank"), place)
+    mean = 0.5 * (left.angle + right.angle)
+    se = 0.5 * float(np.hypot(left.se, right.se))
+    # An angle that no grain has does not say that another look would show the heap better.
+    found = (doubt for doubt in doubts_of(left, right, mean, se, outline) if doubt.name != "range")
+    doubts = (*sighting.doubts, *found)
+    lean = abs(left.angle - right.angle) / LARGEST_LEAN
+    crooked = relative_misfit(left, right, outline)
+    misfit = crooked / LARGEST_MISFIT + lean
+    return Judged(sighting, level_angle(mean, sighting.elevation), doubts, misfit, crooked)

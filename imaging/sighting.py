@@ -1,0 +1,244 @@
+"""A heap among what stands out of a photograph's background, on a plate that is seen or not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from imaging.background import Contrast, unshaded
+from imaging.doubts import LARGEST_UNSEEN_TILT
+from imaging.errors import PictureError
+from imaging.foot import Base, below_plate, front_of_base, joined_foot
+from imaging.geometry import FloatArray, Layer
+from imaging.outline import bottom_edge, inner_contrast, largest_pieces, refine_thin, top_edge
+from imaging.plate import PlateLine, find_plate
+from imaging.reasons import Doubt
+from imaging.view import View
+
+FLOATING = 0.1
+"""A piece that ends this far over the plate's line, in its own heights, does not stand on it."""
+RIVAL_SHARE = 0.25
+"""A second piece larger than this share of the largest is a second heap or an object."""
+LEAST_FOOT = 4.0
+"""A foot is seen where it reaches this far below the plate's line [pixels]: a lens bends that by less."""
+DEEP_FOOT = 0.05
+"""Depth of a foot over its width, a camera 6 degrees up, from which on its colour is asked for."""
+LEAST_WIDTH = 100.0
+"""What a narrower heap [pixels] stands on is not looked at: a blurred edge is as wide as the strips below."""
+BRIMFUL_RULE = "the heap stands on a plate wider than itself"
+BESIDE_NOISE, BESIDE_DIFFERENCE = 6.0, 24.0
+"""Multiple of the wall's noise, and difference [of 255], from which on two sides differ: twice a cloth's."""
+VIEW_FROM_ABOVE = 0.5
+"""Depth of the base over its half width: from here on, a camera 30 degrees up, flanks are hidden."""
+
+
+@dataclass(frozen=True)
+class Sighting:
+    """A heap found in a picture."""
+
+    rows: FloatArray
+    """Upper edge of the heap; NaN beside it, shape (columns,)."""
+    plate: PlateLine
+    elevation: float
+    elevation_se: float
+    """Of the camera [degrees]."""
+    doubts: tuple[Doubt, ...]
+    depth: float = 0.0
+    """How far the heap's foot goes on below the plate's line [pixels]."""
+
+
+def sight(seen: Contrast, threshold: float, given: PlateLine | None, view: View, place: str) -> Sighting:
+    """The heap among what stands out of the wall by a threshold."""
+    contrast = seen.values
+    plate, body, heap = _on_plate(contrast > threshold, seen, threshold, given, view, place)
+    if not plate.visible:
+        threshold = 0.5 * inner_contrast(heap, contrast)
+        near = cv2.dilate(heap.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
+        plate, body, heap = _on_plate(near & (contrast > threshold), seen, threshold, given, view, place)
+        rows = refine_thin(top_edge(heap, contrast, threshold), heap, contrast, plate)
+        return _seen_whole(rows, body, plate, contrast, threshold, place)
+    if given is not None:
+        return Sighting(top_edge(heap, contrast, threshold), plate, 0.0, 0.0, ())
+    return _on_seen_plate(seen, threshold, plate, body, heap, place)
+
+
+def _on_plate(
+    front: NDArray[np.bool_],
+    seen: Contrast,
+    threshold: float,
+    given: PlateLine | None,
+    view: View,
+    place: str,
+) -> tuple[PlateLine, NDArray[np.bool_], NDArray[np.bool_]]:
+    """The plate, the largest piece of what stands out of the wall, and what of it stands on the plate."""
+    if not front.any():
+        raise PictureError("a heap stands out of the background", "nothing that does", place)
+    body, _ = largest_pieces(front)
+    plate = _plate_of(body, seen, threshold, place) if given is None else given
+    above = plate.above(front)
+    if not above.any():
+        raise PictureError("a heap stands on the plate", "nothing above the plate line", place)
+    heap = _chosen_piece(above, plate, view, place)
+    if given is None and plate.visible and _floats(heap, plate):
+        # What was taken for the plate lies before the heap's foot: the front of a table as pale as the wall.
+        body = heap
+        plate = _plate_of(body, seen, threshold, place)
+        heap = plate.above(heap)
+        if not heap.any():
+            raise PictureError("a heap stands on the plate", "nothing above the plate line", place)
+    for border, name in ((heap[:, 0], "left"), (heap[:, -1], "right"), (heap[0], "top")):
+        if border.any():
+            rule = "the whole heap is in the picture"
+            raise PictureError(rule, f"a heap cropped by the {name} border", place)
+    if not plate.visible and body[-1].any():
+        rule = "the heap stands on its plate, its whole foot in the picture"
+        raise PictureError(rule, "something that goes on below the bottom border: no heap?", place)
+    return plate, body, heap
+
+
+def _plate_of(body: NDArray[np.bool_], seen: Contrast, threshold: float, place: str) -> PlateLine:
+    upper, lower = (edge(body, seen.values, threshold) for edge in (top_edge, bottom_edge))
+    return find_plate(upper, lower, place)
+
+
+def _floats(heap: NDArray[np.bool_], plate: PlateLine) -> bool:
+    """Whether a piece ends well above the plate's line."""
+    rows, columns = np.nonzero(heap)
+    gap = float((plate.rows_at(columns) - rows).min())
+    return gap > max(4.0, FLOATING * float(np.ptp(rows)))
+
+
+def _chosen_piece(above: NDArray[np.bool_], plate: PlateLine, view: View, place: str) -> NDArray[np.bool_]:
+    """The one large piece above the plate's line, or the one of several that was chosen."""
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(above.astype(np.uint8), connectivity=8)
+    areas = stats[1:, cv2.CC_STAT_AREA]
+    large = 1 + np.flatnonzero(areas > RIVAL_SHARE * areas.max())
+    large = large[np.argsort(stats[large, cv2.CC_STAT_LEFT])]
+    if view.heap is not None:
+        if view.heap > len(large):
+            raise PictureError(f"the picture shows {len(large)} heaps", f"heap {view.heap}", place)
+        return np.asarray(labels == large[view.heap - 1])
+    if len(large) > 1:
+        rule = "one heap stands on the plate, and nothing of its size beside it (cut it out, or choose one)"
+        raise PictureError(
+            rule, f"several pieces of like size, {len(large)}: a second heap or objects", place
+        )
+    return np.asarray(labels == large[0])
+
+
+def _seen_whole(
+    rows: FloatArray,
+    body: NDArray[np.bool_],
+    plate: PlateLine,
+    contrast: Layer,
+    threshold: float,
+    place: str,
+) -> Sighting:
+    """A heap without a plate's edge in view: the front of its base is its lower edge."""
+    doubts = []
+    bottom = bottom_edge(body, contrast, threshold)
+    base = front_of_base(bottom, None)
+    elevation = elevation_se = 0.0
+    depth = 0.0
+    if base.seen:
+        plate, elevation, elevation_se = _raised(base, rows, plate, place)
+        depth = base.row + base.depth - plate.row
+    if abs(plate.tilt) > LARGEST_UNSEEN_TILT:
+        finding = f"{plate.tilt:.1f} degrees without a plate seen, over {LARGEST_UNSEEN_TILT:g}"
+        doubts.append(Doubt("tilt", finding))
+    return Sighting(rows, plate, elevation, elevation_se, tuple(doubts), depth)
+
+
+def _on_seen_plate(
+    seen: Contrast,
+    threshold: float,
+    plate: PlateLine,
+    body: NDArray[np.bool_],
+    heap: NDArray[np.bool_],
+    place: str,
+) -> Sighting:
+    """A heap on a plate whose edge is seen: a level one ends there, one seen from above goes on below."""
+    doubts: list[Doubt] = []
+    top = below_plate(seen.colors, heap, body, plate)
+    level = np.asarray(seen.values / threshold, dtype=np.float32)
+    if top.alike:
+        doubts.append(Doubt("plate", "heap and plate are of like colour: the heap's foot is not seen"))
+        return Sighting(top_edge(heap, level, 1.0), plate, 0.0, 0.0, tuple(doubts))
+    whole = joined_foot(heap, top.level, plate)
+    line = plate.rows_at(np.arange(heap.shape[1]))
+    combined = np.where(np.arange(heap.shape[0])[:, None] <= line, level, top.level)
+    base = front_of_base(bottom_edge(whole, combined, 1.0), plate.slope)
+    if base.row + base.depth - plate.row < LEAST_FOOT:
+        return Sighting(top_edge(heap, level, 1.0), plate, 0.0, 0.0, tuple(doubts))
+    if whole[-1].any():
+        doubts.append(Doubt("border", "the heap's foot goes on below the bottom border"))
+    rows = top_edge(whole, combined, 1.0)
+    level_line = PlateLine(base.row, plate.slope, visible=True)
+    elevation = elevation_se = 0.0
+    if base.seen:
+        level_line, elevation, elevation_se = _raised(base, rows, plate, place)
+    depth = base.row + base.depth - level_line.row
+    return Sighting(rows, level_line, elevation, elevation_se, tuple(doubts), depth)
+
+
+def refuse_brimful(seen: Contrast, found: Sighting, place: str) -> None:
+    """Refuse a heap that stands on, or in, something no wider than itself: a dish, a box, a narrow board.
+
+    What is right below its foot then differs from what is beside it at the same level, to the left and to the
+    right; on a plate both are the plate, and shadows on it do not count.
+    """
+    columns = np.flatnonzero(np.isfinite(found.rows)).astype(np.float64)
+    position, _ = found.plate.level(columns, found.rows[columns.astype(np.intp)])
+    left, right = float(position.min()), float(position.max())
+    width = right - left
+    if width < LEAST_WIDTH:
+        return
+    least = max(BESIDE_NOISE * seen.noise, BESIDE_DIFFERENCE)
+    middle = np.linspace(left + 0.3 * width, right - 0.3 * width, 60)
+    if found.depth > DEEP_FOOT * width:
+        low = _sampled(seen, found.plate, middle, -found.depth * np.linspace(0.3, 0.7, 8))
+        high = _sampled(seen, found.plate, middle, np.linspace(0.02, 0.06, 8) * width)
+        if low is not None and high is not None and min(_differ(low, high), _differ(high, low)) > least:
+            raise PictureError(BRIMFUL_RULE, "a dish, or an object of another colour below it", place)
+    heights = -found.depth - np.linspace(0.02, 0.05, 8) * width - 1.0
+    under = _sampled(seen, found.plate, np.linspace(left + 0.2 * width, right - 0.2 * width, 60), heights)
+    sides = [
+        _sampled(seen, found.plate, np.linspace(end + 0.05 * step, end + 0.1 * step, 20), heights)
+        for end, step in ((left, -width), (right, width))
+    ]
+    if under is None or any(side is None for side in sides):
+        return
+    if all(side is not None and _differ(under, side) > least for side in sides):
+        raise PictureError(BRIMFUL_RULE, "a dish, or a narrow board", place)
+
+
+def _sampled(seen: Contrast, plate: PlateLine, position: FloatArray, heights: FloatArray) -> Layer | None:
+    """Median colour of each height's points; None where the picture does not show them."""
+    across, up = (grid.ravel() for grid in np.meshgrid(position, heights))
+    columns, rows = (np.rint(value).astype(np.intp) for value in plate.picture_point(across, up))
+    if min(columns.min(), rows.min()) < 0 or columns.max() >= seen.colors.shape[1]:
+        return None
+    if rows.max() >= seen.colors.shape[0]:
+        return None
+    colors = seen.colors[rows, columns].reshape(len(heights), len(position), -1)
+    return np.asarray(np.median(colors, axis=1), dtype=np.float32)
+
+
+def _differ(one: Layer, other: Layer) -> float:
+    """Median difference of colours from others that a shadow on the first does not make."""
+    return float(np.median(unshaded(one[None], other[None], 0)))
+
+
+def _raised(base: Base, rows: FloatArray, plate: PlateLine, place: str) -> tuple[PlateLine, float, float]:
+    """The line at which the straight outline of a cone ends, and the camera's height, from its base."""
+    if base.depth > VIEW_FROM_ABOVE * base.half_width:
+        rule = "the picture shows the heap from the side"
+        raise PictureError(rule, f"a view from above, by some {base.elevation:.0f} degrees", place)
+    tip = np.nanmax(base.row + base.slope * np.arange(len(rows)) - rows)
+    # The tangents from the tip touch the ellipse this far above its middle.
+    touch = base.depth**2 / max(float(tip), 1.0)
+    line = PlateLine(base.row - touch, base.slope, plate.visible)
+    return line, base.elevation, base.elevation_se
