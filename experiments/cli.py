@@ -7,17 +7,15 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
-from rich.table import Table
 
 from experiments.commands.console import FAILED_RUN, CaseProgress, clear_errors, fail, messages
+from experiments.commands.results import print_angles, print_clump, print_measured, show_stage
 
 if TYPE_CHECKING:
-    from experiments.calibrate.results import StageResult
-    from experiments.cases import Heap
+    pass
 
 app = typer.Typer(
     name="dem-warp",
@@ -118,7 +116,7 @@ def calibrate(
             published_replicates=paper_replicates if follow_paper or only_paper else 0,
             campaign=not only_paper,
             watch=CaseProgress,
-            on_stage=_show_stage,
+            on_stage=show_stage,
         )
     if ended.record is not None:
         messages.print(f"Published runs: {ended.record}")
@@ -230,7 +228,7 @@ def heap(
     if simulated.reason:
         fail(f"the case {simulated.result.status}: {simulated.reason}", FAILED_RUN)
     elif not as_json:
-        _print_measured(simulated)
+        print_measured(simulated)
 
 
 @app.command(epilog="Example: [bold]dem-warp angle photos/*.jpg --fit middle --overlay measured[/]")
@@ -281,7 +279,7 @@ def angle(
             result = {"pictures": rows, "mean": mean.to_dict() if mean else None}
             typer.echo(json.dumps(result, allow_nan=False))
         else:
-            _print_angles(rows, fit)
+            print_angles(rows, fit)
             if mean:
                 typer.echo(str(mean))
     for row in rows:
@@ -324,7 +322,7 @@ def clump(
     if as_json:
         typer.echo(json.dumps(made.to_dict(mass_density), allow_nan=False))
     else:
-        _print_clump(made.to_dict(mass_density))
+        print_clump(made.to_dict(mass_density))
 
 
 @app.command(epilog="Example: [bold]dem-warp new mygrain[/] writes mygrain.toml")
@@ -379,24 +377,6 @@ def _quantity(text: str, dimension: str, option: str) -> float:
         raise InputError(str(error), text, option) from None
 
 
-def _show_stage(name: str, result: StageResult) -> None:
-    """Show what a stage decided, as it ends."""
-    for decision in result.decisions:
-        messages.print(f"{name.replace('_', ' ')}: {decision.outcome}", markup=False)
-
-
-def _print_clump(facts: dict[str, Any]) -> None:
-    """Show a clump's facts, one a line, without its spheres."""
-    moments = ", ".join(f"{moment:.4f}" for moment in facts["inertia_over_mass_mm2"])
-    typer.echo(f"spheres {facts['sphere_count']}, bounding radius {facts['bounding_radius_mm']:.3f} mm")
-    typer.echo(f"volume {facts['volume_mm3']:.4f} mm3 (overlaps counted once)")
-    typer.echo(f"inertia over mass {moments} mm2 (principal)")
-    if facts["mass_mg"] is not None:
-        typer.echo(f"mass {facts['mass_mg']:.4f} mg")
-    if facts["coverage"] is not None:
-        typer.echo(f"covers {facts['coverage']:.1%} of the solid, passes it by {facts['overshoot']:.1%}")
-
-
 def _go_on(command: str, *files: Path | None, **options: object) -> str:
     """Command that goes on where this one was interrupted; options that were not given are left out."""
     words = ["dem-warp", command, *(str(file) for file in files if file)]
@@ -404,28 +384,3 @@ def _go_on(command: str, *files: Path | None, **options: object) -> str:
         if value is not None and value is not False:
             words += [f"--{name.replace('_', '-')}", *([] if value is True else [str(value)])]
     return " ".join([*words, "--resume"])
-
-
-def _print_measured(simulated: Heap) -> None:
-    """Show the angle of a heap; for a test that leaves none, what else it measures, one a line."""
-    if simulated.angle:
-        typer.echo(f"{simulated.angle.mean:.2f} +- {simulated.angle.se:.2f} degrees")
-        return
-    for name, unit in simulated.units.items():
-        value = simulated.observed.observables[name]
-        typer.echo(f"{name.replace('_', ' ')}: {value:.5g} {'' if unit == '1' else unit}".rstrip())
-
-
-def _print_angles(rows: list[dict[str, Any]], fit: str) -> None:
-    table = Table(title=f"Repose angles [degrees], {fit} fit")
-    table.add_column("picture", overflow="fold")
-    for name in ("left", "right", "mean", "se"):
-        table.add_column(name, justify="right")
-    table.add_column("doubts", overflow="fold")
-    for row in rows:
-        if row["mean"] is not None:
-            values = [f"{row[name]:.2f}" for name in ("left", "right", "mean", "se")]
-            doubts = ", ".join(doubt.partition(":")[0] for doubt in row["doubts"])
-            table.add_row(row["picture"], *values, doubts)
-    if table.row_count:
-        Console().print(table)

@@ -1,0 +1,60 @@
+"""Results on standard output, as people read them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from experiments.commands.console import messages
+
+if TYPE_CHECKING:
+    from experiments.calibrate.results import StageResult
+    from experiments.cases import Heap
+
+
+def show_stage(name: str, result: StageResult) -> None:
+    """Show what a stage decided, as it ends."""
+    for decision in result.decisions:
+        messages.print(f"{name.replace('_', ' ')}: {decision.outcome}", markup=False)
+
+
+def print_clump(facts: Mapping[str, Any]) -> None:
+    """Show a clump's facts, one a line, without its spheres."""
+    moments = ", ".join(f"{moment:.4f}" for moment in facts["inertia_over_mass_mm2"])
+    typer.echo(f"spheres {facts['sphere_count']}, bounding radius {facts['bounding_radius_mm']:.3f} mm")
+    typer.echo(f"volume {facts['volume_mm3']:.4f} mm3 (overlaps counted once)")
+    typer.echo(f"inertia over mass {moments} mm2 (principal)")
+    if facts["mass_mg"] is not None:
+        typer.echo(f"mass {facts['mass_mg']:.4f} mg")
+    if facts["coverage"] is not None:
+        typer.echo(f"covers {facts['coverage']:.1%} of the solid, passes it by {facts['overshoot']:.1%}")
+
+
+def print_measured(simulated: Heap) -> None:
+    """Show the angle of a heap; for a test that leaves none, what else it measures, one a line."""
+    if simulated.angle:
+        typer.echo(f"{simulated.angle.mean:.2f} +- {simulated.angle.se:.2f} degrees")
+        return
+    for name, unit in simulated.units.items():
+        value = simulated.observed.observables[name]
+        typer.echo(f"{name.replace('_', ' ')}: {value:.5g} {'' if unit == '1' else unit}".rstrip())
+
+
+def print_angles(rows: Sequence[Mapping[str, Any]], fit: str) -> None:
+    """Lay out measured pictures as a table, with their doubts."""
+    table = Table(title=f"Repose angles [degrees], {fit} fit")
+    table.add_column("picture", overflow="fold")
+    for name in ("left", "right", "mean", "se"):
+        table.add_column(name, justify="right")
+    table.add_column("doubts", overflow="fold")
+    for row in rows:
+        if row["mean"] is not None:
+            values = [f"{row[name]:.2f}" for name in ("left", "right", "mean", "se")]
+            doubts = ", ".join(doubt.partition(":")[0] for doubt in row["doubts"])
+            table.add_row(row["picture"], *values, doubts)
+    if table.row_count:
+        Console().print(table)
