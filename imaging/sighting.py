@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -14,7 +14,7 @@ from imaging.errors import PictureError
 from imaging.foot import Base, below_plate, front_of_base, joined_foot
 from imaging.geometry import FloatArray, Layer
 from imaging.outline import bottom_edge, inner_contrast, largest_pieces, refine_thin, top_edge
-from imaging.plate import PlateLine, find_plate
+from imaging.plate import PLATE_CLEARANCE, PlateLine, find_plate
 from imaging.reasons import Doubt
 from imaging.view import View
 
@@ -191,6 +191,19 @@ def _on_seen_plate(
         level_line, elevation, elevation_se = _raised(base, rows, plate, place)
     depth = base.row + base.depth - level_line.row
     return Sighting(rows, level_line, elevation, elevation_se, tuple(doubts), depth)
+
+
+def without_strays(found: Sighting) -> Sighting:
+    """The same heap without what lies beyond a gap in its outline: grains that rolled off."""
+    height = found.plate.rows_at(np.arange(len(found.rows))) - found.rows
+    height = np.where(np.isfinite(height), height, 0.0)
+    tip = int(height.argmax())
+    low = np.flatnonzero(height <= PLATE_CLEARANCE)
+    first = int(low[low < tip].max(initial=-1)) + 1
+    last = int(low[low > tip].min(initial=len(height)))
+    kept = np.zeros(len(height), dtype=np.bool_)
+    kept[first:last] = True
+    return replace(found, rows=np.where(kept, found.rows, np.nan))
 
 
 def refuse_brimful(seen: Contrast, found: Sighting, place: str) -> None:
