@@ -147,7 +147,7 @@ def find_heap(picture: Picture, given: PlateLine | None, view: View, place: str)
         rule = "two straight flanks meet at the tip of a heap"
         raise PictureError(rule, f"no heap: an outline {best.crooked:.2f} of its height off two lines", place)
     if given is None:
-        refuse_brimful(seen, best.sighting, place)
+        refuse_brimful(seen, best.sighting, best.ends, place)
     shift = best.shift(tries)
     if not best.clear or shift <= LARGEST_SHIFT:
         return best.sighting
@@ -173,7 +173,8 @@ def _tries(
 class Judged:
     """A sighting with the angle of its whole flanks [degrees], what speaks against it, and its misfit.
 
-    `crooked` is the misfit of its flanks alone, in heights (see `relative_misfit`).
+    `crooked` is the misfit of its flanks alone, in heights (see `relative_misfit`); `ends` are where its lines
+    meet the plate.
     """
 
     sighting: Sighting
@@ -181,6 +182,7 @@ class Judged:
     doubts: tuple[Doubt, ...]
     misfit: float
     crooked: float
+    ends: tuple[float, float]
 
     @property
     def clear(self) -> bool:
@@ -215,4 +217,5 @@ def _judged(sighting: Sighting, place: str) -> Judged:
     lean = abs(left.angle - right.angle) / LARGEST_LEAN
     crooked = relative_misfit(left, right, outline)
     misfit = crooked / LARGEST_MISFIT + lean
-    return Judged(sighting, level_angle(mean, sighting.elevation), doubts, misfit, crooked)
+    ends = (-left.intercept / left.slope, -right.intercept / right.slope)
+    return Judged(sighting, level_angle(mean, sighting.elevation), doubts, misfit, crooked, ends)
