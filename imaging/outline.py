@@ -58,9 +58,9 @@ def levelled(
 ) -> tuple[FloatArray, FloatArray]:
     """Positions along the plate, increasing, and heights over it, of an upper edge's points."""
     position, height = plate.level(columns, rows)
-    if np.ptp(position) < MINIMUM_HEAP_WIDTH:
-        rule = f"a heap is at least {MINIMUM_HEAP_WIDTH} pixels wide"
-        raise PictureError(rule, f"{np.ptp(position):.0f}", place)
+    width = float(np.ptp(position)) if len(position) else 0.0
+    if width < MINIMUM_HEAP_WIDTH:
+        raise PictureError(f"a heap is at least {MINIMUM_HEAP_WIDTH} pixels wide", f"{width:.0f}", place)
     order = np.argsort(position, kind="stable")
     return position[order], np.maximum(height[order], 0.0)
 

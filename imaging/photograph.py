@@ -26,11 +26,15 @@ from imaging.looks import other_looks, with_faint
 from imaging.outline import Outline, levelled
 from imaging.plate import PlateLine
 from imaging.reasons import Doubt
-from imaging.sighting import Sighting, refuse_brimful, sight
+from imaging.sighting import Sighting, refuse_brimful, sight, without_strays
 from imaging.view import View, level_angle
 
 NO_HEAP = 0.1
 """Misfit of the flanks' shape, in heights, from which on it is no heap: half a circle, 0.075, is doubtful."""
+CROOKED = 0.03
+"""Misfit of the flanks' shape, in heights, that another look at the picture may better."""
+NEARLY = 2.0
+"""Factor between misfits beyond which the better one shows the heap, and the other something beside it."""
 AS_GOOD = 1.3
 """Factor between misfits that are about the same: two thresholds on one heap differ by as much."""
 LEAST_STEP = 15.0
@@ -128,7 +132,7 @@ def find_heap(picture: Picture, given: PlateLine | None, view: View, place: str)
     seen = contrast_with_background(picture, place, np.float32)
     tries, errors = _tries(with_faint(seen), given, view, place)
     best = _first_of_best(tries)
-    if best is None or not best.clear or best.shift(tries) > LARGEST_SHIFT:
+    if best is None or not best.clear or best.crooked > CROOKED or best.shift(tries) > LARGEST_SHIFT:
         others = [judged for look in other_looks(seen) for judged in _tries(look, given, view, place)[0]]
         # Another look counts where it leaves fewer doubts, none where the plain ones refuse, or where these
         # disagree.
@@ -143,7 +147,7 @@ def find_heap(picture: Picture, given: PlateLine | None, view: View, place: str)
         rule = "two straight flanks meet at the tip of a heap"
         raise PictureError(rule, f"no heap: an outline {best.crooked:.2f} of its height off two lines", place)
     if given is None:
-        refuse_brimful(seen, best.sighting, place)
+        refuse_brimful(seen, best.sighting, best.ends, place)
     shift = best.shift(tries)
     if not best.clear or shift <= LARGEST_SHIFT:
         return best.sighting
@@ -158,7 +162,8 @@ def _tries(
     tries, errors = [], []
     for threshold in seen.thresholds:
         try:
-            tries.append(_judged(sight(seen, threshold, given, view, place), place))
+            found = without_strays(sight(seen, threshold, given, view, place))
+            tries.append(_judged(found, place))
         except PictureError as error:
             errors.append(error)
     return tries, errors
@@ -168,7 +173,8 @@ def _tries(
 class Judged:
     """A sighting with the angle of its whole flanks [degrees], what speaks against it, and its misfit.
 
-    `crooked` is the misfit of its flanks alone, in heights (see `relative_misfit`).
+    `crooked` is the misfit of its flanks alone, in heights (see `relative_misfit`); `ends` are where its lines
+    meet the plate.
     """
 
     sighting: Sighting
@@ -176,6 +182,7 @@ class Judged:
     doubts: tuple[Doubt, ...]
     misfit: float
     crooked: float
+    ends: tuple[float, float]
 
     @property
     def clear(self) -> bool:
@@ -183,8 +190,9 @@ class Judged:
         return not self.doubts
 
     def shift(self, others: Sequence[Judged]) -> float:
-        """Greatest change of the angle [degrees] among others without a doubt."""
-        return max((abs(other.mean - self.mean) for other in others if other.clear), default=0.0)
+        """Greatest change of the angle [degrees] among others without a doubt that fit nearly as well."""
+        rivals = [other for other in others if other.clear and other.misfit <= NEARLY * self.misfit]
+        return max((abs(other.mean - self.mean) for other in rivals), default=0.0)
 
 
 def _first_of_best(tries: Sequence[Judged]) -> Judged | None:
@@ -209,4 +217,5 @@ def _judged(sighting: Sighting, place: str) -> Judged:
     lean = abs(left.angle - right.angle) / LARGEST_LEAN
     crooked = relative_misfit(left, right, outline)
     misfit = crooked / LARGEST_MISFIT + lean
-    return Judged(sighting, level_angle(mean, sighting.elevation), doubts, misfit, crooked)
+    ends = (-left.intercept / left.slope, -right.intercept / right.slope)
+    return Judged(sighting, level_angle(mean, sighting.elevation), doubts, misfit, crooked, ends)

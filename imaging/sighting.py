@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -14,7 +14,7 @@ from imaging.errors import PictureError
 from imaging.foot import Base, below_plate, front_of_base, joined_foot
 from imaging.geometry import FloatArray, Layer
 from imaging.outline import bottom_edge, inner_contrast, largest_pieces, refine_thin, top_edge
-from imaging.plate import PlateLine, find_plate
+from imaging.plate import PLATE_CLEARANCE, PlateLine, find_plate
 from imaging.reasons import Doubt
 from imaging.view import View
 
@@ -168,6 +168,9 @@ def _on_seen_plate(
         doubts.append(Doubt("plate", "heap and plate are of like colour: the heap's foot is not seen"))
         return Sighting(top_edge(heap, level, 1.0), plate, 0.0, 0.0, tuple(doubts))
     whole = joined_foot(heap, top.level, plate)
+    if whole[:, 0].any() or whole[:, -1].any():
+        doubts.append(Doubt("plate", "the plate differs from its own ends: the heap's foot is not seen"))
+        return Sighting(top_edge(heap, level, 1.0), plate, 0.0, 0.0, tuple(doubts))
     line = plate.rows_at(np.arange(heap.shape[1]))
     combined = np.where(np.arange(heap.shape[0])[:, None] <= line, level, top.level)
     base = front_of_base(bottom_edge(whole, combined, 1.0), plate.slope)
@@ -184,15 +187,35 @@ def _on_seen_plate(
     return Sighting(rows, level_line, elevation, elevation_se, tuple(doubts), depth)
 
 
-def refuse_brimful(seen: Contrast, found: Sighting, place: str) -> None:
+def without_strays(found: Sighting) -> Sighting:
+    """The same heap without what lies beyond a gap in its outline: grains that rolled off."""
+    height = found.plate.rows_at(np.arange(len(found.rows))) - found.rows
+    height = np.where(np.isfinite(height), height, 0.0)
+    tip = int(height.argmax())
+    low = np.flatnonzero(height <= PLATE_CLEARANCE)
+    first = int(low[low < tip].max(initial=-1)) + 1
+    last = int(low[low > tip].min(initial=len(height)))
+    kept = np.zeros(len(height), dtype=np.bool_)
+    kept[first:last] = True
+    return replace(found, rows=np.where(kept, found.rows, np.nan))
+
+
+def refuse_brimful(seen: Contrast, found: Sighting, ends: tuple[float, float], place: str) -> None:
     """Refuse a heap that stands on, or in, something no wider than itself: a dish, a box, a narrow board.
 
     What is right below its foot then differs from what is beside it at the same level, to the left and to the
-    right; on a plate both are the plate, and shadows on it do not count.
+    right; on a plate both are the plate, and shadows on it do not count. Or it is round below.
+
+    Parameters
+    ----------
+    seen : Contrast
+    found : Sighting
+    ends : (float, float)
+        Where the flanks' lines meet the plate [pixels along it].
+    place : str
+        Names the picture in errors.
     """
-    columns = np.flatnonzero(np.isfinite(found.rows)).astype(np.float64)
-    position, _ = found.plate.level(columns, found.rows[columns.astype(np.intp)])
-    left, right = float(position.min()), float(position.max())
+    left, right = ends
     width = right - left
     if width < LEAST_WIDTH:
         return
@@ -204,7 +227,7 @@ def refuse_brimful(seen: Contrast, found: Sighting, place: str) -> None:
         if low is not None and high is not None and min(_differ(low, high), _differ(high, low)) > least:
             raise PictureError(BRIMFUL_RULE, "a dish, or an object of another colour below it", place)
     heights = -found.depth - np.linspace(0.02, 0.05, 8) * width - 1.0
-    under = _sampled(seen, found.plate, np.linspace(left + 0.2 * width, right - 0.2 * width, 60), heights)
+    under = _sampled(seen, found.plate, middle, heights)
     sides = [
         _sampled(seen, found.plate, np.linspace(end + 0.05 * step, end + 0.1 * step, 20), heights)
         for end, step in ((left, -width), (right, width))
@@ -213,6 +236,14 @@ def refuse_brimful(seen: Contrast, found: Sighting, place: str) -> None:
         return
     if all(side is not None and _differ(under, side) > least for side in sides):
         raise PictureError(BRIMFUL_RULE, "a dish, or a narrow board", place)
+    heights = -found.depth - np.linspace(0.1, 0.14, 8) * width
+    under = _sampled(seen, found.plate, middle, heights)
+    corners = [
+        _sampled(seen, found.plate, np.linspace(end - 0.04 * step, end, 20), heights)
+        for end, step in ((left, -width), (right, width))
+    ]
+    if under is not None and all(corner is not None and _differ(under, corner) > least for corner in corners):
+        raise PictureError(BRIMFUL_RULE, "a dish, round below", place)
 
 
 def _sampled(seen: Contrast, plate: PlateLine, position: FloatArray, heights: FloatArray) -> Layer | None:
