@@ -39,7 +39,7 @@ class Estimate:
 
 @dataclass(frozen=True, eq=False)
 class Agreement:
-    """How values follow reference values, run by run; made by ``agreement``.
+    """Agreement of values with reference values, run by run; made by ``agreement``.
 
     The intervals hold for runs that are drawn: from as many others as these stand for, each with its misfit
     (the true value less the true reference) and its noise, all of them normal. Each property says from what

@@ -90,7 +90,7 @@ class Comparison:
 
     @property
     def different(self) -> bool:
-        """Whether the difference is significant at alpha."""
+        """The difference is significant at alpha."""
         return self.p < self.alpha
 
     @property
@@ -103,7 +103,7 @@ class Comparison:
 
     @property
     def equivalent(self) -> bool | None:
-        """Whether the means are shown to differ by less than the margin, at alpha; None without a margin."""
+        """The means are shown to differ by less than the margin, at alpha; None without a margin."""
         return None if self.equivalence_p is None else self.equivalence_p < self.alpha
 
     @property

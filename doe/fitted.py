@@ -1,4 +1,4 @@
-"""What contours, optima and regions need to know of a fitted surface."""
+"""Interface of a fitted surface for contours, optima and regions."""
 
 from typing import Protocol
 

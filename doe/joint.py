@@ -80,7 +80,7 @@ class JointFit:
 
     @property
     def factors(self) -> tuple[Factor, ...]:
-        """What all surfaces are fitted over."""
+        """Factors that all surfaces are fitted over."""
         return next(iter(self.goals.values())).surface.design.factors
 
     @cached_property
@@ -159,14 +159,14 @@ class JointFit:
         return pd.DataFrame.from_dict(rows, orient="index").rename_axis("response")
 
     def agrees(self, point: Mapping[str, float] | None = None) -> bool:
-        """Whether all responses agree with their targets at a point (default: that of the smallest chi2)."""
+        """Tell if all responses agree with their targets at a point (default: that of the smallest chi2)."""
         coded = self.coded_point if point is None else self._coded(point)
         level = self.alpha / len(self.goals)
         return all(bool(goal.accepts(goal.misfit(coded[None]), level)[0]) for goal in self.goals.values())
 
     @cached_property
     def shrinkage(self) -> pd.DataFrame:
-        """How the compatible region shrinks with each response: the first, then what shrinks it most.
+        """Shares of the compatible region left by each response: the first, then what shrinks it most.
 
         A response that tells nothing new makes it a little larger, as each is then held to a stricter level.
 

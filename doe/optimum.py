@@ -26,7 +26,7 @@ FLAT_RATIO = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class StationaryPoint:
-    """Where the gradient of a quadratic surface vanishes."""
+    """Point at which the gradient of a quadratic surface vanishes."""
 
     coded: pd.Series
     natural: pd.Series
@@ -39,7 +39,7 @@ class StationaryPoint:
 
     @property
     def inside(self) -> bool:
-        """Whether it lies in the coded box -1..+1."""
+        """It lies in the coded box -1..+1."""
         return bool((self.coded.abs() <= 1.0).all())
 
 

@@ -149,7 +149,7 @@ def compatible_region(
 
 
 def agrees(surface: FittedSurface, coded: ArrayLike, target: Sample, alpha: float = 0.05) -> bool:
-    """Whether a target does not contradict the fitted mean at one coded point, by the region's rule."""
+    """Tell if a target does not contradict the fitted mean at one coded point, by the region's rule."""
     difference, error, share, errors = misfit(surface, coded, *_goal(target, 0.0, np.inf))
     return bool(np.abs(difference[0]) <= errors.critical(share, alpha)[0] * error[0])
 

@@ -26,7 +26,7 @@ from doe.lenth import LENTH_DRAWS, SEED, orthogonal_null, pseudo_error
 from doe.terms import Term, find_term, model_matrix, model_terms, natural_coefficients, term_name
 
 ERRORS = ("pooled", "dummies", "pure", "lenth")
-"""What effects can be tested against."""
+"""Errors that effects can be tested against."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,7 @@ class ScreenResult:
     """Least squares of the response on the intercept and every factor (dummies are left to the error)."""
     pure_error: ErrorTerm
     error: ErrorTerm
-    """What the effects are tested against, by the rule ``error_rule``."""
+    """Error that the effects are tested against, by the rule ``error_rule``."""
     error_rule: str
 
     def summary(self) -> str:

@@ -358,7 +358,7 @@ class Surface:
     def agrees(
         self, point: Mapping[str, float], target: Sample, alpha: float = 0.05, coded: bool = False
     ) -> bool:
-        """Whether a target does not contradict one setting: the rule of ``compatible_region`` there."""
+        """Tell if a target does not contradict one setting: the rule of ``compatible_region`` there."""
         inside = self._coded_table(pd.DataFrame([dict(point)]), coded)
         return region.agrees(self, inside.to_numpy(), target, alpha)
 

@@ -87,7 +87,7 @@ def find_term(name: str, terms: Iterable[Term]) -> Term:
 
 
 def contains(term: Term, part: Term) -> bool:
-    """Whether a term is a multiple of another one: "E:F" and "E^2" contain "E"."""
+    """Tell if a term is a multiple of another one: "E:F" and "E^2" contain "E"."""
     return term != part and all(term.count(name) >= part.count(name) for name in part)
 
 

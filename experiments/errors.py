@@ -12,9 +12,9 @@ class Problem:
     """One thing that is wrong."""
 
     rule: str
-    """What must hold, in words."""
+    """Rule that must hold, in words."""
     value: str
-    """What was received instead."""
+    """Value received instead."""
     place: str
     """File, line and key, or the name of the option."""
 

@@ -33,13 +33,13 @@ LEAST_NOISE = 1.0
 
 @dataclass(frozen=True)
 class Contrast:
-    """How a picture differs from its background."""
+    """Difference of a picture from its background."""
 
     values: Layer
     """Distance of each pixel's colour from the background's, in the light there, shape (rows,
     columns)."""
     thresholds: tuple[float, ...]
-    """Where to cut it, most likely first: one or two; what is above each differs clearly from the
+    """Thresholds, most likely first: one or two; what is above each differs clearly from the
     noise."""
     noise: float
     """Median distance of the background's own pixels."""

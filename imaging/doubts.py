@@ -28,7 +28,7 @@ SHAPE_PARTS = 6
 LARGEST_END = 0.3
 """Height of the outline's end over the heap's: a heap ends a grain high, a dish's wall higher."""
 LEAST_END = 3.0
-"""What rises less at its end [pixels] is the blur of an edge."""
+"""Rise at an end [pixels] below which it is the blur of an edge."""
 LEAST_FOOT_SLOPE = 0.6
 """Slope of a flank's lowest third over the rest's, or the reverse: it lies within for 19 heaps of 20."""
 END_WIDTH = 0.02

@@ -34,13 +34,13 @@ LEAST_ARC = 3.0
 
 @dataclass(frozen=True)
 class PlateTop:
-    """What is seen below the plate's line."""
+    """View below the plate's line."""
 
     level: Layer
     """Difference from the plate's own colours over that at which the heap is cut out; 0 above the line,
     shape (rows, columns)."""
     alike: bool
-    """Whether heap and plate are too alike to tell where the heap ends."""
+    """Heap and plate are too alike to tell where the heap ends."""
 
 
 def below_plate(
@@ -135,7 +135,7 @@ class Base:
 
     @property
     def seen(self) -> bool:
-        """Whether the base is a curve, and no line."""
+        """The base is a curve, and no line."""
         return self.depth > LEAST_ARC * max(self.depth_se, 1.0)
 
     @property

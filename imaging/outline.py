@@ -32,7 +32,7 @@ class Outline:
     height: FloatArray
     """Height over the plate line [pixels], positive, shape (n,)."""
     plate: PlateLine
-    """Where the plate lies in the picture."""
+    """Plate line in the picture."""
     meters_per_pixel: float | None = None
     """Scale, where it is known."""
     elevation: float = 0.0
@@ -41,7 +41,7 @@ class Outline:
     distance: float | None = None
     """From the camera to the heap, in widths of the heap, where it is known."""
     doubts: tuple[Doubt, ...] = ()
-    """What speaks against the outline; empty for a drawn silhouette."""
+    """Doubts about the outline; empty for a drawn silhouette."""
 
     def in_part(self, left: int, top: int) -> Outline:
         """The same outline in a part of the picture that begins at this column and row."""

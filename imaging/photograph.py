@@ -173,7 +173,7 @@ def _tries(
 class Judged:
     """A sighting with the angle of its whole flanks [degrees], what speaks against it, and its misfit.
 
-    `crooked` is the misfit of its flanks alone, in heights (see `relative_misfit`); `ends` are where its lines
+    `crooked` is the misfit of its flanks alone, in heights (see `relative_misfit`); at `ends` its lines
     meet the plate.
     """
 
@@ -186,7 +186,7 @@ class Judged:
 
     @property
     def clear(self) -> bool:
-        """Whether there is no doubt."""
+        """There is no doubt."""
         return not self.doubts
 
     def shift(self, others: Sequence[Judged]) -> float:

@@ -31,7 +31,7 @@ LINE_ROUNDS = 8
 LEAST_SEEN = 0.6
 """A plate is seen in at least this share of the columns at either end; grains may hide the others."""
 PLATE_CLEARANCE = 0.25
-"""What rises less than this over the plate line [pixels] belongs to the plate."""
+"""Height over the plate line [pixels] below which all belongs to the plate."""
 MAXIMUM_TILT = 20.0
 """A camera that is tilted by more [degrees] has not seen a plate."""
 

@@ -12,7 +12,7 @@ class Doubt:
     name: str
     """Short name, for tables: one of `DOUBTS`."""
     finding: str
-    """What was found, and against which limit."""
+    """Finding, and the limit that it passes."""
 
     def __str__(self) -> str:
         return f"{self.name}: {self.finding}"

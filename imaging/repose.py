@@ -62,7 +62,7 @@ class ReposeAngle:
 
     @cached_property
     def doubts(self) -> tuple[Doubt, ...]:
-        """What speaks against the angle; empty where nothing does, and for what was drawn."""
+        """Doubts about the angle; empty where there are none, and for what was drawn."""
         judged = doubts_of(self.left_line, self.right_line, self.mean, self.se, self.outline)
         return (*self.outline.doubts, *judged)
 

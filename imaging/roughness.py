@@ -74,7 +74,7 @@ def _white(x: FloatArray, residual: FloatArray) -> SlopeError:
 
 @dataclass(frozen=True)
 class _Model:
-    """What the likelihood of each length of correlation needs, for so many bins.
+    """Terms of the likelihood of each length of correlation, for so many bins.
 
     `projections` (k, n, n) give the weighted squares of what the shape leaves, `constants` (k,) the part of
     the log likelihood that the data do not touch, `slope_variances` (k,) that of a slope at unit variance.

@@ -27,7 +27,7 @@ LEAST_FOOT = 4.0
 DEEP_FOOT = 0.05
 """Depth of a foot over its width, a camera 6 degrees up, from which on its colour is asked for."""
 LEAST_WIDTH = 100.0
-"""What a narrower heap [pixels] stands on is not looked at: a blurred edge is as wide as the strips below."""
+"""Width [pixels] below which the base of a heap is not looked at: a blurred edge is as wide as the strips."""
 BRIMFUL_RULE = "the heap stands on a plate wider than itself"
 BESIDE_NOISE, BESIDE_DIFFERENCE = 6.0, 24.0
 """Multiple of the wall's noise, and difference [of 255], from which on two sides differ: twice a cloth's."""
@@ -47,7 +47,7 @@ class Sighting:
     """Of the camera [degrees]."""
     doubts: tuple[Doubt, ...]
     depth: float = 0.0
-    """How far the heap's foot goes on below the plate's line [pixels]."""
+    """Reach of the heap's foot below the plate's line [pixels]."""
 
 
 def sight(seen: Contrast, threshold: float, given: PlateLine | None, view: View, place: str) -> Sighting:
@@ -105,7 +105,7 @@ def _plate_of(body: NDArray[np.bool_], seen: Contrast, threshold: float, place: 
 
 
 def _floats(heap: NDArray[np.bool_], plate: PlateLine) -> bool:
-    """Whether a piece ends well above the plate's line."""
+    """Tell if a piece ends well above the plate's line."""
     rows, columns = np.nonzero(heap)
     gap = float((plate.rows_at(columns) - rows).min())
     return gap > max(4.0, FLOATING * float(np.ptp(rows)))

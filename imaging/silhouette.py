@@ -13,7 +13,7 @@ from imaging.outline import Outline, inner_contrast, largest_pieces, levelled, r
 from imaging.plate import PlateLine
 
 RIVAL_SHARE = 0.5
-"""Where a second piece is larger than this share of the heap, the picture does not show one heap."""
+"""Largest second piece, as a share of the heap, of a picture that shows one heap."""
 
 
 def drawn_outline(picture: Picture, ground_row: float, meters_per_pixel: float | None, place: str) -> Outline:

@@ -1,4 +1,4 @@
-"""What a person can say of a photograph: the part to look at, the plate, the heap, the camera's height."""
+"""Facts that a person gives of a photograph: the part to look at, plate, heap, the camera's height."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ LEVEL_ROUNDS = 8
 
 @dataclass(frozen=True)
 class View:
-    """What is known of a photograph beforehand."""
+    """Facts known of a photograph beforehand."""
 
     crop: tuple[int, int, int, int] | None = None
     """Left, top, right and bottom of the part to look at [pixels of the upright picture]."""

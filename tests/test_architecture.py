@@ -1,4 +1,4 @@
-"""How the packages hang together: who imports whom, what loads with what, how long things are."""
+"""Ties between the packages: who imports whom, what loads with what, how long things are."""
 
 import ast
 import re

@@ -97,7 +97,7 @@ def table() -> dict[str, tuple[str, str]]:
 
 @pytest.fixture(scope="module")
 def used(tmp_path_factory: pytest.TempPathFactory) -> dict[str, object]:
-    """What a copy of the tree makes of everything that was added to it."""
+    """Findings of a copy of the tree in everything that was added to it."""
     tree = tmp_path_factory.mktemp("tree")
     for package in PACKAGES:
         shutil.copytree(ROOT / package, tree / package, ignore=EVIDENCE)

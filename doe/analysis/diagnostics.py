@@ -144,7 +144,7 @@ class RobustTable:
     spread_p: float
     """p of Levene's test that replicates spread alike; NaN where too few settings are replicated."""
     note: str
-    """What the replicates say, and which standard errors to use."""
+    """Verdict of the replicates, and the standard errors to use."""
 
     def __str__(self) -> str:
         return f"{self.table.to_string()}\n{self.note}"

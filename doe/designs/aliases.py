@@ -21,7 +21,7 @@ SMALL = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class AliasStructure:
-    """What a two-level design mixes up; made by ``alias_structure``. Its text says it in words."""
+    """Effects that a two-level design mixes up; made by ``alias_structure``. Its text says it in words."""
 
     matrix: pd.DataFrame
     """Correlation of the columns of every two effects, from -1 to +1; +-1: they cannot be told apart."""

@@ -165,7 +165,7 @@ class SelectionResult(StageResult):
     decisions: tuple[Decision, ...]
 
     def tables(self) -> dict[str, pd.DataFrame]:
-        """Why each factor was kept or not."""
+        """Reason that each factor was kept or not."""
         return {"selection": self.table}
 
 

@@ -44,7 +44,7 @@ class Heap:
 
     @property
     def reason(self) -> str:
-        """Why the case or the measurement failed; empty when neither did."""
+        """Reason that the case or the measurement failed; empty when neither did."""
         return self.observed.reason
 
     @property

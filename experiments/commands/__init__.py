@@ -1,1 +1,1 @@
-"""What the commands of ``experiments.cli`` do and show. Nothing is imported here: ``--help`` stays quick."""
+"""Commands of ``experiments.cli``: their work and output. Nothing is imported here: ``--help`` stays quick."""

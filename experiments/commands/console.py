@@ -1,4 +1,4 @@
-"""What the command line shows: progress with the time left, and errors as one clear message."""
+"""Output of the command line: progress with the time left, and errors as one clear message."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ BAD_INPUT, FAILED_RUN, INTERRUPTED = 2, 1, 130
 """Exit codes."""
 
 QUIET_START = 2.0
-"""What ends sooner shows no progress [s]."""
+"""Least duration that shows progress [s]."""
 FIRST_GUESS = 0.01
 """Part of the work that is done before the time left is guessed."""
 LINE_EVERY = 10.0
 """Time between two lines of progress where there is no terminal [s]."""
 
 messages = Console(stderr=True, highlight=False, soft_wrap=True)
-"""Where progress and errors go; results go to standard output."""
+"""Console of progress and errors; results go to standard output."""
 
 
 @contextmanager

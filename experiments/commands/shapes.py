@@ -23,7 +23,7 @@ class Clump:
     shape: ClumpShape
     """The spheres."""
     fit: ClumpFit | None
-    """How well it fits; None for spheres that were given."""
+    """Quality of the fit; None for spheres that were given."""
 
     def to_dict(self, density: float | None = None) -> dict[str, Any]:
         """Describe the clump as JSON-able data, in mm and mg; with a density [kg/m3], its mass too."""

@@ -36,7 +36,7 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Job:
-    """What a command was asked for; its parts are parameters of `experiments.api.discover`."""
+    """Order of a command; its parts are parameters of `experiments.api.discover`."""
 
     study: Study
     measured: Path | None
@@ -50,7 +50,7 @@ class Job:
 
 @dataclass(frozen=True)
 class SearchResult:
-    """How a search ended."""
+    """End of a search."""
 
     discovery: Discovery | None
     """None where only the bank was made."""

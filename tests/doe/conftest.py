@@ -17,7 +17,7 @@ def read(name: str, **options) -> pd.DataFrame:
 
 @pytest.fixture
 def agrees() -> Callable[[float, str], bool]:
-    """Whether a value rounds to a printed number: half a unit of the last printed digit is the tolerance."""
+    """Tell if a value rounds to a printed number: half a unit of the last printed digit is the tolerance."""
 
     def check(value: float, printed: str) -> bool:
         digits = len(printed.partition(".")[2])

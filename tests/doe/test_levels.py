@@ -28,7 +28,7 @@ POINT = {"A": 0.4, "B": -0.5}
 
 
 def close(share: float, stated: float, trials: int) -> bool:
-    """Whether a share is within four binomial standard deviations of what is stated."""
+    """Tell if a share is within four binomial standard deviations of what is stated."""
     return abs(share - stated) < 4.0 * np.sqrt(stated * (1.0 - stated) / trials)
 
 

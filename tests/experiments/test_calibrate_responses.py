@@ -54,7 +54,7 @@ def mass_left(row: Mapping[str, float]) -> float:
 
 
 MEASURED = {"target": {"angle": angle, "solid_fraction": solid_fraction}, "bin": {"mass_left": mass_left}}
-"""What every scene measures."""
+"""Observables of every scene."""
 
 
 @dataclass(frozen=True)

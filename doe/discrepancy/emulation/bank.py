@@ -72,7 +72,7 @@ class Bank:
     values: np.ndarray
     """Natural units; NaN in rows that failed, (n, observables)."""
     reasons: np.ndarray
-    """Why a case failed, empty where it did not, (n,)."""
+    """Reason that a case failed, empty where it did not, (n,)."""
     study: str = ""
     """Fingerprint of what was simulated; empty where it is not known."""
     maker: Mapping[str, str] = field(default_factory=dict)

@@ -26,7 +26,7 @@ class PhoneCamera:
     """About the line of sight [degrees]."""
     aside: float = 0.0
     above: float = 0.0
-    """Where the heap's middle lies, in columns and rows from the picture's middle, as shares of them."""
+    """Place of the heap's middle, in columns and rows from the picture's middle, as shares of them."""
     height: float = 0.2
     """Height of the point that the camera aims at."""
     bulge: float = 0.0
@@ -34,7 +34,7 @@ class PhoneCamera:
 
     @property
     def place(self) -> FloatArray:
-        """Where the camera stands."""
+        """Position of the camera."""
         rise = self.distance * np.tan(np.radians(self.elevation))
         return np.array([0.0, -self.distance, rise])
 

@@ -21,7 +21,7 @@ Color = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Lamp:
-    """Where the light comes from, and what it leaves dark."""
+    """Direction of the light, and what it leaves dark."""
 
     direction: tuple[float, float, float] = (-0.4, -0.6, 0.69)
     """To the lamp: right, away, up; of length 1."""
@@ -59,7 +59,7 @@ class Surroundings:
 
 @dataclass(frozen=True)
 class Phone:
-    """What becomes of the light in the phone: blur, noise, sharpening, JPEG."""
+    """Changes of the light in the phone: blur, noise, sharpening, JPEG."""
 
     blur: float = 0.6
     noise: float = 2.0

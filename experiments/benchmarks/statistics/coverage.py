@@ -24,7 +24,7 @@ class Figure:
     """A stated probability and its share in a simulation."""
 
     figure: str
-    """What is stated, such as ``compatible_region``."""
+    """Statement that is tested, such as ``compatible_region``."""
     case: str
     stated: float
     promise: str
@@ -42,7 +42,7 @@ class Figure:
 
     @property
     def holds(self) -> bool:
-        """Whether the share keeps the promise, within `SLACK`."""
+        """The share keeps the promise, within `SLACK`."""
         too_low = self.found < self.stated - SLACK and self.promise != AT_MOST
         too_high = self.found > self.stated + SLACK and self.promise != AT_LEAST
         return not (too_low or too_high)

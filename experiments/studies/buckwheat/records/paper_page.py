@@ -46,7 +46,7 @@ class Record:
     replay: Replay
     """The paper's runs at full scale."""
     provenance: Mapping[str, Any]
-    """What made the numbers: commit, machine, date, wall times."""
+    """Origin of the numbers: commit, machine, date, wall times."""
     campaign: Mapping[str, Any] | None = None
     """A campaign of our own beside it: outcome, reason, effects of its screening."""
     card: bool = False
@@ -57,7 +57,7 @@ class Record:
     picture: bool = False
     """There is a picture of heaps."""
     notes: str = ""
-    """What a person makes of the numbers, Markdown."""
+    """A person's reading of the numbers, Markdown."""
 
     @classmethod
     def read(cls, folder: Path) -> Record:
