@@ -173,8 +173,8 @@ def _tries(
 class Judged:
     """A sighting with the angle of its whole flanks [degrees], what speaks against it, and its misfit.
 
-    `crooked` is the misfit of its flanks alone, in heights (see `relative_misfit`); at `ends` its lines
-    meet the plate.
+        `crooked` is the misfit of its flanks alone, in heights (see `relative_misfit`); `ends` are where its
+    lines meet the plate.
     """
 
     sighting: Sighting

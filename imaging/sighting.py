@@ -215,17 +215,21 @@ def refuse_brimful(seen: Contrast, found: Sighting, ends: tuple[float, float], p
     place : str
         Names the picture in errors.
     """
+    least = max(BESIDE_NOISE * seen.noise, BESIDE_DIFFERENCE)
+    columns = np.flatnonzero(np.isfinite(found.rows)).astype(np.float64)
+    position, height = found.plate.level(columns, found.rows[columns.astype(np.intp)])
+    span = float(np.ptp(position))
+    if found.depth > DEEP_FOOT * span:
+        across = float(position.min()) + np.linspace(0.3, 0.7, 60) * span
+        low = _sampled(seen, found.plate, across, -found.depth * np.linspace(0.3, 0.7, 8))
+        high = _sampled(seen, found.plate, across, float(height.max()) * np.linspace(0.1, 0.3, 8))
+        if low is not None and high is not None and min(_differ(low, high), _differ(high, low)) > least:
+            raise PictureError(BRIMFUL_RULE, "a dish, or an object of another colour below it", place)
     left, right = ends
     width = right - left
     if width < LEAST_WIDTH:
         return
-    least = max(BESIDE_NOISE * seen.noise, BESIDE_DIFFERENCE)
     middle = np.linspace(left + 0.3 * width, right - 0.3 * width, 60)
-    if found.depth > DEEP_FOOT * width:
-        low = _sampled(seen, found.plate, middle, -found.depth * np.linspace(0.3, 0.7, 8))
-        high = _sampled(seen, found.plate, middle, np.linspace(0.02, 0.06, 8) * width)
-        if low is not None and high is not None and min(_differ(low, high), _differ(high, low)) > least:
-            raise PictureError(BRIMFUL_RULE, "a dish, or an object of another colour below it", place)
     heights = -found.depth - np.linspace(0.02, 0.05, 8) * width - 1.0
     under = _sampled(seen, found.plate, middle, heights)
     sides = [

@@ -17,8 +17,8 @@ NEAR = 4.0
 """Smallest distance [heap widths] that is usual."""
 BASE_POINTS = 721
 """Points of half the base's circle."""
-LEVEL_ROUNDS = 8
-"""Rounds of bringing the seen angle and the cone's to agree; each gains a digit."""
+LEVEL_ROUNDS = 16
+"""Rounds of bringing the seen angle and the cone's to agree; two or three gain a digit."""
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -231,7 +232,7 @@ def test_photographs_become_angles_and_overlays() -> None:
     save_picture("b.png", triangle(0.3))
     code, out, _ = dem_warp("angle", "a.png", "b.png", "--json", "--overlay", "drawn")
     assert code == 0
-    angles = [row["mean"] for row in json.loads(out)]
+    angles = [row["mean"] for row in json.loads(out)["pictures"]]
     # The smooth-heap tolerance of `imaging` at this width.
     assert angles == pytest.approx(np.degrees(np.arctan([0.5, 0.3])), abs=0.3)
     assert sorted(path.name for path in Path("drawn").iterdir()) == ["a-angle.png", "b-angle.png"]
@@ -252,8 +253,45 @@ def test_one_bad_photograph_does_not_hide_the_others() -> None:
     save_picture("a.png", triangle())
     code, out, err = dem_warp("angle", "a.png", "absent.png", "--json")
     assert code == 2
-    assert [row["mean"] is None for row in json.loads(out)] == [False, True]
+    assert [row["mean"] is None for row in json.loads(out)["pictures"]] == [False, True]
     assert "absent.png" in err
+
+
+def test_photographs_become_a_target() -> None:
+    for name, slope in (("a", 0.5), ("b", 0.52), ("c", 0.54)):
+        save_picture(f"{name}.png", triangle(slope))
+    code, out, _ = dem_warp("angle", "a.png", "b.png", "c.png", "--target")
+    assert code == 0
+    section = tomllib.loads(out)["target"]
+    truth = np.degrees(np.arctan([0.5, 0.52, 0.54]))
+    # Three angles, each within the smooth-heap tolerance.
+    assert float(section["mean"].split()[0]) == pytest.approx(truth.mean(), abs=0.3)
+    assert float(section["sd"].split()[0]) == pytest.approx(truth.std(ddof=1), abs=0.3)
+    assert section["n"] == 3
+    code, _, err = dem_warp("angle", "a.png", "--target")
+    assert code == 2
+    assert "two measured heaps" in err
+    code, out, _ = dem_warp("angle", "a.png", "b.png", "--csv")
+    assert (code, len(out.splitlines())) == (0, 3)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--crop", "1,2,3"), "--crop"),
+        (("--crop", "10,10,5,20"), "left < right"),
+        (("--plate", "a,b,c,d"), "--plate"),
+        (("--heap", "0"), "counted from 1"),
+        (("--elevation", "70"), "elevation"),
+        (("--by", "name"), "--by"),
+        (("--overlay", "a.png"), "--overlay"),
+    ],
+)
+def test_wrong_words_about_a_photograph_end_with_2(options: tuple[str, str], words: str) -> None:
+    save_picture("a.png", triangle())
+    code, out, err = dem_warp("angle", "a.png", *options)
+    assert (code, out) == (2, "")
+    assert words in err
 
 
 def test_an_unknown_fit_ends_with_2() -> None:
