@@ -1,1 +1,1 @@
-"""Commands of ``experiments.cli``: their work and output. It imports nothing, so that ``--help`` stays quick."""
+"""Commands of ``experiments.cli``: their work and output. It imports nothing: ``--help`` stays quick."""
