@@ -158,7 +158,7 @@ def test_the_report_says_when_another_engine_made_the_bank(
 def test_the_shipped_banks_know_what_made_them(scale: str | None) -> None:
     file = f"bank-{scale}.npz" if scale else "bank.npz"
     maker = Search.of(load_study(TRIAL, scale)).read_bank(TRIAL.with_name(file)).maker
-    assert (maker["day"], maker["commit"]) == ("2026-11-22", "71088ff")
+    assert (maker["day"], maker["commit"]) == ("2026-11-22", "86e9dc7")
     assert len(maker["engine"]) == 64
 
 
