@@ -41,8 +41,10 @@ class Outline:
         Angle at which the camera looked down on the plate, and its standard error [degrees].
     distance : float or None
         From the camera to the heap, in widths of the heap, where it is known.
+    photographed : bool
+        Whether it comes from a photograph, whose angle may be doubted, and not from a drawn silhouette.
     doubts : tuple of Doubt
-        What speaks against the outline; empty for a drawn silhouette.
+        What speaks against the outline.
     """
 
     position: FloatArray
@@ -52,6 +54,7 @@ class Outline:
     elevation: float = 0.0
     elevation_se: float = 0.0
     distance: float | None = None
+    photographed: bool = False
     doubts: tuple[Doubt, ...] = ()
 
     def in_part(self, left: int, top: int) -> Outline:

@@ -69,7 +69,9 @@ class ReposeAngle:
 
     @cached_property
     def doubts(self) -> tuple[Doubt, ...]:
-        """What speaks against the angle; empty where nothing does, and for what was drawn."""
+        """What speaks against the angle; nothing does against that of a drawn silhouette."""
+        if not self.outline.photographed:
+            return ()
         judged = doubts_of(self.left_line, self.right_line, self.mean, self.se, self.outline)
         return (*self.outline.doubts, *judged)
 
