@@ -244,25 +244,34 @@ def angle(
     keep_doubtful: Annotated[bool, typer.Option(help="Count doubtful pictures in the mean.")] = False,
     crop: Annotated[str | None, typer.Option(metavar="X1,Y1,X2,Y2", help="Look at this part only.")] = None,
     plate: Annotated[
-        str | None, typer.Option(metavar="X1,Y1,X2,Y2", help="Two points where heap and plate meet [pixels].")
+        str | None,
+        typer.Option(metavar="X1,Y1,X2,Y2", help="Two points (pixels) where heap and plate meet."),
     ] = None,
     heap_number: Annotated[
         int | None, typer.Option("--heap", help="Which of several, from the left.")
     ] = None,
-    elevation: Annotated[float | None, typer.Option(help="How far the camera looks down [degrees].")] = None,
-    distance: Annotated[float | None, typer.Option(help="Camera to heap [widths of the heap].")] = None,
-    as_target: Annotated[bool, typer.Option("--target", help="Print a study's [target] section.")] = False,
+    elevation: Annotated[
+        float | None, typer.Option(help="Angle at which the camera looks down, in degrees.")
+    ] = None,
+    distance: Annotated[float | None, typer.Option(help="Camera to heap, in widths of the heap.")] = None,
+    as_target: Annotated[bool, typer.Option("--target", help="Print a study's \\[target] section.")] = False,
     as_csv: Annotated[bool, typer.Option("--csv", help="Print the rows as CSV.")] = False,
     as_json: AsJson = False,
 ) -> None:
     """Measure repose angles on photographs.
 
-    How to take them: the phone level, as high as the heap's middle, five heap widths away or more (zoom in);
-    a plain wall behind that differs from the grains, no hard shadow; nothing else in view; the whole heap
-    with its foot, half the picture wide, the plate's edge beside it. Go round the heap for more views of it.
+    How to take them:
 
-    Doubtful angles are marked, with the reason, and left out of the mean. HEIC pictures need
-    pip install 'dem-warp\\[heic]'; or save them as JPEG.
+    - the phone level, as high as the heap's middle, five heap widths away or more (zoom in);
+
+    - a plain wall behind that differs from the grains; soft light, no hard shadow;
+
+    - the whole heap with its foot, half the picture wide, the plate seen on both sides of it;
+
+    - nothing else in view: no tube, ruler, label or second heap (--crop cuts them off).
+
+    Doubtful angles are marked, with the reason, and left out of the mean. Pictures in HEIC need
+    pip install 'dem-warp\\[heic]', or to be saved as JPEG.
     """
     with clear_errors():
         from experiments.commands import photographs

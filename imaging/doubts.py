@@ -33,16 +33,8 @@ LEAST_FOOT_SLOPE = 0.6
 """Slope of a flank's lowest third over the rest's, or the reverse: it lies within for 19 heaps of 20."""
 END_WIDTH = 0.02
 """Part of the outline's columns that make its end."""
-LARGEST_GAP = 0.1
-"""Part of the area under the outline that does not differ from the background."""
 LARGEST_SHIFT = 1.0
 """Change of the mean [degrees] with the threshold: an edge stays where it is, a shadow's fades."""
-
-DOUBTS = (
-    "lean", "error", "tilt", "range", "elevation", "straightness", "ends", "gaps", "threshold", "foot",
-    "border", "plate", "shadow", "objects",
-)  # fmt: skip
-"""Names of all doubts."""
 
 
 def doubts_of(left: FlankLine, right: FlankLine, mean: float, se: float, outline: Outline) -> Iterator[Doubt]:

@@ -39,7 +39,9 @@ class Outline:
     elevation_se: float = 0.0
     """Angle at which the camera looked down on the plate, and its standard error [degrees]."""
     distance: float | None = None
-    """From the camera to the heap, in widths of the heap, where it is known."""
+    """Distance from the camera to the heap, in widths of the heap, where it is known."""
+    photographed: bool = False
+    """Comes from a photograph, whose angle may be doubted, and not from a drawn silhouette."""
     doubts: tuple[Doubt, ...] = ()
     """Doubts about the outline; empty for a drawn silhouette."""
 

@@ -14,6 +14,7 @@ from imaging.repose import ReposeAngle
 LINE_COLOR = (40, 40, 215)
 OUTLINE_COLOR = (225, 150, 30)
 PLATE_COLOR = (90, 90, 90)
+DOUBT_COLOR = (0, 110, 225)
 HALO_COLOR = (255, 255, 255)
 REFERENCE_WIDTH = 900
 """Lines and letters are one unit thick in a picture of this many columns, and grow with it."""
@@ -33,7 +34,7 @@ def overlay(picture: Picture | Snapshot, angle: ReposeAngle) -> Picture:
     ends = np.array([outline.position[0], outline.position[-1]])
     _stroke(canvas, _on_picture(angle, ends, np.zeros(2)), PLATE_COLOR, unit)
     summit = _summit(angle)
-    for line, aside in ((angle.left_line, -1.0), (angle.right_line, 1.0)):
+    for line, degrees, aside in ((angle.left_line, angle.left, -1.0), (angle.right_line, angle.right, 1.0)):
         fitted = np.array([line.start, line.stop])
         whole = np.array([-line.intercept / line.slope, summit])
         covered = (outline.position >= line.start) & (outline.position <= line.stop)
@@ -45,10 +46,19 @@ def overlay(picture: Picture | Snapshot, angle: ReposeAngle) -> Picture:
             1.5 * unit,
         )
         _stroke(canvas, _on_picture(angle, fitted, _height(line, fitted)), LINE_COLOR, 2.5 * unit)
-        _label(
-            canvas, _on_picture(angle, fitted, _height(line, fitted)).mean(axis=0), line.angle, aside, unit
-        )
+        _label(canvas, _on_picture(angle, fitted, _height(line, fitted)).mean(axis=0), degrees, aside, unit)
+    if angle.doubts:
+        _mark(canvas, "doubtful: " + ", ".join(dict.fromkeys(doubt.name for doubt in angle.doubts)), unit)
     return canvas
+
+
+def _mark(canvas: Picture, text: str, unit: float) -> None:
+    """Write a line in the upper left corner, on a bar from border to border."""
+    size, weight = 0.7 * unit, max(1, round(1.4 * unit))
+    (_, height), _ = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, size, weight)
+    cv2.rectangle(canvas, (0, 0), (canvas.shape[1], 2 * height), DOUBT_COLOR, -1)
+    origin = (height // 2, round(1.5 * height))
+    cv2.putText(canvas, text, origin, cv2.FONT_HERSHEY_SIMPLEX, size, HALO_COLOR, weight, cv2.LINE_AA)
 
 
 def _same_scale(snapshot: Snapshot, angle: ReposeAngle) -> Snapshot:

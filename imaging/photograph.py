@@ -66,10 +66,11 @@ def photographed_outline(picture: Picture, view: View, meters_per_pixel: float |
         height,
         plate,
         meters_per_pixel,
-        sighting.elevation,
-        sighting.elevation_se,
-        view.distance_of(float(np.ptp(position))),
-        sighting.doubts,
+        elevation=sighting.elevation,
+        elevation_se=sighting.elevation_se,
+        distance=view.distance_of(float(np.ptp(position))),
+        photographed=True,
+        doubts=sighting.doubts,
     )
 
 

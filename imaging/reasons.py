@@ -4,6 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from imaging.errors import PictureError
+
+DOUBTS = (
+    "lean", "error", "range", "elevation", "straightness", "foot", "ends",
+    "tilt", "border", "plate", "threshold",
+)  # fmt: skip
+"""Names of all doubts: of a fitted angle, and of the outline that it was fitted on."""
+
 
 @dataclass(frozen=True)
 class Doubt:
@@ -13,6 +21,10 @@ class Doubt:
     """Short name, for tables: one of `DOUBTS`."""
     finding: str
     """Finding, and the limit that it passes."""
+
+    def __post_init__(self) -> None:
+        if self.name not in DOUBTS:
+            raise PictureError(f"a doubt is one of {', '.join(DOUBTS)}", self.name, "doubt")
 
     def __str__(self) -> str:
         return f"{self.name}: {self.finding}"

@@ -62,7 +62,9 @@ class ReposeAngle:
 
     @cached_property
     def doubts(self) -> tuple[Doubt, ...]:
-        """Doubts about the angle; empty where there are none, and for what was drawn."""
+        """Doubts about the angle; none about that of a drawn silhouette."""
+        if not self.outline.photographed:
+            return ()
         judged = doubts_of(self.left_line, self.right_line, self.mean, self.se, self.outline)
         return (*self.outline.doubts, *judged)
 

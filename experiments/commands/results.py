@@ -46,7 +46,7 @@ def print_measured(simulated: Heap) -> None:
 
 def print_angles(rows: Sequence[Mapping[str, Any]], fit: str) -> None:
     """Lay out measured pictures as a table, with their doubts."""
-    table = Table(title=f"Repose angles [degrees], {fit} fit")
+    table = Table(title=f"Repose angles in degrees, {fit} fit")
     table.add_column("picture", overflow="fold")
     for name in ("left", "right", "mean", "se"):
         table.add_column(name, justify="right")

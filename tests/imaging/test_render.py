@@ -84,7 +84,7 @@ def test_lines_are_drawn_where_they_were_measured(heap) -> None:
 
 @pytest.mark.parametrize("tilt", [0.0, -4.0])
 def test_a_measurement_lies_in_a_part_where_it_lay_in_the_whole(tilt: float) -> None:
-    image = draw(DrawnHeap(32.0, 27.0, grain=8.0), Camera(plate=(90, 90, 90), tilt=tilt))
+    image = draw(DrawnHeap(32.0, 30.0, grain=8.0), Camera(plate=(90, 90, 90), tilt=tilt))
     angle = measure(image)
     drawn = overlay(image, angle)
     left, top = 20, 15

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from imaging import PictureError, View, measure
+from imaging import PictureError, View, find_outline, measure, overlay
 from imaging.synthetic import Camera, DrawnHeap, draw
 from imaging.view import level_angle, level_error, seen_angle
 
@@ -77,6 +77,16 @@ def test_grain_and_plate_of_one_colour_are_said() -> None:
 def test_flanks_of_unlike_angles_are_doubted() -> None:
     (doubt,) = measure(draw(DrawnHeap(24, 32), Camera(noise=3))).doubts
     assert (doubt.name, "8.0 degrees apart" in doubt.finding) == ("lean", True)
+
+
+def test_doubts_stand_on_the_drawn_copy_and_not_on_a_drawn_silhouette() -> None:
+    picture = draw(DrawnHeap(24, 32), Camera(noise=3))
+    doubted = overlay(picture, measure(picture))
+    corner = picture[:12, -12:]
+    assert (doubted[:12, -12:] != corner).any()
+    clear = draw(DrawnHeap(30, 30), Camera(noise=3))
+    np.testing.assert_array_equal(overlay(clear, measure(clear))[:12, -12:], clear[:12, -12:])
+    assert measure(find_outline(picture, ground_row=len(picture) - 60.5)).doubts == ()
 
 
 def test_a_tilt_is_believed_where_the_plate_is_seen() -> None:
