@@ -38,8 +38,8 @@ def decoded(data: bytes, place: str) -> str:
     """Decode text in UTF-8 as `read_text` does; ``place`` names it in errors."""
     named = next((name for mark, name in _MARKS.items() if data.startswith(mark)), "")
     if not named and data.count(0, 0, 4096) > 0:
-        halves = data[:4096:2], data[1:4096:2]
-        named = "UTF-16" if any(half.count(0) > 0.4 * len(half) for half in halves) else "binary data"
+        zeros = sorted(half.count(0) / max(len(half), 1) for half in (data[:4096:2], data[1:4096:2]))
+        named = "UTF-16" if zeros[0] < 0.05 and zeros[1] > 0.5 else "binary data"
     if named:
         advice = ": save it as UTF-8" if named.startswith("UTF") else ""
         raise InputError("needs text in UTF-8", f"{named}{advice}", place)

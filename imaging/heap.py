@@ -76,8 +76,8 @@ def heap_angle(
     Raises
     ------
     PictureError
-        When an argument is wrong, there are fewer grains than `LEAST_GRAINS`, or fewer than two azimuths show a
-        measurable heap.
+        When an argument is wrong, there are fewer grains than `LEAST_GRAINS`, or fewer than two azimuths show
+        a measurable heap.
     """
     settings = FitSettings.of(fit)
     spheres = Spheres.of(centers, radii)

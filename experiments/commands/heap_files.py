@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -13,7 +14,8 @@ from experiments.errors import InputError
 from experiments.sphere_files import format_of, length_unit, read_spheres
 from experiments.studyfile.study import MeasurementSection
 from experiments.studyfile.units import Quantity
-from imaging import HeapAngle, heap_angle, overlay, snapshot
+from imaging import Doubt, HeapAngle, heap_angle, overlay, snapshot
+from imaging.doubts import GREATEST_ANGLE, LARGEST_ERROR, LEAST_ANGLE
 from imaging.geometry import Picture, Spheres
 from imaging.ground import find_ground
 
@@ -97,7 +99,9 @@ def measure_heap_file(path: Path, fit: str, settings: HeapSettings) -> MeasuredH
     height = find_ground(spheres) if settings.plate_height is None else settings.plate_height
     standing = spheres.centers[:, 2] > height - BELOW * spheres.radii
     if not standing.any():
-        raise InputError("spheres stand on the plate", f"none above {1e3 * height:g} mm", f"{path}, --plate-height")
+        raise InputError(
+            "spheres stand on the plate", f"none above {1e3 * height:g} mm", f"{path}, --plate-height"
+        )
     heap = Spheres(spheres.centers[standing] - np.array([0.0, 0.0, height]), spheres.radii[standing])
     settled = MeasurementSection()
     bodies = len(heap.radii) if file.bodies is None else len(np.unique(file.bodies[standing]))
@@ -130,4 +134,13 @@ def values_of(heap: MeasuredHeap, level: float) -> dict[str, Any]:
         "low": low,
         "high": high,
         "source": heap.told,
+        "doubts": [str(doubt) for doubt in _doubts(heap.angle)],
     }
+
+
+def _doubts(angle: HeapAngle) -> Iterator[Doubt]:
+    """Reasons to doubt an angle that need no camera."""
+    if not LEAST_ANGLE <= angle.mean <= GREATEST_ANGLE:
+        yield Doubt("range", f"{angle.mean:.1f} degrees, outside {LEAST_ANGLE:g} to {GREATEST_ANGLE:g}")
+    if angle.se > LARGEST_ERROR:
+        yield Doubt("error", f"a standard error of {angle.se:.2f} degrees, over {LARGEST_ERROR:g}")

@@ -135,6 +135,7 @@ def measure_pictures(
         # A picture may break a decoder, memory or a fit in ways that nobody thought of: it is a row, no end.
         try:
             if is_heap_file(picture):
+                row["source"] = "file of spheres"
                 heap = measure_heap_file(picture, fit, heaps or HeapSettings())
                 row |= values_of(heap, LEVEL)
                 drawn = heap.picture

@@ -114,7 +114,8 @@ def check_grain_size(length: float, place: str, read_as: str) -> None:
     """
     low, high = GRAIN_SIZES
     if not low <= length <= high:
-        rule = f"a grain is {1e3 * low:g} to {1e3 * high:g} mm long, unless its unit is named (--unit, clump_unit)"
+        sizes = f"{1e3 * low:g} to {1e3 * high:g} mm"
+        rule = f"a grain is {sizes} long, unless its unit is named (--unit, clump_unit)"
         raise InputError(rule, f"{1e3 * length:.4g} mm, {read_as}", place)
 
 

@@ -9,7 +9,6 @@ file of EDEM itself was at hand to test this with.
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,14 +16,19 @@ import numpy as np
 from experiments.errors import InputError
 from experiments.sphere_files.sphere_file import Columns, Format, SphereFile, content_lines, spheres_of
 from experiments.studyfile.units import UNITS
-from experiments.texts import DELIMITERS, read_text, split
+from experiments.texts import read_text, split
 
 HEADER_LINES = 60
 """Lines within which the names of the columns stand."""
+HEADER_DELIMITERS = (";", "\t", ",", None)
+"""Delimiters of names, in the order in which they are tried: names may have blanks within."""
 _PLACE = r"(?:particle|sphere)?(?:position|pos|center|centre|coordinate|coord|points)?"
 _SIZE = r"(?:particle|sphere|physical)*"
 _NAMES = {
-    **{axis: rf"{_PLACE}(?:{axis}|{n})|{axis}(?:position|pos|coordinate|coord)?" for n, axis in enumerate("xyz")},
+    **{
+        axis: rf"{_PLACE}(?:{axis}|{n})|{axis}(?:position|pos|coordinate|coord)?"
+        for n, axis in enumerate("xyz")
+    },
     "r": rf"{_SIZE}(?:radius|radii|r)",
     "d": rf"{_SIZE}(?:diameter|d)",
     "body": "clumpid|idmultisphere|mol|grain|owner|particleid|clump",
@@ -41,7 +45,7 @@ def column_kind(name: str) -> str | None:
 def _find_header(text: str) -> tuple[int, list[str], str | None] | None:
     """Number of the line with the names, its cells and the delimiter; None where there is none."""
     for number, line in content_lines(text)[:HEADER_LINES]:
-        for delimiter in DELIMITERS:
+        for delimiter in HEADER_DELIMITERS:
             cells = split(line, delimiter)
             kinds = {column_kind(cell) for cell in cells}
             if {"x", "y", "z"} <= kinds and kinds & {"r", "d"}:
@@ -67,9 +71,8 @@ def _read(path: Path) -> SphereFile:
     header, names, delimiter = found
     kinds = [column_kind(name) for name in names]
     size = "r" if "r" in kinds else "d"
-    columns = Columns(*(kinds.index(kind) for kind in ("x", "y", "z", size)), is_diameter=size == "d")
-    if "body" in kinds:
-        columns = replace(columns, body=kinds.index("body"))
+    x, y, z, r = (kinds.index(kind) for kind in ("x", "y", "z", size))
+    columns = Columns(x, y, z, r, size == "d", kinds.index("body") if "body" in kinds else None)
     rows = ((n, split(line, delimiter)) for n, line in content_lines(text) if n > header)
     spheres, bodies = spheres_of(rows, columns, path, delimiter)
     sizes = [_unit_of(names[column], f"{path}, line {header}") for column in columns.needed()[:4]]

@@ -33,7 +33,9 @@ def _read(path: Path) -> SphereFile:
     size = next((name for name in (*RADII, *DIAMETERS) if name in values), None)
     if size is None:
         named = ", ".join(arrays.values()) or "none"
-        raise InputError("the points have an array radius (or radii, diameter)", f"arrays: {named}", str(path))
+        raise InputError(
+            "the points have an array radius (or radii, diameter)", f"arrays: {named}", str(path)
+        )
     table = np.column_stack([points, np.ravel(values[size])[: len(points)]]).astype(np.float64)
     rows = ((n, [repr(float(value)) for value in row]) for n, row in enumerate(table))
     try:

@@ -21,7 +21,7 @@ _NEEDED = ("x", "y", "z")
 
 
 def _recognises(head: str) -> bool:
-    return head.lstrip().startswith("<") and "<VTKFile" not in head and not head.lstrip().startswith("<!DOCTYPE html")
+    return head.lstrip().startswith("<")
 
 
 def _read(path: Path) -> SphereFile:
@@ -46,7 +46,9 @@ def _read(path: Path) -> SphereFile:
     lengths = [name for name in named if name in UNITS["length"]]
     if len(lengths) > 1:
         raise InputError("one unit of length", ", ".join(sorted(lengths)), str(path))
-    return SphereFile("XML with an element for each sphere", spheres, unit=UNITS["length"][lengths[0]] if lengths else None)
+    return SphereFile(
+        "XML with an element for each sphere", spheres, unit=UNITS["length"][lengths[0]] if lengths else None
+    )
 
 
 def _spheres(element: ElementTree.Element) -> Iterator[dict[str, str]]:

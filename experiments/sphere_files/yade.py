@@ -48,7 +48,9 @@ def _read_template(path: Path) -> SphereFile:
         if isinstance(node, ast.Call) and ast.unparse(node.func).endswith("clumpTemplate")
     ]
     if len(calls) != 1:
-        raise InputError("holds one clumpTemplate(relRadii, relPositions)", f"{len(calls)} of them", str(path))
+        raise InputError(
+            "holds one clumpTemplate(relRadii, relPositions)", f"{len(calls)} of them", str(path)
+        )
     [call] = calls
     place = f"{path}, line {call.lineno}"
     given = dict(zip(("relRadii", "relPositions"), call.args, strict=False))

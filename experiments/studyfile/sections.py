@@ -38,10 +38,10 @@ class ShapeSection(Section):
     """Source of a shape: a file of spheres, or the radius of one."""
 
     clump: Path | None = None
-    """File with the clump's spheres, relative to the study file: x y z r a line, or a table, text or VTK file of
-    LIGGGHTS, Yade, EDEM or DEM-Engine."""
+    """File with the clump's spheres, relative to the study file: x y z r a line, or a table, text or VTK file
+    of LIGGGHTS, Yade, EDEM or DEM-Engine."""
     clump_unit: str | None = None
-    """Unit of that file (mm, m, ...), or the length that is 1 in it; left out: that which it names, else mm."""
+    """Unit of that file (mm, m, ...), or the length that is 1 in it; left out: the one it names, or mm."""
     sphere: Length | None = Field(default=None, gt=0.0)
     """Radius of spherical grains, instead of a clump."""
 

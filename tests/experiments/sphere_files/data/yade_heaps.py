@@ -9,10 +9,10 @@ random.seed(1)
 
 
 def collapse(clumped):
-    """Let a column of grains collapse on a facet plate, single spheres or the pellets of pellet.multisphere."""
+    """Let a column of spheres, or of the pellets of pellet.multisphere, collapse on a plate of facets."""
     O.reset()
     O.materials.append(FrictMat(young=5e6, poisson=0.3, frictionAngle=math.atan(0.6), density=1000))
-    plate = [(-0.06, -0.06, 0), (0.06, -0.06, 0), (0.06, 0.06, 0), (-0.06, 0.06, 0)]
+    plate = [(-0.05, -0.05, 0), (0.05, -0.05, 0), (0.05, 0.05, 0), (-0.05, 0.05, 0)]
     O.bodies.append([facet([plate[0], plate[1], plate[2]]), facet([plate[0], plate[2], plate[3]])])
     pitch = 0.0068 if clumped else 0.0045
     for layer in range(16 if clumped else 20):
@@ -32,8 +32,8 @@ def collapse(clumped):
         InsertionSortCollider([Bo1_Sphere_Aabb(), Bo1_Facet_Aabb()]),
         InteractionLoop(
             [Ig2_Sphere_Sphere_ScGeom(), Ig2_Facet_Sphere_ScGeom()],
-            [Ip2_FrictMat_FrictMat_MindlinPhys(en=0.2, es=0.2)],
-            [Law2_ScGeom_MindlinPhys_Mindlin()],
+            [Ip2_FrictMat_FrictMat_MindlinPhys(en=0.2, es=0.2, eta=0.3, krot=0.005)],
+            [Law2_ScGeom_MindlinPhys_Mindlin(includeMoment=True)],
         ),
         NewtonIntegrator(gravity=(0, 0, -9.81), damping=0.05),
     ]
