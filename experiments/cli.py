@@ -26,7 +26,7 @@ from experiments.commands.options import (
     Workers,
     assignments,
 )
-from experiments.commands.results import print_measured, show_stage
+from experiments.commands.results import print_measured, print_study, show_stage
 
 if TYPE_CHECKING:
     pass
@@ -95,7 +95,7 @@ def calibrate(
         paper_replicates=paper_replicates if follow_paper or only_paper else None,
     )  # fmt: skip
     with clear_errors(resume=go_on):
-        messages.print(f"{chosen.name}, on {device}", chosen.note, sep="\n", markup=False)
+        print_study(chosen, device)
         ended = api.calibrate(
             chosen,
             folder,
@@ -157,7 +157,7 @@ def discover(
         device=device, seed=seed,
     )  # fmt: skip
     with clear_errors(resume=go_on):
-        messages.print(f"{chosen.name}, on {device}", chosen.note, sep="\n", markup=False)
+        print_study(chosen, device)
         ended = api.discover(
             chosen,
             measured,
@@ -175,7 +175,7 @@ def discover(
         return
     if as_json:
         typer.echo(json.dumps(results_of(ended.discovery, ended.terms), allow_nan=False))
-    messages.print(verdict_line(ended.discovery, ended.terms), markup=False)
+    messages.print(verdict_line(ended.discovery, ended.terms))
     messages.print(f"Report: {ended.page}")
 
 
@@ -187,7 +187,8 @@ def heap(
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of sizes, places and orientations.")] = 1,
     scene: Annotated[
-        str | None, typer.Option(metavar="NAME", help="A further scene of the study, [response-scene.NAME].")
+        str | None,
+        typer.Option(metavar="NAME", help="A further scene of the study, \\[response-scene.NAME]."),
     ] = None,
     out: Out = None,
     scale: Scale = None,

@@ -53,4 +53,4 @@ def clump(
     else:
         print_clump(made.to_dict(mass_density))
     if made.told:
-        messages.print(f"Read: {shape}: {made.told}", markup=False)
+        messages.print(f"Read: {shape}: {made.told}")

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import typer
 from rich.console import Console
-from rich.markup import escape
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn
+from rich.text import Text
 
 if TYPE_CHECKING:
     from dem_warp import Progress as BatchProgress
@@ -25,8 +25,8 @@ FIRST_GUESS = 0.01
 LINE_EVERY = 10.0
 """Time between two lines of progress where there is no terminal [s]."""
 
-messages = Console(stderr=True, highlight=False, soft_wrap=True)
-"""Console of progress and errors; results go to standard output."""
+messages = Console(stderr=True, highlight=False, soft_wrap=True, markup=False)
+"""Console of progress and errors, whose text is taken as it is; results go to standard output."""
 
 
 @contextmanager
@@ -48,7 +48,7 @@ def clear_errors(resume: str | None = None) -> Iterator[None]:
 
 def fail(message: str, code: int = BAD_INPUT) -> None:
     """Say what is wrong and end the command by typer.Exit."""
-    messages.print(f"[bold red]Error:[/] {escape(message)}")
+    messages.print(Text.assemble(("Error:", "bold red"), f" {message}"))
     raise typer.Exit(code)
 
 
@@ -61,7 +61,7 @@ class CaseProgress:
         self._first: BatchProgress | None = None
         self._bar = Progress(
             SpinnerColumn(),
-            TextColumn("{task.description}"),
+            TextColumn("{task.description}", markup=False),
             BarColumn(bar_width=16),
             TextColumn("{task.percentage:3.0f} %  {task.fields[state]}"),
             console=messages,

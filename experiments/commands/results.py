@@ -14,12 +14,20 @@ from experiments.commands.console import messages
 if TYPE_CHECKING:
     from experiments.calibrate.results import StageResult
     from experiments.cases import Heap
+    from experiments.studyfile import Study
 
 
 def show_stage(name: str, result: StageResult) -> None:
     """Show what a stage decided, as it ends."""
     for decision in result.decisions:
-        messages.print(f"{name.replace('_', ' ')}: {decision.outcome}", markup=False)
+        messages.print(f"{name.replace('_', ' ')}: {decision.outcome}")
+
+
+def print_study(study: Study, device: str) -> None:
+    """Say which study runs where, and what is doubtful about it."""
+    messages.print(f"{study.name}, on {device}", study.note, sep="\n")
+    if narrow := study.narrowness():
+        messages.print(f"Doubtful: {narrow}")
 
 
 def print_clump(facts: Mapping[str, Any]) -> None:
@@ -57,13 +65,14 @@ def print_angles(rows: Sequence[Mapping[str, Any]], fit: str) -> None:
             doubts = ", ".join(doubt.partition(":")[0] for doubt in row["doubts"])
             table.add_row(row["picture"], *values, doubts)
     if table.row_count:
-        Console().print(table)
+        # Names of files may have brackets, which are no markup.
+        Console(markup=False).print(table)
 
 
 def print_findings(rows: Sequence[Mapping[str, Any]]) -> None:
     """Say how files of heaps were read, and why angles are doubtful."""
     for row in rows:
         if row["mean"] is not None and row["source"] != "photograph":
-            messages.print(f"Read: {row['picture']}: {row['source']}", markup=False)
+            messages.print(f"Read: {row['picture']}: {row['source']}")
         for doubt in row["doubts"]:
-            messages.print(f"Doubtful: {row['picture']}: {doubt}", markup=False)
+            messages.print(f"Doubtful: {row['picture']}: {doubt}")

@@ -25,7 +25,7 @@ def format_of(path: Path) -> Format | None:
         with path.open("rb") as file:
             data = file.read(HEAD)
     except OSError as error:
-        raise InputError("needs a file that can be read", error.strerror or str(error), str(path)) from None
+        raise InputError("must be a readable file", error.strerror or str(error), str(path)) from None
     head = data.removeprefix(b"\xef\xbb\xbf").decode("latin-1")
     binary_vtk = head.startswith("# vtk DataFile") or "<VTKFile" in head[:4096]
     if "\0" in head and not binary_vtk:

@@ -9,7 +9,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from experiments.errors import StudyError
+from experiments.errors import InputError, StudyError
+from experiments.texts import read_text
 
 
 def read_toml(path: Path, what: str = "the study") -> tuple[str, dict[str, Any]]:
@@ -21,17 +22,15 @@ def read_toml(path: Path, what: str = "the study") -> tuple[str, dict[str, Any]]
         When it cannot be read, or is no TOML.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_text(path).replace("\r\n", "\n")
         return text, tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         found = re.search(r"at line (\d+)", str(error))
         number = int(found[1]) if found else len(text.splitlines())
         shown = text.splitlines()[number - 1].strip()
         raise StudyError(f"must be valid TOML: {error}", shown, f"{path}:{number}") from None
-    except UnicodeDecodeError:
-        raise StudyError("must be a text file in UTF-8", "other bytes", str(path)) from None
-    except OSError as error:
-        raise StudyError(f"{what} must be a readable file", error.strerror or "none", str(path)) from None
+    except InputError as error:
+        raise StudyError(f"{what} {error.rule}", error.value, error.place) from None
 
 
 def toml_text(document: Mapping[str, Any], path: tuple[str, ...] = (), array: bool = False) -> str:

@@ -27,6 +27,9 @@ UNITS: dict[str, dict[str, float]] = {
 }
 """Size of each unit in the base unit of its dimension (SI; degrees for angles)."""
 
+_SPELLINGS = str.maketrans({"²": "^2", "³": "^3", "µ": "u", "μ": "u", "°": "deg", "−": "-"})
+_POWER = re.compile(r"\b([a-z]*m)(?:\*\*)?([23])\b")
+_COMMA = re.compile(r"\s*[+-]?\d+,\d+(?:[eE][+-]?\d+)?(?:\s*[^\s\d].*)?")
 _TEXT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\S.*?)?\s*")
 
 
@@ -50,8 +53,11 @@ class Quantity:
             quantity = value
         elif isinstance(value, (int, float)) and not isinstance(value, bool):
             quantity = cls(float(value))
-        elif isinstance(value, str) and (match := _TEXT.fullmatch(value)):
-            quantity = cls(float(match[1]), match[2] or "")
+        elif isinstance(value, str) and (match := _TEXT.fullmatch(value.translate(_SPELLINGS))):
+            quantity = cls(float(match[1]), _POWER.sub(r"\1^\2", match[2] or ""))
+        elif isinstance(value, str) and _COMMA.fullmatch(value):
+            point = value.strip().replace(",", ".", 1)
+            raise ValueError(f'must have a decimal point, not a comma: "{point}"')
         else:
             raise ValueError('must be a number, or text with a number and its unit such as "110 mm"')
         if not math.isfinite(quantity.number):
