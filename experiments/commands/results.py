@@ -14,6 +14,7 @@ from experiments.commands.console import messages
 if TYPE_CHECKING:
     from experiments.calibrate.results import StageResult
     from experiments.cases import Heap
+    from experiments.commands.clump_search import Trial
     from experiments.studyfile import Study
 
 
@@ -40,6 +41,21 @@ def print_clump(facts: Mapping[str, Any]) -> None:
         typer.echo(f"mass {facts['mass_mg']:.4f} mg")
     if facts["coverage"] is not None:
         typer.echo(f"covers {facts['coverage']:.1%} of the solid, passes it by {facts['overshoot']:.1%}")
+        typer.echo(_quality(facts["trials"][-1]))
+
+
+def print_trial(trial: Trial) -> None:
+    """Show a number of spheres as it was tried."""
+    messages.print(f"{trial.spheres:3d} spheres: {_quality(trial.to_dict())}")
+
+
+def _quality(trial: Mapping[str, Any]) -> str:
+    """Errors of a clump, against its solid."""
+    return (
+        f"volume {trial['volume_error']:+.1%}, inertia {trial['inertia_error']:.1%} off, surface "
+        f"{trial['surface_distance_mm']:.3f} mm ({trial['surface_error']:.1%}) off, "
+        f"protrusion {trial['protrusion_mm']:.3f} mm"
+    )
 
 
 def print_measured(simulated: Heap) -> None:

@@ -55,7 +55,7 @@ def read_rows(path: Path, needed: Collection[str], known: Collection[str]) -> It
 
 
 def _lines(path: Path) -> Iterator[tuple[int, list[str]]]:
-    """Lines of cells; where semicolons or tabs separate them, as German Excel does, numbers may have commas."""
+    """Lines of cells; where semicolons or tabs separate them, as in German, numbers may have commas."""
     text = read_text(path)
     delimiter = _delimiter(text)
     try:

@@ -174,7 +174,9 @@ def test_a_unit_of_the_right_kind_is_converted(read) -> None:
 
 
 def test_wrong_units_that_leave_no_value_are_refused(read) -> None:
-    with pytest.raises(InputError, match=r"2: value, rows 2, 3: .* is the unit right\? \(received 40 m, 41 m\)"):
+    with pytest.raises(
+        InputError, match=r"2: value, rows 2, 3: .* is the unit right\? \(received 40 m, 41 m\)"
+    ):
         read("base,1,height,40,m\nbase,2,height,41,m\n")
 
 
