@@ -104,8 +104,8 @@ def make_clump(request: ClumpRequest, watch: Callable[[Trial], None] = lambda tr
     """
     source, unit = request.source, request.unit
     named = ":" in source and not Path(source).is_file()
-    given = not named and _holds_spheres(Path(source))
     wanted = [each for each in (request.sphere_count, request.tolerance) if each is not None]
+    given = not named and _holds_spheres(Path(source), bool(wanted))
     if given and wanted:
         raise InputError("spheres that are given are not fitted", wanted[0], "--spheres, --tolerance")
     if not given and len(wanted) != 1:
@@ -141,8 +141,11 @@ def _fitted(
     return fit, [Trial.of(fit, reach)]
 
 
-def _holds_spheres(path: Path) -> bool:
-    return path.suffix.lower() not in MESH_FILES and (not path.is_file() or format_of(path) is not None)
+def _holds_spheres(path: Path, to_fit: bool) -> bool:
+    """Tell by ending and content that a file holds spheres; where neither tells, one to be fitted is a mesh."""
+    if path.suffix.lower() in MESH_FILES:
+        return False
+    return not to_fit or (path.is_file() and format_of(path) is not None)
 
 
 def _check_unit(unit: str) -> None:

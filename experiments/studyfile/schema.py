@@ -94,7 +94,10 @@ class Section(BaseModel):
         """Refuse true and false for a number: Python counts with them."""
         if isinstance(value, bool) and info.field_name is not None:
             kind = cls.model_fields[info.field_name].annotation
-            if int in (kind, *get_args(kind)):
+            kinds = [kind, *get_args(kind)]
+            if int in kinds or any(
+                get_origin(each) is Annotated and get_args(each)[0] is int for each in kinds
+            ):
                 raise ValueError("must be a whole number, not true or false")
         return value
 

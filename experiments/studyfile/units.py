@@ -53,11 +53,11 @@ class Quantity:
             quantity = value
         elif isinstance(value, (int, float)) and not isinstance(value, bool):
             quantity = cls(float(value))
-        elif isinstance(value, str) and (match := _TEXT.fullmatch(value.translate(_SPELLINGS))):
-            quantity = cls(float(match[1]), _POWER.sub(r"\1^\2", match[2] or ""))
         elif isinstance(value, str) and _COMMA.fullmatch(value):
             point = value.strip().replace(",", ".", 1)
             raise ValueError(f'must have a decimal point, not a comma: "{point}"')
+        elif isinstance(value, str) and (match := _TEXT.fullmatch(value.translate(_SPELLINGS))):
+            quantity = cls(float(match[1]), _POWER.sub(r"\1^\2", match[2] or ""))
         else:
             raise ValueError('must be a number, or text with a number and its unit such as "110 mm"')
         if not math.isfinite(quantity.number):
