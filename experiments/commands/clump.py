@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from experiments.commands.console import clear_errors, messages
 from experiments.commands.options import AsJson, quantity, share
 from experiments.commands.results import print_clump, print_trial
+
+if TYPE_CHECKING:
+    from experiments.commands.shapes import Clump
 
 CLUMP_EXAMPLE = "Example: [bold]dem-warp clump tri-pyramid:5.90x3.93 --spheres 9 --out clump.txt[/]"
 
@@ -55,8 +58,13 @@ def clump(
 ) -> None:
     """Make a grain of spheres from a mesh or measured dimensions: volume, mass, inertia, spheres."""
     with clear_errors():
-        from experiments.commands.shapes import ClumpRequest, make_clump, write_clump
+        from experiments.commands.clump_picture import require_picture
+        from experiments.commands.shapes import ClumpRequest, make_clump, require_new, write_clump
 
+        if out:
+            require_new(out)
+        if picture:
+            require_picture(picture)
         request = ClumpRequest(
             shape, spheres, share(tolerance, "--tolerance") if tolerance else None,
             _reach(protrusion, tolerance), unit,
@@ -71,8 +79,13 @@ def clump(
         typer.echo(json.dumps(made.to_dict(mass_density), allow_nan=False))
     else:
         print_clump(made.to_dict(mass_density))
+    _print_remarks(made, shape)
+
+
+def _print_remarks(made: Clump, source: str) -> None:
+    """Say how a file was read, and what may be done about a poor fit."""
     if made.told:
-        messages.print(f"Read: {shape}: {made.told}")
+        messages.print(f"Read: {source}: {made.told}")
     if made.advice:
         messages.print(f"Advice: {made.advice}")
 

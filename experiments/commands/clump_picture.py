@@ -19,18 +19,27 @@ SUBDIVISIONS = 3
 """Of the icosahedron that a sphere is drawn as."""
 
 
-def draw_clump(path: Path, spheres: np.ndarray, solid: Trimesh | None) -> None:
-    """Draw spheres (n, 4) [m], beside their solid where there is one, seen from the same side.
+def require_picture(path: Path) -> None:
+    """Refuse a picture that exists, or whose ending names no kind of picture.
 
     Raises
     ------
     InputError
-        When the file exists, or its ending names no kind of picture.
+        When it is one of these.
     """
     from matplotlib.figure import Figure
 
     if path.exists():
         raise InputError("a picture never overwrites a file", "one that exists", str(path))
+    known = Figure().canvas.get_supported_filetypes()
+    if path.suffix.removeprefix(".").lower() not in known:
+        raise InputError(f"must be a kind of picture ({', '.join(known)})", path.suffix or "none", str(path))
+
+
+def draw_clump(path: Path, spheres: np.ndarray, solid: Trimesh | None) -> None:
+    """Draw spheres (n, 4) [m], beside their solid where there is one, seen from the same side."""
+    from matplotlib.figure import Figure
+
     figure = Figure(figsize=(9.0, 4.5) if solid is not None else (4.5, 4.5), dpi=150)
     figure.subplots_adjust(0.0, 0.0, 1.0, 0.92, 0.0)
     clump = _mesh_of(spheres)
@@ -49,13 +58,8 @@ def draw_clump(path: Path, spheres: np.ndarray, solid: Trimesh | None) -> None:
         axes.set_title(
             f"{title}, {' x '.join(f'{1e3 * side:.3g}' for side in np.ptp(mesh.bounds, axis=0))} mm"
         )
-    try:
-        with replacing(path) as temporary:
-            figure.savefig(temporary)
-    except ValueError as error:
-        raise InputError(
-            f"must be a kind of picture that can be written: {error}", path.suffix, str(path)
-        ) from None
+    with replacing(path) as temporary:
+        figure.savefig(temporary)
 
 
 def _mesh_of(spheres: np.ndarray) -> Trimesh:

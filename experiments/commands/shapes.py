@@ -142,7 +142,7 @@ def _fitted(
 
 
 def _holds_spheres(path: Path, to_fit: bool) -> bool:
-    """Tell by ending and content that a file holds spheres; where neither tells, one to be fitted is a mesh."""
+    """Tell by ending and content that a file holds spheres; in doubt, what is to be fitted is a mesh."""
     if path.suffix.lower() in MESH_FILES:
         return False
     return not to_fit or (path.is_file() and format_of(path) is not None)
@@ -165,6 +165,18 @@ def _mesh(path: Path, unit: str | None) -> Trimesh:
     return mesh
 
 
+def require_new(path: Path) -> None:
+    """Refuse a file that exists.
+
+    Raises
+    ------
+    InputError
+        When it does.
+    """
+    if path.exists():
+        raise InputError("a clump never overwrites a file", "one that exists", str(path))
+
+
 def write_clump(shape: ClumpShape, path: Path) -> None:
     """Write a clump's file of spheres.
 
@@ -173,7 +185,6 @@ def write_clump(shape: ClumpShape, path: Path) -> None:
     InputError
         When the file exists.
     """
-    if path.exists():
-        raise InputError("a clump never overwrites a file", "one that exists", str(path))
+    require_new(path)
     with replacing(path) as temporary:
         shape.write(temporary)

@@ -29,7 +29,7 @@ UNITS: dict[str, dict[str, float]] = {
 
 _SPELLINGS = str.maketrans({"²": "^2", "³": "^3", "µ": "u", "μ": "u", "°": "deg", "−": "-"})
 _POWER = re.compile(r"\b([a-z]*m)(?:\*\*)?([23])\b")
-_COMMA = re.compile(r"\s*[+-]?\d+,\d+(?:[eE][+-]?\d+)?(?:\s*[^\s\d].*)?")
+_COMMA = re.compile(r"\s*[+-]?\d+,\d+(?:[eE][+-]?\d+)?(?:\s+\S.*|[^\s\d].*)?")
 _TEXT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\S.*?)?\s*")
 
 

@@ -66,9 +66,9 @@ def test_the_protrusion_found_keeps_the_volume() -> None:
 
 def test_a_tolerance_takes_the_first_number_of_spheres_that_keeps_it() -> None:
     seen: list[Trial] = []
-    fit, trials = fit_within(parse_solid("ellipsoid:6x3x3"), 0.1, None, seen.append)
+    fit, trials = fit_within(parse_solid("ellipsoid:6x3x3"), 0.2, None, seen.append)
     assert seen == trials
-    assert [trial.within(0.1) for trial in trials] == [False] * (len(trials) - 1) + [True]
+    assert [trial.within(0.2) for trial in trials] == [False] * (len(trials) - 1) + [True]
     assert trials[-1].spheres == fit.shape.sphere_count > 1
 
 
@@ -79,7 +79,7 @@ def test_a_tolerance_that_no_clump_keeps_names_the_best(monkeypatch: pytest.Monk
 
 
 def test_a_person_is_told_how_the_fit_goes_and_what_to_do() -> None:
-    code, out, err = dem_warp("clump", "ellipsoid:6x3x3", "--tolerance", "15%", "--json")
+    code, out, err = dem_warp("clump", "ellipsoid:6x3x3", "--tolerance", "25%", "--json")
     assert code == 0
     trials = json.loads(out)["trials"]
     assert [line.split()[0] for line in err.splitlines()] == [str(trial["spheres"]) for trial in trials]

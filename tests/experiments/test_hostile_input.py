@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 from commandline import dem_warp
-from conftest import SMALL_STUDY
 
+SMALL_STUDY = Path(__file__).with_name("small.toml").read_text(encoding="utf-8")
 LONGEST_MESSAGE = 2500
 """Characters: a message is read, whatever came in."""
 CONDITIONS = "\n[condition.base]\n\n[condition.fast]\nscene.lifted-cylinder.lift_speed = '0.2 m/s'\n"
@@ -113,7 +113,8 @@ HOSTILE = {
         "heap s.toml --device tpu", ("--device", "tpu", "one of"), {"s.toml": SMALL_STUDY}
     ),
     "two CPUs": Hostile(
-        "discover s.toml --device cpu,cpu", ("--device", "each device once", "cpu,cpu"), {"s.toml": SMALL_STUDY}
+        "discover s.toml --device cpu,cpu", ("--device", "each device once", "cpu,cpu"),
+        {"s.toml": SMALL_STUDY},
     ),
     "a setting without value": Hostile(
         "heap s.toml --device cpu --set E", ("--set", "NAME=VALUE", "E"), {"s.toml": SMALL_STUDY}
@@ -139,7 +140,8 @@ HOSTILE = {
     "wrong column": measured(HEAD.replace("unit", "units"), "m.csv:1", "known column", "units"),
     "columns missing": measured("a,b\n1,2\n", "m.csv:1", "missing", "a, b"),
     "one unit wrong in every row": measured(
-        HEAD + "".join(f"base,{n},flank_angle,30,mm\n" for n in range(1, 40)), "m.csv:2: ", "and 36 more", "angle"
+        HEAD + "".join(f"base,{n},flank_angle,30,mm\n" for n in range(1, 40)),
+        "m.csv:2: ", "and 36 more", "angle",
     ),
     "measured in UTF-16": measured(
         (HEAD + "base,1,flank_angle,30,deg\n").encode("utf-16"), "m.csv", "UTF-16"
@@ -166,7 +168,8 @@ HOSTILE = {
         name="g.stl",
     ),
     "an open mesh": clump(
-        "solid o\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n"
+        "solid o\nfacet normal 0 0 1\nouter loop\n"
+        "vertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n"
         "endsolid o\n", "g.stl", "closed", "open or doubled", options="--spheres 3", name="g.stl",
     ),
     "spheres in metres": clump("x,y,z,r\n0,0,0,0.002\n", "g.txt", "--unit", "0.004 mm"),

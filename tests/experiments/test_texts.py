@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 import typer
 from commandline import dem_warp
-from conftest import SMALL_STUDY
 
 from dem_warp.device import resolve_device
 from experiments.cli import app
@@ -21,6 +20,8 @@ from experiments.texts import read_text
 
 CSV = "name,value,note\nα,1.5,a b\nb,-2.25e3,1 mm\n"
 EXCEL = "name;value;note\r\nα;1,5;a b\r\nb;-2,25e3;1 mm\r\n"
+
+SMALL_STUDY = Path(__file__).with_name("small.toml").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("mark", [b"", b"\xef\xbb\xbf"])
