@@ -75,7 +75,7 @@ def without_heap(source: int | Path) -> tuple[Row, Picture]:
     outcome, angle, why = measured(picture)
     row: Row = {
         "kind": kind,
-        "seed": "" if isinstance(source, Path) else source,
+        "seed": seed,
         "outcome": outcome,
         "why": why,
     }
