@@ -28,7 +28,7 @@ class CaseResult:
     """End of one case."""
 
     status: str
-    """"finished", "diverged", "overflow", or "failed"."""
+    """"finished", "diverged", "overflow", or "failed"; of another program also "no-answer"."""
     reason: str
     """Cause of the end, and a remedy; empty when finished."""
     positions: np.ndarray

@@ -9,7 +9,7 @@ from typing import Any
 
 from experiments.calibrate import Campaign
 from experiments.calibrate.campaign import StageHook
-from experiments.cases.engines import engine_named
+from experiments.cases import with_engine
 from experiments.report.companion import Replay
 from experiments.runs.campaign import (
     Desk,
@@ -79,7 +79,7 @@ def calibrate(
     workers
         Processes on the CPU; None: one a core.
     engine
-        Name of an engine from outside (`experiments.cases.ENGINES`); None: `dem_warp.simulate`.
+        Name of an engine (`experiments.cases.ENGINES`); None: that of the study.
     resume
         Go on in the folder of an earlier run: no finished case is simulated again.
     published_replicates
@@ -98,8 +98,8 @@ def calibrate(
     """
     chosen = chosen_study(study, scale, device := chosen_device(device))
     folder = Path(out) if out is not None else default_folder(chosen)
-    chosen = check_runs(chosen, campaign=campaign, paper=published_replicates > 0)
-    desk = Desk.open(chosen, folder, device, workers, resume, watch, engine_named(engine))
+    chosen = check_runs(with_engine(chosen, engine), campaign=campaign, paper=published_replicates > 0)
+    desk = Desk.open(chosen, folder, device, workers, resume, watch)
     replay = replay_published(desk, published_replicates) if published_replicates else None
     found = run_campaign(desk, on_stage, replay) if campaign else None
     record = record_published(desk, replay, found) if replay is not None else None
@@ -117,6 +117,7 @@ def discover(
     scale: str | None = None,
     device: str | None = None,
     workers: int | None = None,
+    engine: str | None = None,
     resume: bool = False,
     watch: Watch = lambda title: nullcontext(),
 ) -> SearchResult:
@@ -124,7 +125,7 @@ def discover(
 
     Parameters
     ----------
-    study, out, scale, workers, resume, watch
+    study, out, scale, workers, engine, resume, watch
         As of `calibrate`.
     data
         File of measured heaps; None: only the bank of library waves is made.
@@ -142,7 +143,7 @@ def discover(
     InputError
         When study, data, bank, device or folder break a rule; nothing is written then.
     """
-    chosen = chosen_study(study, scale, device := chosen_device(device, several=True))
+    chosen = with_engine(chosen_study(study, scale, device := chosen_device(device, several=True)), engine)
     folder = Path(out) if out is not None else default_folder(chosen, "discover")
     data, bank = (Path(file) if file is not None else None for file in (data, bank))
     return run_search(Job(chosen, data, folder, bank, photographs_only, device, workers, seed), resume, watch)

@@ -65,6 +65,12 @@ Devices = Annotated[
     ),
 ]
 Workers = Annotated[int | None, typer.Option(min=1, help="Processes on the CPU. Left out: one a core.")]
+EngineName = Annotated[
+    str | None,
+    typer.Option(
+        "--engine", metavar="NAME", help="Engine that simulates. Left out: the study's, or dem-warp's own."
+    ),
+]
 Out = Annotated[Path | None, typer.Option(help="Folder of the results, new or empty.")]
 Resume = Annotated[bool, typer.Option("--resume", help="Go on in the folder of an earlier run.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Write the result to standard output as JSON.")]
@@ -77,10 +83,7 @@ def calibrate(
     scale: Scale = None,
     device: Device = None,
     workers: Workers = None,
-    engine: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", help="Engine of an installed package. Left out: dem-warp's own."),
-    ] = None,
+    engine: EngineName = None,
     resume: Resume = False,
     follow_paper: Annotated[
         bool, typer.Option("--follow-paper", help="Simulate the paper's own runs too, and set them beside.")
@@ -150,6 +153,7 @@ def discover(
     scale: Scale = None,
     device: Devices = None,
     workers: Workers = None,
+    engine: EngineName = None,
     resume: Resume = False,
     as_json: AsJson = False,
 ) -> None:
@@ -164,7 +168,7 @@ def discover(
         folder = out or default_folder(chosen, "discover")
     go_on = _go_on(
         "discover", study, measured, out=folder, bank=bank, photographs_only=photographs_only, scale=scale,
-        device=device, seed=seed,
+        device=device, seed=seed, engine=engine,
     )  # fmt: skip
     with clear_errors(resume=go_on):
         messages.print(f"{chosen.name}, on {device}", chosen.note, sep="\n", markup=False)
@@ -177,6 +181,7 @@ def discover(
             seed=seed,
             device=device,
             workers=workers,
+            engine=engine,
             resume=resume,
             watch=CaseProgress,
         )

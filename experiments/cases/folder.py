@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from experiments.cases.engines import Engine
+from experiments.cases.engines import engine_of
 from experiments.cases.store import Store
 from experiments.errors import StoreError
 from experiments.files import write_text
@@ -22,15 +22,13 @@ CASES = "cases"
 """Folder of the stored cases."""
 
 
-def open_folder(
-    folder: Path, study: Study, resume: bool = False, engine: Engine | None = None
-) -> tuple[Store, list[str]]:
+def open_folder(folder: Path, study: Study, resume: bool = False) -> tuple[Store, list[str]]:
     """Make a campaign's folder, or go on in an existing one.
 
     Returns
     -------
     store
-        Store of the cases.
+        Store of the cases, which has the study's engine.
     changes
         Differences from the study that the folder was made with, one line a key. Cases that a change does
         not touch are used again: each is stored under all that determines it.
@@ -39,7 +37,10 @@ def open_folder(
     ------
     StoreError
         When the folder is in use and not to be resumed, or is no campaign's. Nothing is written then.
+    StudyError
+        When the study's engine cannot be used.
     """
+    engine = engine_of(study)
     manifest = folder / MANIFEST
     described = describe(study)
     changes: list[str] = []

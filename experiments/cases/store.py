@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from dem_warp import Case, CaseResult
-from experiments.cases.engines import Engine
+from experiments.cases.engine import Engine
 from experiments.cases.key import case_key
 from experiments.errors import StoreError
 from experiments.files import replacing

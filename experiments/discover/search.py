@@ -23,15 +23,19 @@ from doe.discrepancy import (
     make_bank,
     settings_of,
 )
+from experiments.cases.engines import engine_of
 from experiments.cases.folder import describe
+from experiments.cases.key import engine_identity
 from experiments.discover.library import FORMER_NAMES, Mechanism, library_for
 from experiments.discover.maker import notes_on
 from experiments.errors import InputError, StudyError
 from experiments.studyfile import Study
 from experiments.studyfile.schema import nearest_name
 
-WITHOUT_EFFECT = ("name", "note", "companion", "target", "response", "campaign", "discover", "factor")
-"""Keys of a study that change no heap at given factors."""
+WITHOUT_EFFECT = (
+    "name", "note", "companion", "target", "response", "campaign", "discover", "factor", "engine",
+)  # fmt: skip
+"""Keys of a study that change no heap at given factors; of its engine, the identity does."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +85,9 @@ class Search:
         """Hash of all of the study that determines a heap at given factors."""
         described = describe(self.study)
         document = {key: value for key, value in described["study"].items() if key not in WITHOUT_EFFECT}
-        text = json.dumps([document, described["clump_sha256"]], sort_keys=True)
+        engine = engine_of(self.study)
+        others = [] if engine is None else [engine_identity(engine)]
+        text = json.dumps([document, described["clump_sha256"], *others], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
 
     def make_bank(self, simulator: Simulator, maker: Mapping[str, str] | None = None) -> Bank:
@@ -116,7 +122,7 @@ class Search:
         foreign = [one.name for one in emulator.space.mechanisms if one not in known]
         lacking = [one.name for one in known if one not in bank.space.mechanisms]
         notes = [f"{name} is not in the bank, so it was not looked for" for name in lacking]
-        notes += notes_on(bank.maker)
+        notes += notes_on(bank.maker, engine_of(self.study))
         emulator = replace(emulator.without(*foreign), notes=(*emulator.notes, *notes))
         return analyse(measured, emulator, self.settings, seed)
 

@@ -19,7 +19,7 @@ from experiments.calibrate import Campaign, calibrate
 from experiments.calibrate.campaign import StageHook
 from experiments.calibrate.checks import check_study
 from experiments.calibrate.export import jsonable
-from experiments.cases import Engine, Store, open_folder, run_cases
+from experiments.cases import Store, open_folder, run_cases
 from experiments.errors import InputError, StudyError
 from experiments.files import write_text
 from experiments.measurement.target import with_measurements
@@ -61,7 +61,6 @@ class Desk:
         workers: int | None = None,
         resume: bool = False,
         watch: Watch = lambda title: nullcontext(),
-        engine: Engine | None = None,
     ) -> Desk:
         """Make the folder of a study, or go on in it; parameters as of `experiments.api.calibrate`.
 
@@ -70,7 +69,7 @@ class Desk:
         StoreError
             When the folder is in use, or is not one to resume; nothing is written then.
         """
-        store, changes = open_folder(folder, study, resume, engine)
+        store, changes = open_folder(folder, study, resume)
         for change in changes:
             _log.warning("The study has changed since the earlier run: %s", change)
         return cls(study, folder, store, device, workers, watch)

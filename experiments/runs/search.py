@@ -11,12 +11,11 @@ from pathlib import Path
 from typing import Any
 
 from dem_warp import Progress
-from dem_warp.provenance import engine_fingerprint
 from dem_warp.version import source_commit
 from doe.discrepancy import Bank, Discovery, Fit, Measured, Outcomes, Point, drive
-from experiments.cases import open_folder, require_unused
+from experiments.cases import engine_of, open_folder, require_unused
 from experiments.discover.engine import EngineSimulator
-from experiments.discover.maker import maker_of_today
+from experiments.discover.maker import fingerprint_of, maker_of_today
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.search import Search
 from experiments.measurement.measured_file import read_measured
@@ -62,13 +61,12 @@ class SearchResult:
 class _Watched:
     """The engine, with a display for every wave."""
 
-    observables = EngineSimulator.observables
-
     def __init__(self, search: Search, job: Job, watch: Watch) -> None:
         table = OutcomeTable(job.folder / OUTCOMES)
         self.engine = EngineSimulator(
             search.study, search.library, table, job.device, job.workers, progress=self._report
         )
+        self.observables = self.engine.observables
         self.title = "library waves"
         self.waves: list[dict[str, Any]] = []
         self._watch = watch
@@ -112,7 +110,8 @@ def run_search(job: Job, resume: bool = False, watch: Watch = lambda title: null
     simulator = _Watched(search, job, watch)
     with simulator.engine:
         if bank is None:
-            bank = search.make_bank(simulator, maker_of_today(source_commit()))
+            maker = maker_of_today(source_commit(), simulator.engine.engine)
+            bank = search.make_bank(simulator, maker)
             bank.save(job.folder / BANK)
         if measured is None:
             return SearchResult(None, terms, job.folder / BANK)
@@ -170,7 +169,7 @@ def _provenance(job: Job, bank: Bank, waves: Sequence[dict[str, Any]]) -> dict[s
         "device": job.device,
         "workers": job.workers,
         "commit": source_commit(),
-        "engine": engine_fingerprint(),
+        "engine": fingerprint_of(engine_of(job.study)),
         "bank": dict(bank.maker) or None,
         "photographs only": job.photographs_only,
         "data": job.measured.name if job.measured else None,

@@ -76,6 +76,7 @@ Number = Annotated[float, Dimension("")]
 Length = Annotated[float, Dimension("length")]
 Pressure = Annotated[float, Dimension("pressure")]
 Density = Annotated[float, Dimension("density")]
+Time = Annotated[float, Dimension("time")]
 Angle = Annotated[float, Dimension("angle")]
 """A measured angle, in degrees."""
 RawQuantity = Annotated[Quantity, PlainValidator(Quantity.parse)]

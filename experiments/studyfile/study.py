@@ -21,6 +21,7 @@ from experiments.errors import StudyError
 from experiments.studyfile.campaign import TARGET_SCENE, CampaignSettings, Target
 from experiments.studyfile.card import with_material
 from experiments.studyfile.conditions import BASE, Condition, Conditions, under_condition
+from experiments.studyfile.engine_section import EngineSection
 from experiments.studyfile.factor_section import (
     FactorSection,
     FactorTable,
@@ -94,6 +95,8 @@ class Study(Physics):
     """Every decision of the campaign."""
     discover: DiscoverSection = DiscoverSection()
     """The search for a missing effect."""
+    engine: EngineSection | None = None
+    """The program that simulates the cases; left out: dem-warp itself."""
 
     _document: dict[str, Any] = PrivateAttr(default_factory=dict)
     _places: Places = PrivateAttr(default_factory=lambda: Places(BUCKWHEAT, {}))
