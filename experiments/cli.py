@@ -12,6 +12,19 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from experiments.commands.console import FAILED_RUN, CaseProgress, clear_errors, fail, messages
+from experiments.commands.export import EXPORT_EXAMPLE, export
+from experiments.commands.options import (
+    AsJson,
+    Device,
+    Devices,
+    EngineName,
+    Out,
+    Resume,
+    Scale,
+    StudyFile,
+    Workers,
+    assignments,
+)
 from experiments.commands.results import print_angles, print_clump, print_measured, show_stage
 
 if TYPE_CHECKING:
@@ -44,36 +57,6 @@ def _options(
     ] = False,
 ) -> None:
     """Calibrate discrete element models of grain: simulated heaps, designed experiments, repose angles."""
-
-
-StudyFile = Annotated[
-    Path | None, typer.Argument(metavar="[STUDY.toml]", help="Study file; left out: the paper's buckwheat.")
-]
-Scale = Annotated[
-    str | None,
-    typer.Option(
-        help="A scale of the study; the paper's has bench, soft and paper. Left out: paper with a CUDA "
-        "device, bench without, where the study has it.",
-    ),
-]
-Device = Annotated[str | None, typer.Option(help="cpu, cuda or cuda:N. Left out: the GPU if there is one.")]
-Devices = Annotated[
-    str | None,
-    typer.Option(
-        "--device",
-        help="cpu, cuda, cuda:N or several GPUs, as cuda:0,cuda:1. Left out: the GPU if there is one.",
-    ),
-]
-Workers = Annotated[int | None, typer.Option(min=1, help="Processes on the CPU. Left out: one a core.")]
-EngineName = Annotated[
-    str | None,
-    typer.Option(
-        "--engine", metavar="NAME", help="Engine that simulates. Left out: the study's, or dem-warp's own."
-    ),
-]
-Out = Annotated[Path | None, typer.Option(help="Folder of the results, new or empty.")]
-Resume = Annotated[bool, typer.Option("--resume", help="Go on in the folder of an earlier run.")]
-AsJson = Annotated[bool, typer.Option("--json", help="Write the result to standard output as JSON.")]
 
 
 @app.command(epilog="Example: [bold]dem-warp calibrate mygrain.toml --out out/mygrain[/]")
@@ -221,7 +204,7 @@ def heap(
 
         device = chosen_device(device)
         chosen = chosen_study(study, scale, device)
-        values = chosen.natural_settings(_assignments(settings or []), "--set")
+        values = chosen.natural_settings(assignments(settings or []), "--set")
         folder = out or default_folder(chosen, f"{scene or 'heap'}-{seed}")
         require_unused(folder)
         with CaseProgress(scene or "heap") as progress:
@@ -364,20 +347,12 @@ def new(
     typer.echo(f"Wrote {path}. Fill it in, then: {then} {path}")
 
 
+app.command(epilog=EXPORT_EXAMPLE)(export)
+
+
 def main() -> None:
     """Run the command line."""
     app()
-
-
-def _assignments(texts: list[str]) -> dict[str, str]:
-    """Split ``NAME=VALUE`` options."""
-    from experiments.errors import InputError
-
-    pairs = [text.partition("=") for text in texts]
-    for text, (name, equals, value) in zip(texts, pairs, strict=True):
-        if not (name.strip() and equals and value.strip()):
-            raise InputError("needs NAME=VALUE, for example E=0.48", text, "--set")
-    return {name.strip(): value.strip() for name, _, value in pairs}
 
 
 def _quantity(text: str, dimension: str, option: str) -> float:

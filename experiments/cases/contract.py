@@ -43,7 +43,6 @@ class CommandProgram:
     version: str = ""
     observables: tuple[str, ...] = ()
     """Observables of the test that it tells beside the heap."""
-    answers = (HEAP, RESULT)
 
     @property
     def name(self) -> str:
@@ -59,6 +58,10 @@ class CommandProgram:
 
     def check(self, case: Case) -> None:
         """Take every case: what a program lacks it says itself."""
+
+    def answers(self, case: Case) -> tuple[str, ...]:
+        """Name the files of the answer."""
+        return HEAP, RESULT
 
     def write(self, case: Case, folder: Path) -> Sequence[str]:
         """Write ``case.json``, and the clumps and walls that it names."""

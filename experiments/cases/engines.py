@@ -7,6 +7,7 @@ from dataclasses import replace
 from dem_warp import simulate
 from dem_warp.registry import Registry
 from experiments.cases.contract import command_program
+from experiments.cases.driver import Driver
 from experiments.cases.engine import Engine
 from experiments.cases.program import ProgramEngine
 from experiments.errors import InputError, StudyError
@@ -18,7 +19,9 @@ def _check(name: str, engine: object, known: object) -> None:
         raise TypeError(f"must be a function of cases, got {engine!r}")
 
 
-ENGINES: Registry[Engine] = Registry("dem_warp.engines", {}, _check)
+_DRIVERS = {name: ProgramEngine(Driver(name)) for name in ("liggghts", "lammps", "yade")}
+
+ENGINES: Registry[Engine] = Registry("dem_warp.engines", _DRIVERS, _check)
 """Engines by name: drivers of other codes, and those of installed packages."""
 
 

@@ -59,9 +59,8 @@ class Program(Protocol):
     def observables(self) -> tuple[str, ...]:
         """Observables of the test that it tells beside the heap."""
 
-    @property
-    def answers(self) -> tuple[str, ...]:
-        """Files that it leaves and `read` reads."""
+    def answers(self, case: Case) -> tuple[str, ...]:
+        """Name the files that it leaves and `read` reads."""
 
     def check(self, case: Case) -> None:
         """Raise ValueError for a case that it cannot simulate."""
@@ -225,7 +224,7 @@ class _Crew:
         except AnswerError as error:
             raise AnswerError(f"{error}{_last_words(folder)}") from error
         if self.keeps:  # what else the program left may be large
-            _remove_others(folder, {keeper.ENDING, *program.answers})
+            _remove_others(folder, {keeper.ENDING, *program.answers(case)})
         return result
 
     def _put_aside(self, folder: Path) -> str:

@@ -1,6 +1,20 @@
-"""Contact terms of other codes: materials and contacts of a case in their words, with formula and source."""
+"""Cards and tests for other codes: contacts in their words, and the same test as their input."""
 
-from experiments.export.contact import Contact, Exporter, Term, contacts_of, values
+from experiments.export.contact import Contact, Term, contacts_of, values
+from experiments.export.exporter import ExportedTest, Exporter, Translated, Translation
+from experiments.export.folder import export_input, write_export
 from experiments.export.library import EXPORTERS
 
-__all__ = ["EXPORTERS", "Contact", "Exporter", "Term", "contacts_of", "values"]
+__all__ = [
+    "EXPORTERS",
+    "Contact",
+    "ExportedTest",
+    "Exporter",
+    "Term",
+    "Translated",
+    "Translation",
+    "contacts_of",
+    "export_input",
+    "values",
+    "write_export",
+]

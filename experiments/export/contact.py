@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -74,19 +73,3 @@ class Term:
 def values(terms: tuple[Term, ...]) -> dict[str, float]:
     """Values of terms by their names."""
     return {term.name: term.value for term in terms}
-
-
-@dataclass(frozen=True)
-class Exporter:
-    """Translation of materials and contacts into the terms of another code."""
-
-    code: str
-    """Its name."""
-    laws: str
-    """Names of its laws that the terms are for."""
-    differs: str
-    """Differences between those laws and ours."""
-    material_terms: Callable[[Material], tuple[Term, ...]]
-    """Terms of one material; empty where all belong to contacts."""
-    contact_terms: Callable[[Contact], tuple[Term, ...]]
-    """Terms of one contact."""

@@ -7,7 +7,8 @@ import math
 import numpy as np
 from scipy.optimize import brentq
 
-from experiments.export.contact import Contact, Exporter, Term, values
+from experiments.export.contact import Contact, Term, values
+from experiments.export.exporter import Exporter
 
 TSUJI = (4.8218, -18.022, 27.467, -22.348, 11.087, -4.2783, 1.2728)
 """Polynomial of the restitution that LAMMPS makes the coefficient of Tsuji's damping from."""

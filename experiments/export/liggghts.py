@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dem_warp import Material
-from experiments.export.contact import Contact, Exporter, Term
+from experiments.export.contact import Contact, Term
+from experiments.export.exporter import Exporter
 
 LAWS = "hertz tangential history rolling_friction cdt"
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 
 from dem_warp import Material
-from experiments.export.contact import Contact, Exporter, Term
+from experiments.export.contact import Contact, Term
+from experiments.export.exporter import Exporter
 
 _MATERIAL = "Yade documentation, FrictMat"
 _PHYSICS = "Yade documentation, Ip2_FrictMat_FrictMat_MindlinPhys"

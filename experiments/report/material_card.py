@@ -52,7 +52,7 @@ def material_card(campaign: Campaign, optimum: OptimumResult, study: Study) -> d
     return {
         "format": FORMAT,
         "name": study.name,
-        "fitted": _fitted(campaign, study),
+        "fitted": _fitted(campaign, study) | {"test": chosen["scene"]},
         "factor": _factors(optimum, study),
         "compatible": _compatible(optimum.region),
         MATERIAL: copy.deepcopy({key: chosen[key] for key in SECTIONS if key in chosen}),
@@ -66,10 +66,9 @@ def _fitted(campaign: Campaign, study: Study) -> dict[str, Any]:
         "outcome": campaign.outcome.value,
         "reason": campaign.reason,
         "scale": study.scale,
-        "test": study.document["scene"],
         "estimator": f"repose angle, {measurement.fit!r} fit, mean of {measurement.azimuths} views",
-        "modulus_scale": numerics.modulus_scale,
-        "time_step_fraction": numerics.time_step_fraction,
+        "measurement": measurement.model_dump(),
+        "numerics": numerics.model_dump(exclude_none=True),
         "response": {response.name: _response(campaign, response) for response in campaign.responses},
     }
     scenes, document = {response.scene for response in campaign.responses}, study.document

@@ -60,6 +60,31 @@ def read_card(path: Path) -> dict[str, Any]:
     return sections
 
 
+FITTED = ("measurement", "numerics")
+"""Further sections of a study that a card keeps, among what it was fitted to."""
+
+
+def is_card(path: Path) -> bool:
+    """Tell a card from a study; raises `StudyError` when the file cannot be read."""
+    return isinstance(read_toml(path)[1].get(MATERIAL), Mapping)
+
+
+def card_document(card: Mapping[str, Any], path: Path) -> dict[str, Any]:
+    """Lay out the study of a card's own test, from what the card at a path says.
+
+    Raises
+    ------
+    StudyError
+        When it is no card, or does not say which test it was fitted to.
+    """
+    fitted = card.get("fitted", {})
+    if not isinstance(fitted, Mapping) or "test" not in fitted:
+        raise StudyError("a card says which test it was fitted to, [fitted.test.NAME]", fitted, str(path))
+    kept = {name: fitted[name] for name in FITTED if name in fitted}
+    name = str(card.get("name", path.stem))
+    return {"name": name, "scene": fitted["test"]} | kept | read_card(path)
+
+
 def shapes_of(sections: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Tables of a document that name a clump file."""
     grain = sections.get("grain", {})

@@ -19,7 +19,7 @@ from dem_warp import Case
 from doe import Factor
 from experiments.errors import StudyError
 from experiments.studyfile.campaign import TARGET_SCENE, CampaignSettings, Target
-from experiments.studyfile.card import with_material
+from experiments.studyfile.card import card_document, with_material
 from experiments.studyfile.conditions import BASE, Condition, Conditions, under_condition
 from experiments.studyfile.engine_section import EngineSection
 from experiments.studyfile.factor_section import (
@@ -274,6 +274,18 @@ def load_study(
             raise StudyError(rule, scale, str(path))
         document = merge(document, scales[scale])
     return _build(with_material(merge(document, changes or {}), path.parent), places)
+
+
+def load_card(path: Path) -> Study:
+    """Read a material card as the study of its own test, at the values that it chose.
+
+    Raises
+    ------
+    StudyError
+        When the file cannot be read, is no card, or does not say which test it was fitted to.
+    """
+    text, card = read_toml(path, "a material card")
+    return _build(card_document(card, path), Places.read(path, text))
 
 
 def _build(document: dict[str, Any], places: Places) -> Study:
