@@ -7,7 +7,6 @@ step or at most until rest. `docs/laws.md` has formula, lever, direction, limit 
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
-from types import MappingProxyType
 from typing import Annotated, Any, Literal, NamedTuple, get_args, get_type_hints
 
 from dem_warp.parameters import Parameter, check_parameters
@@ -132,35 +131,33 @@ RELATIVE = ContactLaws(rolling="elastic_plastic")
 
 _LIGGGHTS = ContactLaws(sliding="spring_free", friction_load="size", rolling="epsd2")
 
-PRESETS: Mapping[str, ContactLaws] = MappingProxyType(
-    {
-        "edem": EDEM,
-        "edem-c": replace(EDEM, rolling="elastic_plastic", rolling_damping=0.0),
-        "relative": RELATIVE,
-        "liggghts": _LIGGGHTS,
-        "liggghts-cdt": replace(_LIGGGHTS, rolling="cdt"),
-        "lammps": ContactLaws(
-            restitution="polynomial",
-            tangential_damping="normal",
-            sliding="sum",
-            friction_load="size",
-            rolling="sds",
-        ),
-        "yade": ContactLaws(
-            restitution="thornton",
-            attraction="clamped",
-            tangential_history="force",
-            sliding="spring_free",
-            rolling="yade",
-        ),
-        "deme": ContactLaws(
-            normal="overlap_circle",
-            tangential_damping="deme",
-            sliding="sum",
-            friction_load="size",
-            rolling="deme",
-        ),
-        "rocky": ContactLaws(rolling="rocky_3"),
-    }
-)
+PRESETS: Mapping[str, ContactLaws] = {
+    "edem": EDEM,
+    "edem-c": replace(EDEM, rolling="elastic_plastic", rolling_damping=0.0),
+    "relative": RELATIVE,
+    "liggghts": _LIGGGHTS,
+    "liggghts-cdt": replace(_LIGGGHTS, rolling="cdt"),
+    "lammps": ContactLaws(
+        restitution="polynomial",
+        tangential_damping="normal",
+        sliding="sum",
+        friction_load="size",
+        rolling="sds",
+    ),
+    "yade": ContactLaws(
+        restitution="thornton",
+        attraction="clamped",
+        tangential_history="force",
+        sliding="spring_free",
+        rolling="yade",
+    ),
+    "deme": ContactLaws(
+        normal="overlap_circle",
+        tangential_damping="deme",
+        sliding="sum",
+        friction_load="size",
+        rolling="deme",
+    ),
+    "rocky": ContactLaws(rolling="rocky_3"),
+}
 """Sets of laws by the name of their code; two where a code is used in two ways."""
