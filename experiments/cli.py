@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from experiments.commands.bridge import BRIDGE_EXAMPLE, bridge
 from experiments.commands.console import FAILED_RUN, CaseProgress, clear_errors, fail, messages
 from experiments.commands.export import EXPORT_EXAMPLE, export
 from experiments.commands.options import (
@@ -26,9 +27,6 @@ from experiments.commands.options import (
     assignments,
 )
 from experiments.commands.results import print_angles, print_clump, print_measured, show_stage
-
-if TYPE_CHECKING:
-    pass
 
 app = typer.Typer(
     name="dem-warp",
@@ -348,6 +346,7 @@ def new(
 
 
 app.command(epilog=EXPORT_EXAMPLE)(export)
+app.command(epilog=BRIDGE_EXAMPLE)(bridge)
 
 
 def main() -> None:

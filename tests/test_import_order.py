@@ -15,7 +15,7 @@ ROOT = Path(__file__).resolve().parents[1]
 # imports them.
 ROOMS = (
     "errors", "files", "export", "measurement.observables", "studyfile", "measurement", "cases", "calibrate",
-    "discover", "report", "runs", "api", "commands", "cli", "studies", "verification", "benchmarks", "trials",
+    "discover", "report", "runs", "bridge", "api", "commands", "cli", "studies", "verification", "benchmarks", "trials",
 )  # fmt: skip
 
 # Of `doe.discrepancy`, the folders in the order of use.

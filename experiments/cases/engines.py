@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 from dem_warp import simulate
 from dem_warp.registry import Registry
@@ -25,8 +27,13 @@ ENGINES: Registry[Engine] = Registry("dem_warp.engines", _DRIVERS, _check)
 """Engines by name: drivers of other codes, and those of installed packages."""
 
 
-def with_engine(study: Study, name: str | None = None, command: str | None = None) -> Study:
+def with_engine(
+    study: Study, name: str | None = None, command: str | None = None, **limits: Any
+) -> Study:
     """Return a study whose cases another engine simulates, by its name or its command; None: its own.
+
+    Further keys of the section, such as ``time_limit``, are laid over the study's; None leaves one as it is.
+    A command's files are looked for in the current folder.
 
     Raises
     ------
@@ -41,8 +48,13 @@ def with_engine(study: Study, name: str | None = None, command: str | None = Non
         raise InputError(f"must be one of {', '.join(ENGINES) or 'none'}", name, "engine")
     document = study.document
     kept = {key: value for key, value in document.get("engine", {}).items() if key not in ("name", "command")}
-    chosen = {"name": name} if name is not None else {"command": command}
-    return study.with_document(document | {"engine": kept | chosen})
+    if command is not None:
+        words = command_program(command, Path.cwd(), "--command").words
+        chosen = {"command": " ".join(f'"{word}"' for word in words)}
+    else:
+        chosen = {"name": name}
+    given = {key: value for key, value in limits.items() if value is not None}
+    return study.with_document(document | {"engine": kept | chosen | given})
 
 
 def engine_of(study: Study) -> Engine | None:
@@ -65,11 +77,16 @@ def engine_of(study: Study) -> Engine | None:
         rule = f"must be one of {', '.join(ENGINES) or 'none'}"
         raise StudyError(rule, section.name, f"{place}.name")
     engine = ENGINES[section.name]
+    if section.approximate and not (isinstance(engine, ProgramEngine) and isinstance(engine.program, Driver)):
+        raise StudyError("belongs to the codes that a case is exported to", True, f"{place}.approximate")
     if section.version or section.observables:
         rule = "version and observables belong to a command; an engine of a name knows its own"
         raise StudyError(rule, section.version or list(section.observables), place)
     if isinstance(engine, ProgramEngine):
-        engine = replace(engine, workers=section.workers, time_limit=section.time_limit)
+        program = engine.program
+        if isinstance(program, Driver):
+            program = replace(program, approximate=section.approximate)
+        engine = ProgramEngine(program, section.workers, section.time_limit)
     elif section.time_limit is not None:
         raise StudyError("this engine runs no program that a limit could end", section.time_limit, place)
     check = getattr(engine, "check", None)

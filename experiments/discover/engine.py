@@ -9,7 +9,7 @@ import numpy as np
 
 from dem_warp import Case, CaseResult, Progress
 from doe.discrepancy import Outcomes, Point
-from experiments.cases.engines import engine_of
+from experiments.cases import engine_of
 from experiments.cases.key import case_key
 from experiments.discover.library import Mechanism, with_mechanisms
 from experiments.discover.outcome_table import OutcomeTable

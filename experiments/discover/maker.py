@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from datetime import date
 
 from dem_warp.provenance import engine_fingerprint
-from experiments.cases.engine import Engine
+from experiments.cases import Engine
 from experiments.cases.key import engine_identity
 
 

@@ -23,7 +23,7 @@ from doe.discrepancy import (
     make_bank,
     settings_of,
 )
-from experiments.cases.engines import engine_of
+from experiments.cases import engine_of
 from experiments.cases.folder import describe
 from experiments.cases.key import engine_identity
 from experiments.discover.library import FORMER_NAMES, Mechanism, library_for

@@ -17,7 +17,8 @@ from dem_warp import Case, CaseResult, Progress, simulate
 from dem_warp.device import resolve_device
 from dem_warp.processes import end_with_parent
 from dem_warp.simulation import batches
-from experiments.cases.engine import NO_ANSWER, Engine
+from experiments.cases import Engine
+from experiments.cases.engine import NO_ANSWER
 from experiments.discover.devices import resolve_devices
 from experiments.discover.outcome_table import Outcome, OutcomeTable
 from experiments.measurement.observables import NAMES

@@ -14,6 +14,7 @@ from experiments.files import copy_file, write_text
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import Response
 from experiments.studyfile.card import MATERIAL, SECTIONS, shapes_of
+from experiments.studyfile.card_surface import SURFACE, surface_table
 from experiments.studyfile.factor_section import with_factor_values
 from experiments.studyfile.toml_files import toml_text
 
@@ -54,7 +55,8 @@ def material_card(campaign: Campaign, optimum: OptimumResult, study: Study) -> d
         "name": study.name,
         "fitted": _fitted(campaign, study) | {"test": chosen["scene"]},
         "factor": _factors(optimum, study),
-        "compatible": _compatible(optimum.region),
+        "compatible": compatible_points(optimum.region),
+        SURFACE: _surfaces(campaign),
         MATERIAL: copy.deepcopy({key: chosen[key] for key in SECTIONS if key in chosen}),
     }
 
@@ -82,17 +84,18 @@ def _response(campaign: Campaign, response: Response) -> dict[str, Any]:
     """Target of a response, and what fresh cases gave."""
     facts: dict[str, Any] = {"observable": response.observable, "scene": response.scene}
     if campaign.target is not None:
-        facts |= _written(campaign.target.responses[response.name], response.unit)
+        facts |= written(campaign.target.responses[response.name], response.unit)
     if campaign.verification is not None:
         test, unit = campaign.verification.responses[response.name], response.unit
-        interval = [_quantity(end, unit) for end in test.interval]
-        difference = {"difference": _quantity(test.difference, unit), "interval": interval}
-        facts["fresh"] = _written(test.a, unit) | difference
+        interval = [quantity_text(end, unit) for end in test.interval]
+        difference = {"difference": quantity_text(test.difference, unit), "interval": interval}
+        facts["fresh"] = written(test.a, unit) | difference
     return facts
 
 
-def _written(sample: Sample, unit: str) -> dict[str, Any]:
-    return {"mean": _quantity(sample.mean, unit), "sd": _quantity(sample.sd, unit), "n": sample.n}
+def written(sample: Sample, unit: str) -> dict[str, Any]:
+    """Write a sample as a card has it."""
+    return {"mean": quantity_text(sample.mean, unit), "sd": quantity_text(sample.sd, unit), "n": sample.n}
 
 
 def _factors(optimum: OptimumResult, study: Study) -> dict[str, Any]:
@@ -103,33 +106,41 @@ def _factors(optimum: OptimumResult, study: Study) -> dict[str, Any]:
         factor.name: {
             "parameter": ", ".join(parameters[factor.name]),
             "unit": factor.unit,
-            "chosen": _short(optimum.point[factor.name]),
-            "low": _short(region.ranges["low"][factor.name]) if found else None,
-            "high": _short(region.ranges["high"][factor.name]) if found else None,
+            "chosen": short(optimum.point[factor.name]),
+            "low": short(region.ranges["low"][factor.name]) if found else None,
+            "high": short(region.ranges["high"][factor.name]) if found else None,
             "identified": factor.name not in optimum.unidentified,
         }
         for factor in region.factors
     }
 
 
-def _compatible(region: Region) -> dict[str, Any]:
-    """Points all over the compatible region."""
+def _surfaces(campaign: Campaign) -> dict[str, Any]:
+    """Runs that each response's surface was fitted to, and the terms that stayed: enough to fit it again."""
+    if campaign.surface is None:
+        return {}
+    return {name: surface_table(found.reduced) for name, found in campaign.surface.responses.items()}
+
+
+def compatible_points(region: Region) -> dict[str, Any]:
+    """List points all over a compatible region, as a card does."""
     inside = np.flatnonzero(region.mask)
     count = min(len(inside), MOST_POINTS)
     points = region.natural.to_numpy()[inside[np.linspace(0, len(inside) - 1, count).astype(int)]]
     return {
-        "share_of_design": _short(region.fraction),
+        "share_of_design": short(region.fraction),
         "factors": [factor.name for factor in region.factors],
-        "points": [[_short(value) for value in point] for point in points],
+        "points": [[short(value) for value in point] for point in points],
     }
 
 
-def _short(value: float) -> float:
+def short(value: float) -> float:
+    """Round to the four digits that a card writes."""
     return float(f"{value:.4g}")
 
 
-def _quantity(value: float, unit: str) -> str | float:
+def quantity_text(value: float, unit: str) -> str | float:
     """Write a value as a study file has it: angles with three decimals, others with four digits."""
     if unit == "1":
-        return _short(value)
+        return short(value)
     return f"{value:.3f} deg" if unit == "deg" else f"{value:.4g} {unit}"

@@ -18,6 +18,8 @@ class EngineSection(Section):
     """Name of an engine that ships (liggghts, lammps, yade) or that an installed package adds."""
     command: str | None = None
     """Command of any other program, which is started in the folder of a case; no shell reads it."""
+    approximate: bool = False
+    """Take the nearest for what a code lacks that ships as an engine, as dem-warp export --approximate does."""
     version: str = ""
     """Version of the program, in any words: results of another one are stored apart."""
     observables: tuple[str, ...] = ()
