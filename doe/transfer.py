@@ -192,7 +192,9 @@ def transfer(source: Surface, runs: pd.DataFrame, response: ArrayLike, level: fl
     checked_number("the level", level)
     found = Transfer(source, float(level), points, values, 1.0, 1.0)
     if np.ptp(found._columns(points)[:, 1]) <= 1e-9 * max(1.0, float(np.ptp(source.fitted))):
-        raise DesignError("runs must lie where the surface differs, to tell shift from scale; all have one value")
+        raise DesignError(
+            "runs must lie where the surface differs, to tell shift from scale; all have one value"
+        )
     for _ in range(ROUNDS):
         before = found.weight
         found = _with_noise(found)

@@ -7,13 +7,16 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
+from experiments.commands.angle import ANGLE_EXAMPLE, angle
 from experiments.commands.bridge import BRIDGE_EXAMPLE, bridge
+from experiments.commands.clump import CLUMP_EXAMPLE, clump
 from experiments.commands.console import FAILED_RUN, CaseProgress, clear_errors, fail, messages
 from experiments.commands.export import EXPORT_EXAMPLE, export
+from experiments.commands.new import NEW_EXAMPLE, new
 from experiments.commands.options import (
     AsJson,
     Device,
@@ -26,7 +29,7 @@ from experiments.commands.options import (
     Workers,
     assignments,
 )
-from experiments.commands.results import print_angles, print_clump, print_measured, show_stage
+from experiments.commands.results import print_measured, show_stage
 
 app = typer.Typer(
     name="dem-warp",
@@ -217,132 +220,9 @@ def heap(
         print_measured(simulated)
 
 
-@app.command(epilog="Example: [bold]dem-warp angle photos/*.jpg --fit middle --overlay measured[/]")
-def angle(
-    pictures: Annotated[list[Path], typer.Argument(metavar="PICTURE...", help="Photographs of heaps.")],
-    fit: Annotated[str, typer.Option(help="Part of the flanks: flank, middle, lower or upper.")] = "flank",
-    overlay: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Draw the fitted flanks on copies in this folder.")
-    ] = None,
-    by: Annotated[
-        str, typer.Option(help="Views of one heap: each picture another heap, or one heap a folder.")
-    ] = "picture",
-    keep_doubtful: Annotated[bool, typer.Option(help="Count doubtful pictures in the mean.")] = False,
-    crop: Annotated[str | None, typer.Option(metavar="X1,Y1,X2,Y2", help="Look at this part only.")] = None,
-    plate: Annotated[
-        str | None,
-        typer.Option(metavar="X1,Y1,X2,Y2", help="Two points (pixels) where heap and plate meet."),
-    ] = None,
-    heap_number: Annotated[
-        int | None, typer.Option("--heap", help="Which of several, from the left.")
-    ] = None,
-    elevation: Annotated[
-        float | None, typer.Option(help="Angle at which the camera looks down, in degrees.")
-    ] = None,
-    distance: Annotated[float | None, typer.Option(help="Camera to heap, in widths of the heap.")] = None,
-    as_target: Annotated[bool, typer.Option("--target", help="Print a study's \\[target] section.")] = False,
-    as_csv: Annotated[bool, typer.Option("--csv", help="Print the rows as CSV.")] = False,
-    as_json: AsJson = False,
-) -> None:
-    """Measure repose angles on photographs.
-
-    How to take them:
-
-    - the phone level, as high as the heap's middle, five heap widths away or more (zoom in);
-
-    - a plain wall behind that differs from the grains; soft light, no hard shadow;
-
-    - the whole heap with its foot, half the picture wide, the plate seen on both sides of it;
-
-    - nothing else in view: no tube, ruler, label or second heap (--crop cuts them off).
-
-    Doubtful angles are marked, with the reason, and left out of the mean. Pictures in HEIC need
-    pip install 'dem-warp\\[heic]', or to be saved as JPEG.
-    """
-    with clear_errors():
-        from experiments.commands import photographs
-
-        view = photographs.view_of(crop, plate, heap_number, elevation, distance)
-        grouping = photographs.grouping_of(by)
-        rows = photographs.measure_pictures(pictures, fit, overlay, view)
-        mean = photographs.mean_angle(rows, grouping, keep_doubtful)
-        if as_target:
-            typer.echo(photographs.target_section(mean, fit), nl=False)
-        elif as_csv:
-            typer.echo(photographs.csv_table(rows), nl=False)
-        elif as_json:
-            result = {"pictures": rows, "mean": mean.to_dict() if mean else None}
-            typer.echo(json.dumps(result, allow_nan=False))
-        else:
-            print_angles(rows, fit)
-            if mean:
-                typer.echo(str(mean))
-    for row in rows:
-        for doubt in row["doubts"]:
-            messages.print(f"Doubtful: {row['picture']}: {doubt}", markup=False)
-    if rejected := [row["reason"] for row in rows if row["reason"]]:
-        fail("\n".join(rejected))
-
-
-@app.command(epilog="Example: [bold]dem-warp clump tri-pyramid:5.90x3.93 --spheres 9 --out clump.txt[/]")
-def clump(
-    shape: Annotated[
-        str,
-        typer.Argument(
-            metavar="SHAPE",
-            help="A mesh file in mm; a solid by its dimensions in mm (sphere:D, ellipsoid:LxWxT, "
-            "cylinder:LxD, capsule:LxD, tri-pyramid:HxEDGE); or a file of spheres (x y z r in mm), "
-            "to be described.",
-        ),
-    ],
-    spheres: Annotated[int | None, typer.Option(min=1, help="Spheres to fill the solid with.")] = None,
-    protrusion: Annotated[
-        str, typer.Option(help="How far a sphere may pass the surface: sharp edges are covered better.")
-    ] = "0 mm",
-    density: Annotated[str | None, typer.Option(help='For the mass, as "698 kg/m^3".')] = None,
-    out: Annotated[
-        Path | None, typer.Option(help="File of spheres to write, for a study's grain.clump.")
-    ] = None,
-    as_json: AsJson = False,
-) -> None:
-    """Make a grain of spheres from a mesh or measured dimensions: volume, mass, inertia, spheres."""
-    with clear_errors():
-        from experiments.commands.shapes import make_clump, write_clump
-
-        reach = _quantity(protrusion, "length", "--protrusion")
-        mass_density = _quantity(density, "density", "--density") if density else None
-        made = make_clump(shape, spheres, reach)
-        if out:
-            write_clump(made.shape, out)
-    if as_json:
-        typer.echo(json.dumps(made.to_dict(mass_density), allow_nan=False))
-    else:
-        print_clump(made.to_dict(mass_density))
-
-
-@app.command(epilog="Example: [bold]dem-warp new mygrain[/] writes mygrain.toml")
-def new(
-    name: Annotated[str, typer.Argument(help="Name of the grain, and of the file.")],
-    measured: Annotated[
-        bool,
-        typer.Option(
-            "--measured", help="Write NAME-measured.csv instead: room for heaps measured for the study NAME."
-        ),
-    ] = False,
-) -> None:
-    """Write a commented study file to start from, or a file for the measured heaps of a study."""
-    with clear_errors():
-        if measured:
-            from experiments.measurement.template import write_measured_template
-            from experiments.studyfile import load_study
-
-            study = Path(name) if name.endswith(".toml") else Path(f"{name}.toml")
-            path, then = write_measured_template(load_study(study)), f"dem-warp discover {study}"
-        else:
-            from experiments.studyfile import write_template
-
-            path, then = write_template(name), "dem-warp calibrate"
-    typer.echo(f"Wrote {path}. Fill it in, then: {then} {path}")
+app.command(epilog=ANGLE_EXAMPLE)(angle)
+app.command(epilog=CLUMP_EXAMPLE)(clump)
+app.command(epilog=NEW_EXAMPLE)(new)
 
 
 app.command(epilog=EXPORT_EXAMPLE)(export)
@@ -352,17 +232,6 @@ app.command(epilog=BRIDGE_EXAMPLE)(bridge)
 def main() -> None:
     """Run the command line."""
     app()
-
-
-def _quantity(text: str, dimension: str, option: str) -> float:
-    """Read an option's quantity in SI."""
-    from experiments.errors import InputError
-    from experiments.studyfile.units import Quantity
-
-    try:
-        return Quantity.parse(text).to_base(dimension)
-    except ValueError as error:
-        raise InputError(str(error), text, option) from None
 
 
 def _go_on(command: str, *files: Path | None, **options: object) -> str:

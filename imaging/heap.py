@@ -17,6 +17,8 @@ from imaging.repose import ReposeAngle, confidence_interval, measure
 
 LEAST_DOF = 3.0
 """Satterthwaite's formula tends to no degrees of freedom at all for a small difference of variances."""
+LEAST_GRAINS = 20
+"""Fewer grains have no flank: one grain gave 25.06 +- 1.21 degrees."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,7 @@ def heap_angle(
     fit: str | FitSettings = "flank",
     pixels: int = 800,
     backend: str = "raster",
+    grain_count: int | None = None,
 ) -> HeapAngle:
     """Measure the repose angle of a heap of spheres on the plate z = 0.
 
@@ -67,14 +70,21 @@ def heap_angle(
         Width of the heap in the pictures.
     backend : {"raster", "pyvista", "auto"}
         What draws the silhouettes (see `silhouette`).
+    grain_count : int, optional
+        Number of grains that the spheres make; left out: each sphere is one.
 
     Raises
     ------
     PictureError
-        When an argument is wrong, or when fewer than two azimuths show a measurable heap.
+        When an argument is wrong, there are fewer grains than `LEAST_GRAINS`, or fewer than two azimuths show
+        a measurable heap.
     """
     settings = FitSettings.of(fit)
-    frame = Frame.around(Spheres.of(centers, radii), pixels)
+    spheres = Spheres.of(centers, radii)
+    grains = len(spheres.radii) if grain_count is None else grain_count
+    if grains < LEAST_GRAINS:
+        raise PictureError(f"a heap has at least {LEAST_GRAINS} grains", grains, "heap")
+    frame = Frame.around(spheres, pixels)
     views, seen, rejections = [], [], []
     for azimuth in _directions(azimuths):
         snapshot = silhouette(centers, radii, float(azimuth), backend=backend, frame=frame)

@@ -69,7 +69,7 @@ def _fresh(crossing: Crossing) -> dict[str, Any]:
 def _bridge(crossing: Crossing) -> dict[str, Any]:
     """Say which solver the values hold in, and how far from its own surface the card was."""
     carried, unit = crossing.carried, crossing.source.unit
-    told: dict[str, Any] = {"engine": crossing.engine, "runs": int(len(crossing.runs))}
+    told: dict[str, Any] = {"engine": crossing.engine, "runs": len(crossing.runs)}
     told |= {"beyond_design": crossing.extent > 1.0, "card_point": crossing.source.point}
     if carried is not None:
         ends = carried.intervals()

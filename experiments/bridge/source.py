@@ -83,7 +83,9 @@ def _with_factors(study: Study, card: dict[str, Any], surface: Surface) -> Study
         parameters = [name.strip() for name in told["parameter"].split(",")]
         for parameter in parameters:
             drop(document, parameter.split("."))
-        low, high = (str(Quantity(end, factor.unit)) if factor.unit else end for end in (factor.low, factor.high))
+        low, high = (
+            str(Quantity(end, factor.unit)) if factor.unit else end for end in (factor.low, factor.high)
+        )
         row = {"name": factor.name, "label": factor.name, "parameter": parameters, "low": low, "high": high}
         factors.append(row)
     return study.with_document(document | {"factor": factors})

@@ -6,7 +6,6 @@ import dataclasses
 import hashlib
 import json
 import math
-import re
 import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,6 +20,7 @@ from experiments.cases.program import AnswerError, empty_result
 from experiments.cases.surfaces import stl_text, triangles_of
 from experiments.errors import InputError
 from experiments.files import write_text
+from experiments.sphere_files import read_spheres
 from experiments.studyfile.engine_section import words_of
 
 FORMAT = 1
@@ -260,50 +260,27 @@ def _observables(told: object, known: list[str]) -> dict[str, float]:
 
 
 def read_heap(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Read spheres of a heap: centres and radii [m], (n, 4), and the number of each one's grain, (n,).
+    """Read spheres of a heap, in metres where the file names no unit, in any format of `sphere_files`.
+
+    Returns
+    -------
+    spheres, grains
+        Centres and radii [m], (n, 4), and the number of each one's grain, (n,).
 
     Raises
     ------
     AnswerError
         When the file is missing, or a line breaks the rules.
     """
+    if not path.is_file():
+        raise AnswerError(f"the program wrote no {path.name}")
     try:
-        lines = path.read_text(encoding="utf-8").splitlines()
-    except OSError:
-        raise AnswerError(f"the program wrote no {path.name}") from None
-    except ValueError:
-        raise AnswerError(f"{path.name}: must be a text file in UTF-8") from None
-    if not lines:
-        raise AnswerError(f"{path.name}: must begin with the line {','.join(COLUMNS)}, it is empty")
-    names = _parts(lines[0])
-    if missing := [name for name in COLUMNS if name not in names]:
-        rule = f"the first line must name the columns {', '.join(COLUMNS)}"
-        raise AnswerError(f"{path.name}: {rule}; without {', '.join(missing)}: {_shown(lines[0])}")
-    wanted = [names.index(name) for name in (*COLUMNS, *(("grain",) if "grain" in names else ()))]
-    rows = []
-    for number, line in enumerate(lines[1:], start=2):
-        if not line.strip():
-            continue
-        parts = _parts(line)
-        try:
-            row = [float(parts[index]) for index in wanted]
-        except (ValueError, IndexError):
-            rule = f"line {number} must have {len(names)} numbers"
-            raise AnswerError(f"{path.name}: {rule}, got {_shown(line)}") from None
-        if not all(map(math.isfinite, row)) or row[3] <= 0.0:
-            rule = f"line {number} must have finite numbers and a positive radius"
-            raise AnswerError(f"{path.name}: {rule}, got {_shown(line)}")
-        rows.append(row)
-    if not rows:
-        raise AnswerError(f"{path.name}: must have a line for each sphere, it has none")
-    table = np.array(rows)
-    grains = table[:, 4] if table.shape[1] > 4 else np.arange(len(table))
-    return table[:, :4], np.unique(grains, return_inverse=True)[1].ravel()
-
-
-def _parts(line: str) -> list[str]:
-    """Split at commas, or at blanks where there is no comma."""
-    return [part.strip() for part in line.split(",")] if "," in line else re.split(r"\s+", line.strip())
+        found = read_spheres(path)
+    except InputError as error:
+        place = error.place.replace(str(path), path.name)
+        raise AnswerError(f"{place}: {error.rule}, got {_shown(error.value)}") from error
+    bodies = np.arange(len(found.spheres)) if found.bodies is None else found.bodies
+    return found.spheres * (found.unit or 1.0), np.unique(bodies, return_inverse=True)[1].ravel()
 
 
 def _shown(value: object) -> str:

@@ -10,16 +10,14 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 import experiments.export
 from dem_warp import Case, CaseResult
 from dem_warp.provenance import source_meaning
-from experiments.cases.contract import heap_result
-from experiments.cases.program import AnswerError
+from experiments.cases.contract import heap_result, read_heap
 from experiments.errors import InputError
 from experiments.export import EXPORTERS, ExportedTest, Translation, export_input
 from experiments.files import write_text
+
 
 @dataclass(frozen=True)
 class Driver:
@@ -54,7 +52,7 @@ class Driver:
     def read(self, case: Case, folder: Path) -> CaseResult:
         """Read the spheres of the heap."""
         [heap] = self.answers(case)
-        return heap_result(*read_dump(folder / heap), {}, {"program": EXPORTERS[self.name].code})
+        return heap_result(*read_heap(folder / heap), {}, {"program": EXPORTERS[self.name].code})
 
     def _translation(self, case: Case) -> Translation:
         test = ExportedTest(self.name, case, "the case")
@@ -79,38 +77,3 @@ def _exporters() -> str:
         text = source_meaning(path.read_text(encoding="utf-8"))
         digest.update(f"{path.relative_to(folder).as_posix()}\n{text}\n".encode())
     return digest.hexdigest()
-
-
-def read_dump(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Read the last state of a LAMMPS dump with the columns x, y, z and radius, and mol where it has them.
-
-    Returns
-    -------
-    spheres, grains
-        Centres and radii [m], (n, 4), and the number of each one's grain, (n,).
-
-    Raises
-    ------
-    AnswerError
-        When there is no dump, or it is none of spheres.
-    """
-    try:
-        lines = path.read_text(encoding="utf-8").splitlines()
-    except OSError:
-        raise AnswerError(f"the program wrote no {path.name}") from None
-    heads = [number for number, line in enumerate(lines) if line.startswith("ITEM: ATOMS")]
-    if not heads:
-        raise AnswerError(f"{path.name}: must be a dump of spheres")
-    names = lines[heads[-1]].split()[2:]
-    wanted = ["x", "y", "z", "radius", *(("mol",) if "mol" in names else ())]
-    if missing := [name for name in wanted if name not in names]:
-        raise AnswerError(f"{path.name}: must have the columns {', '.join(missing)}")
-    try:
-        rows = [[float(part) for part in line.split()] for line in lines[heads[-1] + 1 :] if line.strip()]
-        table = np.array(rows)[:, [names.index(name) for name in wanted]]
-    except (ValueError, IndexError):
-        raise AnswerError(f"{path.name}: must have {len(names)} numbers in each line, and one line") from None
-    if not np.isfinite(table).all() or not (table[:, 3] > 0.0).all():
-        raise AnswerError(f"{path.name}: must have finite numbers and positive radii")
-    grains = table[:, 4] if table.shape[1] > 4 else np.arange(len(table))
-    return table[:, :4], np.unique(grains, return_inverse=True)[1].ravel()

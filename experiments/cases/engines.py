@@ -27,9 +27,7 @@ ENGINES: Registry[Engine] = Registry("dem_warp.engines", _DRIVERS, _check)
 """Engines by name: drivers of other codes, and those of installed packages."""
 
 
-def with_engine(
-    study: Study, name: str | None = None, command: str | None = None, **limits: Any
-) -> Study:
+def with_engine(study: Study, name: str | None = None, command: str | None = None, **limits: Any) -> Study:
     """Return a study whose cases another engine simulates, by its name or its command; None: its own.
 
     Further keys of the section, such as ``time_limit``, are laid over the study's; None leaves one as it is.

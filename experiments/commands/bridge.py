@@ -17,10 +17,12 @@ BRIDGE_EXAMPLE = "Example: [bold]dem-warp bridge out/mygrain/material.toml --eng
 def bridge(
     card: Annotated[Path, typer.Argument(metavar="CARD", help="Material card of dem-warp calibrate.")],
     engine: Annotated[
-        str | None, typer.Option(metavar="NAME", help="The other solver: liggghts, lammps, yade, or a plug-in.")
+        str | None,
+        typer.Option(metavar="NAME", help="The other solver: liggghts, lammps, yade, or a plug-in."),
     ] = None,
     command: Annotated[
-        str | None, typer.Option(help="Or the command of any program that keeps the contract of docs/engine.md.")
+        str | None,
+        typer.Option(help="Or the command of any program that keeps the contract of docs/engine.md."),
     ] = None,
     runs: Annotated[int, typer.Option(help="Runs that the correction is made from, six or more.")] = 12,
     fresh: Annotated[int, typer.Option(help="Fresh runs that verify it.")] = 5,

@@ -46,3 +46,14 @@ def assignments(texts: list[str]) -> dict[str, str]:
         if not (name.strip() and equals and value.strip()):
             raise InputError("needs NAME=VALUE, for example E=0.48", text, "--set")
     return {name.strip(): value.strip() for name, _, value in pairs}
+
+
+def quantity(text: str, dimension: str, option: str) -> float:
+    """Read an option's quantity in SI."""
+    from experiments.errors import InputError
+    from experiments.studyfile.units import Quantity
+
+    try:
+        return Quantity.parse(text).to_base(dimension)
+    except ValueError as error:
+        raise InputError(str(error), text, option) from None

@@ -58,3 +58,12 @@ def print_angles(rows: Sequence[Mapping[str, Any]], fit: str) -> None:
             table.add_row(row["picture"], *values, doubts)
     if table.row_count:
         Console().print(table)
+
+
+def print_findings(rows: Sequence[Mapping[str, Any]]) -> None:
+    """Say how files of heaps were read, and why angles are doubtful."""
+    for row in rows:
+        if row["mean"] is not None and row["source"] != "photograph":
+            messages.print(f"Read: {row['picture']}: {row['source']}", markup=False)
+        for doubt in row["doubts"]:
+            messages.print(f"Doubtful: {row['picture']}: {doubt}", markup=False)

@@ -4,16 +4,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from dem_warp import ClumpShape
 from dem_warp.clump_fitting import ClumpFit, fit_clump
 from dem_warp.solids import parse_solid, read_mesh
 from experiments.errors import InputError
 from experiments.files import replacing
+from experiments.sphere_files import format_of, length_unit, read_clump
+from experiments.sphere_files.clump_file import check_grain_size
 
-SPHERE_FILES = (".txt", ".csv", ".dat")
-"""Endings of files that hold spheres; any other file is a mesh."""
+if TYPE_CHECKING:
+    from trimesh import Trimesh
+
+MESH_FILES = (".stl", ".obj", ".ply", ".off", ".3mf", ".glb", ".gltf", ".dae", ".stp", ".step")
+"""Endings of meshes; any other file may hold spheres, and its content tells."""
 
 
 @dataclass(frozen=True)
@@ -24,6 +29,8 @@ class Clump:
     """The spheres."""
     fit: ClumpFit | None
     """Quality of the fit; None for spheres that were given."""
+    told: str = ""
+    """Format and unit of a file of spheres."""
 
     def to_dict(self, density: float | None = None) -> dict[str, Any]:
         """Describe the clump as JSON-able data, in mm and mg; with a density [kg/m3], its mass too."""
@@ -44,30 +51,61 @@ class Clump:
         }
 
 
-def make_clump(source: str, sphere_count: int | None = None, protrusion: float = 0.0) -> Clump:
-    """Read a clump from a file of spheres (``x y z r`` in mm), or fit one to a solid.
+def make_clump(
+    source: str, sphere_count: int | None = None, protrusion: float = 0.0, unit: str | None = None
+) -> Clump:
+    """Read a clump from a file of spheres, or fit one to a solid.
 
-    A solid is a mesh file in mm, or named by its dimensions in mm (``tri-pyramid:5.90x3.93``). A sphere may
-    pass its surface by the ``protrusion`` [m].
+    A solid is a mesh file, or named by its dimensions in mm (``tri-pyramid:5.90x3.93``). A sphere may pass
+    its surface by the ``protrusion`` [m]. A file's ``unit`` is the one that it names, or mm.
 
     Raises
     ------
     InputError
         When the source is none of these, or the sphere count is missing or not needed.
     """
-    given = ":" not in source and Path(source).suffix.lower() in SPHERE_FILES
+    named = ":" in source and not Path(source).is_file()
+    given = not named and _holds_spheres(Path(source))
     if given != (sphere_count is None):
         rule = "a solid is filled with a number of spheres"
         rule = "spheres that are given are not fitted" if given else rule
         raise InputError(rule, sphere_count or "none", "--spheres")
+    if named and unit is not None:
+        raise InputError("the dimensions of a solid are in mm", unit, "--unit")
+    if unit is not None:
+        _check_unit(unit)
+    if sphere_count is None:
+        read = read_clump(Path(source), unit)
+        return Clump(read.shape, None, read.told)
     try:
-        if sphere_count is None:
-            return Clump(ClumpShape.read(source), None)
-        solid = parse_solid(source) if ":" in source else read_mesh(source)
+        solid = parse_solid(source) if named else _mesh(Path(source), unit)
         fit = fit_clump(solid, sphere_count, protrusion)
+    except InputError:
+        raise
     except (ValueError, OSError) as error:
         raise InputError(str(error), source, "SHAPE") from None
     return Clump(fit.shape, fit)
+
+
+def _holds_spheres(path: Path) -> bool:
+    return path.suffix.lower() not in MESH_FILES and (not path.is_file() or format_of(path) is not None)
+
+
+def _check_unit(unit: str) -> None:
+    try:
+        length_unit(unit)
+    except ValueError as error:
+        raise InputError(str(error), unit, "--unit") from None
+
+
+def _mesh(path: Path, unit: str | None) -> Trimesh:
+    """Read one closed body of a grain's size."""
+    mesh = read_mesh(path, length_unit(unit or "mm"))
+    if mesh.body_count > 1:
+        raise InputError("a grain is one closed body", f"{mesh.body_count} bodies in the mesh", str(path))
+    if unit is None:
+        check_grain_size(float(mesh.extents.max()), str(path), "read in mm")
+    return mesh
 
 
 def write_clump(shape: ClumpShape, path: Path) -> None:

@@ -60,7 +60,15 @@ class EngineSimulator:
         self.observables = tuple(name for name in NAMES if name in (*PHOTOGRAPHED, *told))
         """Names of what it answers with."""
         self._runner = WaveRunner(
-            study.measurement, table, device, workers, worlds, drivers, progress, self.engine, self.observables
+            study.measurement,
+            table,
+            device,
+            workers,
+            worlds,
+            drivers,
+            progress,
+            self.engine,
+            self.observables,
         )
         self._library = {mechanism.name: mechanism for mechanism in library}
         self._factors = [factor.name for factor in study.factors]

@@ -39,6 +39,7 @@ def measure_heap(settings: MeasurementSection, result: CaseResult) -> HeapAngle:
         azimuths=settings.azimuths,
         fit=settings.fit,
         pixels=settings.pixels,
+        grain_count=len(result.positions),
     )
 
 

@@ -38,7 +38,10 @@ class ShapeSection(Section):
     """Source of a shape: a file of spheres, or the radius of one."""
 
     clump: Path | None = None
-    """File with the clump's spheres (x y z r in mm), relative to the study file."""
+    """File with the clump's spheres, relative to the study file: x y z r a line, or a table, text or VTK file
+    of LIGGGHTS, Yade, EDEM or DEM-Engine."""
+    clump_unit: str | None = None
+    """Unit of that file (mm, m, ...), or the length that is 1 in it; left out: the one it names, or mm."""
     sphere: Length | None = Field(default=None, gt=0.0)
     """Radius of spherical grains, instead of a clump."""
 
@@ -52,14 +55,25 @@ class ShapeSection(Section):
             raise ValueError(f"must name an existing clump file (looked for {path})")
         return path
 
+    @field_validator("clump_unit")
+    @classmethod
+    def _is_a_length(cls, unit: str | None) -> str | None:
+        from experiments.sphere_files import length_unit
+
+        if unit is not None:
+            length_unit(unit)
+        return unit
+
     def one_shape(self) -> ClumpShape:
         """Build the shape."""
         if self.clump is not None and self.sphere is not None:
             raise ValueError("takes a clump (a file) or a sphere (a radius), not both")
+        if self.clump_unit is not None and self.clump is None:
+            raise ValueError("takes clump_unit only with a clump (a file)")
         if self.sphere is not None:
             return _sphere(self.sphere)
         if self.clump is not None:
-            return _read_clump(self.clump, self.clump.stat().st_mtime_ns)
+            return _read_clump(self.clump, self.clump_unit, self.clump.stat().st_mtime_ns)
         raise ValueError("needs a clump (a file) or a sphere (a radius)")
 
 
@@ -131,8 +145,11 @@ class GrainSection(MaterialSection, ShapeSection):
 
 # The integrals over a shape take milliseconds, and every case of a campaign needs them.
 @lru_cache(maxsize=32)
-def _read_clump(path: Path, modified: int) -> ClumpShape:
-    return ClumpShape.read(path)
+def _read_clump(path: Path, unit: str | None, modified: int) -> ClumpShape:
+    # The readers of files know the units of this package.
+    from experiments.sphere_files import read_clump
+
+    return read_clump(path, unit).shape
 
 
 _elongated = lru_cache(maxsize=32)(ClumpShape.elongated)

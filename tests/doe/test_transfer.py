@@ -84,7 +84,9 @@ def test_intervals_and_errors_hold_their_level() -> None:
         runs = transfer_points(surface, at, 12, extent=1.4)
         found = transfer(surface, runs, there(runs, rng.normal(0.0, 0.7, 12)), LEVEL)
         ends = found.intervals()
-        inside.append([ends["shift"][0] < SHIFT < ends["shift"][1], ends["scale"][0] < SCALE < ends["scale"][1]])
+        inside.append(
+            [ends["shift"][0] < SHIFT < ends["shift"][1], ends["scale"][0] < SCALE < ends["scale"][1]]
+        )
         coded = [[factor.to_coded(at[factor.name]) for factor in (E, F)]]
         mean, error = found.evaluate(coded)
         misses.append(mean[0] - there(pd.DataFrame([at]))[0])

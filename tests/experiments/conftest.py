@@ -1,7 +1,8 @@
-"""Studies and results that the tests of `experiments` share."""
+"""Studies and results that the tests of `experiments` share; and `commandline`, which lies beside them."""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,6 +14,8 @@ from dem_warp.device import resolve_device
 from experiments.benchmarks import columns as scene
 from experiments.benchmarks.columns import Columns
 from experiments.studyfile import Study, load_study
+
+sys.path.insert(0, str(Path(__file__).parent))
 
 SMALL_STUDY = """
 name = "Small"

@@ -12,10 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import pyvista
-from typer.testing import CliRunner
+from commandline import dem_warp
 
 from experiments import api
-from experiments.cli import app
 from experiments.commands.console import CaseProgress, describe_progress, duration
 from experiments.runs import campaign as run
 from imaging import save_picture
@@ -23,13 +22,6 @@ from imaging import save_picture
 WriteStudy = Callable[..., Path]
 
 COMMANDS = ("calibrate", "heap", "angle", "clump", "new", "discover")
-
-
-def dem_warp(*arguments: object) -> tuple[int, str, str]:
-    """Run a command; return its exit code, what it says on standard output, and on standard error."""
-    result = CliRunner().invoke(app, [str(argument) for argument in arguments])
-    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
-    return result.exit_code, result.stdout, result.stderr
 
 
 def last_line_of(program: str) -> str:

@@ -100,12 +100,12 @@ def test_spheres_of_a_grain_belong_together(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "rule"),
     [
-        ("", "must begin with the line x,y,z,r"),
-        ("x,y,z,r\n", "must have a line for each sphere"),
-        ("x,y,z\n1,2,3\n", "without r"),
-        ("x,y,z,r\n1,2,3\n", "line 2 must have 4 numbers"),
-        ("x,y,z,r\n1,2,3,0.1\n1,2,3,-1\n", "line 3 must have finite numbers and a positive radius"),
-        ("x,y,z,r\n1,2,inf,0.1\n", "line 2 must have finite numbers"),
+        ("", "heap.csv: needs a file of spheres"),
+        ("x,y,z,r\n", "needs at least one sphere"),
+        ("x,y,z\n1,2,3\n", "needs a file of spheres"),
+        ("x,y,z,r\n1,2,3\n", "line 2: a sphere is x y z r"),
+        ("x,y,z,r\n1,2,3,0.1\n1,2,3,-1\n", "line 3: a sphere is x y z r: four finite numbers, r > 0"),
+        ("x,y,z,r\n1,2,inf,0.1\n", "line 2: a sphere is x y z r"),
     ],
 )
 def test_a_malformed_heap_is_named_by_its_line(tmp_path: Path, text: str, rule: str) -> None:
@@ -136,10 +136,14 @@ def test_several_cases_run_at_once_and_come_back_in_order(small_study: Study, tm
     [
         ("crash", NO_ANSWER, "the exit code 1; its last words: no license was found"),
         ("silent", NO_ANSWER, "the program wrote no result.json"),
-        ("nan", NO_ANSWER, "heap.csv: line 2 must have finite numbers"),
-        ("words", NO_ANSWER, "heap.csv: line 2 must have 4 numbers"),
-        ("columns", NO_ANSWER, "heap.csv: the first line must name the columns"),
-        ("status", NO_ANSWER, "result.json: status must be one of finished, failed, diverged, overflow, got 'fine'"),
+        ("nan", NO_ANSWER, "heap.csv, line 2: a sphere is x y z r"),
+        ("words", NO_ANSWER, "heap.csv, line 2: a sphere is x y z r"),
+        ("columns", NO_ANSWER, "heap.csv: needs a file of spheres"),
+        (
+            "status",
+            NO_ANSWER,
+            "result.json: status must be one of finished, failed, diverged, overflow, got 'fine'",
+        ),
         ("observable", NO_ANSWER, "result.json: observables.grain_cuont: must be one of"),
         ("infinite", NO_ANSWER, "result.json: observables.grain_count: must be a finite number, got inf"),
         ("diverged", "diverged", "a grain was too fast"),
@@ -197,8 +201,12 @@ def test_an_interrupt_ends_the_programs_and_loses_no_finished_case(
 @pytest.mark.parametrize(
     ("section", "rule", "place"),
     [
-        ('command = "no-such-solver --case x"', "must begin with a program that can be run", "engine.command"),
-        ("command = \"'open\"", "must close every quotation mark", "engine.command"),
+        (
+            'command = "no-such-solver --case x"',
+            "must begin with a program that can be run",
+            "engine.command",
+        ),
+        ('command = "\'open"', "must close every quotation mark", "engine.command"),
         ('command = " "', "must name a program", "engine.command"),
         ('name = "rocky"', "must be one of", "engine.name"),
         ('name = "liggghts"\ncommand = "x"', "has either a name or a command", "engine"),
@@ -248,7 +256,10 @@ def test_a_case_of_a_mixture_names_every_clump(write_study: Write, tmp_path: Pat
     case: Case = study.case({}, 1)
     write_case(case, tmp_path / "case")
     told = json.loads((tmp_path / "case" / "case.json").read_text())["grain"]["clumps"]
-    assert [(entry["file"], entry["fraction"]) for entry in told] == [("clump-1.csv", 0.75), ("clump-2.csv", 0.25)]
+    assert [(entry["file"], entry["fraction"]) for entry in told] == [
+        ("clump-1.csv", 0.75),
+        ("clump-2.csv", 0.25),
+    ]
     assert all(isinstance(shape, ClumpShape) for shape in case.grains.mixture.shapes)
 
 
