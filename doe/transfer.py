@@ -1,11 +1,11 @@
-"""A surface carried over to another process: shifted and scaled by the difference that a few runs there show.
+"""A surface carried over to another process: shifted and scaled by what a few runs there show.
 
-Two simulators of one test, or a simulator and a laboratory, seldom agree, but their responses to the factors are
-of one shape: y = t + shift + scale (s(x) - t), with s the surface of the first and t a level to count from, such
-as the target. Shift and scale are estimated by generalized least squares. Their errors come from both sides: the
-noise of the runs, estimated from them by restricted likelihood, and that of the surface, which moves all its
-values together. What the runs tell of the surface beyond shift and scale moves it within its own errors (best
-linear unbiased prediction; Harville 1977, Kennedy and O'Hagan 2001 with a constant scale).
+Two simulators of one test, or a simulator and a laboratory, seldom agree, but their responses to the factors
+are of one shape: y = t + shift + scale (s(x) - t), with s the surface of the first and t a level to count
+from, such as the target. Shift and scale are estimated by generalized least squares. Their errors come from
+both sides: the noise of the runs, estimated from them by restricted likelihood, and that of the surface,
+which moves its values together. What the runs tell of the surface beyond shift and scale moves it within its
+own errors (best linear unbiased prediction; Harville 1977, Kennedy and O'Hagan 2001 with a constant scale).
 """
 
 from __future__ import annotations

@@ -191,6 +191,7 @@ def heap(
     out: Out = None,
     scale: Scale = None,
     device: Device = None,
+    engine: EngineName = None,
     as_json: AsJson = False,
 ) -> None:
     """Simulate one heap: heap.vtp (ParaView), snapshot.png with the fitted flanks, angle.json.
@@ -199,12 +200,12 @@ def heap(
     --scene with a further scene of the study.
     """
     with clear_errors():
-        from experiments.cases import require_unused, simulate_heap, write_heap
+        from experiments.cases import require_unused, simulate_heap, with_engine, write_heap
         from experiments.runs.choices import chosen_device, chosen_study, default_folder
         from experiments.studyfile.campaign import TARGET_SCENE
 
         device = chosen_device(device)
-        chosen = chosen_study(study, scale, device)
+        chosen = with_engine(chosen_study(study, scale, device), engine)
         values = chosen.natural_settings(assignments(settings or []), "--set")
         folder = out or default_folder(chosen, f"{scene or 'heap'}-{seed}")
         require_unused(folder)

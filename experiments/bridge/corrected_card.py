@@ -20,7 +20,7 @@ RESULTS, RUNS = "bridge.json", "runs.csv"
 
 HEAD = """\
 # Material card, corrected by dem-warp bridge for {engine}.
-# Its values hold in that solver, with the contact law, the clump and the estimator that stand below, and nowhere else.
+# Its values hold in that solver, with the clump and the estimator that stand below, and nowhere else.
 
 """
 

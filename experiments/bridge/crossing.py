@@ -1,8 +1,8 @@
 """The course of a bridge: runs around the card's point, runs around the corrected one, and fresh runs there.
 
-Half of the runs are placed around the card's point: on it, across the target's contour and along it. They shift
-and scale the surface, and the other half are placed alike around the point that the corrected surface chooses; so
-the last correction is made from runs close to where it is used, however large the first was.
+Half of the runs are placed around the card's point: on it, across the target's contour and along it. They
+shift and scale the surface, and the other half are placed alike around the point that the corrected surface
+chooses; so the last correction is made from runs close to where it is used, however large the first was.
 """
 
 from __future__ import annotations
@@ -152,8 +152,9 @@ def _nearest(source: Source, carried: Transfer, reach: float) -> tuple[dict[str,
         missed = f"the nearest point of its contour, {listed(point)}, is not physical"
     unit = source.unit
     reason = (
-        f"There the surface is shifted by {quantity(carried.shift, unit, '+')} and scaled by {carried.scale:.3g}, and "
-        f"{missed}. Widen the ranges of the factors, or choose laws nearer to that solver's, and calibrate again."
+        f"There the surface is shifted by {quantity(carried.shift, unit, '+')} and scaled by "
+        f"{carried.scale:.3g}, and {missed}. Widen the ranges of the factors, or choose laws nearer to that "
+        "solver's, and calibrate again."
     )
     raise _EndError(BridgeOutcome.OUT_OF_REACH, reason)
 

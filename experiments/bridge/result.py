@@ -1,4 +1,4 @@
-"""The end of a bridge: shift and scale with their intervals, the corrected point, and what fresh runs gave."""
+"""The end of a bridge: shift and scale with their intervals, the corrected point, the fresh runs there."""
 
 from __future__ import annotations
 
@@ -83,7 +83,8 @@ class Crossing:
         if self.carried is not None:
             ends = self.carried.intervals()
             said.append(
-                f"Shift {quantity(self.carried.shift, unit, '+')} (95 % {interval_text(ends['shift'], unit, '+')}), "
+                f"Shift {quantity(self.carried.shift, unit, '+')} "
+                f"(95 % {interval_text(ends['shift'], unit, '+')}), "
                 f"scale {self.carried.scale:.3g} (95 % {ends['scale'][0]:.3g} to {ends['scale'][1]:.3g}), "
                 f"noise of a run {quantity(self.carried.noise, unit)}."
             )

@@ -1,4 +1,4 @@
-"""The card that a bridge starts from: its test with the chosen factors free again, its surface, its target."""
+"""The card that a bridge starts from: its test with its factors free again, its surface, its target."""
 
 from __future__ import annotations
 

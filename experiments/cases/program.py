@@ -1,7 +1,7 @@
 """Programs as engines: one folder a case, several at once, each failure a status with its reason.
 
-A finished case is never run twice: its answer stays in its folder until the caller, who keeps results, removes
-the folder of all. What a program failed at is tried again.
+A finished case is never run twice: its answer stays in its folder until the caller, who keeps results,
+removes the folder of all. What a program failed at is tried again.
 """
 
 from __future__ import annotations

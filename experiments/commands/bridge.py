@@ -18,11 +18,11 @@ def bridge(
     card: Annotated[Path, typer.Argument(metavar="CARD", help="Material card of dem-warp calibrate.")],
     engine: Annotated[
         str | None,
-        typer.Option(metavar="NAME", help="The other solver: liggghts, lammps, yade, or a plug-in."),
+        typer.Option(metavar="NAME", help="The other solver: liggghts, lammps, yade, a plug-in."),
     ] = None,
     command: Annotated[
         str | None,
-        typer.Option(help="Or the command of any program that keeps the contract of docs/engine.md."),
+        typer.Option(help="Or the command of any program that keeps docs/engine.md."),
     ] = None,
     runs: Annotated[int, typer.Option(help="Runs that the correction is made from, six or more.")] = 12,
     fresh: Annotated[int, typer.Option(help="Fresh runs that verify it.")] = 5,
@@ -42,7 +42,7 @@ def bridge(
     resume: Resume = False,
     as_json: AsJson = False,
 ) -> None:
-    """Correct a card for another solver: a few runs there shift and scale its surface; fresh runs verify it."""
+    """Correct a card for another solver: a few runs there shift and scale its surface, fresh ones verify."""
     with clear_errors():
         from experiments import api
 

@@ -1,4 +1,4 @@
-"""The response surface on a material card: the runs that it was fitted to, so that anyone can fit it again."""
+"""The response surface on a material card: the runs that it was fitted to, to be fitted again."""
 
 from __future__ import annotations
 

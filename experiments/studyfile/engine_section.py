@@ -19,7 +19,7 @@ class EngineSection(Section):
     command: str | None = None
     """Command of any other program, which is started in the folder of a case; no shell reads it."""
     approximate: bool = False
-    """Take the nearest for what a code lacks that ships as an engine, as dem-warp export --approximate does."""
+    """Take the nearest for what an engine that ships lacks, as dem-warp export --approximate does."""
     version: str = ""
     """Version of the program, in any words: results of another one are stored apart."""
     observables: tuple[str, ...] = ()

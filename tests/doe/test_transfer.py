@@ -91,7 +91,7 @@ def test_intervals_and_errors_hold_their_level() -> None:
         mean, error = found.evaluate(coded)
         misses.append(mean[0] - there(pd.DataFrame([at]))[0])
         errors.append(error[0])
-    # 200 trials of .95: one of a thousand leaves .95 by .05; the level of GLS with a scale in its weights .02.
+    # 200 trials of .95: one of a thousand leaves .95 by .05; that the weights are estimated adds .02.
     assert np.mean(inside, axis=0) == pytest.approx(0.95, abs=0.07)
     # A standard deviation of 200 values is known to 5 %.
     assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(np.std(misses), rel=0.25)

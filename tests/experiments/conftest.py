@@ -69,6 +69,12 @@ numerics.modulus_scale = 1.0
 """
 
 
+@pytest.fixture(scope="session")
+def small_text() -> str:
+    """Text of the small study."""
+    return SMALL_STUDY
+
+
 @pytest.fixture
 def write_study(tmp_path: Path) -> Callable[..., Path]:
     """Write the small study, some of its text replaced and some added."""

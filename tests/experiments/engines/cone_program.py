@@ -1,6 +1,6 @@
-"""A program that keeps the folder contract with the standard library alone: a cone, the steeper the more friction.
+"""A program that keeps the folder contract with the standard library alone: cones, by their friction.
 
-The further word, where there is one, names a way to go wrong.
+The further word, where there is one, names a way to go wrong, or to be another solver.
 """
 
 import json
@@ -32,7 +32,8 @@ def main(way=""):
         case "sleep":
             time.sleep(600.0)
     noise = 0.3 * math.sin(12.9898 * case["seed"])
-    angle = 15.0 + 30.0 * case["contact"]["grain-grain"]["static_friction"] + noise
+    foot, slope = (12.0, 33.0) if mode == "flatter" else (15.0, 30.0)
+    angle = foot + slope * case["contact"]["grain-grain"]["static_friction"] + noise
     lines = [f"{x:.9g},{y:.9g},{z:.9g},{RADIUS}" for x, y, z in cone(math.tan(math.radians(angle)))]
     Path("heap.csv").write_text("\n".join(["x,y,z,r", *lines]) + "\n", encoding="utf-8")
     told = {"status": "finished", "program": "cones 1.0", "observables": {"grain_count": len(lines)}}

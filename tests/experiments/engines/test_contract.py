@@ -142,7 +142,7 @@ def test_several_cases_run_at_once_and_come_back_in_order(small_study: Study, tm
         (
             "status",
             NO_ANSWER,
-            "result.json: status must be one of finished, failed, diverged, overflow, got 'fine'",
+            "status must be one of finished, failed, diverged, overflow, got 'fine'",
         ),
         ("observable", NO_ANSWER, "result.json: observables.grain_cuont: must be one of"),
         ("infinite", NO_ANSWER, "result.json: observables.grain_count: must be a finite number, got inf"),
@@ -156,7 +156,7 @@ def test_a_failure_is_a_status_with_its_reason(
     assert result.status == status
     assert reason in result.reason
     assert len(result.sphere_radii) == 0
-    kept = [path for path in tmp_path.glob("failed/*/case.json")]
+    kept = list(tmp_path.glob("failed/*/case.json"))
     assert len(kept) == (1 if status == NO_ANSWER else 0), "whoever looks for the cause finds the folder"
 
 

@@ -110,7 +110,8 @@ def test_a_search_asks_a_program_and_keeps_what_it_answers(write_study: Write, t
     assert outcomes.reasons[:2] == ("", "")
     assert "no license was found" in outcomes.reasons[2]
     assert len(table) == 2, "a failure of the program is tried again"
-    assert np.all(np.diff(outcomes.values[:2, 0]) > 3.0), "more friction, a steeper cone"
+    low, high, _ = outcomes.values[:, 0]  # noqa: PD011  (an array)
+    assert high > low + 3.0, "more friction, a steeper cone"
     with EngineSimulator(study, library_for(study), table, "cpu", workers=1) as simulator:
         again = simulator(points)
     np.testing.assert_array_equal(again.values, outcomes.values)
