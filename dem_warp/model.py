@@ -8,7 +8,8 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from dem_warp.clumps import ClumpShape
-from dem_warp.laws.contact_law import Mechanisms
+from dem_warp.laws.contact_law import Mechanisms, check_forms
+from dem_warp.laws.conventions import BASE_FORMS, LawForms
 from dem_warp.laws.library import MECHANISMS
 from dem_warp.laws.mechanism import Mechanism, clashes
 from dem_warp.materials import Interaction, Material, damping_coefficient, effective_moduli
@@ -37,8 +38,12 @@ class ContactCoefficients:
     """Keeps the damping from attracting at the end of an impact."""
     mechanisms: tuple[Mechanism, ...] = ()
     """Mechanisms beside the base law."""
-    tangential_damping: bool = True
-    """Damps the tangential spring."""
+    tangential_damping: float = 1.0
+    """Damping of the tangential spring over what the same constant makes of its own stiffness."""
+    rolling_spring: float = 0.0
+    """Spring of a rolling resistance that takes one: as such [N/m], or as a torque [N m/rad]."""
+    rolling_dashpot: float = 0.0
+    """Its dashpot [kg/s]; of a damping ratio [1], the ratio."""
 
     def __post_init__(self) -> None:
         names = [mechanism.name for mechanism in self.mechanisms]
@@ -55,7 +60,7 @@ class ContactCoefficients:
         interaction: Interaction,
         clamp_attraction: bool = False,
         mechanisms: tuple[Mechanism, ...] = (),
-        tangential_damping: bool = True,
+        tangential_damping: float = 1.0,
     ) -> "ContactCoefficients":
         """Coefficients of two materials in contact."""
         modulus, shear_modulus = effective_moduli(a, b)
@@ -73,9 +78,12 @@ class ContactCoefficients:
     @property
     def parameters(self) -> dict[str, float]:
         """Fields of `ContactParams`; a mechanism that is not there is at its null."""
-        base = {f.name: float(getattr(self, f.name)) for f in fields(self) if f.name != "mechanisms"}
+        apart = ("mechanisms", "rolling_spring", "rolling_dashpot")
+        base = {f.name: float(getattr(self, f.name)) for f in fields(self) if f.name not in apart}
+        # laws that take a spring or a dashpot share the places of the mechanism that has both
+        rolling = {"rolling_stiffness": self.rolling_spring, "rolling_damping": self.rolling_dashpot}
         own = {name: value for m in self.mechanisms for name, value in m.parameters.items()}
-        return base | _nulls() | own
+        return base | _nulls() | rolling | own
 
 
 @functools.cache
@@ -150,6 +158,8 @@ class WorldSetup:
     """Rate at which the air takes a grain's velocity, whatever its size [1/s]."""
     rolling_holds: bool = True
     """Lets rolling resistance stop a spin at most, and never reverse it."""
+    forms: LawForms = BASE_FORMS
+    """Forms of the contact law."""
     weighed: int | None = None
     """Number of the wall whose impulse is summed up in every step (`Solver.impulses`)."""
 
@@ -164,6 +174,7 @@ class WorldSetup:
             )
         if not np.all(np.subtract(self.domain[1], self.domain[0]) > 0):
             raise ValueError(f"WorldSetup.domain: lower corner must lie below the upper, got {self.domain!r}")
+        check_forms(self.mechanisms, self.forms)
         for wall, pair in self.walls:
             if not 1 <= pair < len(self.contacts):
                 raise ValueError(
