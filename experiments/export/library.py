@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dem_warp.registry import Registry
+from experiments.export.edem import EDEM
 from experiments.export.exporter import Exporter
 from experiments.export.lammps import LAMMPS
 from experiments.export.liggghts import LIGGGHTS
+from experiments.export.rocky import ROCKY
 from experiments.export.yade import YADE
 
 
@@ -18,6 +20,8 @@ _ALL = {
     "liggghts": LIGGGHTS,
     "lammps": LAMMPS,
     "yade": YADE,
+    "edem": EDEM,
+    "rocky": ROCKY,
 }
 
 EXPORTERS: Registry[Exporter] = Registry("dem_warp.exporters", _ALL, _check)
