@@ -10,7 +10,7 @@ from typing import Any
 from experiments.bridge.result import Crossing
 from experiments.bridge.source import BRIDGE
 from experiments.files import copy_file, write_text
-from experiments.report.material_card import CARD, compatible_points, quantity_text, short, written
+from experiments.report.material_card import CARD, compatible_points, quantity_text, sample_table, short
 from experiments.studyfile.card import MATERIAL, SECTIONS, shapes_of
 from experiments.studyfile.factor_section import with_factor_values
 from experiments.studyfile.toml_files import toml_text
@@ -47,13 +47,12 @@ def corrected_card(crossing: Crossing) -> dict[str, Any]:
     card[MATERIAL] = copy.deepcopy({key: chosen[key] for key in SECTIONS if key in chosen})
     card["fitted"]["outcome"], card["fitted"]["reason"] = crossing.outcome.value, crossing.reason
     card["fitted"]["response"][source.response]["fresh"] = _fresh(crossing)
-    found = region is not None and bool(region.mask.any())
     for name, value in point.items():
-        ends = region.ranges.loc[name] if region is not None and found else {"low": None, "high": None}
-        low, high = (None if ends[end] is None else short(ends[end]) for end in ("low", "high"))
-        card["factor"][name] |= {"chosen": value, "low": low, "high": high}
+        card["factor"][name]["chosen"] = value
     if region is not None:
         card["compatible"] = compatible_points(region)
+        for name, ends in region.ranges.iterrows() if region.mask.any() else ():
+            card["factor"][name] |= {end: short(ends[end]) for end in ("low", "high")}
     card[BRIDGE] = _bridge(crossing)
     return card
 
@@ -63,7 +62,7 @@ def _fresh(crossing: Crossing) -> dict[str, Any]:
     if test is None:
         return {}
     interval = [quantity_text(end, unit) for end in test.interval]
-    return written(test.a, unit) | {"difference": quantity_text(test.difference, unit), "interval": interval}
+    return sample_table(test.a, unit) | {"difference": quantity_text(test.difference, unit), "interval": interval}
 
 
 def _bridge(crossing: Crossing) -> dict[str, Any]:

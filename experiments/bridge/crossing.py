@@ -86,7 +86,7 @@ def cross(
     made: list[pd.DataFrame] = []
 
     def run(points: pd.DataFrame, stage: str, first: int) -> pd.DataFrame:
-        numbers = np.arange(first, first + len(points))
+        numbers = list(range(first, first + len(points)))
         seeds = [int(np.random.SeedSequence([seed, n]).generate_state(1, np.uint32)[0] >> 1) for n in numbers]
         cases = runner(points.assign(stage=stage, run=numbers, seed=seeds), stage)
         made.append(cases)
@@ -115,8 +115,14 @@ def _correct(crossing: Crossing, run: Callable[..., pd.DataFrame], count: int) -
     coded = [[float(f.to_coded(point[f.name])) for f in source.surface.design.factors]]
     mean, error = carried.evaluate(coded)
     region = carried.compatible_region(source.target, extent=extent)
-    told = {"point": point, "extent": extent / reach, "region": region}
-    return replace(crossing, carried=carried, prediction=(float(mean[0]), float(error[0])), **told)
+    return replace(
+        crossing,
+        carried=carried,
+        extent=extent / reach,
+        point=point,
+        prediction=(float(mean[0]), float(error[0])),
+        region=region,
+    )
 
 
 def _inside_limits(source: Source, places: pd.DataFrame) -> pd.DataFrame:

@@ -169,10 +169,10 @@ def _material(material: Material) -> dict[str, float]:
 
 
 def _laws(case: Case[Any]) -> dict[str, Any]:
-    """Contact laws of a case: numerics that choose among them, and mechanisms beside them."""
-    plain = case.to_dict()
-    chosen = ("modulus_scale", "clamp_attraction", "tangential_damping", "rolling_holds")
-    return {name: plain["numerics"][name] for name in chosen} | {"mechanisms": plain["mechanisms"]}
+    """Contact laws of a case: the name of their set, each choice, the softening, mechanisms beside them."""
+    softened = {"modulus_scale": case.numerics.modulus_scale}
+    mechanisms = {"mechanisms": case.to_dict()["mechanisms"]}
+    return {"set": case.laws.name} | case.laws.to_dict() | softened | mechanisms
 
 
 def _scene(case: Case[Any]) -> dict[str, Any]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -83,7 +82,7 @@ def engine_of(study: Study) -> Engine | None:
     if isinstance(engine, ProgramEngine):
         program = engine.program
         if isinstance(program, Driver):
-            program = replace(program, approximate=section.approximate)
+            program = Driver(program.name, section.approximate)
         engine = ProgramEngine(program, section.workers, section.time_limit)
     elif section.time_limit is not None:
         raise StudyError("this engine runs no program that a limit could end", section.time_limit, place)

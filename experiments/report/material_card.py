@@ -29,8 +29,8 @@ MOST_POINTS = 60
 
 HEAD = """\
 # Material card, written by dem-warp calibrate. A study takes its values by  material = "{card}"
-# They hold together with the contact laws [material.solver], the clump and the estimator that they were found with. Every point
-# of [compatible] is as good as the chosen one; not so every combination of the ranges.
+# They hold together with the contact laws [material.solver], the clump and the estimator that they were found
+# with. Every point of [compatible] is as good as the chosen one; not so every combination of the ranges.
 
 """
 
@@ -86,16 +86,16 @@ def _response(campaign: Campaign, response: Response) -> dict[str, Any]:
     """Target of a response, and what fresh cases gave."""
     facts: dict[str, Any] = {"observable": response.observable, "scene": response.scene}
     if campaign.target is not None:
-        facts |= written(campaign.target.responses[response.name], response.unit)
+        facts |= sample_table(campaign.target.responses[response.name], response.unit)
     if campaign.verification is not None:
         test, unit = campaign.verification.responses[response.name], response.unit
         interval = [quantity_text(end, unit) for end in test.interval]
         difference = {"difference": quantity_text(test.difference, unit), "interval": interval}
-        facts["fresh"] = written(test.a, unit) | difference
+        facts["fresh"] = sample_table(test.a, unit) | difference
     return facts
 
 
-def written(sample: Sample, unit: str) -> dict[str, Any]:
+def sample_table(sample: Sample, unit: str) -> dict[str, Any]:
     """Write a sample as a card has it."""
     return {"mean": quantity_text(sample.mean, unit), "sd": quantity_text(sample.sd, unit), "n": sample.n}
 
