@@ -62,7 +62,10 @@ def _fresh(crossing: Crossing) -> dict[str, Any]:
     if test is None:
         return {}
     interval = [quantity_text(end, unit) for end in test.interval]
-    return sample_table(test.a, unit) | {"difference": quantity_text(test.difference, unit), "interval": interval}
+    return sample_table(test.a, unit) | {
+        "difference": quantity_text(test.difference, unit),
+        "interval": interval,
+    }
 
 
 def _bridge(crossing: Crossing) -> dict[str, Any]:

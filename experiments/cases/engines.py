@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from experiments.cases.engine import Engine
 from experiments.cases.program import ProgramEngine
 from experiments.errors import InputError, StudyError
 from experiments.studyfile import Study
+from experiments.studyfile.engine_section import EngineSection, quoted
 
 
 def _check(name: str, engine: object, known: object) -> None:
@@ -47,9 +49,9 @@ def with_engine(study: Study, name: str | None = None, command: str | None = Non
     kept = {key: value for key, value in document.get("engine", {}).items() if key not in ("name", "command")}
     if command is not None:
         words = command_program(command, Path.cwd(), "--command").words
-        chosen = {"command": " ".join(f'"{word}"' for word in words)}
+        chosen = {"command": " ".join(map(quoted, words))}
     else:
-        chosen = {"name": name}
+        chosen = {"name": str(name)}
     given = {key: value for key, value in limits.items() if value is not None}
     return study.with_document(document | {"engine": kept | chosen | given})
 
@@ -67,31 +69,37 @@ def engine_of(study: Study) -> Engine | None:
     if section is None:
         return None
     if section.command is not None:
-        folder, more = study.file.parent, (section.version, section.observables)
-        program = command_program(section.command, folder, f"{place}.command", *more)
-        return ProgramEngine(program, section.workers, section.time_limit)
-    if section.name not in ENGINES:
-        rule = f"must be one of {', '.join(ENGINES) or 'none'}"
-        raise StudyError(rule, section.name, f"{place}.name")
-    engine = ENGINES[section.name]
-    if section.approximate and not (isinstance(engine, ProgramEngine) and isinstance(engine.program, Driver)):
-        raise StudyError("belongs to the codes that a case is exported to", True, f"{place}.approximate")
-    if section.version or section.observables:
-        rule = "version and observables belong to a command; an engine of a name knows its own"
-        raise StudyError(rule, section.version or list(section.observables), place)
-    if isinstance(engine, ProgramEngine):
-        program = engine.program
-        if isinstance(program, Driver):
-            program = Driver(program.name, section.approximate)
-        engine = ProgramEngine(program, section.workers, section.time_limit)
-    elif section.time_limit is not None:
-        raise StudyError("this engine runs no program that a limit could end", section.time_limit, place)
+        more = (section.version, section.observables)
+        command = command_program(section.command, study.file.parent, f"{place}.command", *more)
+        return ProgramEngine(command, section.workers, section.time_limit)
+    engine = _engine_named(section, place)
     check = getattr(engine, "check", None)
     if check is not None:
         try:
             check(study.case({}, seed=0))
         except ValueError as error:
             raise StudyError(f"{section.name} cannot run this study: {error}", section.name, place) from None
+    return engine
+
+
+def _engine_named(section: EngineSection, place: str) -> Engine:
+    """Engine of a section's name, with the section's limits."""
+    if section.name is None or section.name not in ENGINES:
+        rule = f"must be one of {', '.join(ENGINES) or 'none'}"
+        raise StudyError(rule, section.name, f"{place}.name")
+    engine = ENGINES[section.name]
+    if section.version or section.observables:
+        rule = "version and observables belong to a command; an engine of a name knows its own"
+        raise StudyError(rule, section.version or list(section.observables), place)
+    driver = engine.program if isinstance(engine, ProgramEngine) else None
+    if section.approximate and not isinstance(driver, Driver):
+        raise StudyError("belongs to the codes that a case is exported to", True, f"{place}.approximate")
+    if isinstance(driver, Driver):
+        return ProgramEngine(Driver(driver.name, section.approximate), section.workers, section.time_limit)
+    if isinstance(engine, ProgramEngine):
+        return replace(engine, workers=section.workers, time_limit=section.time_limit)
+    if section.time_limit is not None:
+        raise StudyError("this engine runs no program that a limit could end", section.time_limit, place)
     return engine
 
 

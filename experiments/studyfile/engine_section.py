@@ -65,3 +65,9 @@ def words_of(command: str) -> list[str]:
         return list(lexer)
     except ValueError:
         raise ValueError("must close every quotation mark that it opens") from None
+
+
+def quoted(word: str) -> str:
+    """Write a word so that `words_of` reads it as one."""
+    mark = "'" if '"' in word else '"'
+    return f"{mark}{word}{mark}"
