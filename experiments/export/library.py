@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dem_warp.registry import Registry
+from experiments.export.deme import DEME
 from experiments.export.exporter import Exporter
 from experiments.export.lammps import LAMMPS
 from experiments.export.liggghts import LIGGGHTS
@@ -18,6 +19,7 @@ _ALL = {
     "liggghts": LIGGGHTS,
     "lammps": LAMMPS,
     "yade": YADE,
+    "deme": DEME,
 }
 
 EXPORTERS: Registry[Exporter] = Registry("dem_warp.exporters", _ALL, _check)

@@ -6,6 +6,7 @@ orientations and places, grain by grain, released at the same times.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from functools import cache
 from importlib.resources import files
@@ -18,12 +19,15 @@ from dem_warp.scenes.lifted_cylinder import CLOGGED, GONE, LiftController
 from dem_warp.scenes.poured_controller import CALM, HEAPED
 from experiments.export.exporter import Translated
 from experiments.export.lift import LOOK, Lift
+from experiments.export.lift_rows import lift_rows
 
-RAIN_FILE, TEST_FILE, HEAP = "rain.csv", "test.json", "heap.dump"
+SCRIPT, RAIN_FILE, TEST_FILE, HEAP = "lift.py", "rain.csv", "test.json", "heap.dump"
 
 RAIN_HEAD = "shape,size,release_time,x,y,z,qx,qy,qz,qw"
 """Columns of the rain: number of the shape from 0, its scale, the time [s] at which the grain is released to
 gravity and contacts, its centre then [m], and its orientation."""
+
+REST = "at rest: rms speed below {scene.rest_speed:g} m/s, none above {lift.calm_speed:g} m/s, for {scene.rest_time:g} s"
 
 
 def world_of(lift: Lift) -> WorldSetup:
@@ -38,7 +42,9 @@ def rain_text(world: WorldSetup) -> str:
     times = grains.release_steps * world.time_step
     places = grains.positions + grains.velocities * times[:, None]
     table = np.column_stack([grains.shapes, grains.sizes, times, places, grains.orientations])
-    rows = (",".join(["%d" % row[0], *(f"{value:.9g}" for value in row[1:])]) for row in table[np.argsort(times)])
+    rows = (
+        ",".join(["%d" % row[0], *(f"{value:.9g}" for value in row[1:])]) for row in table[np.argsort(times)]
+    )
     return "\n".join([RAIN_HEAD, *rows, ""])
 
 
@@ -76,6 +82,7 @@ def phases(lift: Lift, world: WorldSetup) -> dict[str, Any]:
     scene, release = lift.scene, world.grains.release_steps.max() * world.time_step
     return {
         "look": LOOK,
+        "bottom": world.domain[0][2],
         "brim": scene.brim,
         "height": scene.height,
         "strike_off": scene.grain_count is None,
@@ -97,8 +104,21 @@ def phases(lift: Lift, world: WorldSetup) -> dict[str, Any]:
 
 def program(name: str, solver: str) -> str:
     """Text of a program: what it is, the course of the test, and the part of a solver."""
-    about = f'"""Lifted cylinder in {name}. Reads {TEST_FILE}, {RAIN_FILE} and the clumps; writes {HEAP}."""\n'
+    about = (
+        f'"""Lifted cylinder in {name}. Reads {TEST_FILE}, {RAIN_FILE} and the clumps; writes {HEAP}."""\n'
+    )
     return about + template("course") + template(solver)
+
+
+def program_files(lift: Lift, world: WorldSetup, text: str, numbers: Mapping[str, Any]) -> dict[str, str]:
+    """Files of a program: its text, the numbers that it reads, the rain and the clumps."""
+    told = test_numbers(lift, world) | numbers
+    return {
+        SCRIPT: text,
+        TEST_FILE: json.dumps(told, indent=1) + "\n",
+        RAIN_FILE: rain_text(world),
+        **clump_texts(world),
+    }
 
 
 @cache
@@ -107,6 +127,17 @@ def template(name: str) -> str:
     return (files("experiments.export") / "templates" / f"{name}.txt").read_text(encoding="utf-8")
 
 
-def same_rain_rows(rows: tuple[Translated, ...], changes: Mapping[str, tuple[str, str]]) -> list[Translated]:
-    """Rows of the README with those changed that the program does otherwise: by subject, here and there."""
+def same_rain_rows(lift: Lift) -> list[Translated]:
+    """Rows of the README on the test, changed where the program has it as it is here and other inputs do not."""
+    scene, grains = lift.scene, lift.case.grains
+    sizes = f"{grains.size_mean:g} +- {grains.size_sd:g} of the shape, normal, cut at 3 sd"
+    filled = f"{scene.grain_count} grains" if scene.grain_count else "to the rim, struck off there"
+    filling = f"{filled}; {scene.rain_rate:g} grains a second, {scene.rain_speed:g} m/s"
+    changes = {
+        "sizes": (sizes, "the same grains, one by one"),
+        "filling": (filling, "the same places, orientations and times, one by one"),
+        "seed": (f"{lift.case.seed}", "the same rain; another seed is another export"),
+        "end": (REST.format(lift=lift, scene=scene), "the same, of the grains' speeds"),
+    }
+    rows = lift_rows(lift)
     return [Translated(row.subject, *changes[row.subject]) if row.subject in changes else row for row in rows]
