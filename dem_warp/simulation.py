@@ -110,6 +110,7 @@ def batches(cases: Sequence[Case], one_each: bool) -> list[list[int]]:
     groups: dict[Any, list[int]] = {}
     for i, case in enumerate(cases):
         mechanisms = frozenset(mechanism.name for mechanism in case.mechanisms)
-        build = (type(case.scene), case.numerics.precision, case.grains.sphere_count, mechanisms)
+        kind, forms = type(case.scene), case.laws.forms
+        build = (kind, case.numerics.precision, case.grains.sphere_count, mechanisms, forms)
         groups.setdefault(build, []).append(i)
     return list(groups.values())

@@ -81,11 +81,11 @@ class Solver:
         layout = self.layout
         self.build = Build(
             self.precision, layout.sphere_count, layout.wall_count, self.device.is_cuda,
-            layout.mechanisms, layout.has_mesh,
+            layout.mechanisms, layout.has_mesh, layout.forms,
         )  # fmt: skip
         self._step_kernels = step_kernels(self.build)
-        self._cell_kernels = cell_kernels(self.build.without_mechanisms)
-        self._wall_kernels = wall_kernels(self.build.without_mechanisms)
+        self._cell_kernels = cell_kernels(self.build.without_forces)
+        self._wall_kernels = wall_kernels(self.build.without_forces)
         self._list_kernels = neighbour_kernels(self.build)
         room = [neighbour_room(world) for world in worlds]
         self._watch_kernels = watch_kernels(self.build)
@@ -106,7 +106,7 @@ class Solver:
         first = build_grains(self.worlds, layout, self.precision, device)
         self.grains = (first, copy_grains(first, self.precision))
         self.neighbours = build_neighbours(
-            layout, capacity, memory_size(layout.mechanisms), self.precision, device
+            layout, capacity, memory_size(layout.mechanisms, layout.forms), self.precision, device
         )
         self.alive = living_grains(self.worlds, layout, device)
         self.flags, self.stale, self.idle, self.rebuilds, self.running = (

@@ -11,7 +11,7 @@ import warp as wp
 from dem_warp.kernels.lanes import load_pair
 from dem_warp.kernels.packing import packing
 from dem_warp.kernels.walls import wall_functions
-from dem_warp.laws.contact_law import acts_apart, contact_law, memory_size
+from dem_warp.laws.contact_law import acts_apart, contact_law, memory_size, turns_apart
 from dem_warp.types import SPHERE_BITS, SPHERE_MASK, Build, device_structs
 
 
@@ -25,13 +25,13 @@ def contact_functions(build: Build) -> SimpleNamespace:
     Model, World, Grains, Neighbours = types.Model, types.World, types.Grains, types.Neighbours
     Contact = types.Contact
     pack = packing(precision)
-    law = contact_law(build.mechanisms)
+    law = contact_law(build.mechanisms, build.forms)
     is_apart = acts_apart(build.mechanisms)
-    memory_each = wp.constant(memory_size(build.mechanisms))
+    memory_each = wp.constant(memory_size(build.mechanisms, build.forms))
     # the lanes of a warp that meet nothing wait for the others: let them load and work as if, so that nobody
     # waits for the distance before the rest is loaded
-    is_speculative = build.cooperative and not build.mechanisms and not build.has_mesh
-    walls = wall_functions(build.without_mechanisms)
+    is_speculative = build.cooperative and build.has_base_law and not build.has_mesh
+    walls = wall_functions(build.without_forces)
     spheres_each = wp.constant(build.sphere_count)
     walls_each = wp.constant(build.wall_count)
 
@@ -87,6 +87,8 @@ def contact_functions(build: Build) -> SimpleNamespace:
         to_contact = contact.normal * (rb - real(0.5) * contact.overlap)
         lever = lever_of(grains, world, j, b, to_contact)
         contact.velocity = -surface_velocity(grains, j, lever)
+        if wp.static(turns_apart(build.forms)):
+            contact.rolled = -wp.cross(spin_of(grains, j), lever)
         contact.spin = -spin_of(grains, j)
         contact.partner_lever = lever
         mb = pack.load_vec4(grains.velocity, j)[3]
@@ -221,15 +223,23 @@ def contact_functions(build: Build) -> SimpleNamespace:
             c.mobility += real(1.0) / (mass * wp.dot(c.lever, c.lever))
             c.velocity += surface_velocity(grains, g, c.lever)
             c.spin += spin_of(grains, g)
+            if wp.static(turns_apart(build.forms)):
+                c.rolled += wp.cross(spin_of(grains, g), c.lever)
             displacement, is_new = recall(model, world, grains, neighbours, w, g, slot, step)
             c.is_new = is_new
             force, displacement, torque, rolling, partner_rolling = law(
                 model.contact[pair], c, displacement, neighbours.memory, slot * memory_each
             )
+            on_partner = torque
+            if wp.static(turns_apart(build.forms)):
+                on_partner = wp.cross(c.partner_lever, torque)
+                torque = wp.cross(c.lever, torque)
             if wp.static(not build.cooperative):
                 if partner < wall_base:
                     j = w * model.grain_count + partner // spheres_each
-                    react(neighbours, j, force, torque + wp.cross(c.partner_lever, force), partner_rolling)
+                    react(
+                        neighbours, j, force, on_partner + wp.cross(c.partner_lever, force), partner_rolling
+                    )
             torque += wp.cross(c.lever, force)
             if meets:
                 pack.store_vec4(neighbours.history, slot, pack.stamp(displacement, step + 1))

@@ -34,6 +34,15 @@ class LawForms(NamedTuple):
     friction_load: str
     rolling: str
 
+    @property
+    def changed(self) -> tuple[str, ...]:
+        """Choices that are not the base law's."""
+        return tuple(own for own, base in zip(self, BASE_FORMS, strict=True) if own != base)
+
+
+BASE_FORMS = LawForms("tsuji", "displacement", "spring", "push", "own_spin")
+"""Forms of the base law."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class ContactLaws:
@@ -88,11 +97,17 @@ class ContactLaws:
             raise ValueError(
                 f"ContactLaws.damping_rate: {rule}, got {self.damping_rate!r} with {self.normal_damping!r}"
             )
+        if self.normal_damping != "tsuji" and self.tangential_damping not in ("normal", "none"):
+            rule = f"must be normal or none with the normal damping {self.normal_damping}"
+            raise ValueError(f"ContactLaws.tangential_damping: {rule}, got {self.tangential_damping!r}")
 
     @property
     def forms(self) -> LawForms:
         """Choices that kernels are compiled for."""
-        return LawForms(*(getattr(self, name) for name in LawForms._fields))
+        own = {name: getattr(self, name) for name in LawForms._fields}
+        # how long the torque acts is a number of the integration
+        is_own_spin = self.rolling == "own_spin_whole_step"
+        return LawForms(**(own | {"rolling": "own_spin"} if is_own_spin else own))
 
     @property
     def name(self) -> str:

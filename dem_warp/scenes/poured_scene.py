@@ -163,7 +163,8 @@ def _world(case: Case[Any], rain: Rain) -> WorldSetup:
         ),
         gravity=scene.gravity,
         air_drag=scene.air_drag,
-        rolling_holds=case.numerics.rolling_holds,
+        rolling_holds=case.laws.rolling != "own_spin_whole_step",
+        forms=case.laws.forms,
         weighed=scene.weighed,
     )
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from dem_warp import ContactLaws
 from dem_warp.case import Case
 from experiments.export import EXPORTERS, Contact, contacts_of, values
 from experiments.export.lammps import TSUJI, granular_words
@@ -96,6 +97,6 @@ def test_what_no_other_code_has_is_refused(case: Case) -> None:
     with_more = load_study(scale="soft", changes=changes).case({}, 1)
     with pytest.raises(ValueError, match=r"terms for the base law alone, got \['micro_slip'\]"):
         contacts_of(with_more, RADIUS, MASS)
-    clamped = replace(case, numerics=replace(case.numerics, clamp_attraction=True))
+    clamped = replace(case, laws=ContactLaws(attraction="clamped"))
     with pytest.raises(ValueError, match="have a damping that may attract, got a clamped one"):
         contacts_of(clamped, RADIUS, MASS)
