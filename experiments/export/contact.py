@@ -16,7 +16,7 @@ class Contact:
     Raises
     ------
     ValueError
-        When the contact has more than the base law: no other code has the same mechanisms or clamps alike.
+        When the contact has a mechanism: no other code has the same ones.
     """
 
     first: Material
@@ -33,8 +33,6 @@ class Contact:
     def __post_init__(self) -> None:
         if names := [mechanism.name for mechanism in self.coefficients.mechanisms]:
             raise ValueError(f"Contact: other codes have terms for the base law alone, got {names}")
-        if self.coefficients.clamp_attraction:
-            raise ValueError("Contact: other codes have a damping that may attract, got a clamped one")
 
 
 def contacts_of(case: Case[Any], radius: float, mass: float) -> tuple[Contact, Contact]:
@@ -45,7 +43,7 @@ def contacts_of(case: Case[Any], radius: float, mass: float) -> tuple[Contact, C
     Raises
     ------
     ValueError
-        When the case has a mechanism beside the base law, or a clamped damping.
+        When the case has a mechanism.
     """
     grain, wall = case.grain_material, case.scene.wall_material
     among, with_wall = case.contacts(wall)

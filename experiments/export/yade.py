@@ -58,7 +58,7 @@ def rolling_terms(contact: Contact) -> tuple[Term, ...]:
     law = contact.coefficients
     return (
         Term("maxBendPl", law.rolling_friction, "1", "mu_r, times R*", _BENDING),
-        Term("kr", getattr(law, "rolling_spring", 0.0), "N m/rad", "k R*^2", _BENDING),
+        Term("kr", law.rolling_spring, "N m/rad", "k R*^2", _BENDING),
     )
 
 
