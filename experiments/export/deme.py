@@ -63,7 +63,7 @@ def translate(test: ExportedTest) -> Translation:
     warnings = CONVENTIONS.warnings(laws) + mechanism_warnings(test.case, "DEM-Engine") + lift_warnings(lift)
     among, tube = contacts_of(case, lift.largest_radius, max(t.mass for t in lift.templates))
     plate = replace(tube, coefficients=scene.contacts(case)[2])
-    # its contact radius is that of the circle in which spheres overlap, sqrt(2) times Hertz's of equal spheres
+    # its contact radius is that of the circle of overlap, sqrt(2) times Hertz's where spheres are equal
     stiffening = math.sqrt(2.0) if laws.normal == "hertz" else 1.0
     materials = [
         {"E": terms["E"] / stiffening, "nu": terms["nu"], "CoR": 0.5, "mu": 0.0, "Crr": 0.0}
@@ -76,7 +76,7 @@ def translate(test: ExportedTest) -> Translation:
 DEME = Exporter(
     "DEM-Engine",
     "FullHertzianForceModel",
-    "The contact radius is that of the overlap's circle; rolling resists what rotation moves the surfaces at.",
+    "The contact radius is that of the overlap's circle; rolling resists what rotation moves surfaces at.",
     material_terms,
     contact_terms,
     translate,

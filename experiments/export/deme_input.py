@@ -16,7 +16,7 @@ radius behind them, so that a thinner wall would pull grains through."""
 
 _ROWS = (
     Translated(
-        "clumps", "rigid, mass properties of the union of the spheres", "the same, a template a grain"
+        "clumps", "rigid, mass properties of the union of the spheres", "the same, one template a grain"
     ),
     Translated(
         "tube's wall",
@@ -24,7 +24,7 @@ _ROWS = (
         f"{THICKNESS:g} radii of the largest sphere thick, outside the tube: triangles have one side",
     ),
     Translated(
-        "integration", "velocities, then places", "the same: `centered_difference`; float32 velocities"
+        "integration", "velocities, then places", "the same: `centered_difference`; velocities in float32"
     ),
 )
 

@@ -1,6 +1,7 @@
 """Problems of the verification: each is one file of `problems` and one line here."""
 
 from experiments.verification.problems.beverloo import beverloo
+from experiments.verification.problems.contacts_yade import contacts_yade
 from experiments.verification.problems.energy import energy
 from experiments.verification.problems.friction_and_rolling import friction_and_rolling
 from experiments.verification.problems.heap_angle import heap_angle
@@ -25,7 +26,9 @@ PROBLEMS: dict[str, Problem] = {
     "beverloo": beverloo,
     "heap-angle": heap_angle,
     "stability": stability,
+    "contacts-yade": contacts_yade,
 }
 
-HEAVY = ("beverloo", "heap-angle", "stability")
-"""Problems that run only when they are named: minutes on a GPU, up to hours on two cores."""
+HEAVY = ("beverloo", "heap-angle", "stability", "contacts-yade")
+"""Problems that run only when they are named: minutes on a GPU, up to hours on two cores; or
+contacts in another code, which must be installed."""

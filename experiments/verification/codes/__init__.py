@@ -1,0 +1,1 @@
+"""Contacts in other codes: the same two bodies there and here, step by step."""
