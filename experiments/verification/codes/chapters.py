@@ -9,7 +9,7 @@ import numpy as np
 from dem_warp import ContactLaws
 from experiments.verification.codes.contact_cases import CASES, GRAIN, RADIUS, SURFACE, Trajectory, simulated
 from experiments.verification.codes.driver import CodeRun
-from experiments.verification.result import Curve, Plot, Result, Row, absolute_row
+from experiments.verification.result import Curve, Plot, Result, absolute_row
 
 TOLERANCE = 1e-3
 """Largest difference of two trajectories, over their size, that passes."""

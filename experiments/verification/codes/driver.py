@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from dem_warp import ContactLaws, Material
-from experiments.export import EXPORTERS, values
+from experiments.export import values
 from experiments.export.contact import Contact, Term
 from experiments.verification.codes.contact_cases import GRAIN, RADIUS, SAMPLES, ContactCase, Trajectory
 
