@@ -19,15 +19,15 @@ FIRST_SEED = 10_000
 """LIGGGHTS wants primes above it."""
 
 RAIN_DENSITY = 0.12
-"""Largest solid fraction of the rain: denser ones find no place for all grains at random, and codes that place
-the largest first then leave out small ones."""
+"""Largest solid fraction of the rain: in a denser one not all grains find a place at random, and codes that
+place the largest first then leave out small ones."""
 
 RAIN_HEIGHT = 3.0
 """Height of the space that the rain is put in, in diameters of the largest grain."""
 
 SIDES = 60
-"""Sides of the prism that stands for the tube; it touches the cylinder from outside, its edges stand out of it
-by 0.14 % of the radius."""
+"""Sides of the prism that stands for the tube; it touches the cylinder from outside, and its edges stand out
+of it by 0.14 % of the radius."""
 
 LOOK = 5e-3
 """Time between two looks at the grains [s]."""
@@ -141,7 +141,7 @@ class Lift:
         """Steps that a time [s] takes."""
         return max(round(time / self.case.time_step), 1)
 
-    # ---- the rain --------------------------------------------------------------------------------------------
+    # ---- the rain ----------------------------------------------------------------------------------------
 
     @property
     def count(self) -> int:
@@ -175,7 +175,7 @@ class Lift:
         area = math.pi * max(self.rain_radius - self.reach, 0.3 * self.rain_radius) ** 2
         return min(self.scene.rain_rate, RAIN_DENSITY * self.scene.rain_speed * area / volume)
 
-    # ---- the phases ------------------------------------------------------------------------------------------
+    # ---- the phases ----------------------------------------------------------------------------------------
 
     @property
     def fill_limit(self) -> float:
@@ -202,12 +202,17 @@ class Lift:
         """Slow grains above the rim that show the tube to be full."""
         return HEAPED
 
+    @property
+    def strike(self) -> float:
+        """Height above which spheres' centres are struck off with their grains [m].
+
+        Codes strike off by spheres, not by grains: as many are struck off this way, in the mean.
+        """
+        return self.scene.height + self.rise_of_spheres
+
     @cached_property
     def rise_of_spheres(self) -> float:
-        """Mean height of a grain's highest sphere centre above its centre, over all directions [m].
-
-        Codes that strike off by spheres strike off by it above the rim.
-        """
+        """Mean height of a grain's highest sphere centre above its centre, over all directions [m]."""
         directions = np.random.default_rng(FIRST_SEED).normal(size=(4096, 3))
         directions /= np.linalg.norm(directions, axis=1)[:, None]
         rises = [(directions @ template.centers.T).max(axis=1).mean() for template in self.templates]

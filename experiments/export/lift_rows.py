@@ -6,8 +6,8 @@ from experiments.export.exporter import Translated
 from experiments.export.lift import SIDES, Lift
 
 
-def lift_rows(lift: Lift) -> tuple[Translated, ...]:
-    """Say what became of the test's parts, where all codes do alike."""
+def lift_rows(lift: Lift, exact_tube: bool = False) -> tuple[Translated, ...]:
+    """Say what became of the test's parts, where all codes do alike; the tube is a prism or exact."""
     case, scene = lift.case, lift.scene
     scale = case.numerics.modulus_scale
     shear, softened = case.grains.material.shear_modulus, case.grain_material.shear_modulus
@@ -16,12 +16,13 @@ def lift_rows(lift: Lift) -> tuple[Translated, ...]:
     filled = f"{scene.grain_count} grains" if scene.grain_count else "to the rim, struck off there"
     rate = f"{lift.rain_rate:.4g} grains a second, {scene.rain_speed:g} m/s"
     slower = "" if lift.rain_rate == scene.rain_rate else " (so many find a place at random)"
+    prism = f"prism of {SIDES} sides that touch it from outside"
     return (
         Translated("shear modulus of the grains", f"{shear:.6g} Pa", f"{softening}; calibrated so, keep it"),
         Translated("sizes", sizes, f"{len(lift.templates)} templates: mean, variance and mean mass the same"),
         Translated("mass and inertia", "of the union of the spheres", "the same, given with each template"),
         Translated("filling", f"{filled}; {scene.rain_rate:g} grains a second", f"{filled}; {rate}{slower}"),
-        Translated("tube", "cylinder", f"prism of {SIDES} sides that touch it from outside"),
+        Translated("tube", "cylinder", "the same" if exact_tube else prism),
         Translated("plate", _plate(lift), _plate(lift)),
         Translated("lift", f"{scene.lift_speed:g} m/s", f"{scene.lift_speed:g} m/s, until clear of the heap"),
         Translated(

@@ -148,7 +148,7 @@ def _setup(lift: Lift, model: str, properties: Mapping[str, str], walls: str) ->
     scene, templates = lift.scene, lift.templates
     half_width, _, bottom = scene.room(lift.reach)
     rain_top = lift.rain_bottom + lift.rain_height
-    first, sizes_seed, rain_seed, *seeds = lift.seeds(3 + len(templates))
+    sizes_seed, rain_seed, *seeds = lift.seeds(2 + len(templates))
     gravity = sum(part**2 for part in scene.gravity) ** 0.5
     words = [
         _template(number, template, seed)
@@ -183,7 +183,7 @@ def _setup(lift: Lift, model: str, properties: Mapping[str, str], walls: str) ->
         rain_steps=lift.steps(lift.rain_period),
         rain_speed=scene.rain_speed,
         look=lift.steps(LOOK),
-        strike=lift.scene.height + lift.rise_of_spheres,
+        strike=lift.strike,
         slow=0.5 * scene.rain_speed,
         rest=scene.rest_speed,
         calm=lift.calm_speed,
@@ -203,7 +203,8 @@ def _template(number: int, template: Template, seed: int) -> str:
     return (
         f"fix grain{number} all particletemplate/multisphere {seed} {material} &\n"
         f"    nspheres {template.shape.sphere_count} ntry 100000 spheres &\n    {spheres} &\n"
-        f"    type {number} mass {template.mass:.9g} inertia_tensor {xx:.9g} 0 0 {yy:.9g} 0 {zz:.9g} use_density"
+        f"    type {number} mass {template.mass:.9g} &\n"
+        f"    inertia_tensor {xx:.9g} 0 0 {yy:.9g} 0 {zz:.9g} use_density"
     )
 
 
