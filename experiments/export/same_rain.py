@@ -1,4 +1,4 @@
-"""The lifted cylinder as a program of another code reads it: the same grains in the same rain, and all numbers.
+"""The lifted cylinder as a program of another code reads it: the same grains in the same rain, all numbers.
 
 Codes that are driven by a program can place every grain, so that their rain is ours: the same sizes, shapes,
 orientations and places, grain by grain, released at the same times.
@@ -27,8 +27,6 @@ RAIN_HEAD = "shape,size,release_time,x,y,z,qx,qy,qz,qw"
 """Columns of the rain: number of the shape from 0, its scale, the time [s] at which the grain is released to
 gravity and contacts, its centre then [m], and its orientation."""
 
-REST = "at rest: rms speed below {scene.rest_speed:g} m/s, none above {lift.calm_speed:g} m/s, for {scene.rest_time:g} s"
-
 
 def world_of(lift: Lift) -> WorldSetup:
     """World of a case before its first step."""
@@ -42,9 +40,8 @@ def rain_text(world: WorldSetup) -> str:
     times = grains.release_steps * world.time_step
     places = grains.positions + grains.velocities * times[:, None]
     table = np.column_stack([grains.shapes, grains.sizes, times, places, grains.orientations])
-    rows = (
-        ",".join(["%d" % row[0], *(f"{value:.9g}" for value in row[1:])]) for row in table[np.argsort(times)]
-    )
+    order = np.argsort(times, kind="stable")
+    rows = [",".join(f"{value:.9g}" for value in row) for row in table[order]]
     return "\n".join([RAIN_HEAD, *rows, ""])
 
 
@@ -103,10 +100,9 @@ def phases(lift: Lift, world: WorldSetup) -> dict[str, Any]:
 
 
 def program(name: str, solver: str) -> str:
-    """Text of a program: what it is, the course of the test, and the part of a solver."""
-    about = (
-        f'"""Lifted cylinder in {name}. Reads {TEST_FILE}, {RAIN_FILE} and the clumps; writes {HEAP}."""\n'
-    )
+    """Write a program: its head, the course of the test, and the part of a solver."""
+    reads = f"Reads {TEST_FILE}, {RAIN_FILE} and the clumps; writes {HEAP}."
+    about = f'"""Lifted cylinder in {name}. {reads}"""\n'
     return about + template("course") + template(solver)
 
 
@@ -128,7 +124,7 @@ def template(name: str) -> str:
 
 
 def same_rain_rows(lift: Lift) -> list[Translated]:
-    """Rows of the README on the test, changed where the program has it as it is here and other inputs do not."""
+    """Rows of the README on the test, with what such a program has as it is here and other inputs have not."""
     scene, grains = lift.scene, lift.case.grains
     sizes = f"{grains.size_mean:g} +- {grains.size_sd:g} of the shape, normal, cut at 3 sd"
     filled = f"{scene.grain_count} grains" if scene.grain_count else "to the rim, struck off there"
@@ -137,7 +133,17 @@ def same_rain_rows(lift: Lift) -> list[Translated]:
         "sizes": (sizes, "the same grains, one by one"),
         "filling": (filling, "the same places, orientations and times, one by one"),
         "seed": (f"{lift.case.seed}", "the same rain; another seed is another export"),
-        "end": (REST.format(lift=lift, scene=scene), "the same, of the grains' speeds"),
+        "end": (_end(lift), "the same"),
     }
     rows = lift_rows(lift)
     return [Translated(row.subject, *changes[row.subject]) if row.subject in changes else row for row in rows]
+
+
+def _end(lift: Lift) -> str:
+    scene = lift.scene
+    if scene.duration is not None:
+        return f"{scene.duration:g} s after the first grain"
+    return (
+        f"at rest: rms speed below {scene.rest_speed:g} m/s, none above {lift.calm_speed:g} m/s, for "
+        f"{scene.rest_time:g} s"
+    )

@@ -83,7 +83,7 @@ def translate(test: ExportedTest) -> Translation:
 YADE = Exporter(
     "Yade",
     "MindlinPhys, Law2_ScGeom_MindlinPhys_Mindlin",
-    "No attraction, forces remembered in place of displacements, rolling resisted by a spring without a dashpot.",
+    "No attraction; forces are remembered, not displacements; rolling is resisted by a spring, undamped.",
     material_terms,
     contact_terms,
     translate,

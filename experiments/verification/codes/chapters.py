@@ -46,8 +46,8 @@ def code_result(
             rows.append(absolute_row(row, 0.0, difference, tolerance))
     about = (
         f"Spheres of {RADIUS * 1e3:g} mm, {GRAIN.youngs_modulus:g} Pa, e = {SURFACE.restitution:g}, mu = "
-        f"{SURFACE.static_friction:g}, mu_r = {SURFACE.rolling_friction:g}; the plate is of steel. Both codes "
-        f'start from the same state, with the laws `"{laws.name}"` and the coefficients that '
+        f"{SURFACE.static_friction:g}, mu_r = {SURFACE.rolling_friction:g}; the plate is of steel. Both "
+        f'codes start from the same state, with the laws `"{laws.name}"` and the coefficients that '
         "`dem-warp export` writes; a difference is the largest of all states and spheres."
     )
     notes = [f"*{name}*: {sentence}" for name, sentence in explained.items()]
