@@ -145,7 +145,7 @@ class Batch:
             clumps=stack_spheres(setup.shapes),
             observables=course.observables | counts,
             phases=course.phases,
-            provenance=self.provenance,
+            provenance=self.provenance | {"laws": self.cases[w].laws.to_dict()},
         )
 
 

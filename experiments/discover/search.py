@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from dem_warp import EDEM
 from doe.discrepancy import (
     Analysis,
     Bank,
@@ -81,6 +82,8 @@ class Search:
         """Hash of all of the study that determines a heap at given factors."""
         described = describe(self.study)
         document = {key: value for key, value in described["study"].items() if key not in WITHOUT_EFFECT}
+        if self.study.solver.laws == EDEM:
+            document.pop("solver", None)  # as from before laws had names
         text = json.dumps([document, described["clump_sha256"]], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
 

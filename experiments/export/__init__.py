@@ -1,9 +1,10 @@
 """Cards and tests for other codes: contacts in their words, and the same test as their input."""
 
 from experiments.export.contact import Contact, Term, contacts_of, values
-from experiments.export.exporter import ExportedTest, Exporter, Translated, Translation
+from experiments.export.exporter import ExportedTest, Exporter, Translation
 from experiments.export.folder import export_input, write_export
 from experiments.export.library import EXPORTERS
+from experiments.export.translated import Translated
 
 __all__ = [
     "EXPORTERS",

@@ -16,7 +16,7 @@ class Contact:
     Raises
     ------
     ValueError
-        When the contact has a mechanism: no other code has the same ones.
+        When the contact has a mechanism: no other code has the same.
     """
 
     first: Material
@@ -43,7 +43,7 @@ def contacts_of(case: Case[Any], radius: float, mass: float) -> tuple[Contact, C
     Raises
     ------
     ValueError
-        When the case has a mechanism.
+        When the case has a mechanism beside the base law.
     """
     grain, wall = case.grain_material, case.scene.wall_material
     among, with_wall = case.contacts(wall)

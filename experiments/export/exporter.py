@@ -8,6 +8,8 @@ from typing import Any
 
 from dem_warp import Case, Material
 from experiments.export.contact import Contact, Term
+from experiments.export.laws import LawsOfCode
+from experiments.export.translated import Translated
 
 
 @dataclass(frozen=True)
@@ -24,18 +26,6 @@ class ExportedTest:
     """Values of the factors with their units, by name."""
     estimator: str = "repose angle"
     """Reading of the result, in words."""
-
-
-@dataclass(frozen=True)
-class Translated:
-    """One thing that was translated."""
-
-    subject: str
-    """As "filling", "tube", "time step"."""
-    here: str
-    """Its form in dem-warp."""
-    there: str
-    """Its form in the other code; what is lost or changed on the way stands here."""
 
 
 @dataclass(frozen=True)
@@ -93,3 +83,5 @@ class Exporter:
     translate: Callable[[ExportedTest], Translation] | None = None
     """Input of a test; None where contacts alone can be translated. Raises `InputError` for a test that the
     code cannot have in any form."""
+    conventions: LawsOfCode | None = None
+    """Conventions that its input has."""

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from dem_warp import Case
-from experiments.export.exporter import ExportedTest, Exporter, Translated
+from experiments.export.exporter import ExportedTest, Exporter
+from experiments.export.translated import Translated
 
 
 def laws_row(test: ExportedTest, exporter: Exporter) -> Translated:

@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 from experiments.export.contact import Contact, Term, contacts_of, values
 from experiments.export.exporter import ExportedTest, Exporter, Translation
 from experiments.export.lammps_input import translate_lift
-from experiments.export.laws import LawsOfCode, laws_of, mechanism_warnings
+from experiments.export.laws import LawsOfCode, mechanism_warnings
 from experiments.export.lift import Lift
 
 CONVENTIONS = LawsOfCode(
@@ -59,10 +59,10 @@ def contact_terms(contact: Contact) -> tuple[Term, ...]:
     """
     law = contact.coefficients
     spring = 8.0 * law.shear_modulus
-    rolling = spring * contact.radius * math.sqrt(2.0 * ROLLING_OVERLAP)
+    rolling = law.rolling_spring or spring * contact.radius * math.sqrt(2.0 * ROLLING_OVERLAP)
     # the tangential damping is given as a multiple of the normal one
     share = 2.0 * math.sqrt(law.shear_modulus / law.modulus) * law.tangential_damping
-    damping = math.sqrt(rolling * contact.mass)
+    damping = law.rolling_dashpot or math.sqrt(rolling * contact.mass)
     stiffness = "8 G* R* sqrt(2 x overlap / R), at an overlap of 0.01 R"
     return (
         Term("E", 2.0 * law.modulus, "Pa", "2 E*", _SOURCE),
@@ -101,8 +101,9 @@ def translate(test: ExportedTest) -> Translation:
     InputError
         When the test is another one.
     """
-    lift, laws = Lift(test), laws_of(test.case)
-    case, words = replace(lift.case, mechanisms=()), CONVENTIONS.words(laws)
+    lift, laws = Lift(test), test.case.laws
+    words = CONVENTIONS.words(laws)
+    case = replace(lift.case, mechanisms=(), laws=CONVENTIONS.nearest_laws(laws))
     among, tube = contacts_of(case, lift.largest_radius, max(t.mass for t in lift.templates))
     plate = replace(tube, coefficients=lift.scene.contacts(case)[2])
     contacts = [granular_words(contact, words) for contact in (among, tube, plate)]
@@ -131,4 +132,5 @@ LAMMPS = Exporter(
     lambda material: (),  # LAMMPS has all terms by contact
     contact_terms,
     translate,
+    CONVENTIONS,
 )

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from experiments.export.exporter import Translated, Translation
+from experiments.export.exporter import Translation
 from experiments.export.lift import LOOK, Lift, Template
 from experiments.export.lift_rows import lift_rows, lift_warnings
+from experiments.export.translated import Translated
 
 INPUT, HEAP = "lift.in", "heap.dump"
 

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
-from dem_warp import Case
-from dem_warp.laws.conventions import EDEM, ContactLaws
-from experiments.export.exporter import Translated
+from dem_warp import Case, ContactLaws
+from experiments.export.translated import Translated
 
 
 @dataclass(frozen=True)
@@ -38,6 +37,13 @@ class LawsOfCode:
         """Choice that the input has, by law: the case's own, or the nearest."""
         own = laws.to_dict()
         return {law: self._taken(law, str(own[law])) for law in self.has}
+
+    def nearest_laws(self, laws: ContactLaws) -> ContactLaws:
+        """Laws that the input has: the case's own, or the nearest."""
+        taken: dict[str, Any] = dict(self.taken(laws))
+        if taken.get("normal_damping", laws.normal_damping) == "tsuji":
+            taken["damping_rate"] = None
+        return replace(laws, **taken)
 
     def words(self, laws: ContactLaws) -> dict[str, str]:
         """Words of the code for each of its laws."""
@@ -69,11 +75,6 @@ class LawsOfCode:
         if choice in self.has[law]:
             return choice
         return self.nearest.get(choice, next(iter(self.has[law])))
-
-
-def laws_of(case: Case[Any]) -> ContactLaws:
-    """Conventions of a case."""
-    return getattr(case, "laws", EDEM)
 
 
 def mechanism_warnings(case: Case[Any], code: str) -> tuple[str, ...]:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from dem_warp.registry import Registry
 from experiments.export.deme import DEME
+from experiments.export.edem import EDEM
 from experiments.export.exporter import Exporter
 from experiments.export.lammps import LAMMPS
 from experiments.export.liggghts import LIGGGHTS
+from experiments.export.rocky import ROCKY
 from experiments.export.yade import YADE
 
 
@@ -20,6 +22,8 @@ _ALL = {
     "lammps": LAMMPS,
     "yade": YADE,
     "deme": DEME,
+    "edem": EDEM,
+    "rocky": ROCKY,
 }
 
 EXPORTERS: Registry[Exporter] = Registry("dem_warp.exporters", _ALL, _check)

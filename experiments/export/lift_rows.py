@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from experiments.export.exporter import Translated
 from experiments.export.lift import SIDES, Lift
+from experiments.export.translated import Translated
 
 
 def lift_rows(lift: Lift, exact_tube: bool = False) -> tuple[Translated, ...]:

@@ -7,7 +7,7 @@ from dataclasses import replace
 from dem_warp import Material
 from experiments.export.contact import Contact, Term, contacts_of, values
 from experiments.export.exporter import ExportedTest, Exporter, Translation
-from experiments.export.laws import LawsOfCode, laws_of, mechanism_warnings
+from experiments.export.laws import LawsOfCode, mechanism_warnings
 from experiments.export.lift import Lift
 from experiments.export.liggghts_input import translate_lift
 
@@ -28,6 +28,7 @@ CONVENTIONS = LawsOfCode(
 )
 
 LAWS = "hertz tangential history rolling_friction cdt"
+"""Laws of the peers' column."""
 
 _HERTZ = "LIGGGHTS(R)-PUBLIC 3.8, gran model hertz"
 _ROLLING = "LIGGGHTS(R)-PUBLIC 3.8, gran model rolling_friction"
@@ -45,15 +46,7 @@ def material_terms(material: Material) -> tuple[Term, ...]:
 
 
 def contact_terms(contact: Contact) -> tuple[Term, ...]:
-    """Terms of a contact, ``property/global NAME peratomtypepair``.
-
-    Raises
-    ------
-    ValueError
-        When the tangential spring is not damped, as that of these laws is.
-    """
-    if not contact.coefficients.tangential_damping:
-        raise ValueError(f"contact: {LAWS!r} damps the tangential spring, got one without damping")
+    """Terms of a contact, ``property/global NAME peratomtypepair``."""
     surface = contact.surface
     return (
         Term("coefficientRestitution", surface.restitution, "1", "e", _HERTZ),
@@ -70,7 +63,7 @@ def translate(test: ExportedTest) -> Translation:
     InputError
         When the test is another one.
     """
-    lift, laws = Lift(test), laws_of(test.case)
+    lift, laws = Lift(test), test.case.laws
     words = CONVENTIONS.words(laws)
     model = " ".join(words[law] for law in _ORDER if words[law])
     warnings = CONVENTIONS.warnings(laws) + mechanism_warnings(test.case, "LIGGGHTS")
@@ -79,7 +72,8 @@ def translate(test: ExportedTest) -> Translation:
 
 def _properties(lift: Lift) -> dict[str, str]:
     """Write the global properties of the types 1 (grains), 2 (tube) and 3 (plate)."""
-    case, scene = replace(lift.case, mechanisms=()), lift.scene
+    scene = lift.scene
+    case = replace(lift.case, mechanisms=(), laws=CONVENTIONS.nearest_laws(lift.case.laws))
     among, tube = contacts_of(case, lift.largest_radius, max(t.mass for t in lift.templates))
     friction = scene.contacts(case)[2].static_friction
     plate = replace(tube, surface=replace(tube.surface, static_friction=friction))
@@ -98,9 +92,10 @@ def _properties(lift: Lift) -> dict[str, str]:
 
 LIGGGHTS = Exporter(
     "LIGGGHTS",
-    LAWS,
-    "Its resistance to rolling acts for whole steps and may reverse a spin.",
+    "gran model hertz, tangential history, rolling_friction epsd2 or cdt",
+    "`cdt` acts for whole steps and may reverse a spin; `epsd2` is a spring without a dashpot.",
     material_terms,
     contact_terms,
     translate,
+    CONVENTIONS,
 )

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from experiments.export.exporter import Translated, Translation
+from experiments.export.exporter import Translation
 from experiments.export.lift import LOOK, Lift, Template, disc, prism, stl_text
 from experiments.export.lift_rows import lift_rows, lift_warnings
+from experiments.export.translated import Translated
 
 INPUT, HEAP, TUBE_FILE, PLATE_FILE = "lift.in", "heap.dump", "tube.stl", "plate.stl"
 

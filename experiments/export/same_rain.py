@@ -124,7 +124,7 @@ def template(name: str) -> str:
 
 
 def same_rain_rows(lift: Lift) -> list[Translated]:
-    """Rows of the README on the test, with what such a program has as it is here and other inputs have not."""
+    """Rows of the README on the test, with what a program has as it is here and other inputs have not."""
     scene, grains = lift.scene, lift.case.grains
     sizes = f"{grains.size_mean:g} +- {grains.size_sd:g} of the shape, normal, cut at 3 sd"
     filled = f"{scene.grain_count} grains" if scene.grain_count else "to the rim, struck off there"

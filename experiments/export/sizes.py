@@ -38,8 +38,8 @@ def size_classes(mean: float, sd: float, count: int = CLASSES) -> tuple[tuple[fl
     nodes = nodes * SIZE_LIMIT
     weights = weights * np.exp(-0.5 * nodes**2)
     weights /= weights.sum()
-    squares, below, present = [], np.zeros(_NODES), np.ones(_NODES)
-    norm = 1.0
+    squares: list[float] = []
+    below, present, norm = np.zeros(_NODES), np.ones(_NODES), 1.0
     for _ in range(count - 1):
         # the weight is even: each polynomial is the node times the last one, less a part of the one before
         above = nodes * present - (squares[-1] if squares else 0.0) * below

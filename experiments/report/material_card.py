@@ -15,6 +15,7 @@ from experiments.studyfile import Study
 from experiments.studyfile.campaign import Response
 from experiments.studyfile.card import MATERIAL, SECTIONS, shapes_of
 from experiments.studyfile.factor_section import with_factor_values
+from experiments.studyfile.solver_section import LAWS, written
 from experiments.studyfile.toml_files import toml_text
 
 CARD = "material.toml"
@@ -27,7 +28,7 @@ MOST_POINTS = 60
 
 HEAD = """\
 # Material card, written by dem-warp calibrate. A study takes its values by  material = "{card}"
-# They hold together with the contact law, the clump and the estimator that they were found with. Every point
+# They hold together with the contact laws [material.solver], the clump and the estimator that they were found with. Every point
 # of [compatible] is as good as the chosen one; not so every combination of the ranges.
 
 """
@@ -49,6 +50,7 @@ def write_material_card(campaign: Campaign, study: Study, folder: Path) -> Path 
 def material_card(campaign: Campaign, optimum: OptimumResult, study: Study) -> dict[str, Any]:
     """Lay out a card as nested tables; clump files as the study names them."""
     chosen = with_factor_values(study.document, study.factor_sections, optimum.settings)
+    chosen["solver"] = {LAWS: written(study.solver.laws)}
     return {
         "format": FORMAT,
         "name": study.name,

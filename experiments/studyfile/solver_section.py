@@ -8,12 +8,15 @@ from typing import Annotated, Any, Self
 
 from pydantic import Field, ValidationError, ValidationInfo, model_validator
 
-from dem_warp import EDEM, PRESETS, ContactLaws, laws_named
+from dem_warp import EDEM, PRESETS, ContactLaws
 from experiments.studyfile.generated import EngineSection, section_for
 from experiments.studyfile.schema import Generated, Section, nearest_name, nested_error
 
 BASE = "base"
 """Key of ``[solver.laws]`` that names the set of which its other keys change something."""
+
+LAWS, CARD_LAWS = "laws", "card_laws"
+"""Keys of ``[solver]``."""
 
 UNNAMED = "edem"
 """Set of a study, and of a card, that names no laws: the only one while laws had no names."""
@@ -64,15 +67,11 @@ class _Laws(Generated):
         except ValidationError as error:
             raise nested_error(error.errors()) from None
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
-        return super().__get_pydantic_core_schema__(source, handler)
-
 
 def _named(name: str) -> ContactLaws:
     if name not in PRESETS:
-        rule = f"must be a set of laws, {nearest_name(name, list(PRESETS))}"
-        raise ValueError(rule)
-    return laws_named(name)
+        raise ValueError(f"must be a set of laws, {nearest_name(name, list(PRESETS))}")
+    return PRESETS[name]
 
 
 class SolverSection(Section):
@@ -84,15 +83,15 @@ class SolverSection(Section):
     """Laws of the material card, where it was found with others than the study's: told, and taken."""
 
 
-def laws_of(document: Mapping[str, Any]) -> ContactLaws:
-    """Laws that a document names, in its ``[solver]``.
+def laws_of(solver: Mapping[str, Any]) -> ContactLaws:
+    """Laws that a ``[solver]`` names.
 
     Raises
     ------
     pydantic.ValidationError
         When they break a rule.
     """
-    return SolverSection.model_validate(document.get("solver", {})).laws  # type: ignore[no-any-return]
+    return SolverSection.model_validate(solver).laws  # type: ignore[no-any-return]
 
 
 def written(laws: ContactLaws) -> str | dict[str, Any]:

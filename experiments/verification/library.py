@@ -30,5 +30,5 @@ PROBLEMS: dict[str, Problem] = {
 }
 
 HEAVY = ("beverloo", "heap-angle", "stability", "contacts-yade")
-"""Problems that run only when they are named: minutes on a GPU, up to hours on two cores; or contacts in another
-code, which must be installed."""
+"""Problems that run only when they are named: minutes on a GPU, up to hours on two cores; or contacts in
+another code, which must be installed."""

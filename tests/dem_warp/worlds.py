@@ -106,9 +106,7 @@ def pair(
     """Contact of the grains' material with a partner's; reduced radius and mass are those on a wall."""
     interaction = Interaction(restitution, friction, rolling)
     laws = replace(laws, attraction="clamped") if clamp else laws
-    return ContactCoefficients.of_pair(
-        GRAIN, partner, interaction, laws, mechanisms, RADIUS, ball_mass()
-    )
+    return ContactCoefficients.of_pair(GRAIN, partner, interaction, laws, mechanisms, RADIUS, ball_mass())
 
 
 def world(
