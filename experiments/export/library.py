@@ -8,6 +8,7 @@ from experiments.export.edem import EDEM
 from experiments.export.exporter import Exporter
 from experiments.export.lammps import LAMMPS
 from experiments.export.liggghts import LIGGGHTS
+from experiments.export.mercury import MERCURY
 from experiments.export.rocky import ROCKY
 from experiments.export.yade import YADE
 
@@ -22,6 +23,7 @@ _ALL = {
     "lammps": LAMMPS,
     "yade": YADE,
     "deme": DEME,
+    "mercurydpm": MERCURY,
     "edem": EDEM,
     "rocky": ROCKY,
 }

@@ -8,7 +8,7 @@ from dataclasses import replace
 from dem_warp import Material
 from experiments.export.contact import Contact, Term, contacts_of, values
 from experiments.export.exporter import ExportedTest, Exporter, Translation
-from experiments.export.laws import LawsOfCode, laws_of, mechanism_warnings
+from experiments.export.laws import LawsOfCode, mechanism_warnings
 from experiments.export.lift import Lift
 from experiments.export.lift_rows import lift_warnings
 from experiments.export.yade_input import translate_lift
@@ -70,8 +70,9 @@ def translate(test: ExportedTest) -> Translation:
     InputError
         When the test is another one.
     """
-    lift, laws = Lift(test), laws_of(test.case)
-    case, scene = replace(lift.case, mechanisms=()), lift.scene
+    lift, laws = Lift(test), test.case.laws
+    case = replace(lift.case, mechanisms=(), laws=CONVENTIONS.nearest_laws(laws))
+    scene = lift.scene
     warnings = CONVENTIONS.warnings(laws) + mechanism_warnings(test.case, "Yade") + lift_warnings(lift)
     among, tube = contacts_of(case, lift.largest_radius, max(t.mass for t in lift.templates))
     plate = replace(tube, coefficients=scene.contacts(case)[2])
