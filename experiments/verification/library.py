@@ -5,6 +5,8 @@ from experiments.verification.problems.energy import energy
 from experiments.verification.problems.friction_and_rolling import friction_and_rolling
 from experiments.verification.problems.heap_angle import heap_angle
 from experiments.verification.problems.janssen import janssen
+from experiments.verification.problems.lammps_contacts import lammps_contacts
+from experiments.verification.problems.liggghts_contacts import liggghts_contacts
 from experiments.verification.problems.micro_slip import micro_slip
 from experiments.verification.problems.normal_impact import elastic_impact, restitution
 from experiments.verification.problems.oblique_impact import oblique_impact, spinning_impact
@@ -20,6 +22,8 @@ PROBLEMS: dict[str, Problem] = {
     "spinning-impact": spinning_impact,
     "friction-and-rolling": friction_and_rolling,
     "rigid-body": rigid_body,
+    "liggghts-contacts": liggghts_contacts,
+    "lammps-contacts": lammps_contacts,
     "energy": energy,
     "janssen": janssen,
     "beverloo": beverloo,
@@ -27,5 +31,8 @@ PROBLEMS: dict[str, Problem] = {
     "stability": stability,
 }
 
-HEAVY = ("beverloo", "heap-angle", "stability")
-"""Problems that run only when they are named: minutes on a GPU, up to hours on two cores."""
+PEERS = ("liggghts-contacts", "lammps-contacts")
+"""Problems that run another code, which must be installed."""
+
+HEAVY = ("beverloo", "heap-angle", "stability", *PEERS)
+"""Problems that run only when they are named: minutes on a GPU, up to hours on two cores, or another code."""
