@@ -28,8 +28,8 @@ MOST_POINTS = 60
 
 HEAD = """\
 # Material card, written by dem-warp calibrate. A study takes its values by  material = "{card}"
-# They hold together with the contact laws [material.solver], the clump and the estimator that they were found with. Every point
-# of [compatible] is as good as the chosen one; not so every combination of the ranges.
+# They hold together with the contact laws [material.solver], the clump and the estimator that they were found
+# with. Every point of [compatible] is as good as the chosen one; not so every combination of the ranges.
 
 """
 

@@ -1,16 +1,18 @@
 """Problems of the verification: each is one file of `problems` and one line here."""
 
 from experiments.verification.problems.beverloo import beverloo
-from experiments.verification.problems.contacts_yade import contacts_yade
 from experiments.verification.problems.energy import energy
 from experiments.verification.problems.friction_and_rolling import friction_and_rolling
 from experiments.verification.problems.heap_angle import heap_angle
 from experiments.verification.problems.janssen import janssen
+from experiments.verification.problems.lammps_contacts import lammps_contacts
+from experiments.verification.problems.liggghts_contacts import liggghts_contacts
 from experiments.verification.problems.micro_slip import micro_slip
 from experiments.verification.problems.normal_impact import elastic_impact, restitution
 from experiments.verification.problems.oblique_impact import oblique_impact, spinning_impact
 from experiments.verification.problems.rigid_body import rigid_body
 from experiments.verification.problems.stability import stability
+from experiments.verification.problems.yade_contacts import yade_contacts
 from experiments.verification.result import Problem
 
 PROBLEMS: dict[str, Problem] = {
@@ -21,14 +23,18 @@ PROBLEMS: dict[str, Problem] = {
     "spinning-impact": spinning_impact,
     "friction-and-rolling": friction_and_rolling,
     "rigid-body": rigid_body,
+    "liggghts-contacts": liggghts_contacts,
+    "lammps-contacts": lammps_contacts,
+    "yade-contacts": yade_contacts,
     "energy": energy,
     "janssen": janssen,
     "beverloo": beverloo,
     "heap-angle": heap_angle,
     "stability": stability,
-    "contacts-yade": contacts_yade,
 }
 
-HEAVY = ("beverloo", "heap-angle", "stability", "contacts-yade")
-"""Problems that run only when they are named: minutes on a GPU, up to hours on two cores; or contacts in
-another code, which must be installed."""
+PEERS = ("liggghts-contacts", "lammps-contacts", "yade-contacts")
+"""Problems that run another code, which must be installed."""
+
+HEAVY = ("beverloo", "heap-angle", "stability", *PEERS)
+"""Problems that run only when they are named: minutes on a GPU, up to hours on two cores, or another code."""

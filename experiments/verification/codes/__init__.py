@@ -1,1 +1,0 @@
-"""Contacts in other codes: the same two bodies there and here, step by step."""
