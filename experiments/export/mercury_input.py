@@ -36,7 +36,7 @@ _ROWS = (
     Translated(
         "clumps",
         "rigid, mass properties of the union of the spheres",
-        "`ClumpParticle` of `Drivers/Clump/ClumpHeaders`, mass and moments given; contacts take the clump's mass",
+        "`ClumpParticle` of `Drivers/Clump/ClumpHeaders`, mass and moments given; contacts take the mass",
     ),
     Translated("edges of the tube's triangles", "none", "joined by the build's `TRIANGLE_WALL_CORRECTION`"),
     Translated("integration", "velocities, then places", "velocity Verlet"),
@@ -100,7 +100,8 @@ def header(lift: Lift, contacts: Sequence[Mapping[str, float]]) -> str:
     rows = ",\n    ".join(f"{{{', '.join(f'{value:.17g}' for value in one.values())}}}" for one in contacts)
     names = ", ".join(f'"{name}"' for name in numbers["clumps"])
     lines = [
-        "// Numbers of the test, in SI units; lift.cpp says what they are for.\n#pragma once\n\nnamespace test\n{",
+        "// Numbers of the test, in SI units; lift.cpp says what they are for.",
+        "#pragma once\n\nnamespace test\n{",
         *(f"constexpr {_kind(value)} {_camel(name)} = {_written(value)};" for name, value in single.items()),
         _array("gravity", numbers["gravity"]),
         _array("low", world.domain[0]),

@@ -108,7 +108,7 @@ def program(name: str, solver: str) -> str:
 
 def program_files(lift: Lift, world: WorldSetup, text: str, numbers: Mapping[str, Any]) -> dict[str, str]:
     """Files of a program: its text, the numbers that it reads, the rain and the clumps."""
-    told = test_numbers(lift, world) | numbers
+    told = test_numbers(lift, world) | dict(numbers)
     return {
         SCRIPT: text,
         TEST_FILE: json.dumps(told, indent=1) + "\n",
