@@ -20,7 +20,7 @@ GRAVITY = 9.81
 """[m/s2]"""
 
 ROLLING_OVERLAP = 0.01
-"""Overlap of two equal spheres, over their radius, at which a rolling spring is as stiff as the tangential."""
+"""Overlap of equal spheres, over their radius, at which a rolling spring is as stiff as the tangential."""
 
 AT_ONCE = 0
 """Release step of a grain that is free from the start."""

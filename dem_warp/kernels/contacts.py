@@ -97,6 +97,22 @@ def contact_functions(build: Build) -> SimpleNamespace:
         return contact
 
     @wp.func
+    def add_motion(grains: Grains, contact: Contact, g: int) -> Contact:
+        """Adds the motion of the grain itself to that of its partner."""
+        contact.velocity += surface_velocity(grains, g, contact.lever)
+        contact.spin += spin_of(grains, g)
+        if wp.static(turns_apart(build.forms)):
+            contact.rolled += wp.cross(spin_of(grains, g), contact.lever)
+        return contact
+
+    @wp.func
+    def torques(contact: Contact, torque: vec3):
+        """Torque on the grain, and the opposite of that on its partner [N m], of what the law gives."""
+        if wp.static(turns_apart(build.forms)):
+            return wp.cross(contact.lever, torque), wp.cross(contact.partner_lever, torque)
+        return torque, torque
+
+    @wp.func
     def joined(model: Model, w: int, entry: int, other: int) -> bool:
         """Tell whether the partners of two entries are triangles that share a corner, the first being one."""
         wall_base = model.grain_count * spheres_each
@@ -221,25 +237,17 @@ def contact_functions(build: Build) -> SimpleNamespace:
         if wp.static(is_speculative) or meets:
             c.lever = lever_of(grains, world, g, a, c.normal * (real(0.5) * c.overlap - radius))
             c.mobility += real(1.0) / (mass * wp.dot(c.lever, c.lever))
-            c.velocity += surface_velocity(grains, g, c.lever)
-            c.spin += spin_of(grains, g)
-            if wp.static(turns_apart(build.forms)):
-                c.rolled += wp.cross(spin_of(grains, g), c.lever)
+            c = add_motion(grains, c, g)
             displacement, is_new = recall(model, world, grains, neighbours, w, g, slot, step)
             c.is_new = is_new
             force, displacement, torque, rolling, partner_rolling = law(
                 model.contact[pair], c, displacement, neighbours.memory, slot * memory_each
             )
-            on_partner = torque
-            if wp.static(turns_apart(build.forms)):
-                on_partner = wp.cross(c.partner_lever, torque)
-                torque = wp.cross(c.lever, torque)
+            torque, opposite = torques(c, torque)
             if wp.static(not build.cooperative):
                 if partner < wall_base:
                     j = w * model.grain_count + partner // spheres_each
-                    react(
-                        neighbours, j, force, on_partner + wp.cross(c.partner_lever, force), partner_rolling
-                    )
+                    react(neighbours, j, force, opposite + wp.cross(c.partner_lever, force), partner_rolling)
             torque += wp.cross(c.lever, force)
             if meets:
                 pack.store_vec4(neighbours.history, slot, pack.stamp(displacement, step + 1))

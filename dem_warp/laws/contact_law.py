@@ -133,15 +133,8 @@ def contact_law(mechanisms: Mechanisms, forms: LawForms = BASE_FORMS) -> Any:
         load = support
         if wp.static(forms.friction_load == "size"):
             load = wp.abs(normal_force)
-        coefficient = friction(
-            params,
-            contact,
-            params.static_friction,
-            wp.length(displacement) * tangential_stiffness,
-            load,
-            memory,
-            first,
-        )
+        held = wp.length(displacement) * tangential_stiffness
+        coefficient = friction(params, contact, params.static_friction, held, load, memory, first)
         tangential_rate = params.tangential_damping * normal_rate
         if wp.static(forms.normal_damping == "tsuji"):
             tangential_rate = (

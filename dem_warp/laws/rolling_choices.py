@@ -11,13 +11,26 @@ from typing import Any
 import warp as wp
 
 from dem_warp.laws.elastic_plastic_rolling import spring_torque
-from dem_warp.laws.tangential import advance_displacement, limited, mindlin_stiffness, sum_spring
+from dem_warp.laws.tangential import (
+    advance_displacement,
+    coulomb_spring,
+    limited,
+    mindlin_stiffness,
+    sum_spring,
+)
 
-STOP_SHARE = wp.constant(0.08)
-"""Part of what stops the relative rotation within a step that `relative_constant` asks for at the most."""
+STEP_SHARE = wp.constant(0.05)
+"""Stiffness of the spring that holds under `relative_constant`, over inertia / step^2: a grain of a pile has
+a dozen contacts or more, and 4 would be too much for them together."""
+
+DASHPOT_SHARE = wp.constant(0.2)
+"""Its dashpot over inertia / step: a damping ratio of 0.45."""
 
 SOLID_SPHERE = wp.constant(2.5)
 """m R^2 / I of a solid sphere."""
+
+UNLIMITED = wp.constant(1.0e30)
+"""More than any torque [N m]."""
 
 EXACT_RATIO = wp.constant(1.8257418583505538)
 """2 sqrt(5/6): the constant of the damping over |beta|."""
@@ -50,20 +63,22 @@ def wound_torque(contact: Any, torque: Any, stiffness: Any, limit: Any, memory: 
 
 @wp.func
 def constant_torque(params: Any, contact: Any, load: Any, memory: Any, at: int):
-    """Torque mu_r R* F_n [N m] against the roll, and no larger than what would stop a share of it in a step.
+    """Torque mu_r R* F_n [N m] against the roll; what does not ask for as much is held.
 
-    A grain at rest has no roll to resist: under a torque it creeps, by what the share is short of 1.
+    It holds by the stiffest spring that the step allows, damped: as the step gets shorter, rigid and then
+    plastic. The inertia is that of solid spheres.
 
-    Source: model A of Ai et al., Powder Technology 206 (2011) 269-282; the share, Simcenter STAR-CCM+, theory
-    guide, rolling resistance, constant torque method, moment limiter.
+    Source: model A of Ai et al., Powder Technology 206 (2011) 269-282, which says nothing of rest.
     """
+    one = type(load)(1.0)
     roll = roll_of(contact)
-    speed = wp.length(roll)
-    torque = roll * type(speed)(0.0)
-    if speed > type(speed)(0.0):
-        stop = speed / (type(speed)(SOLID_SPHERE) * contact.mobility * contact.time_step)
-        limit = params.rolling_friction * contact.radius * load
-        torque = roll * (-wp.min(limit, type(speed)(STOP_SHARE) * stop) / speed)
+    angle = advance_displacement(recalled(contact, memory, at), contact.normal, roll, contact.time_step)
+    rate = one / (type(load)(SOLID_SPHERE) * contact.mobility * contact.time_step)
+    stiffness = type(load)(STEP_SHARE) * rate / contact.time_step
+    limit = params.rolling_friction * contact.radius * load
+    torque, angle = coulomb_spring(angle, stiffness, type(load)(DASHPOT_SHARE) * rate, roll, limit)
+    for i in range(3):
+        memory[at + i] = angle[i]
     return torque
 
 
@@ -117,12 +132,17 @@ def rocky_torque(params: Any, contact: Any, load: Any, memory: Any, at: int):
 def yade_torque(params: Any, contact: Any, load: Any, memory: Any, at: int):
     """Torque [N m] of a spring of one stiffness [N m/rad] without dashpot, at most mu_r R* F_n.
 
+    It has no limit where there is no normal force, in the overlap that a clamped damping leaves at the end of
+    an impact: the source limits it only `if (MomentMax > 0)`.
+
     Source: Yade, pkg/dem/HertzMindlin.cpp, Law2_ScGeom_MindlinPhys_Mindlin::go, "MOMENT CONTACT LAW" (krot;
     eta, the limit over the mean radius and the normal force).
     """
     torque = recalled(contact, memory, at)
     torque = torque - contact.normal * wp.dot(torque, contact.normal)
     limit = params.rolling_friction * contact.radius * load
+    if limit <= type(limit)(0.0):
+        limit = type(limit)(UNLIMITED)
     return wound_torque(contact, torque, params.rolling_stiffness, limit, memory, at)
 
 
@@ -190,7 +210,7 @@ class RollingChoice:
 
 
 ROLLING: Mapping[str, RollingChoice] = {
-    "relative_constant": RollingChoice(constant_torque),
+    "relative_constant": RollingChoice(constant_torque, memory_size=3),
     "cdt": RollingChoice(cdt_torque, "elastic"),
     "elastic_plastic": RollingChoice(spring_torque, memory_size=3),
     "epsd2": RollingChoice(epsd2_torque, "size", 3),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 from dem_warp import Material
@@ -55,6 +56,11 @@ def contact_terms(contact: Contact) -> tuple[Term, ...]:
     )
 
 
+def model_words(words: Mapping[str, str]) -> str:
+    """LIGGGHTS' words after ``model``, from those for each law."""
+    return " ".join(words[law] for law in _ORDER if words[law])
+
+
 def translate(test: ExportedTest) -> Translation:
     """Write the input of a lifted cylinder.
 
@@ -65,7 +71,7 @@ def translate(test: ExportedTest) -> Translation:
     """
     lift, laws = Lift(test), test.case.laws
     words = CONVENTIONS.words(laws)
-    model = " ".join(words[law] for law in _ORDER if words[law])
+    model = model_words(words)
     warnings = CONVENTIONS.warnings(laws) + mechanism_warnings(test.case, "LIGGGHTS")
     return translate_lift(lift, model, _properties(lift), warnings, CONVENTIONS.translated(laws))
 

@@ -36,7 +36,7 @@ def sheet_translation(
     warnings: tuple[str, ...],
 ) -> Translation:
     """Write the sheet of a lifted cylinder as Markdown and as CSV, with a table of the spheres."""
-    rows = [("dialog", "name", "value", "unit")]
+    rows: list[tuple[str, ...]] = [("dialog", "name", "value", "unit")]
     rows += [(entry.dialog, entry.name, entry.value, entry.unit) for entry in entries]
     spheres = _spheres(lift)
     scale = lift.case.numerics.modulus_scale
@@ -71,7 +71,7 @@ def size_entries(lift: Lift, dialog: str, names: tuple[str, str, str, str]) -> l
 
 
 def _spheres(lift: Lift) -> list[tuple[str, ...]]:
-    rows = [("shape", "x", "y", "z", "radius", "unit")]
+    rows: list[tuple[str, ...]] = [("shape", "x", "y", "z", "radius", "unit")]
     for number, shape in enumerate(lift.case.grains.mixture.shapes, 1):
         for center, radius in zip(shape.centers, shape.radii, strict=True):
             rows.append((f"{number}", *(f"{1e3 * value:.6f}" for value in (*center, radius)), "mm"))

@@ -66,8 +66,8 @@ def check_laws(document: Mapping[str, Any], sections: Mapping[str, Any], path: P
         return  # the study's sections are checked next, with their places
     if own != others and solver.get(CARD_LAWS) != others.name:
         rule = (
-            f"the values of the card hold for the laws {others.name!r} and mean something else in these: take "
-            f'those, or say {CARD_LAWS} = "{others.name}" beside them to take the values as they are'
+            f"the values of the card hold for the laws {others.name!r} and mean something else in these: "
+            f'take those, or say {CARD_LAWS} = "{others.name}" beside them to take the values as they are'
         )
         raise StudyError(rule, solver[LAWS], f"solver.{LAWS}, with the card {path}")
 
