@@ -35,6 +35,9 @@ LEAST_RUNS = 4
 ROUNDS = 20
 """Rounds of estimating the scale, which weighs the surface's own error, at the most."""
 
+SETTLED = 1e-3
+"""Change of the scale from one round to the next that weighs nothing."""
+
 LOWEST_NOISE = 1e-3
 """Least standard deviation of a run that is looked for, as a part of the responses' spread."""
 
@@ -199,7 +202,7 @@ def transfer(source: Surface, runs: pd.DataFrame, response: ArrayLike, level: fl
         before = found.weight
         found = _with_noise(found)
         found = Transfer(source, found.level, points, values, found.noise, found.scale)
-        if abs(found.weight - before) < 1e-6:
+        if abs(found.weight - before) < SETTLED:
             break
     return found
 
