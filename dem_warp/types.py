@@ -132,7 +132,7 @@ def device_structs(precision: Precision) -> SimpleNamespace:
         mass: real  # effective mass m* [kg]
         velocity: vec3  # of the grain's surface relative to the partner's [m/s]
         spin: vec3  # of the grain relative to the partner [rad/s]
-        rolled: vec3  # part of the velocity that the two spins make [m/s]
+        rolled: vec3  # of some laws: what the two spins slide [m/s], or the grain's own spin [rad/s]
         lever: vec3  # from the grain's centre to the contact [m]
         partner_lever: vec3  # from the centre of a grain that is its partner [m]
         mobility: real  # 1 / (m lever^2) of the grain and of a grain that is its partner, added [1/(kg m2)]

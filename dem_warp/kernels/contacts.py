@@ -11,7 +11,7 @@ import warp as wp
 from dem_warp.kernels.lanes import load_pair
 from dem_warp.kernels.packing import packing
 from dem_warp.kernels.walls import wall_functions
-from dem_warp.laws.contact_law import acts_apart, contact_law, memory_size, turns_apart
+from dem_warp.laws.contact_law import acts_apart, contact_law, memory_size, turning_of_partner
 from dem_warp.types import SPHERE_BITS, SPHERE_MASK, Build, device_structs
 
 
@@ -27,6 +27,7 @@ def contact_functions(build: Build) -> SimpleNamespace:
     pack = packing(precision)
     law = contact_law(build.mechanisms, build.forms)
     is_apart = acts_apart(build.mechanisms)
+    turning = turning_of_partner(build.forms)
     memory_each = wp.constant(memory_size(build.mechanisms, build.forms))
     # the lanes of a warp that meet nothing wait for the others: let them load and work as if, so that nobody
     # waits for the distance before the rest is loaded
@@ -87,7 +88,7 @@ def contact_functions(build: Build) -> SimpleNamespace:
         to_contact = contact.normal * (rb - real(0.5) * contact.overlap)
         lever = lever_of(grains, world, j, b, to_contact)
         contact.velocity = -surface_velocity(grains, j, lever)
-        if wp.static(turns_apart(build.forms)):
+        if wp.static(turning == "own lever"):
             contact.rolled = -wp.cross(spin_of(grains, j), lever)
         contact.spin = -spin_of(grains, j)
         contact.partner_lever = lever
@@ -101,15 +102,19 @@ def contact_functions(build: Build) -> SimpleNamespace:
         """Adds the motion of the grain itself to that of its partner."""
         contact.velocity += surface_velocity(grains, g, contact.lever)
         contact.spin += spin_of(grains, g)
-        if wp.static(turns_apart(build.forms)):
+        if wp.static(turning == "own lever"):
             contact.rolled += wp.cross(spin_of(grains, g), contact.lever)
+        if wp.static(turning == "alike"):
+            contact.rolled = spin_of(grains, g)
         return contact
 
     @wp.func
     def torques(contact: Contact, torque: vec3):
         """Torque on the grain, and the opposite of that on its partner [N m], of what the law gives."""
-        if wp.static(turns_apart(build.forms)):
+        if wp.static(turning == "own lever"):
             return wp.cross(contact.lever, torque), wp.cross(contact.partner_lever, torque)
+        if wp.static(turning == "alike"):
+            return torque, -torque
         return torque, torque
 
     @wp.func

@@ -48,9 +48,9 @@ def acts_apart(mechanisms: Mechanisms) -> bool:
     return any(mechanism.acts_apart for mechanism in mechanisms)
 
 
-def turns_apart(forms: LawForms) -> bool:
-    """Tell whether the law's torque is a force [N] that turns each grain at its own lever."""
-    return forms.rolling in ROLLING and ROLLING[forms.rolling].is_couple
+def turning_of_partner(forms: LawForms) -> str:
+    """Turning of the partner by a law's torque, `RollingChoice.on_partner`."""
+    return ROLLING[forms.rolling].on_partner if forms.rolling in ROLLING else "opposite"
 
 
 def check_forms(mechanisms: Mechanisms, forms: LawForms) -> None:
@@ -71,7 +71,9 @@ def check_forms(mechanisms: Mechanisms, forms: LawForms) -> None:
             if clash:
                 rule = f"must be {getattr(base, law)!r} beside the mechanism {clash[0]}"
                 raise ValueError(f"ContactLaws.{law}: {rule}, got {chosen!r}")
-    if turns_apart(forms) and (clash := [m.name for m in mechanisms if m.torque is not None]):
+    if turning_of_partner(forms) != "opposite" and (
+        clash := [m.name for m in mechanisms if m.torque is not None]
+    ):
         raise ValueError(
             f"ContactLaws.rolling: must not be {forms.rolling!r} beside the mechanism {clash[0]}"
         )

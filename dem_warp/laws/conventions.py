@@ -20,8 +20,8 @@ TangentialHistory = Literal["displacement", "force", "rescaled_displacement", "r
 Sliding = Literal["spring", "spring_free", "sum"]
 FrictionLoad = Literal["push", "size"]
 Rolling = Literal[
-    "own_spin", "own_spin_whole_step", "relative_constant", "cdt", "elastic_plastic", "epsd2", "sds",
-    "rocky_3", "yade", "deme",
+    "own_spin", "own_spin_whole_step", "edem_rvd", "relative_constant", "cdt", "elastic_plastic", "epsd2",
+    "sds", "rocky_3", "yade", "deme",
 ]  # fmt: skip
 
 
@@ -148,6 +148,7 @@ _LIGGGHTS = ContactLaws(sliding="spring_free", friction_load="size", rolling="ep
 
 PRESETS: Mapping[str, ContactLaws] = {
     "edem": EDEM,
+    "edem-rvd": replace(EDEM, rolling="edem_rvd"),
     "edem-c": replace(EDEM, rolling="elastic_plastic", rolling_damping=0.0),
     "relative": RELATIVE,
     "liggghts": _LIGGGHTS,

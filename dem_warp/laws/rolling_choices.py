@@ -1,12 +1,13 @@
 """Resistance to rolling, choice by choice; `conventions.Rolling` names them.
 
-Each acts on the relative rotation of the two bodies, but DEM-Engine's on what rotation moves their surfaces
-at. Choices that act on a grain's own spin are limits for the integration (`rolling.resist_spin`).
+Each acts on the relative rotation of the two bodies, but EDEM's RVD on the mean of their spins and
+DEM-Engine's on what rotation moves their surfaces at. Choices that act on a grain's own spin are limits for
+the integration (`rolling.resist_spin`).
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import warp as wp
 
@@ -79,6 +80,25 @@ def constant_torque(params: Any, contact: Any, load: Any, memory: Any, at: int):
     torque, angle = coulomb_spring(angle, stiffness, type(load)(DASHPOT_SHARE) * rate, roll, limit)
     for i in range(3):
         memory[at + i] = angle[i]
+    return torque
+
+
+@wp.func
+def rvd_torque(params: Any, contact: Any, load: Any, memory: Any, at: int):
+    """Torque mu_r R* F_n [N m] against the mean of the two spins in the contact's plane, on both alike.
+
+    On a wall it is the grain's own spin. It acts for whole steps.
+
+    Source: Altair EDEM, help, RVD Rolling Friction Model, as printed but for the sign.
+    """
+    spin = contact.rolled
+    if wp.length(contact.partner_lever) > type(load)(0.0):
+        spin = spin - type(load)(0.5) * contact.spin
+    spin = spin - contact.normal * wp.dot(spin, contact.normal)
+    speed = wp.length(spin)
+    torque = spin * type(load)(0.0)
+    if speed > type(load)(0.0):
+        torque = spin * (-params.rolling_friction * contact.radius * load / speed)
     return torque
 
 
@@ -199,17 +219,19 @@ class RollingChoice:
     """A resistance to rolling that is a torque of the contact."""
 
     torque: Any
-    """Device function of ContactParams, Contact, load [N], memory and place in it: torque [N m] on the grain,
-    the partner feeling the opposite one; or, of a couple, the force [N]."""
+    """Device function of ContactParams, Contact, load [N], memory and place in it: torque [N m] on the grain;
+    or, of one that turns each grain at its own lever, the force [N]."""
     load: str = "push"
     """Load: the normal force where it pushes, its `size`, or its `elastic` part."""
     memory_size: int = 0
     """Values that it remembers of a contact."""
-    is_couple: bool = False
-    """True of one that gives a force that acts at each grain's lever and only turns."""
+    on_partner: Literal["opposite", "alike", "own lever"] = "opposite"
+    """Turning of the partner: by the opposite torque, by the same one, or by the opposite force at its own
+    lever. Then `Contact.rolled` is the grain's own spin [rad/s], and what both spins slide [m/s]."""
 
 
 ROLLING: Mapping[str, RollingChoice] = {
+    "edem_rvd": RollingChoice(rvd_torque, on_partner="alike"),
     "relative_constant": RollingChoice(constant_torque, memory_size=3),
     "cdt": RollingChoice(cdt_torque, "elastic"),
     "elastic_plastic": RollingChoice(spring_torque, memory_size=3),
@@ -217,6 +239,6 @@ ROLLING: Mapping[str, RollingChoice] = {
     "sds": RollingChoice(sds_torque, "size", 3),
     "rocky_3": RollingChoice(rocky_torque, memory_size=3),
     "yade": RollingChoice(yade_torque, "size", 3),
-    "deme": RollingChoice(deme_couple, "size", 1, is_couple=True),
+    "deme": RollingChoice(deme_couple, "size", 1, "own lever"),
 }
 """Choices that are torques of a contact, by name; the others are limits of a grain's own spin."""

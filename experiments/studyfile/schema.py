@@ -95,6 +95,8 @@ class Generated:
 
     section: Callable[[], type[Section]]
     """Builds the section."""
+    name: str = ""
+    """Default of a field that takes a name as well as a section."""
 
     def read(self, value: object, info: ValidationInfo) -> Section:
         """Validate the section."""

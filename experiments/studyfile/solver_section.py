@@ -77,7 +77,7 @@ def _named(name: str) -> ContactLaws:
 class SolverSection(Section):
     """``[solver]``: the conventions that the coefficients hold for."""
 
-    laws: Annotated[Any, _Laws(laws_section)] = EDEM
+    laws: Annotated[Any, _Laws(laws_section, UNNAMED)] = EDEM
     """Set of laws by the name of its code, or a table law by law; left out, the base law, ``"edem"``."""
     card_laws: str | None = Field(default=None)
     """Laws of the material card, where it was found with others than the study's: told, and taken."""

@@ -295,6 +295,7 @@ def _build(document: dict[str, Any], places: Places) -> Study:
     middle = with_factor_values(document, sections, {}) | {"factor": sections}
     study = validated(Study, middle, places, natural_value=partial(natural_value, sections))
     study._document, study._places = document, places
+    _check_restitution(study)
     for name in study.condition_sections:
         study.under(name)
     for name in study.response_scenes:
@@ -305,6 +306,15 @@ def _build(document: dict[str, Any], places: Places) -> Study:
     target, responses = study.target_section, study.response_sections
     study._target = build_target(target, responses, study.scenes, held_out, places)
     return study
+
+
+def _check_restitution(study: Study) -> None:
+    """Refuse a factor that varies a restitution which the laws make nothing of."""
+    for section in study.factor_sections if study.solver.laws.damping_rate is not None else ():
+        if any(path[-1] == "restitution" for path in section.paths):
+            damping = study.solver.laws.normal_damping
+            rule = f"varies a restitution, and the damping {damping!r} takes none: leave the factor out"
+            raise StudyError(rule, section.name, f"{study.file}: factor {section.name}")
 
 
 def study_scales(path: str | Path | None = None) -> tuple[str, ...]:

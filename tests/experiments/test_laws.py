@@ -101,6 +101,15 @@ def test_no_factor_varies_a_law(write_study: WriteStudy) -> None:
         load_study(path)
 
 
+def test_a_restitution_that_the_laws_take_no_part_of_is_no_factor(write_study: WriteStudy) -> None:
+    laws = '[solver.laws]\nbase = "lammps"\nnormal_damping = "mass_velocity"\ndamping_rate = "200 1/s"\n'
+    factor = '[[factor]]\nname = "C"\nlabel = "e"\nlow = 0.2\nhigh = 0.4\n'
+    place = 'parameter = "contact.grain-grain.restitution"\n'
+    path = write_study(("restitution = 0.2\n", ""), add=factor + place + laws)
+    with pytest.raises(StudyError, match="the damping 'mass_velocity' takes none: leave the factor out"):
+        load_study(path)
+
+
 def test_cases_of_other_laws_are_stored_apart_and_banks_refused(write_study: WriteStudy) -> None:
     studies = [load_study(write_study(add=f'[solver]\nlaws = "{name}"\n')) for name in PRESETS]
     assert len({case_key(study.case({}, 1)) for study in studies}) == len(PRESETS)
