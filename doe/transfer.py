@@ -4,19 +4,22 @@ Two simulators of one test, or a simulator and a laboratory, seldom agree, but t
 are of one shape: y = t + shift + scale (s(x) - t), with s the surface of the first and t a level to count
 from, such as the target. Shift and scale are estimated by generalized least squares. Their errors come from
 both sides: the noise of the runs, estimated from them by restricted likelihood, and that of the surface,
-which moves its values together. What the runs tell of the surface beyond shift and scale moves it within its
+which moves its values together. Where they tell little of the scale, which noise would let them, it stays near
+1: that it is so within a quarter is taken as known beforehand (mixed estimation; Theil and Goldberger 1961).
+What the runs tell of the surface beyond shift and scale moves it within its
 own errors (best linear unbiased prediction; Harville 1977, Kennedy and O'Hagan 2001 with a constant scale).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from scipy import optimize, stats
+from scipy.linalg import block_diag
 from statsmodels.regression.linear_model import GLS
 
 from doe import optimum, region
@@ -28,6 +31,9 @@ from doe.factors import coded_points, natural_points
 from doe.quadratic import QuadraticForm
 from doe.surface import Surface
 from doe.terms import INTERCEPT, model_matrix
+
+SCALE_SD = 0.25
+"""Standard deviation of the scale about 1 before any run: solvers of one test are alike so far."""
 
 LEAST_RUNS = 4
 """Fewest runs that leave a spread beside shift and scale."""
@@ -57,6 +63,8 @@ class Transfer:
     """Standard deviation of one of them."""
     weight: float
     """Scale with which the surface's own error is weighed."""
+    scale_sd: float = SCALE_SD
+    """Standard deviation of the scale about 1 that was taken as known beforehand; infinite: nothing was."""
 
     @property
     def design(self) -> Design:
@@ -65,8 +73,7 @@ class Transfer:
 
     @cached_property
     def _fit(self):  # type: ignore[no-untyped-def]  # statsmodels has no types
-        below = self.response - self.level
-        return GLS(below, self._columns(self.points), sigma=self._covariance).fit()
+        return GLS(*_with_prior(self), sigma=_with_prior_variance(self, self._covariance)).fit()
 
     @property
     def shift(self) -> float:
@@ -100,7 +107,7 @@ class Transfer:
         gap = own - common @ np.linalg.solve(self._covariance, self._columns(self.points))
         prior = self.weight**2 * _quadratic(self._rows(points), self._surface_covariance)
         variance = prior - np.einsum("ij,ji->i", common, weighed[:, 1:])
-        variance += np.einsum("ij,jk,ik->i", gap, self._fit.normalized_cov_params, gap)
+        variance += _quadratic(gap, self._fit.normalized_cov_params)
         return mean, np.sqrt(np.maximum(self._fit.scale * variance, 0.0))
 
     @cached_property
@@ -158,12 +165,29 @@ class Transfer:
         return self.response - self.level - self._columns(self.points) @ self._fit.params
 
 
+def _with_prior(found: Transfer) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return responses and columns of shift and scale, with what is known of the scale as one more run."""
+    below, columns = found.response - found.level, found._columns(found.points)
+    if not np.isfinite(found.scale_sd):
+        return below, columns
+    return np.append(below, 1.0), np.vstack([columns, [0.0, 1.0]])
+
+
+def _with_prior_variance(found: Transfer, covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the covariance of those responses."""
+    if not np.isfinite(found.scale_sd):
+        return covariance
+    return block_diag(covariance, found.scale_sd**2)
+
+
 def _quadratic(rows: NDArray[np.float64], matrix: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return r'Mr of every row r."""
     return np.asarray(np.einsum("ij,jk,ik->i", rows, matrix, rows))
 
 
-def transfer(source: Surface, runs: pd.DataFrame, response: ArrayLike, level: float) -> Transfer:
+def transfer(
+    source: Surface, runs: pd.DataFrame, response: ArrayLike, level: float, scale_sd: float = SCALE_SD
+) -> Transfer:
     """Carry a surface over to another process by a few runs there.
 
     Parameters
@@ -174,6 +198,8 @@ def transfer(source: Surface, runs: pd.DataFrame, response: ArrayLike, level: fl
     response : array-like, shape (runs,)
     level : float
         Response that shift and scale count from: the target. They are then nearly uncorrelated.
+    scale_sd : float
+        Standard deviation of the scale about 1 before any run; infinite: nothing is known of it.
 
     Raises
     ------
@@ -193,7 +219,9 @@ def transfer(source: Surface, runs: pd.DataFrame, response: ArrayLike, level: fl
     if not (np.isfinite(values).all() and np.isfinite(points).all()):
         raise DesignError("runs and responses must be finite, received others")
     checked_number("the level", level)
-    found = Transfer(source, float(level), points, values, 1.0, 1.0)
+    if not scale_sd > 0.0:
+        raise DesignError(f"the standard deviation of the scale must be positive, received {scale_sd!r}")
+    found = Transfer(source, float(level), points, values, 1.0, 1.0, scale_sd)
     if np.ptp(found._columns(points)[:, 1]) <= 1e-9 * max(1.0, float(np.ptp(source.fitted))):
         raise DesignError(
             "runs must lie where the surface differs, to tell shift from scale; all have one value"
@@ -201,7 +229,7 @@ def transfer(source: Surface, runs: pd.DataFrame, response: ArrayLike, level: fl
     for _ in range(ROUNDS):
         before = found.weight
         found = _with_noise(found)
-        found = Transfer(source, found.level, points, values, found.noise, found.scale)
+        found = replace(found, weight=found.scale)
         if abs(found.weight - before) < SETTLED:
             break
     return found
@@ -212,11 +240,11 @@ def _with_noise(found: Transfer) -> Transfer:
     spread = float(np.std(found.response, ddof=1))
     if not spread > 0.0:
         raise DesignError("no noise can be told from responses that are all the same")
-    columns, below = found._columns(found.points), found.response - found.level
+    below, columns = _with_prior(found)
     common = found._common(found.points)
 
     def lack(log_noise: float) -> float:
-        covariance = np.exp(2.0 * log_noise) * np.eye(len(below)) + common
+        covariance = _with_prior_variance(found, np.exp(2.0 * log_noise) * np.eye(len(common)) + common)
         inverse = np.linalg.inv(covariance)
         normal = columns.T @ inverse @ columns
         left = below - columns @ np.linalg.solve(normal, columns.T @ inverse @ below)
@@ -225,9 +253,7 @@ def _with_noise(found: Transfer) -> Transfer:
 
     ends = (np.log(LOWEST_NOISE * spread), np.log(3.0 * spread))
     best = optimize.minimize_scalar(lack, bounds=ends, method="bounded", options={"xatol": 1e-6})
-    return Transfer(
-        found.source, found.level, found.points, found.response, float(np.exp(best.x)), found.weight
-    )
+    return replace(found, noise=float(np.exp(best.x)))
 
 
 def transfer_points(

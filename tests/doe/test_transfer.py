@@ -69,7 +69,7 @@ def test_without_an_error_of_the_surface_it_is_least_squares() -> None:
     surface = source(1e-9, rng)
     runs = transfer_points(surface, nearest(surface), 10)
     response = there(runs, rng.normal(0.0, 0.5, 10))
-    found = transfer(surface, runs, response, LEVEL)
+    found = transfer(surface, runs, response, LEVEL, scale_sd=np.inf)
     columns = np.column_stack([np.ones(10), truth(runs) - LEVEL])
     expected, squares, *_ = np.linalg.lstsq(columns, response - LEVEL, rcond=None)
     assert (found.shift, found.scale) == pytest.approx(tuple(expected), abs=1e-6)
@@ -107,6 +107,15 @@ def test_the_region_of_the_carried_surface_holds_its_contour() -> None:
     ranges = region.ranges
     assert (ranges["low"] <= point).all()
     assert (point <= ranges["high"]).all()
+
+
+def test_runs_that_tell_nothing_of_the_scale_leave_it_near_one() -> None:
+    rng = np.random.default_rng(8)
+    surface = source(0.6, rng)
+    runs = transfer_points(surface, nearest(surface), 6)
+    scales = [transfer(surface, runs, 26.0 + rng.normal(0.0, 5.0, 6), LEVEL).scale for _ in range(20)]
+    # A run of such noise says next to nothing against a standard deviation of a quarter about 1.
+    assert scales == pytest.approx([1.0] * 20, abs=0.25)
 
 
 def test_runs_lie_there_across_and_along_inside_the_box() -> None:
