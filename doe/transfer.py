@@ -4,10 +4,10 @@ Two simulators of one test, or a simulator and a laboratory, seldom agree, but t
 are of one shape: y = t + shift + scale (s(x) - t), with s the surface of the first and t a level to count
 from, such as the target. Shift and scale are estimated by generalized least squares. Their errors come from
 both sides: the noise of the runs, estimated from them by restricted likelihood, and that of the surface,
-which moves its values together. Where they tell little of the scale, which noise would let them, it stays near
-1: that it is so within a quarter is taken as known beforehand (mixed estimation; Theil and Goldberger 1961).
-What the runs tell of the surface beyond shift and scale moves it within its
-own errors (best linear unbiased prediction; Harville 1977, Kennedy and O'Hagan 2001 with a constant scale).
+which moves its values together. That the scale is 1 within a quarter is taken as known beforehand (mixed
+estimation; Theil and Goldberger 1961), so that noise alone cannot make it next to nothing. What the runs tell
+of the surface beyond shift and scale moves it within its own errors (best linear unbiased prediction;
+Harville 1977, Kennedy and O'Hagan 2001 with a constant scale).
 """
 
 from __future__ import annotations
