@@ -137,7 +137,7 @@ def test_discover_searches_with_a_program(write_study: Write, tmp_path: Path) ->
     result = CliRunner().invoke(app, [*words, "--device", "cpu", "--json"])
     assert result.exit_code == 0, result.output
     found = json.loads(result.stdout)
-    assert found["verdict"] == "none", "the data are of the model itself"
+    assert found["discovery"]["verdict"] == "none", "the data are of the model itself"
     assert (tmp_path / "out" / "report.html").is_file()
 
 
