@@ -17,17 +17,17 @@ from dem_warp import (
     Numerics,
 )
 
-GRAIN_COUNT = 1000
+GRAIN_COUNT = 2500
 VOLUME = 4.0 / 3.0 * np.pi * 1.25e-3**3
 """Grains of a heap, and the volume of one [m3]: all shapes have the same."""
 
 MATERIAL = Material(density=1000.0, shear_modulus=30.0e6, poisson_ratio=0.25)
 WALL = Material(density=7800.0, shear_modulus=70.0e9, poisson_ratio=0.30)
-SOFTENING = 100.0
+SOFTENING = 400.0
 """Factor that the grains' modulus is divided by."""
 
 TUBE = LiftedCylinder(
-    diameter=0.024, height=0.045, wall_material=WALL, grain_count=GRAIN_COUNT, rest_speed=2e-3
+    diameter=0.032, height=0.060, wall_material=WALL, grain_count=GRAIN_COUNT, rest_speed=2e-3
 )
 
 CODES = {"liggghts": "liggghts", "lammps": "lammps", "yade": "yade", "deme": "deme"}
