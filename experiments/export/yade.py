@@ -16,7 +16,7 @@ from experiments.export.yade_input import translate_lift
 CONVENTIONS = LawsOfCode(
     "Yade",
     {
-        "normal": {"hertz": "hertzian=True on facets and walls"},
+        "normal": {"hertz": "hertzian=True on facets"},
         "restitution": {"thornton": "betan", "closed_form": "betan", "polynomial": "betan"},
         "normal_damping": {"tsuji": "betan"},
         "attraction": {"clamped": ""},
