@@ -18,7 +18,7 @@ _ROWS = (
     Translated(
         "edges of the tube's facets",
         "none",
-        "a sphere touches facets on both sides of an edge at once: they share stiffness and damping, by depth",
+        "a sphere over an edge touches both facets at once; they share its stiffness and damping",
     ),
     Translated("endless plate", "plane", "one triangle, far larger than the heap"),
     Translated("numerical damping", "none", "none: `NewtonIntegrator(damping=0)`, whose default is 0.2"),
