@@ -255,3 +255,9 @@ def test_a_pair_in_yade_goes_the_same_way_as_ours(tmp_path: Any) -> None:
     found = difference(setup, setup.ours("cpu"), yade_contacts.follow(setup, tmp_path))
     # forces are double there and here; the rotation of a history is approximate there
     assert max(found.values()) < 1e-6
+
+
+@pytest.mark.parametrize("code", PROGRAMS)
+def test_a_test_that_ends_in_time_does_so_there(code: str) -> None:
+    translation = export_input(exported(PROGRAMS[code], duration=1.5), code)
+    assert json.loads(translation.files["test.json"])["phases"]["duration"] == 1.5
