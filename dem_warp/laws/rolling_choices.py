@@ -29,6 +29,9 @@ DASHPOT_SHARE = wp.constant(0.2)
 SOLID_SPHERE = wp.constant(2.5)
 """m R^2 / I of a solid sphere."""
 
+UNLIMITED = wp.constant(1.0e30)
+"""More than any torque [N m]."""
+
 EXACT_RATIO = wp.constant(1.8257418583505538)
 """2 sqrt(5/6): the constant of the damping over |beta|."""
 
@@ -129,12 +132,17 @@ def rocky_torque(params: Any, contact: Any, load: Any, memory: Any, at: int):
 def yade_torque(params: Any, contact: Any, load: Any, memory: Any, at: int):
     """Torque [N m] of a spring of one stiffness [N m/rad] without dashpot, at most mu_r R* F_n.
 
+    It has no limit where there is no normal force, in the overlap that a clamped damping leaves at the end of
+    an impact: the source limits it only `if (MomentMax > 0)`.
+
     Source: Yade, pkg/dem/HertzMindlin.cpp, Law2_ScGeom_MindlinPhys_Mindlin::go, "MOMENT CONTACT LAW" (krot;
     eta, the limit over the mean radius and the normal force).
     """
     torque = recalled(contact, memory, at)
     torque = torque - contact.normal * wp.dot(torque, contact.normal)
     limit = params.rolling_friction * contact.radius * load
+    if limit <= type(limit)(0.0):
+        limit = type(limit)(UNLIMITED)
     return wound_torque(contact, torque, params.rolling_stiffness, limit, memory, at)
 
 

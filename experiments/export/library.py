@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dem_warp.registry import Registry
+from experiments.export.deme import DEME
 from experiments.export.edem import EDEM
 from experiments.export.exporter import Exporter
 from experiments.export.lammps import LAMMPS
 from experiments.export.liggghts import LIGGGHTS
+from experiments.export.mercury import MERCURY
 from experiments.export.rocky import ROCKY
 from experiments.export.yade import YADE
 
@@ -20,6 +22,8 @@ _ALL = {
     "liggghts": LIGGGHTS,
     "lammps": LAMMPS,
     "yade": YADE,
+    "deme": DEME,
+    "mercurydpm": MERCURY,
     "edem": EDEM,
     "rocky": ROCKY,
 }

@@ -1,6 +1,7 @@
 """Problems of the verification: each is one file of `problems` and one line here."""
 
 from experiments.verification.problems.beverloo import beverloo
+from experiments.verification.problems.deme_contacts import deme_contacts
 from experiments.verification.problems.energy import energy
 from experiments.verification.problems.friction_and_rolling import friction_and_rolling
 from experiments.verification.problems.heap_angle import heap_angle
@@ -12,6 +13,7 @@ from experiments.verification.problems.normal_impact import elastic_impact, rest
 from experiments.verification.problems.oblique_impact import oblique_impact, spinning_impact
 from experiments.verification.problems.rigid_body import rigid_body
 from experiments.verification.problems.stability import stability
+from experiments.verification.problems.yade_contacts import yade_contacts
 from experiments.verification.result import Problem
 
 PROBLEMS: dict[str, Problem] = {
@@ -24,6 +26,8 @@ PROBLEMS: dict[str, Problem] = {
     "rigid-body": rigid_body,
     "liggghts-contacts": liggghts_contacts,
     "lammps-contacts": lammps_contacts,
+    "yade-contacts": yade_contacts,
+    "deme-contacts": deme_contacts,
     "energy": energy,
     "janssen": janssen,
     "beverloo": beverloo,
@@ -31,7 +35,7 @@ PROBLEMS: dict[str, Problem] = {
     "stability": stability,
 }
 
-PEERS = ("liggghts-contacts", "lammps-contacts")
+PEERS = ("liggghts-contacts", "lammps-contacts", "yade-contacts", "deme-contacts")
 """Problems that run another code, which must be installed."""
 
 HEAVY = ("beverloo", "heap-angle", "stability", *PEERS)

@@ -87,11 +87,13 @@ class PathSetup:
     path: ContactPath
     laws: ContactLaws
     grain: Material = GRAIN
+    pair: tuple[float, float] = RADII
+    """Radii of two spheres [m]; one alone on the plate has the first."""
 
     @property
     def time_step(self) -> float:
         """[s]"""
-        return FRACTION * rayleigh_time(min(RADII), self.grain)
+        return FRACTION * rayleigh_time(min(self.pair), self.grain)
 
     @property
     def stride(self) -> int:
@@ -101,7 +103,7 @@ class PathSetup:
     @property
     def radii(self) -> tuple[float, ...]:
         """Radii of its spheres [m]."""
-        return RADII[: len(self.path.speeds)]
+        return self.pair[: len(self.path.speeds)]
 
     @property
     def masses(self) -> tuple[float, ...]:
@@ -112,10 +114,10 @@ class PathSetup:
     def contact(self) -> Contact:
         """The contact, as exporters translate it."""
         if self.path.has_plate:
-            partner, radius, mass = STEEL, RADII[0], self.masses[0]
+            partner, radius, mass = STEEL, self.pair[0], self.masses[0]
         else:
             partner = self.grain
-            radius = RADII[0] * RADII[1] / sum(RADII)
+            radius = self.pair[0] * self.pair[1] / sum(self.pair)
             mass = self.masses[0] * self.masses[1] / sum(self.masses)
         law = ContactCoefficients.of_pair(self.grain, partner, SURFACE, self.laws, (), radius, mass)
         return Contact(self.grain, partner, SURFACE, law, radius, mass)
@@ -129,13 +131,13 @@ class PathSetup:
     def positions(self) -> np.ndarray:
         """Centres at the start [m], (spheres, 3)."""
         if not self.path.has_plate:
-            half = (sum(RADII) + 1e-6) / 2.0
+            half = (sum(self.pair) + 1e-6) / 2.0
             return np.array([[0.0, 0.0, -half], [0.0, 0.0, half]])
         if not self.path.rests:
-            return np.array([[0.0, 0.0, RADII[0] + 1e-6]])
+            return np.array([[0.0, 0.0, self.pair[0] + 1e-6]])
         law = self.contact.coefficients
-        load = self.masses[0] * GRAVITY / (4.0 / 3.0 * law.modulus * np.sqrt(RADII[0]))
-        return np.array([[0.0, 0.0, RADII[0] - load ** (2.0 / 3.0)]])
+        load = self.masses[0] * GRAVITY / (4.0 / 3.0 * law.modulus * np.sqrt(self.pair[0]))
+        return np.array([[0.0, 0.0, self.pair[0] - load ** (2.0 / 3.0)]])
 
     def ours(self, device: str) -> Trajectory:
         """Trajectory of dem-warp, in float64."""
@@ -157,12 +159,12 @@ class PathSetup:
             self.grain.density,
             velocities=path.speeds,
             spins=path.spins,
-            sizes=np.array(self.radii) / RADII[0],
+            sizes=np.array(self.radii) / self.pair[0],
         )
         walls = (Plane(),) if path.has_plate else ()
         made = world(
             grains,
-            ClumpShape.sphere(RADII[0]),
+            ClumpShape.sphere(self.pair[0]),
             self.contact.coefficients,
             self.time_step,
             walls=walls,
@@ -198,12 +200,18 @@ def _longest(vectors: np.ndarray) -> float:
 
 
 def compare_paths(
-    code: str, laws: ContactLaws, follow: Follow, folder: Path, device: str, explained: Sequence[str] = ()
+    code: str,
+    laws: ContactLaws,
+    follow: Follow,
+    folder: Path,
+    device: str,
+    explained: Sequence[str] = (),
+    pair: tuple[float, float] = RADII,
 ) -> tuple[list[Row], list[Plot]]:
     """Follow every path in both codes; one whose difference is `explained` is only stated."""
     rows, plots = [], []
     for path in PATHS:
-        setup = PathSetup(path, laws)
+        setup = PathSetup(path, laws, pair=pair)
         place = folder / path.name.replace(", ", "-")
         place.mkdir(parents=True, exist_ok=True)
         ours, theirs = setup.ours(device), follow(setup, place)
