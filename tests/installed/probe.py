@@ -18,8 +18,8 @@ from dem_warp.laws.library import MECHANISMS
 from dem_warp.scenes.library import SCENES
 from experiments.calibrate.screening import DESIGNS
 from experiments.cases import ENGINES, Store
-from experiments.export import EXPORTERS
 from experiments.discover.library import library_for, with_mechanisms
+from experiments.export import EXPORTERS
 from experiments.studyfile import load_study
 
 
