@@ -17,7 +17,7 @@ from dem_warp import (
     Numerics,
 )
 
-GRAIN_COUNT = 2500
+GRAIN_COUNT = 2000
 VOLUME = 4.0 / 3.0 * np.pi * 1.25e-3**3
 """Grains of a heap, and the volume of one [m3]: all shapes have the same."""
 
@@ -27,7 +27,7 @@ SOFTENING = 400.0
 """Factor that the grains' modulus is divided by."""
 
 TUBE = LiftedCylinder(
-    diameter=0.032, height=0.060, wall_material=WALL, grain_count=GRAIN_COUNT, rest_speed=2e-3
+    diameter=0.030, height=0.055, wall_material=WALL, grain_count=GRAIN_COUNT, rest_speed=2e-3
 )
 
 CODES = {"liggghts": "liggghts", "lammps": "lammps", "yade": "yade", "deme": "deme"}
