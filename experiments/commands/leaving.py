@@ -35,7 +35,7 @@ def exported_test(
         When there is no such factor or scene, or a value leaves what is physical.
     """
     settings = {
-        factor.name: f"{values.get(factor.name, factor.center):.6g} {factor.unit}".removesuffix(" 1")
+        factor.name: f"{values.get(factor.name, factor.center):.6g} {factor.unit}".rstrip()
         for factor in study.factors
     }
     measurement, at = study.measurement, f", scale {study.scale}" if study.scale else ""

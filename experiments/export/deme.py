@@ -61,7 +61,11 @@ def translate(test: ExportedTest) -> Translation:
     lift, laws = Lift(test), test.case.laws
     case = replace(lift.case, mechanisms=(), laws=CONVENTIONS.nearest_laws(laws))
     scene = lift.scene
-    warnings = CONVENTIONS.warnings(laws) + mechanism_warnings(test.case, "DEM-Engine") + lift_warnings(lift)
+    warnings = (
+        CONVENTIONS.warnings(laws)
+        + mechanism_warnings(test.case, "DEM-Engine")
+        + lift_warnings(lift, ends_in_time=True)
+    )
     among, tube = contacts_of(case, lift.largest_radius, max(t.mass for t in lift.templates))
     plate = replace(tube, coefficients=scene.contacts(case)[2])
     # its contact radius is that of the circle of overlap, sqrt(2) times Hertz's where spheres are equal

@@ -37,13 +37,14 @@ def lift_rows(lift: Lift, exact_tube: bool = False) -> tuple[Translated, ...]:
     )
 
 
-def lift_warnings(lift: Lift) -> tuple[str, ...]:
-    """Name what no input of the lifted cylinder has."""
+def lift_warnings(lift: Lift, ends_in_time: bool = False) -> tuple[str, ...]:
+    """Name what no input of the lifted cylinder has; some can end at a given time."""
     scene = lift.scene
     left_out = {
         f"air_drag = {scene.air_drag:g} /s": scene.air_drag > 0.0,
         f"vibration_amplitude = {scene.vibration_amplitude:g} m": scene.vibration_amplitude > 0.0,
-        f"duration = {scene.duration} s, in place of it the test ends at rest": scene.duration is not None,
+        f"duration = {scene.duration} s, in place of it the test ends at rest": scene.duration is not None
+        and not ends_in_time,
     }
     return tuple(f"scene {name}: left out" for name, present in left_out.items() if present)
 

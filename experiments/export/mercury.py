@@ -66,7 +66,11 @@ def translate(test: ExportedTest) -> Translation:
     """
     lift, laws = Lift(test), test.case.laws
     case = replace(lift.case, mechanisms=(), laws=CONVENTIONS.nearest_laws(laws))
-    warnings = CONVENTIONS.warnings(laws) + mechanism_warnings(test.case, "MercuryDPM") + lift_warnings(lift)
+    warnings = (
+        CONVENTIONS.warnings(laws)
+        + mechanism_warnings(test.case, "MercuryDPM")
+        + lift_warnings(lift, ends_in_time=True)
+    )
     among, tube = contacts_of(case, lift.largest_radius, max(t.mass for t in lift.templates))
     plate = replace(tube, coefficients=lift.scene.contacts(case)[2])
     contacts = [values(contact_terms(each)) for each in (among, tube, plate)]

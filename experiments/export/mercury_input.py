@@ -31,7 +31,10 @@ _CONTACT = """struct Contact
 
 _ROWS = (
     Translated(
-        "state of this export", "", "made for 1.0.0 alpha of July 2024, built and run there as a library"
+        "this driver",
+        "",
+        "written for MercuryDPM 1.0.0 alpha of July 2024, run there, and in no record: put this folder "
+        "beside `Drivers/Clump/ClumpHeaders`, and build lift.cpp as the drivers there are",
     ),
     Translated(
         "clumps",

@@ -16,7 +16,7 @@ from experiments.export.yade_input import translate_lift
 CONVENTIONS = LawsOfCode(
     "Yade",
     {
-        "normal": {"hertz": "hertzian=True on facets and walls"},
+        "normal": {"hertz": "hertzian=True on facets"},
         "restitution": {"thornton": "betan", "closed_form": "betan", "polynomial": "betan"},
         "normal_damping": {"tsuji": "betan"},
         "attraction": {"clamped": ""},
@@ -73,7 +73,11 @@ def translate(test: ExportedTest) -> Translation:
     lift, laws = Lift(test), test.case.laws
     case = replace(lift.case, mechanisms=(), laws=CONVENTIONS.nearest_laws(laws))
     scene = lift.scene
-    warnings = CONVENTIONS.warnings(laws) + mechanism_warnings(test.case, "Yade") + lift_warnings(lift)
+    warnings = (
+        CONVENTIONS.warnings(laws)
+        + mechanism_warnings(test.case, "Yade")
+        + lift_warnings(lift, ends_in_time=True)
+    )
     among, tube = contacts_of(case, lift.largest_radius, max(t.mass for t in lift.templates))
     plate = replace(tube, coefficients=scene.contacts(case)[2])
     materials = [values(material_terms(each)) for each in (among.first, tube.second, plate.second)]

@@ -18,13 +18,11 @@ _ROWS = (
     Translated(
         "edges of the tube's facets",
         "none",
-        "a sphere over an edge touches both facets, each with a history of its own",
+        "a sphere over an edge touches both facets at once; they share its stiffness and damping",
     ),
+    Translated("endless plate", "plane", "one triangle, far larger than the heap"),
     Translated("numerical damping", "none", "none: `NewtonIntegrator(damping=0)`, whose default is 0.2"),
     Translated("rotation into shear", "at the contact point", "the same: `avoidGranularRatcheting=False`"),
-    Translated(
-        "contact point", "in the middle of the overlap", "the same; on the endless plate, the plane itself"
-    ),
 )
 
 
@@ -50,6 +48,7 @@ def translate_lift(
     numbers = {
         "materials": list(materials),
         "contacts": list(contacts),
+        "domain": world.domain,
         "tube": prism(scene.diameter / 2, scene.height).tolist(),
         "plate": None if scene.plate_diameter is None else disc(scene.plate_diameter / 2).tolist(),
     }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -16,6 +17,16 @@ from experiments.benchmarks.columns import Columns
 from experiments.studyfile import Study, load_study
 
 sys.path.insert(0, str(Path(__file__).parent))
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave out tests that run a program which is not installed: they do not count as skipped."""
+    programs = {item: [mark.args[0] for mark in item.iter_markers("program")] for item in items}
+    missing = [item for item, names in programs.items() if any(shutil.which(name) is None for name in names)]
+    if missing:
+        config.hook.pytest_deselected(items=missing)
+        items[:] = [item for item in items if item not in missing]
+
 
 SMALL_STUDY = """
 name = "Small"

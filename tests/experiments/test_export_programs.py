@@ -7,6 +7,7 @@ import io
 import json
 import math
 import re
+import subprocess
 from dataclasses import replace
 from typing import Any
 
@@ -25,9 +26,19 @@ from dem_warp import (
     Numerics,
 )
 from experiments.errors import InputError
-from experiments.export import EXPORTERS, ExportedTest, Translation, contacts_of, export_input, values
+from experiments.export import (
+    EXPORTERS,
+    ExportedTest,
+    Translation,
+    contacts_of,
+    export_input,
+    values,
+    write_export,
+)
 from experiments.export.deme_input import obj_text, thick_tube
 from experiments.export.same_rain import template
+from experiments.verification.problems import yade_contacts
+from experiments.verification.problems.contact_paths import PATHS, PathSetup, difference
 
 GRAIN = Material(density=1000.0, shear_modulus=3e5, poisson_ratio=0.25)
 WALL = Material(density=7800.0, shear_modulus=7e10, poisson_ratio=0.3)
@@ -216,3 +227,37 @@ def test_a_course_takes_out_what_falls_off_and_gives_up_in_time(course: Any) -> 
     restless = _states([0.01, 0.02], [0.3, 0.3])
     with pytest.raises(SystemExit, match="filling"):
         course.look(1e3, *restless, np.zeros(2, bool))
+
+
+@pytest.mark.program("yade")
+def test_yade_runs_the_program_and_leaves_every_grain(tmp_path: Any) -> None:
+    test = exported("yade", grain_count=6, height=0.012)
+    translation = export_input(test, "yade")
+    write_export(test, "yade", translation, tmp_path)
+    subprocess.run(translation.command, cwd=tmp_path, check=True, capture_output=True)
+    rows = (tmp_path / translation.heap).read_text().split("radius mol\n")[1].splitlines()
+    spheres = np.array([row.split() for row in rows], dtype=float)
+    assert (len(spheres), set(spheres[:, 6])) == (18, set(range(1, 7)))
+    # sizes of the grains are ours, and no sphere lies under the plate
+    drawn = test.case.grains.draw(6, test.case.seed).sizes
+    assert sorted(spheres[:, 5]) == pytest.approx(sorted(np.outer(drawn, CLUMP.radii).ravel()), rel=1e-6)
+    assert (spheres[:, 4] > 0.8 * spheres[:, 5]).all()
+    # the distances within a grain are those of the clump: it has stayed rigid
+    for grain, size in zip(np.split(spheres, 6), spheres[::3, 5] / CLUMP.radii[0], strict=True):
+        apart = np.linalg.norm(grain[0, 2:5] - grain[1, 2:5])
+        assert apart == pytest.approx(size * np.linalg.norm(CLUMP.centers[0] - CLUMP.centers[1]), rel=1e-6)
+
+
+@pytest.mark.program("yade")
+def test_a_pair_in_yade_goes_the_same_way_as_ours(tmp_path: Any) -> None:
+    [path] = [path for path in PATHS if path.name == "pair, oblique"]
+    setup = PathSetup(path, PRESETS["yade"])
+    found = difference(setup, setup.ours("cpu"), yade_contacts.follow(setup, tmp_path))
+    # forces are double there and here; the rotation of a history is approximate there
+    assert max(found.values()) < 1e-6
+
+
+@pytest.mark.parametrize("code", PROGRAMS)
+def test_a_test_that_ends_in_time_does_so_there(code: str) -> None:
+    translation = export_input(exported(PROGRAMS[code], duration=1.5), code)
+    assert json.loads(translation.files["test.json"])["phases"]["duration"] == 1.5

@@ -1,7 +1,6 @@
 """Drivers of other codes: what they run and read, with stand-ins on the PATH, and with the codes themselves.
 
-Tests marked `solvers` run the real programs and fail where one is not installed; without
-``-m solvers`` they are not part of a run, and so count as nothing.
+Tests marked with a `program` run it, and are left out where it is not installed.
 """
 
 from __future__ import annotations
@@ -122,6 +121,13 @@ def test_the_nearest_and_the_same_are_stored_apart(small_study: Study, tmp_path:
 # ---- the codes themselves ----------------------------------------------------------------------------------
 
 
+REAL = [
+    pytest.param(name, marks=pytest.mark.program(program))
+    for name, program in {"liggghts": "liggghts", "lammps": "lmp", "yade": "yade"}.items()
+]
+"""Solvers, each left out where its program is not installed."""
+
+
 def at_rest(result: CaseResult) -> bool:
     """Tell that no sphere of a heap hangs: each stands on the plate or touches another."""
     centers, radii = result.sphere_centers, result.sphere_radii
@@ -131,8 +137,7 @@ def at_rest(result: CaseResult) -> bool:
     return bool(np.all((gaps.min(axis=1) < 1e-5) | (centers[:, 2] < 1.01 * radii)))
 
 
-@pytest.mark.solvers
-@pytest.mark.parametrize("name", ["liggghts", "lammps", "yade"])
+@pytest.mark.parametrize("name", REAL)
 def test_the_real_code_ends_in_a_heap(write_study: Write, name: str) -> None:
     study = study_for(write_study, name)
     heap = simulate_heap(study, {"E": 0.5}, seed=3, device="cpu")
@@ -143,8 +148,7 @@ def test_the_real_code_ends_in_a_heap(write_study: Write, name: str) -> None:
     # The spheres' 5 % spread of 30: a part of 0.01 of their mean.
 
 
-@pytest.mark.solvers
-@pytest.mark.parametrize("name", ["liggghts", "lammps", "yade"])
+@pytest.mark.parametrize("name", REAL)
 def test_the_same_seed_is_the_same_heap_and_another_is_another(write_study: Write, name: str) -> None:
     study = study_for(write_study, name)
     first, again, other = (simulate_heap(study, {}, seed, "cpu").result for seed in (1, 1, 2))
