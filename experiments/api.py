@@ -9,6 +9,7 @@ from typing import Any
 
 from experiments.calibrate import Campaign
 from experiments.calibrate.campaign import StageHook
+from experiments.cases import locked
 from experiments.cases.engines import engine_named
 from experiments.report.companion import Replay
 from experiments.runs.campaign import (
@@ -99,10 +100,12 @@ def calibrate(
     chosen = chosen_study(study, scale, device := chosen_device(device))
     folder = Path(out) if out is not None else default_folder(chosen)
     chosen = check_runs(chosen, campaign=campaign, paper=published_replicates > 0)
-    desk = Desk.open(chosen, folder, device, workers, resume, watch, engine_named(engine))
-    replay = replay_published(desk, published_replicates) if published_replicates else None
-    found = run_campaign(desk, on_stage, replay) if campaign else None
-    record = record_published(desk, replay, found) if replay is not None else None
+    simulator = engine_named(engine)
+    with locked(folder, resume):
+        desk = Desk.open(chosen, folder, device, workers, resume, watch, simulator)
+        replay = replay_published(desk, published_replicates) if published_replicates else None
+        found = run_campaign(desk, on_stage, replay) if campaign else None
+        record = record_published(desk, replay, found) if replay is not None else None
     return Calibration(folder, found, replay, record)
 
 

@@ -23,7 +23,7 @@ from doe.discrepancy import (
     make_bank,
     settings_of,
 )
-from experiments.cases.folder import describe
+from experiments.cases.manifest import describe
 from experiments.discover.library import FORMER_NAMES, Mechanism, library_for
 from experiments.discover.maker import notes_on
 from experiments.errors import InputError, StudyError

@@ -10,6 +10,7 @@ import numpy as np
 
 from doe import Region, Sample
 from experiments.calibrate.results import Campaign, OptimumResult
+from experiments.cases.manifest import study_hash
 from experiments.files import copy_file, write_text
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import Response
@@ -66,6 +67,7 @@ def _fitted(campaign: Campaign, study: Study) -> dict[str, Any]:
         "outcome": campaign.outcome.value,
         "reason": campaign.reason,
         "scale": study.scale,
+        "study": study_hash(study),
         "test": study.document["scene"],
         "estimator": f"repose angle, {measurement.fit!r} fit, mean of {measurement.azimuths} views",
         "modulus_scale": numerics.modulus_scale,

@@ -10,6 +10,7 @@ import numpy as np
 
 from doe import Sample
 from doe.discrepancy import Candidate, Data, Discovery, Fit, Interval, Verdict
+from experiments.cases.manifest import study_hash
 from experiments.discover.library import Mechanism, with_mechanisms
 from experiments.files import copy_file, write_text
 from experiments.measurement.target import Replicated, target_tables
@@ -23,6 +24,7 @@ HEAD = """\
 # Written by dem-warp discover: {name}, with {title} added as a factor that ranges over its 90 % interval.
 # All that was measured more than once is to be matched; held-out conditions only judge.
 # Run it with  dem-warp calibrate {file}
+# Study that it was found in: {study}
 
 """
 
@@ -45,7 +47,7 @@ def write_study_files(found: Discovery, study: Study, terms: Terms, folder: Path
             copy_file(source, folder / source.name)
         path = folder / f"study-with-{'-and-'.join(name for name, _ in candidate)}.toml"
         title = terms.titles(name for name, _ in candidate)
-        head = HEAD.format(name=study.name, title=title, file=path.name)
+        head = HEAD.format(name=study.name, title=title, file=path.name, study=study_hash(study))
         write_text(path, head + toml_text(document))
         written.append(path)
     return written
