@@ -107,9 +107,7 @@ class OutcomeTable:
 def _whole(row: Sequence[Any]) -> Outcome | None:
     """Outcome of a row; None where the row is not as it was saved."""
     key, numbers, reason, digest = row
-    if not (
-        isinstance(numbers, bytes) and isinstance(reason, str) and digest == _digest(key, numbers, reason)
-    ):
+    if tuple(map(type, row)) != (str, bytes, str, bytes) or digest != _digest(key, numbers, reason):
         return None
     return np.frombuffer(numbers, "<f8"), reason
 
