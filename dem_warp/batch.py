@@ -12,7 +12,8 @@ from dem_warp.clumps import stack_spheres
 from dem_warp.provenance import engine_fingerprint, provenance
 from dem_warp.result import CaseResult
 from dem_warp.snapshot import STEP, put_snapshot, take_snapshot
-from dem_warp.solver import CHUNK, Solver
+from dem_warp.rollback import Rollback
+from dem_warp.solver import CHUNK, LONGEST_CYCLE, SHORTEST_CYCLE, Solver
 from dem_warp.types import WorldFlag
 
 _log = logging.getLogger(__name__)
@@ -26,6 +27,10 @@ ADVICE = {
     WorldFlag.NEIGHBOUR_OVERFLOW: (
         "overflow",
         "a neighbour list overflowed at {time:.4f} s: lower the skin or check the grains for large overlaps",
+    ),
+    WorldFlag.LATE_REBUILD: (
+        "failed",
+        "a grain or a wall outran the neighbour lists within {steps} steps before {time:.4f} s: raise the skin",
     ),
 }
 
@@ -48,6 +53,7 @@ class Batch:
         self.controllers = [
             case.scene.controller(case, setup, CHUNK) for case, setup in zip(cases, self.setups, strict=True)
         ]
+        self._rollback = Rollback(self.solver)
         self.running = list(range(len(cases)))
         self.steps = [0] * len(cases)
         self.provenance = provenance(self.solver.device, self.solver.precision.name)
@@ -59,13 +65,32 @@ class Batch:
         ahead = min(
             self.controllers[w].period - self.steps[w] % self.controllers[w].period for w in self.running
         )
+        self._rollback.keep()
         self.solver.advance(ahead // CHUNK)
-        for w in self.running:
-            self.steps[w] += ahead
-        ended = self._look([w for w in self.running if self.steps[w] % self.controllers[w].period == 0])
+        due = self._take_back_late(ahead)
+        ended = self._look(due)
         if self._checkpoints and time.monotonic() - self._saved >= self._checkpoints.every:
             self.save()
         return ended
+
+    def _take_back_late(self, ahead: int) -> list[int]:
+        """Count the steps that were taken, save those of worlds whose lists were outrun; return who is due.
+
+        Such a world goes back and takes them again, the lists looked at as often as can be. One that outruns
+        them even so is due at once: its end.
+        """
+        flags = self.solver.flags.numpy()
+        late = {w for w in self.running if WorldFlag.LATE_REBUILD in WorldFlag(int(flags[w]))}
+        again = late if self.solver.cycle_limit > SHORTEST_CYCLE else set()
+        for w in again:
+            self._rollback.restore(w)
+        self.solver.cycle_limit = SHORTEST_CYCLE if again else LONGEST_CYCLE
+        for w in set(self.running) - again:
+            self.steps[w] += ahead
+        return [
+            w for w in self.running
+            if w not in again and (w in late or self.steps[w] % self.controllers[w].period == 0)
+        ]  # fmt: skip
 
     def fraction(self, world: int) -> float:
         """Roughly how much of a world is done, 0 to 1."""
@@ -133,8 +158,7 @@ class Batch:
 
     def _result(self, w: int, status: str, reason: str) -> CaseResult:
         poses, course, setup = self.solver.poses(w), self.controllers[w].course, self.setups[w]
-        late = WorldFlag.LATE_REBUILD in WorldFlag(int(self.solver.flags.numpy()[w]))
-        counts = {"rebuilds": float(self.solver.rebuilds.numpy()[w]), "late_rebuilds": float(late)}
+        counts = {"rebuilds": float(self.solver.rebuilds.numpy()[w])}
         return CaseResult(
             status=status,
             reason=reason,
@@ -152,5 +176,5 @@ class Batch:
 def _verdict(flags: WorldFlag, at: float) -> tuple[str, str] | None:
     for flag, (status, advice) in ADVICE.items():
         if flag in flags:
-            return status, advice.format(time=at)
+            return status, advice.format(time=at, steps=SHORTEST_CYCLE)
     return None

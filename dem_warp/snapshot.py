@@ -98,7 +98,7 @@ def _fields(solver: Solver, world: int, counts: np.ndarray) -> Iterator[_Field]:
     listed[:grains] = np.arange(capacity) < counts[:, None]
     walls = solver.model.wall.reshape((layout.world_count, -1))[world]
     yield _Field("world.walls", (walls,), (layout.wall_count,), slice(None))
-    for name, arrays in _state(solver).items():
+    for name, arrays in state_arrays(solver).items():
         of_lists = name.startswith("neighbours.") and arrays[0].size % (LISTS * layout.grain_total) == 0
         lists, place = (LISTS, (held, world)) if of_lists else (1, (0, world))
         parts = tuple(array.reshape((lists, layout.world_count, -1))[place] for array in arrays)
@@ -111,7 +111,7 @@ def _fields(solver: Solver, world: int, counts: np.ndarray) -> Iterator[_Field]:
             yield _Field(name, parts, (1,), slice(1))
 
 
-def _state(solver: Solver) -> dict[str, tuple[Any, ...]]:
+def state_arrays(solver: Solver) -> dict[str, tuple[Any, ...]]:
     """Every array that steps change, with its copies; those that a build leaves out have no elements."""
     first, second = (arrays_of(grains) for grains in solver.grains)
     state: dict[str, tuple[Any, ...]] = {
