@@ -11,9 +11,9 @@ from dem_warp.checkpoint import Checkpoints
 from dem_warp.clumps import stack_spheres
 from dem_warp.provenance import engine_fingerprint, provenance
 from dem_warp.result import CaseResult
-from dem_warp.snapshot import STEP, put_snapshot, take_snapshot
 from dem_warp.rollback import Rollback
-from dem_warp.solver import CHUNK, LONGEST_CYCLE, SHORTEST_CYCLE, Solver
+from dem_warp.snapshot import STEP, put_snapshot, take_snapshot
+from dem_warp.solver import CHUNK, SHORTEST_CYCLE, Solver
 from dem_warp.types import WorldFlag
 
 _log = logging.getLogger(__name__)
@@ -30,7 +30,7 @@ ADVICE = {
     ),
     WorldFlag.LATE_REBUILD: (
         "failed",
-        "a grain or a wall outran the neighbour lists within {steps} steps before {time:.4f} s: raise the skin",
+        "a grain or a wall outran the neighbour lists within {steps} steps at {time:.4f} s: raise the skin",
     ),
 }
 
@@ -76,15 +76,15 @@ class Batch:
     def _take_back_late(self, ahead: int) -> list[int]:
         """Count the steps that were taken, save those of worlds whose lists were outrun; return who is due.
 
-        Such a world goes back and takes them again, the lists looked at as often as can be. One that outruns
+        Such a world goes back and takes them again, with lists made anew as often as can be. One that outruns
         them even so is due at once: its end.
         """
         flags = self.solver.flags.numpy()
         late = {w for w in self.running if WorldFlag.LATE_REBUILD in WorldFlag(int(flags[w]))}
-        again = late if self.solver.cycle_limit > SHORTEST_CYCLE else set()
+        again = set() if self.solver.careful else late
         for w in again:
             self._rollback.restore(w)
-        self.solver.cycle_limit = SHORTEST_CYCLE if again else LONGEST_CYCLE
+        self.solver.careful = bool(again)
         for w in set(self.running) - again:
             self.steps[w] += ahead
         return [

@@ -27,9 +27,9 @@ class Rollback:
     def restore(self, world: int) -> None:
         """Bring a world back to where it was when it was last kept; no other world changes."""
         for name, array in self._state.items():
-            lists = LISTS if name.startswith("neighbours.") and array.size % (LISTS * self._grains) == 0 else 1
-            kept, present = (
-                each.reshape((lists, self._worlds, -1)) for each in (self._kept[name], array)
+            lists = (
+                LISTS if name.startswith("neighbours.") and array.size % (LISTS * self._grains) == 0 else 1
             )
+            kept, present = (each.reshape((lists, self._worlds, -1)) for each in (self._kept[name], array))
             for number in range(lists):
                 wp.copy(present[number, world], kept[number, world])

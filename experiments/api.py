@@ -9,8 +9,8 @@ from typing import Any
 
 from experiments.calibrate import Campaign
 from experiments.calibrate.campaign import StageHook
-from experiments.cases import locked
 from experiments.cases.engines import engine_named
+from experiments.cases.folder import locked
 from experiments.report.companion import Replay
 from experiments.runs.campaign import (
     Desk,

@@ -2,10 +2,8 @@
 
 from experiments.cases.engines import ENGINES, Engine
 from experiments.cases.execute import run_cases
-from experiments.cases.folder import locked, open_folder, require_unused
+from experiments.cases.folder import open_folder, require_unused
 from experiments.cases.heap import Heap, heap_picture, simulate_heap, write_heap
-from experiments.cases.manifest import study_hash
-from experiments.cases.outputs import publishing
 from experiments.cases.store import Store
 
 __all__ = [
@@ -14,12 +12,9 @@ __all__ = [
     "Heap",
     "Store",
     "heap_picture",
-    "locked",
     "open_folder",
-    "publishing",
     "require_unused",
     "run_cases",
     "simulate_heap",
-    "study_hash",
     "write_heap",
 ]

@@ -70,8 +70,13 @@ def write_files(
     tables: Mapping[str, pd.DataFrame],
 ) -> None:
     """Write a page, and beside it its results, between the study and what made them, and its tables."""
-    about = {"name": study.name, "file": study.file.name, "scale": study.scale, "sha256": study_hash(study)}
-    about["document"] = study.document
+    about = {
+        "name": study.name,
+        "file": study.file.name,
+        "scale": study.scale,
+        "sha256": study_hash(study),
+        "document": study.document,
+    }
     whole = {"study": about, **results, "provenance": jsonable(made_by)}
     text = json.dumps(whole, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
     for name, table in tables.items():

@@ -19,7 +19,8 @@ from experiments.calibrate import Campaign, calibrate
 from experiments.calibrate.campaign import StageHook
 from experiments.calibrate.checks import check_study
 from experiments.calibrate.export import jsonable
-from experiments.cases import Engine, Store, open_folder, publishing, run_cases
+from experiments.cases import Engine, Store, open_folder, run_cases
+from experiments.cases.outputs import publishing
 from experiments.errors import InputError, StudyError
 from experiments.files import write_text
 from experiments.measurement.target import with_measurements

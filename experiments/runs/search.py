@@ -14,8 +14,9 @@ from dem_warp import Progress
 from dem_warp.provenance import engine_fingerprint
 from dem_warp.version import source_commit
 from doe.discrepancy import Bank, Discovery, Fit, Measured, Outcomes, Point, drive
-from experiments.cases import locked, open_folder, publishing, require_unused
-from experiments.cases.outputs import sha256_of
+from experiments.cases import open_folder, require_unused
+from experiments.cases.folder import locked
+from experiments.cases.outputs import publishing, sha256_of
 from experiments.discover.engine import EngineSimulator
 from experiments.discover.maker import maker_of_today
 from experiments.discover.outcome_table import OutcomeTable

@@ -289,7 +289,6 @@ def test_heaps_that_change_at_the_optimum_are_not_verified() -> None:
 
 
 def test_without_equivalence_a_campaign_is_not_calibrated() -> None:
-    # The margin is far below the standard error of the target: nothing can show that the two are equal.
     narrow = settings(verification={"margin": 0.05})
     campaign = calibrate(AnalyticStudy(campaign=narrow), AnalyticHeaps(two_frictions))
     assert campaign.outcome is Outcome.NOT_TOLD_APART

@@ -9,8 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from experiments.cases import locked, open_folder, publishing, study_hash
-from experiments.cases.outputs import DRAFTS, LIST, changed_outputs, sha256_of
+from experiments.cases import open_folder
+from experiments.cases.folder import locked
+from experiments.cases.manifest import study_hash
+from experiments.cases.outputs import DRAFTS, LIST, changed_outputs, publishing, sha256_of
 from experiments.errors import StoreError
 from experiments.studyfile import Study, load_study
 
