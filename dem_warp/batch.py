@@ -6,12 +6,17 @@ from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+import warp as wp
+
 from dem_warp.case import Case
 from dem_warp.checkpoint import Checkpoints
 from dem_warp.clumps import stack_spheres
 from dem_warp.provenance import engine_fingerprint, provenance
 from dem_warp.result import CaseResult
 from dem_warp.rollback import Rollback
+from dem_warp.room import neighbour_room
+from dem_warp.scenes.scene import course_of
 from dem_warp.snapshot import STEP, put_snapshot, take_snapshot
 from dem_warp.solver import CHUNK, SHORTEST_CYCLE, Solver
 from dem_warp.types import WorldFlag
@@ -118,10 +123,16 @@ class Batch:
         for w, (case, controller) in enumerate(zip(self.cases, self.controllers, strict=True)):
             try:
                 if kept := self._checkpoints.load(case, self.maker):
-                    course, snapshot = type(controller.course)(**kept[0]), kept[1]
-                    put_snapshot(self.solver, w, snapshot)
-                    controller.course, self.steps[w] = course, int(snapshot[STEP].item())
-            except (TypeError, ValueError) as error:
+                    fresh, snapshot = controller.course, kept[1]
+                    controller.course = course_of(type(fresh), kept[0])
+                    try:
+                        controller.fraction(0.0)  # knows the phase
+                        put_snapshot(self.solver, w, snapshot)
+                    except (LookupError, TypeError, ValueError):
+                        controller.course = fresh
+                        raise
+                    self.steps[w] = int(snapshot[STEP].item())
+            except (LookupError, TypeError, ValueError) as error:
                 path = self._checkpoints.path(case)
                 _log.warning("%s: a checkpoint that cannot be used, its case starts afresh: %s", path, error)
 
@@ -150,6 +161,8 @@ class Batch:
                 if not decision.done:
                     continue
                 verdict = ("failed" if decision.failure else "finished", decision.failure)
+                if not np.isfinite(view.positions[view.alive]).all():
+                    verdict = ("diverged", "a grain is nowhere: its position is no number")
             self.solver.stop(w)
             self.running.remove(w)
             ended.append((w, self._result(w, *verdict)))
@@ -171,6 +184,56 @@ class Batch:
             phases=course.phases,
             provenance=self.provenance,
         )
+
+
+def begin(
+    cases: Sequence[Case], device: str, checkpoints: Checkpoints | None = None
+) -> tuple[Batch | None, list[int], dict[int, CaseResult]]:
+    """Begin a batch of those cases that can be, and fail the others.
+
+    Returns
+    -------
+    batch
+        None where no case can be begun.
+    begun
+        Index of the case of each of its worlds.
+    refused
+        Results of the others by their indices, each with its reason.
+    """
+    try:
+        return Batch(cases, device, checkpoints), list(range(len(cases))), {}
+    except (ValueError, MemoryError):
+        faults = {i: _fault(case, device) for i, case in enumerate(cases)}
+        refused = {i: _refusal(cases[i], reason, device) for i, reason in faults.items() if reason}
+        if not refused:
+            raise
+        begun = [i for i in range(len(cases)) if i not in refused]
+        batch = Batch([cases[i] for i in begun], device, checkpoints) if begun else None
+        return batch, begun, refused
+
+
+def _fault(case: Case, device: str) -> str:
+    """Reason that a case has no world; empty where it has one."""
+    try:
+        for setup in case.scene.prepare([case], device):
+            neighbour_room(setup)
+    except (ValueError, MemoryError) as error:
+        return str(error) or "there is not enough memory for it"
+    return ""
+
+
+def _refusal(case: Case, reason: str, device: str) -> CaseResult:
+    """Result of a case that cannot be begun: no grains."""
+    return CaseResult(
+        status="failed",
+        reason=reason,
+        positions=np.zeros((0, 3)),
+        orientations=np.zeros((0, 4)),
+        sizes=np.zeros(0),
+        shapes=np.zeros(0, dtype=int),
+        clumps=stack_spheres(case.grains.mixture.shapes),
+        provenance=provenance(wp.get_device(device), case.numerics.precision),
+    )
 
 
 def _verdict(flags: WorldFlag, at: float) -> tuple[str, str] | None:

@@ -9,7 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dem_warp.reading import read_text
 from dem_warp.sphere_union import DEFAULT_RESOLUTION, Array, union_moments
+
+MOST_SPHERES = 256
+"""Spheres of a clump: their numbers have eight bits in a list of neighbours."""
 
 _MILLIMETER = 1e-3
 _MOMENT_TOLERANCE = 1e-4  # of the largest moment: less apart are equal, smaller products of inertia are none
@@ -152,16 +156,18 @@ class ClumpShape:
         Raises
         ------
         ValueError
-            If a line is not four finite numbers with a positive radius, or the file has no sphere; the
-            message names the file and the line.
+            If a line is not four finite numbers with a positive radius, or the file has no sphere or too
+            many; the message names the file and the line.
         FileNotFoundError
             If there is no such file.
         """
         rows = []
-        for number, line in enumerate(Path(path).read_text(encoding="utf-8").splitlines(), start=1):
+        for number, line in enumerate(read_text(path).splitlines(), start=1):
             words = line.partition("#")[0].split()
             if words:
                 rows.append(_parse_sphere(words, f"{path}, line {number}"))
+            if len(rows) > MOST_SPHERES:
+                raise ValueError(f"{path}: a clump has at most {MOST_SPHERES} spheres, got more")
         if not rows:
             raise ValueError(f"{path}: a clump needs at least one line 'x y z r' [mm], got none")
         spheres = np.array(rows) * _MILLIMETER

@@ -6,16 +6,22 @@ Imports of the simulator, the statistics and the pictures are inside the command
 from __future__ import annotations
 
 import json
+import shlex
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from experiments.commands.console import FAILED_RUN, CaseProgress, clear_errors, fail, messages
+from experiments.commands.console import (
+    FAILED_RUN,
+    Attempt,
+    CaseProgress,
+    clear_errors,
+    fail,
+    messages,
+    plain,
+)
 from experiments.commands.results import print_angles, print_clump, print_measured, show_stage
-
-if TYPE_CHECKING:
-    pass
 
 app = typer.Typer(
     name="dem-warp",
@@ -100,12 +106,12 @@ def calibrate(
         chosen = chosen_study(study, scale, device)
         folder = out or default_folder(chosen)
     go_on = _go_on(
-        "calibrate", study, out=folder, scale=chosen.scale, device=device, engine=engine,
+        "calibrate", study, out=folder, scale=chosen.scale, device=device, workers=workers, engine=engine,
         follow_paper=follow_paper, only_paper=only_paper,
-        paper_replicates=paper_replicates if follow_paper or only_paper else None,
+        paper_replicates=paper_replicates if follow_paper or only_paper else None, json=as_json,
     )  # fmt: skip
-    with clear_errors(resume=go_on):
-        messages.print(f"{chosen.name}, on {device}", chosen.note, sep="\n", markup=False)
+    with clear_errors(go_on):
+        messages.print(f"{chosen.name}, on {device}", chosen.note, sep="\n")
         ended = api.calibrate(
             chosen,
             folder,
@@ -164,10 +170,10 @@ def discover(
         folder = out or default_folder(chosen, "discover")
     go_on = _go_on(
         "discover", study, measured, out=folder, bank=bank, photographs_only=photographs_only, scale=scale,
-        device=device, seed=seed,
+        device=device, workers=workers, seed=seed, json=as_json,
     )  # fmt: skip
-    with clear_errors(resume=go_on):
-        messages.print(f"{chosen.name}, on {device}", chosen.note, sep="\n", markup=False)
+    with clear_errors(go_on):
+        messages.print(f"{chosen.name}, on {device}", chosen.note, sep="\n")
         ended = api.discover(
             chosen,
             measured,
@@ -185,7 +191,7 @@ def discover(
         return
     if as_json:
         typer.echo(json.dumps(results_of(ended.discovery, ended.terms), allow_nan=False))
-    messages.print(verdict_line(ended.discovery, ended.terms), markup=False)
+    messages.print(verdict_line(ended.discovery, ended.terms))
     messages.print(f"Report: {ended.page}")
 
 
@@ -283,7 +289,7 @@ def angle(
         if as_target:
             typer.echo(photographs.target_section(mean, fit), nl=False)
         elif as_csv:
-            typer.echo(photographs.csv_table(rows), nl=False)
+            typer.echo(plain(photographs.csv_table(rows)), nl=False)
         elif as_json:
             result = {"pictures": rows, "mean": mean.to_dict() if mean else None}
             typer.echo(json.dumps(result, allow_nan=False))
@@ -293,7 +299,7 @@ def angle(
                 typer.echo(str(mean))
     for row in rows:
         for doubt in row["doubts"]:
-            messages.print(f"Doubtful: {row['picture']}: {doubt}", markup=False)
+            messages.print(f"Doubtful: {row['picture']}: {doubt}")
     if rejected := [row["reason"] for row in rows if row["reason"]]:
         fail("\n".join(rejected))
 
@@ -309,7 +315,9 @@ def clump(
             "to be described.",
         ),
     ],
-    spheres: Annotated[int | None, typer.Option(min=1, help="Spheres to fill the solid with.")] = None,
+    spheres: Annotated[
+        int | None, typer.Option(min=1, max=256, help="Spheres to fill the solid with.")
+    ] = None,
     protrusion: Annotated[
         str, typer.Option(help="How far a sphere may pass the surface: sharp edges are covered better.")
     ] = "0 mm",
@@ -356,7 +364,7 @@ def new(
             from experiments.studyfile import write_template
 
             path, then = write_template(name), "dem-warp calibrate"
-    typer.echo(f"Wrote {path}. Fill it in, then: {then} {path}")
+    typer.echo(plain(f"Wrote {path}. Fill it in, then: {then} {path}"))
 
 
 def main() -> None:
@@ -386,10 +394,10 @@ def _quantity(text: str, dimension: str, option: str) -> float:
         raise InputError(str(error), text, option) from None
 
 
-def _go_on(command: str, *files: Path | None, **options: object) -> str:
+def _go_on(command: str, *files: Path | None, out: Path, **options: object) -> Attempt:
     """Command that goes on where this one was interrupted; options that were not given are left out."""
     words = ["dem-warp", command, *(str(file) for file in files if file)]
-    for name, value in options.items():
+    for name, value in {"out": out, **options}.items():
         if value is not None and value is not False:
             words += [f"--{name.replace('_', '-')}", *([] if value is True else [str(value)])]
-    return " ".join([*words, "--resume"])
+    return Attempt(shlex.join(words), out)

@@ -37,12 +37,15 @@ def locked(folder: Path, resume: bool = False) -> Iterator[None]:
         resume. Nothing is written then.
     """
     _require_usable(folder, resume)
-    folder.mkdir(parents=True, exist_ok=True)
     lock = FileLock(folder / LOCK, timeout=0)
     try:
+        folder.mkdir(parents=True, exist_ok=True)
         lock.acquire()
     except Timeout:
         raise StoreError("one run at a time works in a folder", "another at work", str(folder)) from None
+    except OSError as error:
+        rule = "a folder of results must be one that can be made and written to"
+        raise StoreError(rule, error.strerror or "none", str(folder)) from error
     try:
         # another run may have come and gone since
         _require_usable(folder, resume)

@@ -9,12 +9,16 @@ from pathlib import Path
 from typing import Any
 
 from experiments.errors import StoreError
-from experiments.files import write_text
+from experiments.files import read_file, write_text
 from experiments.studyfile import Study
 from experiments.studyfile.places import KeyPath, dotted
 
 MANIFEST = "study.json"
 """File that says which study the folder belongs to."""
+
+
+LARGEST = 10_000_000
+"""Bytes of the largest file of this kind that is read."""
 
 
 def describe(study: Study) -> dict[str, Any]:
@@ -60,7 +64,8 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     """
     path = folder / MANIFEST
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
+        manifest: dict[str, Any] = json.loads(read_file(path, LARGEST))
+        return manifest
     except (OSError, ValueError, RecursionError):
         rule = f"a folder to resume must hold the {MANIFEST} of the run that made it"
         raise StoreError(rule, "none that can be read", str(path)) from None

@@ -16,9 +16,9 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from dem_warp.provenance import engine_fingerprint
-from experiments.cases.manifest import study_hash, write_manifest
+from experiments.cases.manifest import LARGEST, study_hash, write_manifest
 from experiments.errors import StoreError
-from experiments.files import write_text
+from experiments.files import read_file, write_text
 from experiments.studyfile import Study
 
 LIST = "files.json"
@@ -99,7 +99,7 @@ def _read_list(folder: Path) -> dict[str, Any]:
     if not path.exists():
         return {"made_from": {}, "files": {}}
     try:
-        listed = json.loads(path.read_text(encoding="utf-8"))
+        listed = json.loads(read_file(path, LARGEST))
         files, made_from = dict(listed["files"]), dict(listed["made_from"])
         if all(known is None or isinstance(known, str) for known in files.values()):
             for name in files:

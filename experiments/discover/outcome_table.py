@@ -91,6 +91,8 @@ class OutcomeTable:
     def _opened(self) -> Iterator[sqlite3.Connection]:
         """Open the file; whatever SQLite finds wrong with it is a `StoreError`."""
         try:
+            if self.path.exists() and not self.path.is_file():
+                raise sqlite3.DatabaseError("it is no regular file")
             with closing(sqlite3.connect(self.path, _PATIENCE)) as file:
                 # a text that is no UTF-8 is a damaged row, not an error
                 file.text_factory = lambda text: text.decode(errors="replace")
@@ -99,6 +101,11 @@ class OutcomeTable:
                 if columns != _COLUMNS:
                     raise sqlite3.DatabaseError(f"its columns are {', '.join(columns)}")
                 yield file
+        except sqlite3.OperationalError as error:
+            rule = (
+                "the table of outcomes must be one that can be read and written: see to room and permissions"
+            )
+            raise StoreError(rule, str(error), str(self.path)) from error
         except sqlite3.Error as error:
             rule = "must be a table of outcomes that this version wrote: move it away, and they are made anew"
             raise StoreError(rule, str(error), str(self.path)) from error

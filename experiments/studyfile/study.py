@@ -48,7 +48,7 @@ class MeasurementSection(Section):
 
     fit: str = "flank"
     """Part of the flank that the line is fitted to, one of ``imaging.FITS``."""
-    azimuths: int = Field(default=8, ge=2)
+    azimuths: int = Field(default=8, ge=2, le=360)
     """Views of one heap, over half a turn."""
     pixels: int = Field(default=800, ge=50, le=4000)
     """Width of the heap in a view."""

@@ -128,7 +128,7 @@ def measure(
     workers: Annotated[int | None, typer.Option(help="Processes.")] = None,
 ) -> None:
     """Simulate and measure the heaps of the trials."""
-    with clear_errors("the same command"):
+    with clear_errors("Resume with the same command."):
         place, device = Folder(folder), chosen_device(device, several=True)
         declaration = read_declaration(place.declared)
         sealed = [trial for trial in read_sealed(place.sealed) if part in (None, trial.part)]

@@ -184,9 +184,22 @@ def test_an_interruption_says_how_to_go_on(write_study: WriteStudy, monkeypatch:
 
     monkeypatch.setattr(api, "run_campaign", interrupt)
     path = write_study()
-    code, _, err = dem_warp("calibrate", path, "--scale", "stiff", "--device", "cpu", "--out", "results")
+    command = (
+        "calibrate",
+        path,
+        "--out",
+        "my results",
+        "--scale",
+        "stiff",
+        "--device",
+        "cpu",
+        "--workers",
+        2,
+    )
+    code, _, err = dem_warp(*command, "--json")
     assert code == 130
-    assert f"dem-warp calibrate {path} --out results --scale stiff --device cpu --resume" in err
+    written = f"dem-warp calibrate {path} --out 'my results' --scale stiff --device cpu --workers 2 --json"
+    assert f"Interrupted. Resume with: {written} --resume" in err
 
 
 def test_a_small_real_heap_is_simulated_and_written(write_study: WriteStudy) -> None:
