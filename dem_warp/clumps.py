@@ -16,6 +16,7 @@ MOST_SPHERES = 256
 """Spheres of a clump: their numbers have eight bits in a list of neighbours."""
 
 _MILLIMETER = 1e-3
+_LARGEST, _SMALLEST = 1e6, 1e-6  # of a file [mm]: its volume and moments are far from the ends of floats
 _MOMENT_TOLERANCE = 1e-4  # of the largest moment: less apart are equal, smaller products of inertia are none
 
 
@@ -229,6 +230,9 @@ def _parse_sphere(words: list[str], place: str) -> list[float]:
         row = []
     if len(row) != 4 or not np.isfinite(row).all() or row[3] <= 0.0:
         rule = "a sphere is four finite numbers 'x y z r' [mm] with r > 0"
+        raise ValueError(f"{place}: {rule}, got {' '.join(words)!r}")
+    if max(map(abs, row)) > _LARGEST or row[3] < _SMALLEST:
+        rule = f"a sphere lies within {_LARGEST:g} mm, and its r is at least {_SMALLEST:g} mm"
         raise ValueError(f"{place}: {rule}, got {' '.join(words)!r}")
     return row
 

@@ -6,7 +6,6 @@ Imports of the simulator, the statistics and the pictures are inside the command
 from __future__ import annotations
 
 import json
-import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -105,7 +104,7 @@ def calibrate(
         device = chosen_device(device)
         chosen = chosen_study(study, scale, device)
         folder = out or default_folder(chosen)
-    go_on = _go_on(
+    go_on = Attempt.of(
         "calibrate", study, out=folder, scale=chosen.scale, device=device, workers=workers, engine=engine,
         follow_paper=follow_paper, only_paper=only_paper,
         paper_replicates=paper_replicates if follow_paper or only_paper else None, json=as_json,
@@ -168,7 +167,7 @@ def discover(
         device = chosen_device(device, several=True)
         chosen = chosen_study(study, scale, device)
         folder = out or default_folder(chosen, "discover")
-    go_on = _go_on(
+    go_on = Attempt.of(
         "discover", study, measured, out=folder, bank=bank, photographs_only=photographs_only, scale=scale,
         device=device, workers=workers, seed=seed, json=as_json,
     )  # fmt: skip
@@ -392,12 +391,3 @@ def _quantity(text: str, dimension: str, option: str) -> float:
         return Quantity.parse(text).to_base(dimension)
     except ValueError as error:
         raise InputError(str(error), text, option) from None
-
-
-def _go_on(command: str, *files: Path | None, out: Path, **options: object) -> Attempt:
-    """Command that goes on where this one was interrupted; options that were not given are left out."""
-    words = ["dem-warp", command, *(str(file) for file in files if file)]
-    for name, value in {"out": out, **options}.items():
-        if value is not None and value is not False:
-            words += [f"--{name.replace('_', '-')}", *([] if value is True else [str(value)])]
-    return Attempt(shlex.join(words), out)

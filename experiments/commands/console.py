@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import logging
+import shlex
 import signal
 import sys
 import threading
@@ -89,6 +90,15 @@ class Attempt:
     """The command with all its options, quoted."""
     folder: Path
     """Its folder."""
+
+    @classmethod
+    def of(cls, command: str, *files: Path | None, out: Path, **options: object) -> Attempt:
+        """Write a command with its files and options; those that were not given are left out."""
+        words = ["dem-warp", command, *(str(file) for file in files if file)]
+        for name, value in {"out": out, **options}.items():
+            if value is not None and value is not False:
+                words += [f"--{name.replace('_', '-')}", *([] if value is True else [str(value)])]
+        return cls(shlex.join(words), out)
 
     def __str__(self) -> str:
         """Say how to go on."""

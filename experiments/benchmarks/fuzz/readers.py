@@ -14,10 +14,18 @@ from typing import Any
 import cv2
 import numpy as np
 
-from dem_warp import Case, ClumpShape, Interaction, LiftedCylinder, Material, Numerics, simulate
+from dem_warp import (
+    Case,
+    ClumpShape,
+    GrainPopulation,
+    Interaction,
+    LiftedCylinder,
+    Material,
+    Numerics,
+    simulate,
+)
 from dem_warp.batch import Batch
 from dem_warp.checkpoint import Checkpoints
-from dem_warp.population import GrainPopulation
 from dem_warp.scenes.scene import course_of
 from dem_warp.snapshot import put_snapshot, take_snapshot
 from dem_warp.solids import read_mesh

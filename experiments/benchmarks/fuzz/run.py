@@ -34,8 +34,8 @@ PATIENCE = 60.0
 """Wall time without a next input after which a process counts as hanging [s]."""
 
 RULE = (
-    f"At most {SECONDS:g} s of the processor and {MEGABYTES:g} MB more a file; any other end is a failure but "
-    "a value or an error of bad input, or, of a file with checksums, a value that was not written."
+    f"A file may take {SECONDS:g} s of the processor and {MEGABYTES:g} MB. A failure is any end but a value "
+    "or an error of bad input; of a file with checksums, a value that was not written too."
 )
 """Rule that the record states."""
 

@@ -79,3 +79,10 @@ def test_a_table_without_digests_is_refused(tmp_path: Path) -> None:
         file.execute("CREATE TABLE outcome (key TEXT PRIMARY KEY, numbers BLOB, reason TEXT NOT NULL)")
     with pytest.raises(StoreError, match="its columns are key, numbers, reason"):
         OutcomeTable(path).load(["a"])
+
+
+def test_a_damaged_name_in_a_message_of_sqlite_is_no_raw_error(table: OutcomeTable) -> None:
+    content = table.path.read_bytes()
+    table.path.write_bytes(content.replace(b"PRIMARY KEY", b"PRIM\x80RY KEY"))
+    with pytest.raises(StoreError):
+        table.load(list(OUTCOMES))
