@@ -45,12 +45,20 @@ def read_arrays(path: str | Path) -> dict[str, np.ndarray]:
             raise ValueError("no regular file")
         with zipfile.ZipFile(path) as archive:
             members = archive.infolist()
+            if len(members) != _stated_count(path):
+                raise ValueError("it states another number of arrays than it has")
             if any(member.compress_type != zipfile.ZIP_STORED for member in members):
                 raise ValueError("its arrays are compressed")
             return {member.filename.removesuffix(".npy"): _array(archive.read(member)) for member in members}
     except Exception as error:
         # the libraries raise whatever their parsers happen to meet in a damaged file
         raise ValueError(f"must be a whole archive of arrays, got one that is not: {error}") from error
+
+
+def _stated_count(path: str | Path) -> int:
+    """Return the number of members that an archive states at its end, which zipfile does not look at."""
+    end = Path(path).read_bytes()[-22:]
+    return int.from_bytes(end[10:12], "little") if end[:4] == b"PK\x05\x06" else -1
 
 
 def _array(content: bytes) -> np.ndarray:

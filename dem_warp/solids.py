@@ -45,8 +45,6 @@ def read_mesh(path: str | Path, unit: float = MILLIMETER) -> "Trimesh":
     FileNotFoundError
         If there is no such file.
     """
-    import trimesh
-
     if not (math.isfinite(unit) and unit > 0.0):
         raise ValueError(f"unit must be finite and positive [m], got {unit!r}")
     kind = Path(path).suffix.lower().removeprefix(".")
@@ -57,18 +55,28 @@ def read_mesh(path: str | Path, unit: float = MILLIMETER) -> "Trimesh":
     if (size := Path(path).stat().st_size) > LARGEST_MESH:
         raise ValueError(f"{path}: a mesh file has at most {LARGEST_MESH:,} bytes, got {size:,}")
     try:
-        # from memory, so that a file names no other files to be read
-        mesh = trimesh.load_mesh(io.BytesIO(Path(path).read_bytes()), file_type=kind)
+        mesh = _surface(Path(path).read_bytes(), kind)
     except Exception as error:  # each reader of trimesh raises what it likes
         raise ValueError(f"{path}: a mesh file that trimesh reads is needed, got {error!r}") from error
-    if not isinstance(mesh, trimesh.Trimesh):
-        raise ValueError(f"{path}: a mesh file has one surface, got {type(mesh).__name__}")
-    if not np.isfinite(mesh.vertices).all():
-        raise ValueError(f"{path}: the corners must be finite numbers")
-    if not mesh.is_watertight:
+    if mesh is None:
         raise ValueError(f"{path}: the surface must be closed, got one with open or doubled edges")
-    mesh.fix_normals()
+    if not (np.isfinite(mesh.vertices).all() and np.isfinite(mesh.volume) and mesh.volume > 0.0):
+        raise ValueError(f"{path}: the corners must be finite, and the volume positive, got {mesh.volume!r}")
     return mesh.apply_scale(unit)
+
+
+def _surface(content: bytes, kind: str) -> "Trimesh | None":
+    """Return the surface of a file with its faces turned outward; None where it is not closed."""
+    import trimesh
+
+    # from memory, so that a file names no other files to be read
+    mesh = trimesh.load_mesh(io.BytesIO(content), file_type=kind)
+    if not isinstance(mesh, trimesh.Trimesh):
+        raise TypeError(f"a {type(mesh).__name__}")
+    if not mesh.is_watertight:
+        return None
+    mesh.fix_normals()
+    return mesh
 
 
 def sphere_mesh(diameter: float) -> "Trimesh":

@@ -20,6 +20,7 @@ from experiments.commands.console import (
     messages,
     plain,
 )
+from experiments.commands.early import check_study_file
 from experiments.commands.results import print_angles, print_clump, print_measured, show_stage
 
 app = typer.Typer(
@@ -98,6 +99,7 @@ def calibrate(
 ) -> None:
     """Run a whole calibration: noise floor, screening, climb, surface, optimum, verification, report."""
     with clear_errors():
+        check_study_file(study, scale)
         from experiments import api
         from experiments.runs.choices import chosen_device, chosen_study, default_folder
 
@@ -160,6 +162,7 @@ def discover(
 ) -> None:
     """Find the effect that a model lacks: calibrate, test the gap, name what explains it, show it closed."""
     with clear_errors():
+        check_study_file(study, scale)
         from experiments import api
         from experiments.report.discovery import results_of, verdict_line
         from experiments.runs.choices import chosen_device, chosen_study, default_folder
@@ -215,6 +218,7 @@ def heap(
     --scene with a further scene of the study.
     """
     with clear_errors():
+        check_study_file(study, scale)
         from experiments.cases import require_unused, simulate_heap, write_heap
         from experiments.runs.choices import chosen_device, chosen_study, default_folder
         from experiments.studyfile.campaign import TARGET_SCENE

@@ -17,7 +17,7 @@ from experiments.studyfile import Study
 from experiments.studyfile.campaign import Response
 from experiments.studyfile.card import MATERIAL, SECTIONS
 from experiments.studyfile.factor_section import with_factor_values
-from experiments.studyfile.toml_files import toml_text
+from experiments.toml_files import toml_text
 
 CARD = "material.toml"
 

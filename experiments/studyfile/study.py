@@ -36,7 +36,7 @@ from experiments.studyfile.schema import Section, nearest_name, validated
 from experiments.studyfile.sections import Physics, Scene
 from experiments.studyfile.setters import changed
 from experiments.studyfile.target_section import ResponseSection, TargetSection, build_target
-from experiments.studyfile.toml_files import read_toml
+from experiments.toml_files import read_toml
 from imaging import FITS
 
 BUCKWHEAT = Path(__file__).parents[1] / "studies" / "buckwheat" / "study.toml"

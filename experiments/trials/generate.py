@@ -27,7 +27,7 @@ from experiments.discover.search import Search
 from experiments.errors import InputError
 from experiments.runs.choices import chosen_device
 from experiments.studyfile import Study, load_study
-from experiments.studyfile.toml_files import read_toml
+from experiments.toml_files import read_toml
 from experiments.trials.declaration import Declaration, declared_effects, read_declaration, with_names
 from experiments.trials.drawing import Declared, Plan, draw
 from experiments.trials.folder import Folder, noted_run

@@ -67,6 +67,22 @@ def test_help_imports_nothing_heavy() -> None:
     assert last_line_of(program) == "[]"
 
 
+@pytest.mark.parametrize("command", ["calibrate", "discover", "heap"])
+@pytest.mark.parametrize("content", [None, "name = ", "[scale.other]\n"])
+def test_a_file_that_is_no_study_is_answered_before_any_library_is_imported(
+    tmp_path: Path, command: str, content: str | None
+) -> None:
+    path = tmp_path / "wrong.toml"
+    if content is not None:
+        path.write_text(content, encoding="utf-8")
+    words = [command, str(path), "--scale", "bench"]
+    program = (
+        f"import sys; from experiments.cli import app; code = app({words!r}, standalone_mode=False); "
+        "print(code, sorted({'warp', 'numpy', 'cv2', 'pandas', 'scipy'} & set(sys.modules)))"
+    )
+    assert last_line_of(program) == "2 []"
+
+
 def test_a_calibration_does_not_need_pyvista() -> None:
     program = "import sys; import experiments.runs.campaign; print('pyvista' in sys.modules)"
     assert last_line_of(program) == "False"

@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 from experiments import api
 from experiments.cli import app
 from experiments.commands.console import plain
-from experiments.studyfile.toml_files import read_toml, toml_text
+from experiments.toml_files import read_toml, toml_text
 
 WriteStudy = Callable[..., Path]
 

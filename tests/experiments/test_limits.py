@@ -21,8 +21,8 @@ from experiments.discover.outcome_table import OutcomeTable
 from experiments.errors import InputError, StudyError
 from experiments.measurement.table import read_rows
 from experiments.studyfile import load_study
-from experiments.studyfile.toml_files import read_toml
 from experiments.studyfile.units import Quantity
+from experiments.toml_files import read_toml
 from imaging import PictureError
 from imaging.pictures import read_picture
 

@@ -175,6 +175,9 @@ def _read_columns(path: Path) -> dict[str, Any]:
         raise ValueError("no regular file")
     with zipfile.ZipFile(path) as archive:
         members = archive.infolist()
+        # a damaged directory may end early, which zipfile does not notice
+        if len(members) != int.from_bytes(path.read_bytes()[-12:-10], "little"):
+            raise ValueError("its directory has another number of arrays than it states")
         if (size := sum(member.file_size for member in members)) > LARGEST:
             raise ValueError(f"arrays of {size:,} bytes, at most {LARGEST:,}")
         # whole, so that its checksum is looked at

@@ -18,7 +18,7 @@ from experiments.report.clump_files import gather_clumps
 from experiments.report.discovery.terms import Terms
 from experiments.report.discovery.verdict import tied
 from experiments.studyfile import Study
-from experiments.studyfile.toml_files import toml_text
+from experiments.toml_files import toml_text
 
 HEAD = """\
 # Written by dem-warp discover: {name}, with {title} added as a factor that ranges over its 90 % interval.

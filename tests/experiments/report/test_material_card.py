@@ -16,7 +16,7 @@ from experiments.errors import StudyError
 from experiments.report.clump_files import gather_clumps
 from experiments.report.material_card import CARD, material_card, write_material_card
 from experiments.studyfile import Study, load_study
-from experiments.studyfile.toml_files import toml_text
+from experiments.toml_files import toml_text
 
 TEST = """
 name = "Another test of the same material"
