@@ -33,8 +33,7 @@ def read_toml(path: Path, what: str = "the study") -> tuple[str, dict[str, Any]]
     try:
         text = read_file(path, LARGEST).decode("utf-8").replace("\r\n", "\n")
         document = tomllib.loads(text)
-        if _depth(document) > DEEPEST:
-            raise RecursionError
+        _check(document)
         return text, document
     except tomllib.TOMLDecodeError as error:
         found = re.search(r"at line (\d+)", str(error))
@@ -55,15 +54,16 @@ def read_toml(path: Path, what: str = "the study") -> tuple[str, dict[str, Any]]
         raise StudyError(f"{what} must be a readable file", error.strerror or "none", str(path)) from None
 
 
-def _depth(document: Mapping[str, Any]) -> int:
-    """Levels of tables and lists in each other, counted without recursion, as far as they are allowed."""
-    depth: int = 0
+def _check(document: Mapping[str, Any]) -> None:
+    """Refuse, without recursion, what is nested too deep, and integers that TOML does not have."""
     level: list[Any] = [document]
-    while level and depth <= DEEPEST:
-        depth += 1
-        inner = (each.values() if isinstance(each, Mapping) else each for each in level)
-        level = [each for values in inner for each in values if isinstance(each, Mapping | list)]
-    return depth
+    for _ in range(DEEPEST):
+        inner = [value for each in level for value in (each.values() if isinstance(each, Mapping) else each)]
+        if large := [value for value in inner if isinstance(value, int) and not -(2**63) <= value < 2**63]:
+            raise ValueError(f"integers have 64 bits, not {str(large[0])[:40]} ...")
+        level = [value for value in inner if isinstance(value, Mapping | list)]
+    if level:
+        raise RecursionError
 
 
 def toml_text(document: Mapping[str, Any], path: tuple[str, ...] = (), array: bool = False) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import warnings
 from contextlib import suppress
 from pathlib import Path
@@ -35,7 +36,7 @@ def read_picture(path: str | Path) -> Picture:
         When there is no such file, when it is no picture, or when it has more than `MAXIMUM_PIXELS`.
     """
     file = Path(path)
-    if not file.is_file():
+    if not os.path.isfile(file):  # a name too long is none, and raises nothing
         raise PictureError("the picture is a file", "no such file", str(path))
     if file.suffix.lower() in HEIC_ENDINGS:
         return _read_heic(file)

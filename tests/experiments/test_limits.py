@@ -20,6 +20,7 @@ from experiments.cases.manifest import read_manifest
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.errors import InputError, StudyError
 from experiments.measurement.table import read_rows
+from experiments.measurement.target import with_measurements
 from experiments.studyfile import load_study
 from experiments.studyfile.units import Quantity
 from experiments.toml_files import read_toml
@@ -87,7 +88,7 @@ def test_quantities_are_read_as_before(text: str) -> None:
         ("seeds = " + "[" * 100_000, "few levels|valid TOML"),
         ("[a" + ".a" * 100_000 + "]\n", "few levels"),
         ("n = " + "1" * 5000 + "\n", "valid TOML"),
-        (f"[numerics]\nskin = {10**400}\n", "finite"),
+        (f"[numerics]\nskin = {10**400}\n", "64 bits"),
     ],
 )
 def test_an_excessive_study_is_refused(write_study: WriteStudy, line: str, said: str) -> None:
@@ -154,3 +155,19 @@ def test_toml_that_is_no_text_is_refused(tmp_path: Path) -> None:
         path.write_bytes(content)
         with pytest.raises(InputError):
             read_toml(path)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ('sphere = "2 mm"', f'clump = "{"a" * 5000}.txt"'),
+        ("n = 5", f"n = {2**63}"),
+        ('mean = "30 deg"\nsd = "0.5 deg"\nn = 5', f'pictures = "{"a" * 5000}"'),
+    ],
+)
+def test_names_and_integers_beyond_the_machine_are_refused(
+    write_study: WriteStudy, old: str, new: str
+) -> None:
+    path = write_study((old, new))
+    with pytest.raises(InputError):
+        with_measurements(load_study(path))
