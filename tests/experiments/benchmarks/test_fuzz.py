@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from experiments.benchmarks.fuzz.mutations import mutated
-from experiments.benchmarks.fuzz.readers import READERS, Reader, accepted_change
+from experiments.benchmarks.fuzz.readers import CORPUS, READERS, Reader, accepted_change
 from experiments.benchmarks.fuzz.run import fuzz
 from experiments.benchmarks.fuzz.worker import AT, FIELDS, READ, REFUSED, content_of, read_inputs
 
@@ -75,3 +75,12 @@ def test_a_process_that_dies_is_a_failure_of_its_input(tmp_path: Path) -> None:
     assert row["failures"] == 2
     lines = failures.read_text(encoding="utf-8").splitlines()
     assert [json.loads(line)["number"] for line in lines] == [5, 6]
+
+
+@pytest.mark.parametrize("path", sorted((CORPUS / "found").iterdir()), ids=lambda path: path.stem)
+def test_what_once_broke_a_reader_is_refused(path: Path, tmp_path: Path) -> None:
+    reader = READERS[path.stem](tmp_path)
+    copy = tmp_path / f"again{path.suffix}"
+    copy.write_bytes(path.read_bytes())
+    with pytest.raises(reader.refusals):
+        reader.read(copy)
