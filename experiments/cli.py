@@ -14,7 +14,15 @@ import typer
 from experiments.commands.angle import ANGLE_EXAMPLE, angle
 from experiments.commands.bridge import BRIDGE_EXAMPLE, bridge
 from experiments.commands.clump import CLUMP_EXAMPLE, clump
-from experiments.commands.console import FAILED_RUN, CaseProgress, clear_errors, fail, messages
+from experiments.commands.console import (
+    FAILED_RUN,
+    Attempt,
+    CaseProgress,
+    clear_errors,
+    fail,
+    messages,
+)
+from experiments.commands.early import check_study_file
 from experiments.commands.export import EXPORT_EXAMPLE, export
 from experiments.commands.new import NEW_EXAMPLE, new
 from experiments.commands.options import (
@@ -80,19 +88,20 @@ def calibrate(
 ) -> None:
     """Run a whole calibration: noise floor, screening, climb, surface, optimum, verification, report."""
     with clear_errors():
+        check_study_file(study, scale)
         from experiments import api
         from experiments.runs.choices import chosen_device, chosen_study, default_folder
 
         device = chosen_device(device)
         chosen = chosen_study(study, scale, device)
         folder = out or default_folder(chosen)
-    go_on = _go_on(
-        "calibrate", study, out=folder, scale=chosen.scale, device=device, engine=engine,
+    go_on = Attempt.of(
+        "calibrate", study, out=folder, scale=chosen.scale, device=device, workers=workers, engine=engine,
         follow_paper=follow_paper, only_paper=only_paper,
-        paper_replicates=paper_replicates if follow_paper or only_paper else None,
+        paper_replicates=paper_replicates if follow_paper or only_paper else None, json=as_json,
     )  # fmt: skip
-    with clear_errors(resume=go_on):
-        messages.print(f"{chosen.name}, on {device}", chosen.note, sep="\n", markup=False)
+    with clear_errors(go_on):
+        messages.print(f"{chosen.name}, on {device}", chosen.note, sep="\n")
         ended = api.calibrate(
             chosen,
             folder,
@@ -143,6 +152,7 @@ def discover(
 ) -> None:
     """Find the effect that a model lacks: calibrate, test the gap, name what explains it, show it closed."""
     with clear_errors():
+        check_study_file(study, scale)
         from experiments import api
         from experiments.report.discovery import results_of, verdict_line
         from experiments.runs.choices import chosen_device, chosen_study, default_folder
@@ -150,12 +160,12 @@ def discover(
         device = chosen_device(device, several=True)
         chosen = chosen_study(study, scale, device)
         folder = out or default_folder(chosen, "discover")
-    go_on = _go_on(
+    go_on = Attempt.of(
         "discover", study, measured, out=folder, bank=bank, photographs_only=photographs_only, scale=scale,
-        device=device, seed=seed, engine=engine,
+        device=device, workers=workers, seed=seed, engine=engine, json=as_json,
     )  # fmt: skip
-    with clear_errors(resume=go_on):
-        messages.print(f"{chosen.name}, on {device}", chosen.note, sep="\n", markup=False)
+    with clear_errors(go_on):
+        messages.print(f"{chosen.name}, on {device}", chosen.note, sep="\n")
         ended = api.discover(
             chosen,
             measured,
@@ -174,7 +184,7 @@ def discover(
         return
     if as_json:
         typer.echo(json.dumps(results_of(ended.discovery, ended.terms), allow_nan=False))
-    messages.print(verdict_line(ended.discovery, ended.terms), markup=False)
+    messages.print(verdict_line(ended.discovery, ended.terms))
     messages.print(f"Report: {ended.page}")
 
 
@@ -200,6 +210,7 @@ def heap(
     --scene with a further scene of the study.
     """
     with clear_errors():
+        check_study_file(study, scale)
         from experiments.cases import require_unused, simulate_heap, with_engine, write_heap
         from experiments.runs.choices import chosen_device, chosen_study, default_folder
         from experiments.studyfile.campaign import TARGET_SCENE
@@ -224,8 +235,6 @@ def heap(
 app.command(epilog=ANGLE_EXAMPLE)(angle)
 app.command(epilog=CLUMP_EXAMPLE)(clump)
 app.command(epilog=NEW_EXAMPLE)(new)
-
-
 app.command(epilog=EXPORT_EXAMPLE)(export)
 app.command(epilog=BRIDGE_EXAMPLE)(bridge)
 
@@ -233,12 +242,3 @@ app.command(epilog=BRIDGE_EXAMPLE)(bridge)
 def main() -> None:
     """Run the command line."""
     app()
-
-
-def _go_on(command: str, *files: Path | None, **options: object) -> str:
-    """Command that goes on where this one was interrupted; options that were not given are left out."""
-    words = ["dem-warp", command, *(str(file) for file in files if file)]
-    for name, value in options.items():
-        if value is not None and value is not False:
-            words += [f"--{name.replace('_', '-')}", *([] if value is True else [str(value)])]
-    return " ".join([*words, "--resume"])

@@ -6,6 +6,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Self
 
+LONGEST = 500
+"""Characters of a value that are shown."""
+
 
 @dataclass(frozen=True)
 class Problem:
@@ -27,7 +30,8 @@ class InputError(ValueError):
 
     def __init__(self, rule: str, value: object, place: str, more: tuple[Problem, ...] = ()) -> None:
         self.rule, self.place = rule, place
-        self.value = value if isinstance(value, str) else repr(value)
+        text = value if isinstance(value, str) else repr(value)
+        self.value = text if len(text) <= LONGEST else f"{text[:LONGEST]} ..."
         self.problems = (Problem(rule, self.value, place), *more)
         super().__init__("\n".join(str(problem) for problem in self.problems))
 

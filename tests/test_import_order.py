@@ -14,8 +14,8 @@ ROOT = Path(__file__).resolve().parents[1]
 # the commands, which load a companion by its name. Verification, benchmarks and trials are evidence: nothing
 # imports them.
 ROOMS = (
-    "errors", "files", "texts", "studyfile.units", "sphere_files", "export", "measurement.observables",
-    "studyfile", "measurement", "cases", "calibrate", "discover", "report", "runs", "bridge", "api",
+    "errors", "files", "texts", "toml_files", "studyfile.units", "sphere_files", "export",
+    "measurement.observables", "studyfile", "measurement", "cases", "calibrate", "discover", "report", "runs", "bridge", "api",
     "commands", "cli", "studies", "verification", "benchmarks", "trials",
 )  # fmt: skip
 

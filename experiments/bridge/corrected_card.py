@@ -13,7 +13,7 @@ from experiments.files import copy_file, write_text
 from experiments.report.material_card import CARD, compatible_points, quantity_text, sample_table, short
 from experiments.studyfile.card import MATERIAL, SECTIONS, shapes_of
 from experiments.studyfile.factor_section import with_factor_values
-from experiments.studyfile.toml_files import toml_text
+from experiments.toml_files import toml_text
 
 RESULTS, RUNS = "bridge.json", "runs.csv"
 """Files beside the card: all that was found, and every run of the other solver."""

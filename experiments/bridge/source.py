@@ -11,8 +11,8 @@ from experiments.errors import StudyError
 from experiments.studyfile import Study, load_card
 from experiments.studyfile.card_surface import SURFACE, card_surfaces
 from experiments.studyfile.places import drop
-from experiments.studyfile.toml_files import read_toml
 from experiments.studyfile.units import Quantity
+from experiments.toml_files import read_toml
 
 BRIDGE = "bridge"
 """Table of a card whose values a bridge has corrected."""

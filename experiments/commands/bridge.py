@@ -64,7 +64,7 @@ def bridge(
     if as_json:
         typer.echo(json.dumps(ended.to_dict(), allow_nan=False))
     for sentence in ended.crossing.sentences():
-        messages.print(sentence, markup=False)
-    messages.print(f"Card: {ended.card}" if ended.card else f"Files: {ended.folder}", markup=False)
+        messages.print(sentence)
+    messages.print(f"Card: {ended.card}" if ended.card else f"Files: {ended.folder}")
     if ended.crossing.outcome == "too-many-failed-runs":
         raise typer.Exit(FAILED_RUN)

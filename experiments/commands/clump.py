@@ -25,7 +25,9 @@ def clump(
             "Yade, EDEM or DEM-Engine, to be described.",
         ),
     ],
-    spheres: Annotated[int | None, typer.Option(min=1, help="Spheres to fill the solid with.")] = None,
+    spheres: Annotated[
+        int | None, typer.Option(min=1, max=256, help="Spheres to fill the solid with.")
+    ] = None,
     unit: Annotated[
         str | None,
         typer.Option(help='Unit of a file, as m, or the length that is 1 in it, as "2.5 mm". Left out: mm.'),
@@ -53,4 +55,4 @@ def clump(
     else:
         print_clump(made.to_dict(mass_density))
     if made.told:
-        messages.print(f"Read: {shape}: {made.told}", markup=False)
+        messages.print(f"Read: {shape}: {made.told}")

@@ -59,9 +59,9 @@ def export(
         require_unused(folder)
         files = write_export(test, to, translation, folder)
     for warning in translation.warnings:
-        messages.print(f"Not the same there: {warning}", markup=False)
+        messages.print(f"Not the same there: {warning}")
     if as_json:
         typer.echo(json.dumps(translation.to_dict() | {"folder": str(folder)}, allow_nan=False))
-    messages.print(f"Files: {folder}: {', '.join(file.name for file in files)}", markup=False)
+    messages.print(f"Files: {folder}: {', '.join(file.name for file in files)}")
     if translation.command:
-        messages.print(f"Run there: {' '.join(translation.command)}", markup=False)
+        messages.print(f"Run there: {' '.join(translation.command)}")

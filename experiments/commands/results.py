@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 import typer
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
-from experiments.commands.console import messages
+from experiments.commands.console import messages, plain
 
 if TYPE_CHECKING:
     from experiments.calibrate.results import StageResult
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 def show_stage(name: str, result: StageResult) -> None:
     """Show what a stage decided, as it ends."""
     for decision in result.decisions:
-        messages.print(f"{name.replace('_', ' ')}: {decision.outcome}", markup=False)
+        messages.print(f"{name.replace('_', ' ')}: {decision.outcome}")
 
 
 def print_clump(facts: Mapping[str, Any]) -> None:
@@ -55,7 +56,7 @@ def print_angles(rows: Sequence[Mapping[str, Any]], fit: str) -> None:
         if row["mean"] is not None:
             values = [f"{row[name]:.2f}" for name in ("left", "right", "mean", "se")]
             doubts = ", ".join(doubt.partition(":")[0] for doubt in row["doubts"])
-            table.add_row(row["picture"], *values, doubts)
+            table.add_row(Text(plain(row["picture"])), *values, doubts)
     if table.row_count:
         Console().print(table)
 
@@ -64,6 +65,6 @@ def print_findings(rows: Sequence[Mapping[str, Any]]) -> None:
     """Say how files of heaps were read, and why angles are doubtful."""
     for row in rows:
         if row["mean"] is not None and row["source"] != "photograph":
-            messages.print(f"Read: {row['picture']}: {row['source']}", markup=False)
+            messages.print(f"Read: {row['picture']}: {row['source']}")
         for doubt in row["doubts"]:
-            messages.print(f"Doubtful: {row['picture']}: {doubt}", markup=False)
+            messages.print(f"Doubtful: {row['picture']}: {doubt}")

@@ -25,8 +25,8 @@ from doe.discrepancy import (
     settings_of,
 )
 from experiments.cases import engine_of
-from experiments.cases.folder import describe
 from experiments.cases.key import engine_identity
+from experiments.cases.manifest import describe
 from experiments.discover.library import FORMER_NAMES, Mechanism, library_for
 from experiments.discover.maker import notes_on
 from experiments.errors import InputError, StudyError

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import csv
+import io
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from experiments.errors import InputError
+from experiments.files import read_file
 from experiments.studyfile.schema import nearest_name
+
+LARGEST = 10_000_000
+"""Bytes of the largest file that is read."""
 
 
 @dataclass(frozen=True)
@@ -53,12 +58,12 @@ def read_rows(path: Path, needed: Collection[str], known: Collection[str]) -> It
 
 def _lines(path: Path) -> Iterator[tuple[int, list[str]]]:
     try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            reader = csv.reader(file)
-            for row in reader:
-                cells = [cell.strip() for cell in row]
-                if any(cells) and not cells[0].startswith("#"):
-                    yield reader.line_num, cells
+        text = read_file(path, LARGEST).decode("utf-8-sig")
+        reader = csv.reader(io.StringIO(text, newline=""))
+        for row in reader:
+            cells = [cell.strip() for cell in row]
+            if any(cells) and not cells[0].startswith("#"):
+                yield reader.line_num, cells
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InputError("must be a readable CSV file in UTF-8", str(error), str(path)) from None
 

@@ -16,7 +16,8 @@ from experiments.studyfile import Study
 
 OUTCOMES = {
     Outcome.CALIBRATED: "Calibrated",
-    Outcome.NOT_VERIFIED: "Not verified",
+    Outcome.NOT_TOLD_APART: "Not told apart",
+    Outcome.MISSED: "Target missed",
     Outcome.NO_SIGNIFICANT_FACTOR: "No significant factor",
     Outcome.TARGET_NOT_REACHED: "Target not reached",
     Outcome.PLATEAU: "Plateau before the target",

@@ -10,14 +10,16 @@ import numpy as np
 
 from doe import Region, Sample
 from experiments.calibrate.results import Campaign, OptimumResult
-from experiments.files import copy_file, write_text
+from experiments.cases.manifest import study_hash
+from experiments.files import write_text
+from experiments.report.clump_files import gather_clumps
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import Response
-from experiments.studyfile.card import MATERIAL, SECTIONS, shapes_of
+from experiments.studyfile.card import MATERIAL, SECTIONS
 from experiments.studyfile.card_surface import SURFACE, surface_table
 from experiments.studyfile.factor_section import with_factor_values
 from experiments.studyfile.solver_section import LAWS, written
-from experiments.studyfile.toml_files import toml_text
+from experiments.toml_files import toml_text
 
 CARD = "material.toml"
 
@@ -40,10 +42,7 @@ def write_material_card(campaign: Campaign, study: Study, folder: Path) -> Path 
     if campaign.optimum is None:
         return None
     card = material_card(campaign, campaign.optimum, study)
-    for shape in shapes_of(card[MATERIAL]):
-        source = study.file.parent / shape["clump"]
-        shape["clump"] = f"material-{source.name}"
-        copy_file(source, folder / shape["clump"])
+    gather_clumps(card[MATERIAL], study.file.parent, folder, "material-")
     write_text(folder / CARD, HEAD.format(card=CARD) + toml_text(card))
     return folder / CARD
 
@@ -70,6 +69,7 @@ def _fitted(campaign: Campaign, study: Study) -> dict[str, Any]:
         "outcome": campaign.outcome.value,
         "reason": campaign.reason,
         "scale": study.scale,
+        "study": study_hash(study),
         "estimator": f"repose angle, {measurement.fit!r} fit, mean of {measurement.azimuths} views",
         "measurement": measurement.model_dump(),
         "numerics": numerics.model_dump(exclude_none=True),

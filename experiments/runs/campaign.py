@@ -20,6 +20,8 @@ from experiments.calibrate.campaign import StageHook
 from experiments.calibrate.checks import check_study
 from experiments.calibrate.export import jsonable
 from experiments.cases import Store, open_folder, run_cases
+from experiments.cases.key import engine_identity
+from experiments.cases.outputs import publishing
 from experiments.errors import InputError, StudyError
 from experiments.files import write_text
 from experiments.measurement.target import with_measurements
@@ -83,6 +85,11 @@ class Desk:
             self._note_wall_time(title, simulated, time.perf_counter() - started)
         return cases
 
+    def publishing(self) -> AbstractContextManager[Path]:
+        """Folder for drafts of outputs, which take their places when the block ends well."""
+        engine = self.store.engine
+        return publishing(self.folder, self.study, simulated_by=engine and engine_identity(engine))
+
     @property
     def wall_times(self) -> pd.DataFrame:
         """Wall times so far: stage, simulated (cases), seconds."""
@@ -112,7 +119,8 @@ def run_campaign(desk: Desk, on_stage: StageHook | None = None, replay: Replay |
         "engine": _engine(desk, campaign.cases),
     }
     pictures = heap_pictures(campaign, desk.study, desk.store.load)
-    write_report(campaign, desk.study, desk.folder, pictures, provenance, replay)
+    with desk.publishing() as drafts:
+        write_report(campaign, desk.study, drafts, pictures, provenance, replay)
     return campaign
 
 
@@ -134,9 +142,10 @@ def replay_published(desk: Desk, replicates: int) -> Replay:
 
 def record_published(desk: Desk, replay: Replay, campaign: Campaign | None = None) -> Path:
     """Write the page on published runs, its tables and its picture into the folder ``record``."""
-    return replay.write_record(
-        desk.folder / RECORD, desk.study, desk.store.load, _provenance(desk, replay), campaign
-    )
+    made_by = _provenance(desk, replay)
+    with desk.publishing() as drafts:
+        page = replay.write_record(drafts / RECORD, desk.study, desk.store.load, made_by, campaign)
+    return desk.folder / page.relative_to(drafts)
 
 
 def found_by(campaign: Campaign | None, replay: Replay | None) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from experiments.errors import StudyError
 from experiments.studyfile.factor_section import merge
 from experiments.studyfile.places import drop
 from experiments.studyfile.solver_section import CARD_LAWS, LAWS, laws_of
-from experiments.studyfile.toml_files import read_toml
+from experiments.toml_files import read_toml
 
 MATERIAL = "material"
 """Key of a study that names a card, and table of a card that holds the sections."""

@@ -5,6 +5,7 @@ A field's type names its dimension; its bounds are the hard physical limits, for
 
 from __future__ import annotations
 
+import os
 from functools import lru_cache, partial
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -53,7 +54,7 @@ class ShapeSection(Section):
         if clump is None:
             return None
         path = Path((info.context or {}).get("folder", ".")) / clump
-        if not path.is_file():
+        if not os.path.isfile(path):  # a name too long is none, and raises nothing
             raise ValueError(f"must name an existing clump file (looked for {path})")
         return path
 

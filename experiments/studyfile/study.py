@@ -31,12 +31,13 @@ from experiments.studyfile.factor_section import (
     with_factor_values,
 )
 from experiments.studyfile.places import Places
+from experiments.studyfile.reserved_names import check_factor_names
 from experiments.studyfile.scene_sections import SceneSection
 from experiments.studyfile.schema import Section, nearest_name, validated
 from experiments.studyfile.sections import Physics, Scene
 from experiments.studyfile.setters import changed
 from experiments.studyfile.target_section import ResponseSection, TargetSection, build_target
-from experiments.studyfile.toml_files import read_toml
+from experiments.toml_files import read_toml
 from imaging import FITS
 
 BUCKWHEAT = Path(__file__).parents[1] / "studies" / "buckwheat" / "study.toml"
@@ -48,7 +49,7 @@ class MeasurementSection(Section):
 
     fit: str = "flank"
     """Part of the flank that the line is fitted to, one of ``imaging.FITS``."""
-    azimuths: int = Field(default=8, ge=2)
+    azimuths: int = Field(default=8, ge=2, le=360)
     """Views of one heap, over half a turn."""
     pixels: int = Field(default=800, ge=50, le=4000)
     """Width of the heap in a view."""
@@ -291,6 +292,8 @@ def load_card(path: Path) -> Study:
 def _build(document: dict[str, Any], places: Places) -> Study:
     """Build a study, and each of its conditions, so that a wrong one is named at once."""
     sections = validated(FactorTable, {"factor": document.get("factor", [])}, places).factor
+    names = [section.name for section in sections]
+    check_factor_names(names, places)
     check_one_home(document, sections, places)
     middle = with_factor_values(document, sections, {}) | {"factor": sections}
     study = validated(Study, middle, places, natural_value=partial(natural_value, sections))
@@ -304,6 +307,8 @@ def _build(document: dict[str, Any], places: Places) -> Study:
             raise StudyError(rule, name, places.of(("response-scene", name)))
     held_out = [condition.name for condition in study.conditions if condition.held_out]
     target, responses = study.target_section, study.response_sections
+    titles = [section.title for section in (*([target] if target else []), *responses)]
+    check_factor_names(names, places, study.scenes.values(), titles)
     study._target = build_target(target, responses, study.scenes, held_out, places)
     return study
 

@@ -27,7 +27,10 @@ UNITS: dict[str, dict[str, float]] = {
 }
 """Size of each unit in the base unit of its dimension (SI; degrees for angles)."""
 
-_TEXT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\S.*?)?\s*")
+_TEXT = re.compile(r"([+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*)")
+
+LONGEST = 100
+"""Characters of the longest text that is read as a quantity."""
 
 
 @dataclass(frozen=True)
@@ -49,9 +52,9 @@ class Quantity:
         if isinstance(value, cls):
             quantity = value
         elif isinstance(value, (int, float)) and not isinstance(value, bool):
-            quantity = cls(float(value))
-        elif isinstance(value, str) and (match := _TEXT.fullmatch(value)):
-            quantity = cls(float(match[1]), match[2] or "")
+            quantity = cls(_float(value))
+        elif isinstance(value, str) and len(value) <= LONGEST and (match := _TEXT.fullmatch(value.strip())):
+            quantity = cls(float(match[1]), match[2])
         else:
             raise ValueError('must be a number, or text with a number and its unit such as "110 mm"')
         if not math.isfinite(quantity.number):
@@ -78,6 +81,14 @@ class Quantity:
         # Dividing by a whole number gives the float nearest to 28 mm in metres; multiplying by 1e-3 may not.
         inverse = round(1.0 / size) if size < 1.0 else 1
         return self.number / inverse if math.isclose(inverse * size, 1.0) else self.number * size
+
+
+def _float(value: float) -> float:
+    """Return a number as a float; an integer beyond all floats is infinite."""
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf
 
 
 def dimension_of_unit(unit: str) -> str:

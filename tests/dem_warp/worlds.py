@@ -312,11 +312,10 @@ def run_batch(cases: Sequence[Case]) -> dict[int, CaseResult]:
 
 
 def assert_measured_as_told(case: Case, result: CaseResult, absent: frozenset[str] = frozenset()) -> None:
-    """A result has every observable that its scene tells of, but for some, and no other; none was late."""
+    """A result has every observable that its scene tells of, but for some, and no other."""
     told = set(case.scene.observables)
-    assert set(result.observables) == (told - absent) | {"rebuilds", "late_rebuilds"}
+    assert set(result.observables) == (told - absent) | {"rebuilds"}
     assert absent <= told
-    assert result.observables["late_rebuilds"] == 0
 
 
 def ball_case(scene: Scene, friction: float, rolling: float = 0.0, seed: int = 1) -> Case:
