@@ -37,7 +37,7 @@ from experiments.commands.options import (
     Workers,
     assignments,
 )
-from experiments.commands.results import print_measured, show_stage
+from experiments.commands.results import print_measured, print_study, show_stage
 
 app = typer.Typer(
     name="dem-warp",
@@ -101,7 +101,7 @@ def calibrate(
         paper_replicates=paper_replicates if follow_paper or only_paper else None, json=as_json,
     )  # fmt: skip
     with clear_errors(go_on):
-        messages.print(f"{chosen.name}, on {device}", chosen.note, sep="\n")
+        print_study(chosen, device)
         ended = api.calibrate(
             chosen,
             folder,
@@ -165,7 +165,7 @@ def discover(
         device=device, workers=workers, seed=seed, engine=engine, json=as_json,
     )  # fmt: skip
     with clear_errors(go_on):
-        messages.print(f"{chosen.name}, on {device}", chosen.note, sep="\n")
+        print_study(chosen, device)
         ended = api.discover(
             chosen,
             measured,
@@ -196,7 +196,8 @@ def heap(
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of sizes, places and orientations.")] = 1,
     scene: Annotated[
-        str | None, typer.Option(metavar="NAME", help="A further scene of the study, [response-scene.NAME].")
+        str | None,
+        typer.Option(metavar="NAME", help="A further scene of the study, \\[response-scene.NAME]."),
     ] = None,
     out: Out = None,
     scale: Scale = None,

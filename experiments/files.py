@@ -30,13 +30,13 @@ def replacing(path: Path) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
-def read_file(path: Path, largest: int) -> bytes:
-    """Read a file that may come from anyone.
+def check_file(path: Path, largest: int) -> None:
+    """Refuse a file, which may come from anyone, before it is opened.
 
     Raises
     ------
     OSError
-        When it cannot be read.
+        When there is none.
     InputError
         When it is no regular file, a pipe or a device for one, or has more bytes than the largest.
     """
@@ -45,6 +45,19 @@ def read_file(path: Path, largest: int) -> bytes:
         raise InputError("must be a regular file", "a pipe, a device or a folder", str(path))
     if facts.st_size > largest:
         raise InputError(f"must have at most {largest:,} bytes", f"{facts.st_size:,}", str(path))
+
+
+def read_file(path: Path, largest: int) -> bytes:
+    """Read a file that `check_file` lets pass.
+
+    Raises
+    ------
+    OSError
+        When it cannot be read.
+    InputError
+        When it is none that is read.
+    """
+    check_file(path, largest)
     with path.open("rb") as file:
         return file.read(largest)
 

@@ -10,10 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from experiments.errors import InputError, StudyError
-from experiments.files import read_file
-
-LARGEST = 10_000_000
-"""Bytes of the largest TOML file that is read."""
+from experiments.texts import read_text
 
 DEEPEST = 20
 """Levels of tables and lists in each other that a file may have."""
@@ -31,7 +28,7 @@ def read_toml(path: Path, what: str = "the study") -> tuple[str, dict[str, Any]]
         When it cannot be read, or is no TOML.
     """
     try:
-        text = read_file(path, LARGEST).decode("utf-8").replace("\r\n", "\n")
+        text = read_text(path).replace("\r\n", "\n")
         document = tomllib.loads(text)
         _check(document)
         return text, document
@@ -43,15 +40,11 @@ def read_toml(path: Path, what: str = "the study") -> tuple[str, dict[str, Any]]
         raise StudyError(f"must be valid TOML: {error}", shown, f"{path}:{number}") from None
     except RecursionError:
         raise StudyError("must be TOML of a few levels", "a table far deeper", str(path)) from None
-    except UnicodeDecodeError:
-        raise StudyError("must be a text file in UTF-8", "other bytes", str(path)) from None
     except InputError as error:
-        raise StudyError(error.rule, error.value, error.place) from None
+        raise StudyError(f"{what} {error.rule}", error.value, error.place) from None
     except ValueError as error:
         # an integer of thousands of digits, for one
         raise StudyError("must be valid TOML", str(error), str(path)) from None
-    except OSError as error:
-        raise StudyError(f"{what} must be a readable file", error.strerror or "none", str(path)) from None
 
 
 def _check(document: Mapping[str, Any]) -> None:

@@ -15,8 +15,8 @@ ROOT = Path(__file__).resolve().parents[1]
 # imports them.
 ROOMS = (
     "errors", "files", "texts", "toml_files", "studyfile.units", "sphere_files", "export",
-    "measurement.observables", "studyfile", "measurement", "cases", "calibrate", "discover", "report", "runs", "bridge", "api",
-    "commands", "cli", "studies", "verification", "benchmarks", "trials",
+    "measurement.observables", "studyfile", "measurement", "cases", "calibrate", "discover", "report",
+    "runs", "bridge", "api", "commands", "cli", "studies", "verification", "benchmarks", "trials",
 )  # fmt: skip
 
 # Of `doe.discrepancy`, the folders in the order of use.

@@ -179,7 +179,7 @@ class CaseProgress:
         self._first: BatchProgress | None = None
         self._bar = Progress(
             SpinnerColumn(),
-            TextColumn("{task.description}"),
+            TextColumn("{task.description}", markup=False),
             BarColumn(bar_width=16),
             TextColumn("{task.percentage:3.0f} %  {task.fields[state]}"),
             console=messages,

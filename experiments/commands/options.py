@@ -57,3 +57,17 @@ def quantity(text: str, dimension: str, option: str) -> float:
         return Quantity.parse(text).to_base(dimension)
     except ValueError as error:
         raise InputError(str(error), text, option) from None
+
+
+def share(text: str, option: str) -> float:
+    """Read a share between 0 and 1, as ``5%`` or ``0.05``."""
+    from experiments.errors import InputError
+
+    words = text.strip()
+    try:
+        value = float(words.removesuffix("%")) / (100.0 if words.endswith("%") else 1.0)
+    except ValueError:
+        value = 0.0
+    if not 0.0 < value < 1.0:
+        raise InputError("must be a share above 0 and below 1, as 5% or 0.05", text, option)
+    return value

@@ -150,7 +150,9 @@ def measure_pictures(
         except (PictureError, InputError) as error:
             row["reason"] = str(error) if str(picture) in str(error) else f"{picture}: {error}"
         except MemoryError:
-            row["reason"] = f"{picture}: the picture fits into memory; received one that does not"
+            row["reason"] = (
+                f"{picture}: expected: a picture that fits into memory; received one that does not"
+            )
         except Exception as error:
             task = "drawing" if row["mean"] is not None else "measuring"
             row["reason"] = f"{picture}: {task} failed: {type(error).__name__}: {error}"

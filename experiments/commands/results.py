@@ -15,12 +15,21 @@ from experiments.commands.console import messages, plain
 if TYPE_CHECKING:
     from experiments.calibrate.results import StageResult
     from experiments.cases import Heap
+    from experiments.commands.clump_search import Trial
+    from experiments.studyfile import Study
 
 
 def show_stage(name: str, result: StageResult) -> None:
     """Show what a stage decided, as it ends."""
     for decision in result.decisions:
         messages.print(f"{name.replace('_', ' ')}: {decision.outcome}")
+
+
+def print_study(study: Study, device: str) -> None:
+    """Say which study runs where, and what is doubtful about it."""
+    messages.print(f"{study.name}, on {device}", study.note, sep="\n")
+    if narrow := study.narrowness():
+        messages.print(f"Doubtful: {narrow}")
 
 
 def print_clump(facts: Mapping[str, Any]) -> None:
@@ -33,6 +42,21 @@ def print_clump(facts: Mapping[str, Any]) -> None:
         typer.echo(f"mass {facts['mass_mg']:.4f} mg")
     if facts["coverage"] is not None:
         typer.echo(f"covers {facts['coverage']:.1%} of the solid, passes it by {facts['overshoot']:.1%}")
+        typer.echo(_quality(facts["trials"][-1]))
+
+
+def print_trial(trial: Trial) -> None:
+    """Show a number of spheres as it was tried."""
+    messages.print(f"{trial.spheres:3d} spheres: {_quality(trial.to_dict())}")
+
+
+def _quality(trial: Mapping[str, Any]) -> str:
+    """Errors of a clump, against its solid."""
+    return (
+        f"volume {trial['volume_error']:+.1%}, inertia {trial['inertia_error']:.1%} off, surface "
+        f"{trial['surface_distance_mm']:.3f} mm ({trial['surface_error']:.1%}) off, "
+        f"protrusion {trial['protrusion_mm']:.3f} mm"
+    )
 
 
 def print_measured(simulated: Heap) -> None:
@@ -58,7 +82,8 @@ def print_angles(rows: Sequence[Mapping[str, Any]], fit: str) -> None:
             doubts = ", ".join(doubt.partition(":")[0] for doubt in row["doubts"])
             table.add_row(Text(plain(row["picture"])), *values, doubts)
     if table.row_count:
-        Console().print(table)
+        # Names of files may have brackets, which are no markup.
+        Console(markup=False).print(table)
 
 
 def print_findings(rows: Sequence[Mapping[str, Any]]) -> None:

@@ -17,6 +17,7 @@ from dem_warp.laws.contact_law import check_forms
 from dem_warp.population import FRACTION_TOLERANCE, size_of_mean_mass
 from experiments.studyfile.generated import section_for
 from experiments.studyfile.mechanisms import MechanismsSection, mechanisms_section
+from experiments.studyfile.proportions import narrowness
 from experiments.studyfile.scene_sections import SceneSection, scene_section
 from experiments.studyfile.schema import Density, Generated, Length, Number, Pressure, Section, nested_error
 from experiments.studyfile.solver_section import SolverSection
@@ -217,6 +218,19 @@ class Physics(Section):
                 at = {"type": "value_error", "loc": ("solver", "laws"), "msg": str(error)}
                 raise nested_error([at]) from None
         return self
+
+    @model_validator(mode="after")
+    def _container_holds_grains(self) -> Self:
+        try:
+            self.narrowness()
+        except ValueError as error:
+            raise nested_error([{"loc": ("scene",), "type": "value_error", "msg": str(error)}]) from None
+        return self
+
+    def narrowness(self) -> str:
+        """Say that the container is narrow for its grains; empty where it is not."""
+        scene = self.scene.scene(self.wall.material())
+        return narrowness(getattr(scene, "diameter", None), self.grain.shape(), self.grain.size_mean)
 
     def build_case(self, seed: int) -> Case:
         """Build one case of the engine."""

@@ -27,6 +27,9 @@ UNITS: dict[str, dict[str, float]] = {
 }
 """Size of each unit in the base unit of its dimension (SI; degrees for angles)."""
 
+_SPELLINGS = str.maketrans({"²": "^2", "³": "^3", "µ": "u", "μ": "u", "°": "deg", "−": "-"})
+_POWER = re.compile(r"\b([a-z]*m)(?:\*\*)?([23])\b")
+_COMMA = re.compile(r"[+-]?\d+,\d+(?:[eE][+-]?\d+)?(?:\s+\S.*|[^\s\d].*)?")
 _TEXT = re.compile(r"([+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*)")
 
 LONGEST = 100
@@ -53,8 +56,10 @@ class Quantity:
             quantity = value
         elif isinstance(value, (int, float)) and not isinstance(value, bool):
             quantity = cls(_float(value))
-        elif isinstance(value, str) and len(value) <= LONGEST and (match := _TEXT.fullmatch(value.strip())):
-            quantity = cls(float(match[1]), match[2])
+        elif (text := _spelled(value)) and _COMMA.fullmatch(text):
+            raise ValueError(f'must have a decimal point, not a comma: "{text.replace(",", ".", 1)}"')
+        elif text and (match := _TEXT.fullmatch(text)):
+            quantity = cls(float(match[1]), _POWER.sub(r"\1^\2", match[2]))
         else:
             raise ValueError('must be a number, or text with a number and its unit such as "110 mm"')
         if not math.isfinite(quantity.number):
@@ -122,3 +127,8 @@ def unit_size(unit: str, dimension: str) -> float:
         example = f'"1.5 {next(iter(known))}"'
         raise ValueError(f"needs a unit of {dimension} ({', '.join(known)}), for example {example}")
     return known[unit]
+
+
+def _spelled(value: object) -> str:
+    """Return the text of a quantity in plain characters; empty where it cannot be one."""
+    return value.strip().translate(_SPELLINGS) if isinstance(value, str) and len(value) <= LONGEST else ""

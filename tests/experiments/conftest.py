@@ -28,56 +28,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         items[:] = [item for item in items if item not in missing]
 
 
-SMALL_STUDY = """
-name = "Small"
-
-[grain]
-sphere = "2 mm"
-density = "700 kg/m^3"
-shear_modulus = "10 MPa"
-poisson_ratio = 0.25
-
-[wall]
-density = "7800 kg/m^3"
-shear_modulus = "70 GPa"
-poisson_ratio = 0.3
-
-[contact.grain-grain]
-restitution = 0.2
-rolling_friction = 0.05
-
-[contact.grain-wall]
-restitution = 0.5
-static_friction = 0.4
-rolling_friction = 0.05
-
-[scene.lifted-cylinder]
-diameter = "28 mm"
-height = "28 mm"
-grain_count = 30
-
-[numerics]
-modulus_scale = 400.0
-
-[measurement]
-azimuths = 2
-pixels = 200
-
-[target]
-mean = "30 deg"
-sd = "0.5 deg"
-n = 5
-
-[[factor]]
-name = "E"
-label = "grain-grain static friction"
-parameter = "contact.grain-grain.static_friction"
-low = 0.2
-high = 0.6
-
-[scale.stiff]
-numerics.modulus_scale = 1.0
-"""
+SMALL_STUDY = Path(__file__).with_name("small.toml").read_text(encoding="utf-8")
 
 
 @pytest.fixture(scope="session")
