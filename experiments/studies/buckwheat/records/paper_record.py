@@ -30,7 +30,7 @@ from experiments.studies.buckwheat.records.paper_page import (
     SENSITIVITIES,
     write_record_page,
 )
-from experiments.studies.buckwheat.sensitivity.sensitivities import SETTINGS
+from experiments.studies.buckwheat.sensitivity.folder import SETTINGS
 from experiments.studies.buckwheat.sensitivity.variants import variants
 
 FOLDER = Path(paper.__file__).with_name(RECORD)
