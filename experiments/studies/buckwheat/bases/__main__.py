@@ -17,7 +17,7 @@ from typing import Annotated
 import typer
 
 from experiments.report.kit.markdown import markdown_table
-from experiments.studies.buckwheat.bases.choice import BaseChoice
+from experiments.studies.buckwheat.bases.choice import BaseChoice, written
 from experiments.studies.buckwheat.bases.choice_tables import choice_tables
 from experiments.studies.buckwheat.bases.grid import chosen_bases
 from experiments.studies.buckwheat.bases.simulation import Folder, measure_bases, simulate_bases
@@ -61,7 +61,9 @@ def choose_command(out: Out = Path("out/bases")) -> None:
     """Choose a base and an estimator by leaving tables out, and say how it does there."""
     found = BaseChoice.read(out)
     if found is None:
-        print("nothing to choose from yet: no base was simulated and measured")
+        print(
+            f"nothing to choose from: {written().base.name} is missing, not measured, or lacks a run's angle"
+        )
         return
     for table in choice_tables(found).values():
         print(markdown_table(table))
