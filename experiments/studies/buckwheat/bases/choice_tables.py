@@ -47,6 +47,7 @@ def candidates_table(found: BaseChoice) -> Table:
         f"noise taken out; bold: the least. It holds the noise of the paper's angles, one of which varies by "
         f"{fixed(low, 2)}° (its composite centre) or {fixed(high, 2)}° (its verification). A perfect model "
         f"would show a mean Spearman of {fixed(best.spearman_ceiling.value, 2)} through the noise of both."
+        f"{_spoilt(found)}"
     )
     return make_table("base-candidates", frame, shown, "The candidates that come nearest.", note, marks)
 
@@ -91,6 +92,13 @@ def shares_table(found: BaseChoice) -> Table:
 
 def _places(stages: tuple[str, ...]) -> str:
     return ", ".join(TABLES[stage] for stage in stages)
+
+
+def _spoilt(found: BaseChoice) -> str:
+    if not found.spoilt:
+        return ""
+    names = dict.fromkeys(name.rpartition("-")[0] for name in found.spoilt)
+    return f" Without the angle of a run in some reading, and so no candidates there: {', '.join(names)}."
 
 
 def _how(found: BaseChoice) -> str:
