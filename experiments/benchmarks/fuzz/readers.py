@@ -32,7 +32,7 @@ from dem_warp.solids import read_mesh
 from doe import DesignError
 from doe.discrepancy import Bank, MechanismRange, SearchSpace, load_bank
 from experiments.cases import Store
-from experiments.commands.shapes import make_clump
+from experiments.commands.shapes import ClumpRequest, make_clump
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.errors import InputError
 from experiments.measurement.measured_file import read_measured
@@ -103,7 +103,7 @@ def measured(folder: Path) -> Reader:
 
 def clump(folder: Path) -> Reader:
     """Files of spheres."""
-    return Reader(_corpus("clump.txt"), lambda path: make_clump(str(path)))
+    return Reader(_corpus("clump.txt"), lambda path: make_clump(ClumpRequest(str(path))))
 
 
 def mesh(folder: Path) -> Reader:
