@@ -49,13 +49,20 @@ def study_page() -> str:
 
 def commands_page() -> str:
     """Every command with its arguments and options."""
-    parts = ["# The command line", "Every command has `--help`. Exit codes: 0 done, 2 bad input, 3 a run that failed."]
+    parts = [
+        "# The command line",
+        "Every command has `--help`. Exit codes: 0 done, 2 bad input, 3 a run that failed.",
+    ]
     group = get_command(app)
     context = typer.Context(group, info_name="dem-warp")
     for name in group.list_commands(context):
         command = group.get_command(context, name)
         inner = typer.Context(command, info_name=name, parent=context)
-        parts += [f"## dem-warp {name}", command.help or "", f"`{command.get_usage(inner).removeprefix('Usage: ')}`"]
+        parts += [
+            f"## dem-warp {name}",
+            command.help or "",
+            f"`{command.get_usage(inner).removeprefix('Usage: ')}`",
+        ]
         rows = []
         for parameter in command.get_params(inner):
             record = parameter.get_help_record(inner)
@@ -68,7 +75,13 @@ def commands_page() -> str:
 def observables_page() -> str:
     """Numbers that a test yields."""
     rows = [
-        (f"`{each.alias or each.name}`", each.title, each.unit, each.instrument.value if each.instrument else "", each.definition)
+        (
+            f"`{each.alias or each.name}`",
+            each.title,
+            each.unit,
+            each.instrument.value if each.instrument else "",
+            each.definition,
+        )
         for each in OBSERVABLES
     ]
     return "\n\n".join(
@@ -84,5 +97,9 @@ def observables_page() -> str:
 def write_pages(folder: Path) -> None:
     """Write the pages into a folder."""
     folder.mkdir(exist_ok=True)
-    for name, text in {"study": study_page, "commands": commands_page, "observables": observables_page}.items():
+    for name, text in {
+        "study": study_page,
+        "commands": commands_page,
+        "observables": observables_page,
+    }.items():
         (folder / f"{name}.md").write_text(text() + "\n", encoding="utf-8")

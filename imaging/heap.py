@@ -142,7 +142,7 @@ def heap_angle(
         a measurable heap.
     """
     settings = FitSettings.of(fit)
-    grains = len(radii) if grain_count is None else grain_count
+    grains = np.size(radii) if grain_count is None else grain_count
     if grains < LEAST_GRAINS:
         raise PictureError(f"a heap has at least {LEAST_GRAINS} grains", grains, "heap")
     return heap_outlines(centers, radii, azimuths, pixels, backend).angle(settings)
