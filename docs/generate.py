@@ -1,4 +1,4 @@
-"""Reference pages, made from the program itself: the study file, the command line, laws, observables, effects."""
+"""Reference pages, made from the program itself: the study file, the command line, observables."""
 
 from __future__ import annotations
 
@@ -49,10 +49,8 @@ def study_page() -> str:
 
 def commands_page() -> str:
     """Every command with its arguments and options."""
-    parts = [
-        "# The command line",
-        "Every command has `--help`. Exit codes: 0 done, 2 bad input, 3 a run that failed.",
-    ]
+    codes = "0 done, 1 a run that failed, 2 bad input, 130 interrupted, 143 ended by a scheduler"
+    parts = ["# The command line", f"Every command has `--help`. Exit codes: {codes}."]
     group = get_command(app)
     context = typer.Context(group, info_name="dem-warp")
     for name in group.list_commands(context):
@@ -87,8 +85,8 @@ def observables_page() -> str:
     return "\n\n".join(
         [
             "# Observables",
-            "An observable is a number that a test yields. A study's target and responses name them, and so does a "
-            "file of measured heaps. The same definition holds for a picture, a balance and a simulated state.",
+            "An observable is a number that a test yields. A study's target and responses name them, and so "
+            "does a file of measured heaps. One definition holds for a picture, a balance and a simulated state.",
             markdown_table(("name", "meaning", "unit", "instrument", "definition"), rows),
         ]
     )
