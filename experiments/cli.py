@@ -7,18 +7,29 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from experiments.commands.angle import ANGLE_EXAMPLE, angle
+from experiments.commands.bridge import BRIDGE_EXAMPLE, bridge
 from experiments.commands.clump import CLUMP_EXAMPLE, clump
-from experiments.commands.console import FAILED_RUN, CaseProgress, clear_errors, fail, messages
+from experiments.commands.console import (
+    FAILED_RUN,
+    Attempt,
+    CaseProgress,
+    clear_errors,
+    fail,
+    messages,
+)
+from experiments.commands.early import check_study_file
+from experiments.commands.export import EXPORT_EXAMPLE, export
 from experiments.commands.new import NEW_EXAMPLE, new
 from experiments.commands.options import (
     AsJson,
     Device,
     Devices,
+    EngineName,
     Out,
     Resume,
     Scale,
@@ -27,9 +38,6 @@ from experiments.commands.options import (
     assignments,
 )
 from experiments.commands.results import print_measured, print_study, show_stage
-
-if TYPE_CHECKING:
-    pass
 
 app = typer.Typer(
     name="dem-warp",
@@ -67,10 +75,7 @@ def calibrate(
     scale: Scale = None,
     device: Device = None,
     workers: Workers = None,
-    engine: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", help="Engine of an installed package. Left out: dem-warp's own."),
-    ] = None,
+    engine: EngineName = None,
     resume: Resume = False,
     follow_paper: Annotated[
         bool, typer.Option("--follow-paper", help="Simulate the paper's own runs too, and set them beside.")
@@ -83,18 +88,19 @@ def calibrate(
 ) -> None:
     """Run a whole calibration: noise floor, screening, climb, surface, optimum, verification, report."""
     with clear_errors():
+        check_study_file(study, scale)
         from experiments import api
         from experiments.runs.choices import chosen_device, chosen_study, default_folder
 
         device = chosen_device(device)
         chosen = chosen_study(study, scale, device)
         folder = out or default_folder(chosen)
-    go_on = _go_on(
-        "calibrate", study, out=folder, scale=chosen.scale, device=device, engine=engine,
+    go_on = Attempt.of(
+        "calibrate", study, out=folder, scale=chosen.scale, device=device, workers=workers, engine=engine,
         follow_paper=follow_paper, only_paper=only_paper,
-        paper_replicates=paper_replicates if follow_paper or only_paper else None,
+        paper_replicates=paper_replicates if follow_paper or only_paper else None, json=as_json,
     )  # fmt: skip
-    with clear_errors(resume=go_on):
+    with clear_errors(go_on):
         print_study(chosen, device)
         ended = api.calibrate(
             chosen,
@@ -140,11 +146,13 @@ def discover(
     scale: Scale = None,
     device: Devices = None,
     workers: Workers = None,
+    engine: EngineName = None,
     resume: Resume = False,
     as_json: AsJson = False,
 ) -> None:
     """Find the effect that a model lacks: calibrate, test the gap, name what explains it, show it closed."""
     with clear_errors():
+        check_study_file(study, scale)
         from experiments import api
         from experiments.report.discovery import results_of, verdict_line
         from experiments.runs.choices import chosen_device, chosen_study, default_folder
@@ -152,11 +160,11 @@ def discover(
         device = chosen_device(device, several=True)
         chosen = chosen_study(study, scale, device)
         folder = out or default_folder(chosen, "discover")
-    go_on = _go_on(
+    go_on = Attempt.of(
         "discover", study, measured, out=folder, bank=bank, photographs_only=photographs_only, scale=scale,
-        device=device, seed=seed,
+        device=device, workers=workers, seed=seed, engine=engine, json=as_json,
     )  # fmt: skip
-    with clear_errors(resume=go_on):
+    with clear_errors(go_on):
         print_study(chosen, device)
         ended = api.discover(
             chosen,
@@ -167,6 +175,7 @@ def discover(
             seed=seed,
             device=device,
             workers=workers,
+            engine=engine,
             resume=resume,
             watch=CaseProgress,
         )
@@ -193,6 +202,7 @@ def heap(
     out: Out = None,
     scale: Scale = None,
     device: Device = None,
+    engine: EngineName = None,
     as_json: AsJson = False,
 ) -> None:
     """Simulate one heap: heap.vtp (ParaView), snapshot.png with the fitted flanks, angle.json.
@@ -201,12 +211,13 @@ def heap(
     --scene with a further scene of the study.
     """
     with clear_errors():
-        from experiments.cases import require_unused, simulate_heap, write_heap
+        check_study_file(study, scale)
+        from experiments.cases import require_unused, simulate_heap, with_engine, write_heap
         from experiments.runs.choices import chosen_device, chosen_study, default_folder
         from experiments.studyfile.campaign import TARGET_SCENE
 
         device = chosen_device(device)
-        chosen = chosen_study(study, scale, device)
+        chosen = with_engine(chosen_study(study, scale, device), engine)
         values = chosen.natural_settings(assignments(settings or []), "--set")
         folder = out or default_folder(chosen, f"{scene or 'heap'}-{seed}")
         require_unused(folder)
@@ -225,17 +236,10 @@ def heap(
 app.command(epilog=ANGLE_EXAMPLE)(angle)
 app.command(epilog=CLUMP_EXAMPLE)(clump)
 app.command(epilog=NEW_EXAMPLE)(new)
+app.command(epilog=EXPORT_EXAMPLE)(export)
+app.command(epilog=BRIDGE_EXAMPLE)(bridge)
 
 
 def main() -> None:
     """Run the command line."""
     app()
-
-
-def _go_on(command: str, *files: Path | None, **options: object) -> str:
-    """Command that goes on where this one was interrupted; options that were not given are left out."""
-    words = ["dem-warp", command, *(str(file) for file in files if file)]
-    for name, value in options.items():
-        if value is not None and value is not False:
-            words += [f"--{name.replace('_', '-')}", *([] if value is True else [str(value)])]
-    return " ".join([*words, "--resume"])

@@ -7,6 +7,10 @@ import re
 from pathlib import Path
 
 from experiments.errors import InputError
+from experiments.files import read_file
+
+LARGEST = 10_000_000
+"""Bytes of the largest text file that is read."""
 
 _MARKS = {
     codecs.BOM_UTF32_LE: "UTF-32", codecs.BOM_UTF32_BE: "UTF-32",
@@ -19,16 +23,16 @@ DELIMITERS = (";", "\t", None, ",")
 """Delimiters of a table, in the order in which they are tried; None: blanks."""
 
 
-def read_text(path: Path) -> str:
-    """Read a text file in UTF-8; a byte-order mark is left out.
+def read_text(path: Path, largest: int = LARGEST) -> str:
+    """Read a text file in UTF-8 of at most so many bytes; a byte-order mark is left out.
 
     Raises
     ------
     InputError
-        When there is no such file, or it is not text in UTF-8; UTF-16 is named.
+        When there is no such file, it is too large, or it is not text in UTF-8; UTF-16 is named.
     """
     try:
-        data = path.read_bytes()
+        data = read_file(path, largest)
     except OSError as error:
         raise InputError("must be a readable file", error.strerror or str(error), str(path)) from None
     return decoded(data, str(path))

@@ -12,6 +12,7 @@ from imaging.errors import PictureError
 from imaging.finding import find_outline
 from imaging.flanks import FitSettings
 from imaging.geometry import FloatArray, Frame, Spheres
+from imaging.outline import Outline
 from imaging.render import silhouette
 from imaging.repose import ReposeAngle, confidence_interval, measure
 
@@ -42,6 +43,67 @@ class HeapAngle:
     def interval(self, level: float = 0.95) -> tuple[float, float]:
         """Confidence interval of the mean [degrees]."""
         return confidence_interval(self, level)
+
+
+@dataclass(frozen=True)
+class HeapOutlines:
+    """Outlines of one simulated heap from several azimuths, for lines through several parts of its flanks."""
+
+    azimuths: tuple[float, ...]
+    """Directions that it was drawn from [rad]."""
+    outlines: tuple[Outline | PictureError, ...]
+    """Its outline from each, or the reason that there is none."""
+
+    def angle(self, fit: str | FitSettings = "flank") -> HeapAngle:
+        """Repose angle with lines through the part of the flanks that `fit` names.
+
+        Raises
+        ------
+        PictureError
+            When there is no such fit, or when fewer than two azimuths show a measurable heap.
+        """
+        settings = FitSettings.of(fit)
+        views, seen, rejections = [], [], []
+        for azimuth, outline in zip(self.azimuths, self.outlines, strict=True):
+            try:
+                if isinstance(outline, PictureError):
+                    raise outline
+                views.append(measure(outline, settings, _place(azimuth)))
+                seen.append(azimuth)
+            except PictureError as error:
+                rejections.append(str(error))
+        if len(views) < 2:
+            raise PictureError("at least two views show a measurable heap", "; ".join(rejections), "heap")
+        se, dof = _heap_error(views)
+        return HeapAngle(
+            mean=float(np.mean([view.mean for view in views])),
+            se=se,
+            dof=dof,
+            views=tuple(views),
+            azimuths=tuple(seen),
+            rejections=tuple(rejections),
+            fit=settings,
+        )
+
+
+def heap_outlines(
+    centers: ArrayLike,
+    radii: ArrayLike,
+    azimuths: int | Sequence[float] = 8,
+    pixels: int = 800,
+    backend: str = "raster",
+) -> HeapOutlines:
+    """Draw a heap of spheres on the plate z = 0 and find its outlines; the arguments are `heap_angle`'s."""
+    frame = Frame.around(Spheres.of(centers, radii), pixels)
+    directions = tuple(float(azimuth) for azimuth in _directions(azimuths))
+    found: list[Outline | PictureError] = []
+    for azimuth in directions:
+        drawn = silhouette(centers, radii, azimuth, backend=backend, frame=frame)
+        try:
+            found.append(find_outline(drawn.image, drawn.ground_row, drawn.meters_per_pixel, _place(azimuth)))
+        except PictureError as error:
+            found.append(error)
+    return HeapOutlines(directions, tuple(found))
 
 
 def heap_angle(
@@ -80,33 +142,14 @@ def heap_angle(
         a measurable heap.
     """
     settings = FitSettings.of(fit)
-    spheres = Spheres.of(centers, radii)
-    grains = len(spheres.radii) if grain_count is None else grain_count
+    grains = np.size(radii) if grain_count is None else grain_count
     if grains < LEAST_GRAINS:
         raise PictureError(f"a heap has at least {LEAST_GRAINS} grains", grains, "heap")
-    frame = Frame.around(spheres, pixels)
-    views, seen, rejections = [], [], []
-    for azimuth in _directions(azimuths):
-        snapshot = silhouette(centers, radii, float(azimuth), backend=backend, frame=frame)
-        place = f"view at {np.degrees(azimuth):.1f} degrees"
-        try:
-            outline = find_outline(snapshot.image, snapshot.ground_row, snapshot.meters_per_pixel, place)
-            views.append(measure(outline, settings, place))
-            seen.append(float(azimuth))
-        except PictureError as error:
-            rejections.append(str(error))
-    if len(views) < 2:
-        raise PictureError("at least two views show a measurable heap", "; ".join(rejections), "heap")
-    se, dof = _heap_error(views)
-    return HeapAngle(
-        mean=float(np.mean([view.mean for view in views])),
-        se=se,
-        dof=dof,
-        views=tuple(views),
-        azimuths=tuple(seen),
-        rejections=tuple(rejections),
-        fit=settings,
-    )
+    return heap_outlines(centers, radii, azimuths, pixels, backend).angle(settings)
+
+
+def _place(azimuth: float) -> str:
+    return f"view at {np.degrees(azimuth):.1f} degrees"
 
 
 def _directions(azimuths: int | Sequence[float]) -> FloatArray:

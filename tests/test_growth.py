@@ -19,7 +19,7 @@ EVIDENCE = shutil.ignore_patterns(
 )
 
 EXPORTER = """
-from experiments.export.contact import Exporter
+from experiments.export.exporter import Exporter
 
 MAGNETS = Exporter("Magnets", "none", "in all", lambda material: (), lambda contact: ())
 """
@@ -67,7 +67,7 @@ ADDITIONS = {
         "", "", "", "\nOBSERVABLES = (",
         'Observable("spread", "spread", "m", "its width", Instrument.RULER), ',
     ),
-    "exporter": Addition("magnets", EXPORTER, "MAGNETS", "= {", '"magnets": MAGNETS, '),
+    "exporter": Addition("magnets", EXPORTER, "MAGNETS", "_ALL = {", '"magnets": MAGNETS, '),
     "format of spheres": Addition(
         "ball", FORMAT, "BALL", "FORMATS: tuple[Format, ...] = (", "BALL, "
     ),

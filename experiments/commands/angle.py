@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from experiments.commands.console import clear_errors, fail
+from experiments.commands.console import clear_errors, fail, plain
 from experiments.commands.options import AsJson
 from experiments.commands.results import print_angles, print_findings
 
@@ -82,7 +82,7 @@ def angle(
         if as_target:
             typer.echo(photographs.target_section(mean, fit), nl=False)
         elif as_csv:
-            typer.echo(photographs.csv_table(rows), nl=False)
+            typer.echo(plain(photographs.csv_table(rows)), nl=False)
         elif as_json:
             result = {"pictures": rows, "mean": mean.to_dict() if mean else None}
             typer.echo(json.dumps(result, allow_nan=False))

@@ -28,7 +28,9 @@ def clump(
             "Yade, EDEM or DEM-Engine, to be described.",
         ),
     ],
-    spheres: Annotated[int | None, typer.Option(min=1, help="Spheres to fill the solid with.")] = None,
+    spheres: Annotated[
+        int | None, typer.Option(min=1, max=256, help="Spheres to fill the solid with.")
+    ] = None,
     tolerance: Annotated[
         str | None,
         typer.Option(

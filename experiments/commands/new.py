@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from experiments.commands.console import clear_errors
+from experiments.commands.console import clear_errors, plain
 
 NEW_EXAMPLE = "Example: [bold]dem-warp new mygrain[/] writes mygrain.toml"
 
@@ -34,4 +34,5 @@ def new(
             from experiments.studyfile import write_template
 
             path, words = write_template(name), ["calibrate"]
-    typer.echo(f"Wrote {path}. Fill it in, then: {shlex.join(['dem-warp', *words, str(path)])}")
+    then = shlex.join(["dem-warp", *words, str(path)])
+    typer.echo(plain(f"Wrote {path}. Fill it in, then: {then}"))

@@ -26,6 +26,12 @@ Devices = Annotated[
     ),
 ]
 Workers = Annotated[int | None, typer.Option(min=1, help="Processes on the CPU. Left out: one a core.")]
+EngineName = Annotated[
+    str | None,
+    typer.Option(
+        "--engine", metavar="NAME", help="Engine that simulates. Left out: the study's, or dem-warp's own."
+    ),
+]
 Out = Annotated[Path | None, typer.Option(help="Folder of the results, new or empty.")]
 Resume = Annotated[bool, typer.Option("--resume", help="Go on in the folder of an earlier run.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Write the result to standard output as JSON.")]

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 import typer
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
-from experiments.commands.console import messages
+from experiments.commands.console import messages, plain
 
 if TYPE_CHECKING:
     from experiments.calibrate.results import StageResult
@@ -79,7 +80,7 @@ def print_angles(rows: Sequence[Mapping[str, Any]], fit: str) -> None:
         if row["mean"] is not None:
             values = [f"{row[name]:.2f}" for name in ("left", "right", "mean", "se")]
             doubts = ", ".join(doubt.partition(":")[0] for doubt in row["doubts"])
-            table.add_row(row["picture"], *values, doubts)
+            table.add_row(Text(plain(row["picture"])), *values, doubts)
     if table.row_count:
         # Names of files may have brackets, which are no markup.
         Console(markup=False).print(table)

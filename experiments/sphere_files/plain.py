@@ -7,6 +7,7 @@ from pathlib import Path
 
 from experiments.errors import InputError
 from experiments.sphere_files.sphere_file import (
+    LARGEST,
     SPHERE_RULE,
     Columns,
     Format,
@@ -32,7 +33,7 @@ def _recognises(head: str) -> bool:
 
 
 def _read(path: Path) -> SphereFile:
-    text = read_text(path)
+    text = read_text(path, LARGEST)
     lines = content_lines(text)
     delimiter = delimiter_of(lines[0][1])
     rows = [(number, split(line, delimiter)) for number, line in lines]

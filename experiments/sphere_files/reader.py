@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from experiments.errors import InputError
+from experiments.files import check_file
 from experiments.sphere_files.library import FORMATS
-from experiments.sphere_files.sphere_file import Format, SphereFile
+from experiments.sphere_files.sphere_file import LARGEST, Format, SphereFile
 from experiments.texts import decoded
 
 HEAD = 65536
@@ -22,6 +23,7 @@ def format_of(path: Path) -> Format | None:
         When there is no such file, or it cannot be read.
     """
     try:
+        check_file(path, LARGEST)
         with path.open("rb") as file:
             data = file.read(HEAD)
     except OSError as error:

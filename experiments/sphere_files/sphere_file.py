@@ -14,6 +14,9 @@ from experiments.texts import is_number, number
 
 SPHERE_RULE = "a sphere is x y z r: four finite numbers, r > 0"
 
+LARGEST = 500_000_000
+"""Bytes of the largest file of spheres that is read: frames of a heap of millions."""
+
 
 @dataclass(frozen=True)
 class SphereFile:

@@ -14,7 +14,14 @@ from pathlib import Path
 import numpy as np
 
 from experiments.errors import InputError
-from experiments.sphere_files.sphere_file import Columns, Format, SphereFile, content_lines, spheres_of
+from experiments.sphere_files.sphere_file import (
+    LARGEST,
+    Columns,
+    Format,
+    SphereFile,
+    content_lines,
+    spheres_of,
+)
 from experiments.studyfile.units import UNITS
 from experiments.texts import read_text, split
 
@@ -61,7 +68,7 @@ def _looks_like_a_table(head: str) -> bool:
 
 
 def _read(path: Path) -> SphereFile:
-    text = read_text(path)
+    text = read_text(path, LARGEST)
     found = _find_header(text)
     if found is None:
         lines = content_lines(text)

@@ -12,7 +12,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from experiments.errors import InputError
-from experiments.sphere_files.sphere_file import Columns, Format, SphereFile, spheres_of
+from experiments.sphere_files.sphere_file import LARGEST, Columns, Format, SphereFile, spheres_of
 from experiments.sphere_files.table import column_kind
 from experiments.studyfile.units import UNITS
 from experiments.texts import read_text
@@ -25,7 +25,7 @@ def _recognises(head: str) -> bool:
 
 
 def _read(path: Path) -> SphereFile:
-    text = read_text(path)
+    text = read_text(path, LARGEST)
     if re.search(r"<!(?:DOCTYPE|ENTITY)", text):
         raise InputError("XML without a document type and entities", "one with them", str(path))
     try:

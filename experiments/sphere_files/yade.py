@@ -13,7 +13,14 @@ from pathlib import Path
 import numpy as np
 
 from experiments.errors import InputError
-from experiments.sphere_files.sphere_file import Columns, Format, SphereFile, content_lines, spheres_of
+from experiments.sphere_files.sphere_file import (
+    LARGEST,
+    Columns,
+    Format,
+    SphereFile,
+    content_lines,
+    spheres_of,
+)
 from experiments.texts import read_text
 
 _HEADER = "#format"
@@ -28,7 +35,7 @@ LAYOUTS = {
 
 
 def _read_text(path: Path) -> SphereFile:
-    text = read_text(path)
+    text = read_text(path, LARGEST)
     name = text.partition("\n")[0].removeprefix(_HEADER).strip()
     if name not in LAYOUTS:
         raise InputError(f"a format of Yade with spheres ({', '.join(LAYOUTS)})", name, f"{path}, line 1")

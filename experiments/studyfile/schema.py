@@ -77,6 +77,7 @@ Number = Annotated[float, Dimension("")]
 Length = Annotated[float, Dimension("length")]
 Pressure = Annotated[float, Dimension("pressure")]
 Density = Annotated[float, Dimension("density")]
+Time = Annotated[float, Dimension("time")]
 Angle = Annotated[float, Dimension("angle")]
 """A measured angle, in degrees."""
 RawQuantity = Annotated[Quantity, PlainValidator(Quantity.parse)]
@@ -108,6 +109,8 @@ class Generated:
 
     section: Callable[[], type[Section]]
     """Builds the section."""
+    name: str = ""
+    """Default of a field that takes a name as well as a section."""
 
     def read(self, value: object, info: ValidationInfo) -> Section:
         """Validate the section."""

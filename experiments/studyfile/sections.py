@@ -5,6 +5,7 @@ A field's type names its dimension; its bounds are the hard physical limits, for
 
 from __future__ import annotations
 
+import os
 from functools import lru_cache, partial
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -12,12 +13,14 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from dem_warp import Case, ClumpShape, GrainPopulation, Interaction, Material, Numerics, ShapeMixture
+from dem_warp.laws.contact_law import check_forms
 from dem_warp.population import FRACTION_TOLERANCE, size_of_mean_mass
 from experiments.studyfile.generated import section_for
 from experiments.studyfile.mechanisms import MechanismsSection, mechanisms_section
 from experiments.studyfile.proportions import narrowness
 from experiments.studyfile.scene_sections import SceneSection, scene_section
 from experiments.studyfile.schema import Density, Generated, Length, Number, Pressure, Section, nested_error
+from experiments.studyfile.solver_section import SolverSection
 
 
 class MaterialSection(Section):
@@ -52,7 +55,7 @@ class ShapeSection(Section):
         if clump is None:
             return None
         path = Path((info.context or {}).get("folder", ".")) / clump
-        if not path.is_file():
+        if not os.path.isfile(path):  # a name too long is none, and raises nothing
             raise ValueError(f"must name an existing clump file (looked for {path})")
         return path
 
@@ -198,6 +201,8 @@ class Physics(Section):
     """The physical test."""
     numerics: Annotated[Any, Generated(partial(section_for, Numerics))] = section_for(Numerics)()
     """Time step, softening, precision."""
+    solver: SolverSection = SolverSection()
+    """Conventions of the contact law."""
     mechanism: Annotated[MechanismsSection, Generated(mechanisms_section)] = Field(
         default_factory=lambda: mechanisms_section()()
     )
@@ -205,7 +210,13 @@ class Physics(Section):
 
     @model_validator(mode="after")
     def _mechanisms_are_physical(self) -> Self:
-        self.mechanism.mechanisms()
+        for kind in ("grains", "walls"):
+            own = (one for one in self.mechanism.mechanisms() if one.acts_between(kind))
+            try:
+                check_forms(tuple(type(one) for one in own), self.solver.laws.forms)
+            except ValueError as error:
+                at = {"type": "value_error", "loc": ("solver", "laws"), "msg": str(error)}
+                raise nested_error([at]) from None
         return self
 
     @model_validator(mode="after")
@@ -231,4 +242,5 @@ class Physics(Section):
             seed=seed,
             numerics=self.numerics.build(),
             mechanisms=self.mechanism.mechanisms(),
+            laws=self.solver.laws,
         )

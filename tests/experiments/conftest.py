@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -17,7 +18,23 @@ from experiments.studyfile import Study, load_study
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave out tests that run a program which is not installed: they do not count as skipped."""
+    programs = {item: [mark.args[0] for mark in item.iter_markers("program")] for item in items}
+    missing = [item for item, names in programs.items() if any(shutil.which(name) is None for name in names)]
+    if missing:
+        config.hook.pytest_deselected(items=missing)
+        items[:] = [item for item in items if item not in missing]
+
+
 SMALL_STUDY = Path(__file__).with_name("small.toml").read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="session")
+def small_text() -> str:
+    """Text of the small study."""
+    return SMALL_STUDY
 
 
 @pytest.fixture
