@@ -15,13 +15,14 @@ from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy import special, stats
+from scipy.stats import qmc
 
 from doe.two_errors import TwoErrors, located
 
 FloatArray = NDArray[np.float64]
 
-DRAWS, SEED = 10_000, 1
+DRAWS, SEED = 4096, 1
 """Of the bootstrap: a level of .05 is known to .002."""
 
 LEVELS = 7
@@ -106,11 +107,13 @@ class Simultaneous:
         _, values, basis = np.linalg.svd(slopes, full_matrices=False)
         basis = basis[values > 1e-9 * values[0]]
         inner, wanted = slopes @ basis.T, basis @ direction
-        difference, variances = self._drawn(first, *INTERVAL_TAILS)
-        error, variance = _estimated(inner, wanted, difference, variances.sum(axis=0))
-        reach = np.quantile(np.abs(error) / np.sqrt(variance), 1.0 - self.alpha)
-        _, found = _estimated(inner, wanted, np.zeros((1, len(first))), (first + self.second)[None])
-        return float(reach * np.sqrt(found[0]))
+        difference, own, other = self._drawn(first, *INTERVAL_TAILS)
+        row = _weights(inner, wanted, np.einsum("bii->bi", own) + other)
+        error = (row * difference).sum(axis=1)
+        reach = np.quantile(np.abs(error) / np.sqrt(_variance(row, own, other)), 1.0 - self.alpha)
+        found = np.sqrt(np.outer(first, first)) * self.correlation
+        row = _weights(inner, wanted, (first + self.second)[None])
+        return float(reach * np.sqrt(_variance(row, found[None], self.second[None])[0]))
 
     @property
     def _grid(self) -> FloatArray:
@@ -124,10 +127,10 @@ class Simultaneous:
         return size, np.array([self._log_level(first) for first in self.reference[place]])
 
     def _log_level(self, first: FloatArray) -> float:
-        difference, variances = self._drawn(first, 0.5, 0.5)
-        total = variances.sum(axis=0)
+        difference, own, other = self._drawn(first, 0.5, 0.5)
+        total = np.einsum("bii->bi", own) + other
         size = np.abs(difference) / np.sqrt(total)
-        lower, way = located(variances[1] / total)
+        lower, way = located(other / total)
 
         def alarms(level: float) -> float:
             found = np.zeros(len(size), dtype=bool)
@@ -146,26 +149,31 @@ class Simultaneous:
             found = min(found, float(np.log(self.alpha / len(self.errors))))
         return found
 
-    def _drawn(self, first: FloatArray, own_tail: float, other_tail: float) -> tuple[FloatArray, FloatArray]:
-        """Return drawn differences, shape (draws, differences), and both their estimated variances.
+    def _drawn(self, first: FloatArray, own_tail: float, other_tail: float) -> tuple[FloatArray, ...]:
+        """Return drawn differences, the covariances of their first errors and the variances of the second.
 
-        The true variances are those of which such an estimate is smaller with the probability of the tails.
+        Both as they would be estimated, shapes (draws, differences), (draws, differences, differences) and
+        (draws, differences). The true variances are those of which such an estimate as was found is smaller
+        with the probability of the tails.
         """
-        dfs = np.array([[min(df, MANY) for df in (rule.first_df, rule.second_df)] for rule in self.errors]).T
+        dfs = np.array(self._dfs)
         normal, spread, other, ratio = self._standard
-        own = first * dfs[0] / stats.chi2.ppf(own_tail, dfs[0])
+        own = np.sqrt(first * dfs[0] / stats.chi2.ppf(own_tail, dfs[0]))
         its = self.second * dfs[1] / stats.chi2.ppf(other_tail, dfs[1])
-        return np.sqrt(own) * normal + np.sqrt(its) * other, np.array([own * spread, its * ratio])
+        return own * normal + np.sqrt(its) * other, np.outer(own, own) * spread, its * ratio
 
     @cached_property
     def _standard(self) -> tuple[FloatArray, ...]:
-        """Draws of unit variance: first errors and their variances, correlated; second errors and theirs."""
-        dfs = [tuple(min(df, MANY) for df in (rule.first_df, rule.second_df)) for rule in self.errors]
-        first_df, second_df = zip(*dfs, strict=True)
-        normal, root, other, ratio = _draws(first_df, second_df)
-        factor = np.linalg.cholesky(self.correlation + 1e-9 * np.eye(len(dfs)))
-        spread = ((factor @ root) ** 2).sum(axis=2) / np.array(first_df)
-        return normal @ factor.T, spread, other, ratio
+        """Draws of unit variance: first errors and their covariance, correlated; second errors and theirs."""
+        normal, root, other, ratio = _draws(*self._dfs)
+        factor = np.linalg.cholesky(self.correlation + 1e-9 * np.eye(len(self.errors)))
+        mixed = (factor @ root) / np.sqrt(self._dfs[0])[:, None]
+        return normal @ factor.T, mixed @ mixed.transpose(0, 2, 1), other, ratio
+
+    @property
+    def _dfs(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        first = tuple(float(min(rule.first_df, MANY)) for rule in self.errors)
+        return first, tuple(float(min(rule.second_df, MANY)) for rule in self.errors)
 
 
 def _size(first: FloatArray) -> FloatArray:
@@ -173,15 +181,17 @@ def _size(first: FloatArray) -> FloatArray:
     return np.log(np.maximum(first, np.finfo(float).tiny)).mean(axis=-1)
 
 
-def _estimated(
-    slopes: FloatArray, direction: FloatArray, difference: FloatArray, variance: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return direction @ x of weighted least squares and its variance, for each row of the differences."""
+def _weights(slopes: FloatArray, direction: FloatArray, variance: FloatArray) -> FloatArray:
+    """Return the weights of differences in direction @ x, by least squares with each row of variances."""
     weighted = slopes / variance[:, :, None]
     information = np.einsum("bij,ik->bjk", weighted, slopes)
     solved = np.linalg.solve(information, np.tile(direction[:, None], (len(variance), 1, 1)))[..., 0]
-    row = np.einsum("bij,bj->bi", weighted, solved)
-    return (row * difference).sum(axis=1), solved @ direction
+    return np.asarray(np.einsum("bij,bj->bi", weighted, solved))
+
+
+def _variance(row: FloatArray, own: FloatArray, other: FloatArray) -> FloatArray:
+    """Return the variance of weighted differences from the covariance of their first and second errors."""
+    return np.asarray(np.einsum("bi,bij,bj->b", row, own, row) + (row**2 * other).sum(axis=1))
 
 
 @cache
@@ -190,12 +200,19 @@ def _draws(first_df: tuple[float, ...], second_df: tuple[float, ...]) -> tuple[F
 
     The root is Bartlett's: lower triangular, the roots of chi-squares of falling degrees of freedom on the
     diagonal and normals below it; with fewer degrees of freedom than differences its last columns are empty.
+    The points are Sobol's, which know a level better than as many random ones.
     """
-    rng, count = np.random.default_rng(SEED), len(first_df)
-    normal, other = rng.standard_normal((2, DRAWS, count))
-    root = np.tril(rng.standard_normal((DRAWS, count, count)), -1)
+    count = len(first_df)
+    points = qmc.Sobol(3 * count + count * (count + 1) // 2, seed=SEED).random(DRAWS)
+    normal, other, ratio, rest = np.split(points, [count, 2 * count, 3 * count], axis=1)
+    ratio = np.column_stack(
+        [stats.chi2.ppf(part, df) / df for part, df in zip(ratio.T, second_df, strict=True)]
+    )
+    root = np.zeros((DRAWS, count, count))
+    below = np.tril_indices(count, -1)
+    root[:, below[0], below[1]] = special.ndtri(rest[:, count:])
     for place, df in enumerate(first_df):
-        root[:, place, place] = np.sqrt(rng.chisquare(df - place, DRAWS)) if df > place else 0.0
+        left = df - place
+        root[:, place, place] = np.sqrt(stats.chi2.ppf(rest[:, place], left)) if left > 0.0 else 0.0
         root[:, place, int(np.ceil(df)) :] = 0.0
-    ratio = np.column_stack([rng.chisquare(df, DRAWS) / df for df in second_df])
-    return normal, root, other, ratio
+    return special.ndtri(normal), root, special.ndtri(other), ratio

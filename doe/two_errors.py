@@ -139,8 +139,9 @@ def _rule(first_df: float, second_df: float, alpha: float) -> tuple[float, float
     place = int(np.clip(np.searchsorted(LEVELS, alpha), 1, len(LEVELS) - 1))
     below, above = LEVELS[place - 1], LEVELS[place]
     weight = float(np.clip(np.log(alpha / below) / np.log(above / below), 0.0, 1.0))
-    rules = [_best_rule(first_df, second_df, level) for level in (below, above)]
-    return tuple(float(v) for v in (1.0 - weight) * np.array(rules[0]) + weight * np.array(rules[1]))
+    rules = np.array([_best_rule(first_df, second_df, level) for level in (below, above)])
+    scale, bend = (1.0 - weight) * rules[0] + weight * rules[1]
+    return float(scale), float(bend)
 
 
 @cache
