@@ -30,7 +30,7 @@ LEVELS = 7
 
 LOWEST, HIGHEST = 0.6, 1.2
 
-INTERVAL_TAILS = (0.35, 0.12)
+LEVEL_TAILS, INTERVAL_TAILS = (0.5, 0.3), (0.35, 0.12)
 """Probabilities of a smaller estimate for the true variances behind an interval: estimates that weigh as well
 as measure must be doubted more than those that only measure."""
 
@@ -127,7 +127,7 @@ class Simultaneous:
         return size, np.array([self._log_level(first) for first in self.reference[place]])
 
     def _log_level(self, first: FloatArray) -> float:
-        difference, own, other = self._drawn(first, 0.5, 0.5)
+        difference, own, other = self._drawn(first, *LEVEL_TAILS)
         total = np.einsum("bii->bi", own) + other
         size = np.abs(difference) / np.sqrt(total)
         lower, way = located(other / total)

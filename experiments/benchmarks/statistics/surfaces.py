@@ -35,7 +35,7 @@ SPREADS = (0.3, 1.0, 3.0)
 FITS, DRAWS = 10_000, 5
 """Fitted surfaces, and measured targets for each."""
 
-JOINT_TRIALS, JOINT_CHECKED = 2_500, 5
+JOINT_TRIALS, JOINT_CHECKED = 4_000, 5
 """Joint fits of each case, and those of them that go through ``joint_fit`` itself."""
 
 SHARED = 0.8
