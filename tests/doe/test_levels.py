@@ -58,7 +58,7 @@ def test_a_reduced_surface_covers_the_true_mean() -> None:
     rng = np.random.default_rng(92)
     mean = DESIGN.points.to_numpy() @ [0.6, 0.3] + 0.3 * DESIGN.points.prod(axis=1).to_numpy()
     truth = 0.6 * 0.4 - 0.3 * 0.5 - 0.3 * 0.2
-    trials = 120
+    trials = 60
     inside = 0
     for _ in range(trials):
         row = fit_surface(DESIGN, mean + rng.standard_normal(len(mean))).reduce(0.05).predict(POINT).iloc[0]

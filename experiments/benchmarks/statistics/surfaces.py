@@ -188,7 +188,7 @@ def _together(
     first = every.se[trial, chosen] ** 2
     residuals = noise - noise @ HAT
     rules = [TwoErrors(every.df, count - 1.0)] * len(target)
-    test = Simultaneous(rules, variance, np.corrcoef(residuals), first[None], 0.05)
+    test = Simultaneous(rules, variance, np.atleast_2d(np.corrcoef(residuals)), first[None], 0.05)
     return bool(test.accepted((every.error[trial, chosen] - target)[None], first[None]).all())
 
 
