@@ -2,6 +2,7 @@
 
 from dem_warp.case import Case, Numerics
 from dem_warp.clumps import ClumpShape
+from dem_warp.laws.conventions import EDEM, PRESETS, RELATIVE, ContactLaws, laws_named
 from dem_warp.laws.library import MECHANISMS
 from dem_warp.laws.mechanism import Mechanism
 from dem_warp.materials import Interaction, Material, effective_moduli, rayleigh_time
@@ -17,11 +18,15 @@ from dem_warp.simulation import simulate
 from dem_warp.version import __version__
 
 __all__ = [
+    "EDEM",
     "MECHANISMS",
+    "PRESETS",
+    "RELATIVE",
     "SCENES",
     "Case",
     "CaseResult",
     "ClumpShape",
+    "ContactLaws",
     "DrawDown",
     "Drum",
     "GrainPopulation",
@@ -36,6 +41,7 @@ __all__ = [
     "ShapeMixture",
     "__version__",
     "effective_moduli",
+    "laws_named",
     "rayleigh_time",
     "simulate",
 ]

@@ -6,13 +6,19 @@ from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+import warp as wp
+
 from dem_warp.case import Case
 from dem_warp.checkpoint import Checkpoints
 from dem_warp.clumps import stack_spheres
 from dem_warp.provenance import engine_fingerprint, provenance
 from dem_warp.result import CaseResult
+from dem_warp.rollback import Rollback
+from dem_warp.room import neighbour_room
+from dem_warp.scenes.scene import course_of
 from dem_warp.snapshot import STEP, put_snapshot, take_snapshot
-from dem_warp.solver import CHUNK, Solver
+from dem_warp.solver import CHUNK, SHORTEST_CYCLE, Solver
 from dem_warp.types import WorldFlag
 
 _log = logging.getLogger(__name__)
@@ -26,6 +32,10 @@ ADVICE = {
     WorldFlag.NEIGHBOUR_OVERFLOW: (
         "overflow",
         "a neighbour list overflowed at {time:.4f} s: lower the skin or check the grains for large overlaps",
+    ),
+    WorldFlag.LATE_REBUILD: (
+        "failed",
+        "a grain or a wall outran the neighbour lists within {steps} steps at {time:.4f} s: raise the skin",
     ),
 }
 
@@ -48,6 +58,7 @@ class Batch:
         self.controllers = [
             case.scene.controller(case, setup, CHUNK) for case, setup in zip(cases, self.setups, strict=True)
         ]
+        self._rollback = Rollback(self.solver)
         self.running = list(range(len(cases)))
         self.steps = [0] * len(cases)
         self.provenance = provenance(self.solver.device, self.solver.precision.name)
@@ -59,13 +70,32 @@ class Batch:
         ahead = min(
             self.controllers[w].period - self.steps[w] % self.controllers[w].period for w in self.running
         )
+        self._rollback.keep()
         self.solver.advance(ahead // CHUNK)
-        for w in self.running:
-            self.steps[w] += ahead
-        ended = self._look([w for w in self.running if self.steps[w] % self.controllers[w].period == 0])
+        due = self._take_back_late(ahead)
+        ended = self._look(due)
         if self._checkpoints and time.monotonic() - self._saved >= self._checkpoints.every:
             self.save()
         return ended
+
+    def _take_back_late(self, ahead: int) -> list[int]:
+        """Count the steps that were taken, save those of worlds whose lists were outrun; return who is due.
+
+        Such a world goes back and takes them again, with lists made anew as often as can be. One that outruns
+        them even so is due at once: its end.
+        """
+        flags = self.solver.flags.numpy()
+        late = {w for w in self.running if WorldFlag.LATE_REBUILD in WorldFlag(int(flags[w]))}
+        again = set() if self.solver.careful else late
+        for w in again:
+            self._rollback.restore(w)
+        self.solver.careful = bool(again)
+        for w in set(self.running) - again:
+            self.steps[w] += ahead
+        return [
+            w for w in self.running
+            if w not in again and (w in late or self.steps[w] % self.controllers[w].period == 0)
+        ]  # fmt: skip
 
     def fraction(self, world: int) -> float:
         """Roughly how much of a world is done, 0 to 1."""
@@ -93,10 +123,16 @@ class Batch:
         for w, (case, controller) in enumerate(zip(self.cases, self.controllers, strict=True)):
             try:
                 if kept := self._checkpoints.load(case, self.maker):
-                    course, snapshot = type(controller.course)(**kept[0]), kept[1]
-                    put_snapshot(self.solver, w, snapshot)
-                    controller.course, self.steps[w] = course, int(snapshot[STEP].item())
-            except (TypeError, ValueError) as error:
+                    fresh, snapshot = controller.course, kept[1]
+                    controller.course = course_of(type(fresh), kept[0])
+                    try:
+                        controller.fraction(0.0)  # knows the phase
+                        put_snapshot(self.solver, w, snapshot)
+                    except (LookupError, TypeError, ValueError):
+                        controller.course = fresh
+                        raise
+                    self.steps[w] = int(snapshot[STEP].item())
+            except (LookupError, TypeError, ValueError) as error:
                 path = self._checkpoints.path(case)
                 _log.warning("%s: a checkpoint that cannot be used, its case starts afresh: %s", path, error)
 
@@ -125,6 +161,8 @@ class Batch:
                 if not decision.done:
                     continue
                 verdict = ("failed" if decision.failure else "finished", decision.failure)
+                if not np.isfinite(view.positions[view.alive]).all():
+                    verdict = ("diverged", "a grain is nowhere: its position is no number")
             self.solver.stop(w)
             self.running.remove(w)
             ended.append((w, self._result(w, *verdict)))
@@ -133,8 +171,7 @@ class Batch:
 
     def _result(self, w: int, status: str, reason: str) -> CaseResult:
         poses, course, setup = self.solver.poses(w), self.controllers[w].course, self.setups[w]
-        late = WorldFlag.LATE_REBUILD in WorldFlag(int(self.solver.flags.numpy()[w]))
-        counts = {"rebuilds": float(self.solver.rebuilds.numpy()[w]), "late_rebuilds": float(late)}
+        counts = {"rebuilds": float(self.solver.rebuilds.numpy()[w])}
         return CaseResult(
             status=status,
             reason=reason,
@@ -145,12 +182,62 @@ class Batch:
             clumps=stack_spheres(setup.shapes),
             observables=course.observables | counts,
             phases=course.phases,
-            provenance=self.provenance,
+            provenance=self.provenance | {"laws": self.cases[w].laws.to_dict()},
         )
+
+
+def begin(
+    cases: Sequence[Case], device: str, checkpoints: Checkpoints | None = None
+) -> tuple[Batch | None, list[int], dict[int, CaseResult]]:
+    """Begin a batch of those cases that can be, and fail the others.
+
+    Returns
+    -------
+    batch
+        None where no case can be begun.
+    begun
+        Index of the case of each of its worlds.
+    refused
+        Results of the others by their indices, each with its reason.
+    """
+    try:
+        return Batch(cases, device, checkpoints), list(range(len(cases))), {}
+    except (ValueError, MemoryError):
+        faults = {i: _fault(case, device) for i, case in enumerate(cases)}
+        refused = {i: _refusal(cases[i], reason, device) for i, reason in faults.items() if reason}
+        if not refused:
+            raise
+        begun = [i for i in range(len(cases)) if i not in refused]
+        batch = Batch([cases[i] for i in begun], device, checkpoints) if begun else None
+        return batch, begun, refused
+
+
+def _fault(case: Case, device: str) -> str:
+    """Reason that a case has no world; empty where it has one."""
+    try:
+        for setup in case.scene.prepare([case], device):
+            neighbour_room(setup)
+    except (ValueError, MemoryError) as error:
+        return str(error) or "there is not enough memory for it"
+    return ""
+
+
+def _refusal(case: Case, reason: str, device: str) -> CaseResult:
+    """Result of a case that cannot be begun: no grains."""
+    return CaseResult(
+        status="failed",
+        reason=reason,
+        positions=np.zeros((0, 3)),
+        orientations=np.zeros((0, 4)),
+        sizes=np.zeros(0),
+        shapes=np.zeros(0, dtype=int),
+        clumps=stack_spheres(case.grains.mixture.shapes),
+        provenance=provenance(wp.get_device(device), case.numerics.precision),
+    )
 
 
 def _verdict(flags: WorldFlag, at: float) -> tuple[str, str] | None:
     for flag, (status, advice) in ADVICE.items():
         if flag in flags:
-            return status, advice.format(time=at)
+            return status, advice.format(time=at, steps=SHORTEST_CYCLE)
     return None

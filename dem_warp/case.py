@@ -3,6 +3,8 @@
 from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Annotated, Any, Generic, Literal, TypeVar
 
+from dem_warp.laws.contact_law import check_forms
+from dem_warp.laws.conventions import EDEM, ContactLaws
 from dem_warp.laws.mechanism import Mechanism
 from dem_warp.materials import Interaction, Material, rayleigh_time
 from dem_warp.model import ContactCoefficients
@@ -26,13 +28,6 @@ class Numerics:
     """Floating point precision of the forces."""
     modulus_scale: Annotated[float, Parameter("1", at_least=1.0)] = 1.0
     """The grains' shear modulus is divided by this (softer grains take larger steps)."""
-    clamp_attraction: bool = False
-    """Keep the damping from attracting at the end of an impact."""
-    tangential_damping: bool = True
-    """Damp the tangential spring of a contact; not every code does."""
-    rolling_holds: bool = True
-    """Let rolling resistance stop a spin at most. Codes that apply its torque for a whole step, whatever the
-    spin, reverse slow ones each step, and grains that ought to stick creep."""
 
     def __post_init__(self) -> None:
         check_parameters(self)
@@ -55,8 +50,11 @@ class Case(Generic[SceneT]):
     mechanisms: tuple[Mechanism, ...] = ()
     """Physical effects beside those of the base contact law. One at its null changes no result, but may
     change the last bits: its code is compiled in."""
+    laws: ContactLaws = EDEM
+    """Conventions of the contact law."""
 
     def __post_init__(self) -> None:
+        check_forms(tuple(type(mechanism) for mechanism in self.mechanisms), self.laws.forms)
         _require(0 <= self.seed < 2**63, "Case.seed", "must be an integer from 0 to 2^63 - 1", self.seed)
 
     @property
@@ -81,27 +79,42 @@ class Case(Generic[SceneT]):
 
     def contacts(self, wall_material: Material) -> tuple[ContactCoefficients, ContactCoefficients]:
         """Contacts of grains with grains, and with walls of a material."""
-        grain, numerics = self.grain_material, self.numerics
+        grain = self.grain_material
         pairs = (("grains", grain, self.grain_grain), ("walls", wall_material, self.grain_wall))
         first, second = (
             ContactCoefficients.of_pair(
                 grain,
                 partner,
                 interaction,
-                numerics.clamp_attraction,
+                self.laws,
                 tuple(m for m in self.mechanisms if m.acts_between(kind)),
-                numerics.tangential_damping,
+                *self._reduced(kind),
             )
             for kind, partner, interaction in pairs
         )
         return first, second
+
+    def _reduced(self, kind: str) -> tuple[float, float]:
+        """Reduced radius [m] and mass [kg] of a pair of the largest spheres, of grains of middle size."""
+        share = 0.5 if kind == "grains" else 1.0
+        size = self.grains.size_mean
+        radius = max(float(shape.radii.max()) for shape in self.grains.mixture.shapes) * size
+        mass = self.grain_material.density * self.grains.mean(lambda shape: shape.volume) * size**3
+        return share * radius, share * mass
 
     def to_dict(self) -> dict[str, Any]:
         """Everything that determines the result, as plain JSON values; the device and the skin do not."""
         content = _plain(self)
         content["scene"] = {"kind": type(self.scene).__name__} | content["scene"]
         del content["numerics"]["skin"]
+        content["numerics"] |= _BASE_LAW
+        if self.laws == EDEM:
+            del content["laws"]
         return content
+
+
+_BASE_LAW = {"clamp_attraction": False, "tangential_damping": True, "rolling_holds": True}
+"""Words for the base law in a case that names no laws, from before they had names: its key stays."""
 
 
 def _plain(value: Any) -> Any:

@@ -9,7 +9,6 @@ import hashlib
 import json
 import logging
 import os
-import zipfile
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from dem_warp.case import Case
+from dem_warp.reading import read_arrays
 from dem_warp.scenes.scene import Course
 from dem_warp.snapshot import Snapshot
 
@@ -102,23 +102,12 @@ class Checkpoints:
         if not path.exists():
             return None
         try:
-            with np.load(path, allow_pickle=False) as archive:
-                snapshot = {name: archive[name] for name in archive.files}
+            snapshot = read_arrays(path)
             record = json.loads(snapshot.pop(_RECORD).tobytes())
             found = {"format": record["format"]} | record["maker"]
             course = dict(record["course"])
-        except (
-            OSError,
-            ValueError,
-            KeyError,
-            TypeError,
-            AttributeError,
-            EOFError,
-            zipfile.BadZipFile,
-        ) as error:
-            raise ValueError(
-                f"must be a whole file that a run wrote, got one that is not: {error}"
-            ) from error
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+            raise ValueError(f"must be a whole file that a run wrote: {error}") from error
         _require_same(found, {"format": FORMAT} | maker)
         return course, snapshot
 

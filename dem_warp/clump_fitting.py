@@ -21,6 +21,7 @@ Cover = NDArray[np.bool_]
 _CANDIDATES = 1500  # about so many samples are tried as centres: the exchange stays below some seconds
 _CHUNK = 256  # candidates handled at once, which bounds the memory
 _MAX_SWEEPS = 100
+_SURFACE_POINTS = 4000
 _STEPS = np.array([step for step in product((-1.0, 0.0, 1.0), repeat=3) if any(step)])
 
 
@@ -36,6 +37,17 @@ class ClumpFit:
     """Part of the solid's volume inside the spheres, 0 to 1."""
     overshoot: float
     """Volume of the spheres outside the solid over the solid's volume."""
+    inertia_error: float
+    """Largest relative difference of a principal moment of inertia over the mass, both sorted."""
+    surface_distance: float
+    """Distance of the solid's surface from that of the spheres, root mean square [m]."""
+    spheres: Array
+    """Centre and radius of each sphere [m] in the solid's frame, shape (S, 4)."""
+
+    @property
+    def volume_error(self) -> float:
+        """Volume of the clump over the solid's, less 1."""
+        return self.shape.volume / self.solid_volume - 1.0
 
 
 def fit_clump(solid: "Trimesh", sphere_count: int, protrusion: float = 0.0, resolution: int = 40) -> ClumpFit:
@@ -76,12 +88,32 @@ def fit_clump(solid: "Trimesh", sphere_count: int, protrusion: float = 0.0, reso
     centers = filling.prune(centers)
     radii = filling.radii(centers)
     covered: Cover = np.logical_or.reduce(_within(samples, centers, radii))
+    spheres = np.column_stack([centers * surface.extent + surface.origin, radii * surface.extent])
+    shape = ClumpShape.from_spheres(spheres[:, :3], spheres[:, 3])
     return ClumpFit(
-        shape=ClumpShape.from_spheres(centers * surface.extent + surface.origin, radii * surface.extent),
+        shape=shape,
         solid_volume=float(solid.volume),
         coverage=float(covered[inside].mean()),
         overshoot=float(covered[~inside].sum() / inside.sum()),
+        inertia_error=_inertia_error(solid, shape),
+        surface_distance=_surface_distance(solid, spheres),
+        spheres=spheres,
     )
+
+
+def _inertia_error(solid: "Trimesh", shape: ClumpShape) -> float:
+    """Largest relative difference of the principal moments over the mass, sorted."""
+    wanted = np.sort(np.linalg.eigvalsh(np.asarray(solid.moment_inertia))) / solid.volume
+    return float(np.abs(np.sort(shape.inertia_over_mass) / wanted - 1.0).max())
+
+
+def _surface_distance(solid: "Trimesh", spheres: Array) -> float:
+    """Root mean square distance of points of the solid's surface, always the same ones, from the spheres'."""
+    import trimesh
+
+    points, _ = trimesh.sample.sample_surface(solid, _SURFACE_POINTS, seed=1)
+    apart = np.linalg.norm(points[:, None] - spheres[None, :, :3], axis=2) - spheres[None, :, 3]
+    return float(np.sqrt((np.min(apart, axis=1) ** 2).mean()))
 
 
 class _Surface:

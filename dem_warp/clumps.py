@@ -9,9 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dem_warp.reading import read_text
 from dem_warp.sphere_union import DEFAULT_RESOLUTION, Array, union_moments
 
+MOST_SPHERES = 256
+"""Spheres of a clump: their numbers have eight bits in a list of neighbours."""
+
 _MILLIMETER = 1e-3
+_LARGEST, _SMALLEST = 1e6, 1e-6  # of a file [mm]: its volume and moments are far from the ends of floats
 _MOMENT_TOLERANCE = 1e-4  # of the largest moment: less apart are equal, smaller products of inertia are none
 
 
@@ -152,16 +157,18 @@ class ClumpShape:
         Raises
         ------
         ValueError
-            If a line is not four finite numbers with a positive radius, or the file has no sphere; the
-            message names the file and the line.
+            If a line is not four finite numbers with a positive radius, or the file has no sphere or too
+            many; the message names the file and the line.
         FileNotFoundError
             If there is no such file.
         """
         rows = []
-        for number, line in enumerate(Path(path).read_text(encoding="utf-8").splitlines(), start=1):
+        for number, line in enumerate(read_text(path).splitlines(), start=1):
             words = line.partition("#")[0].split()
             if words:
                 rows.append(_parse_sphere(words, f"{path}, line {number}"))
+            if len(rows) > MOST_SPHERES:
+                raise ValueError(f"{path}: a clump has at most {MOST_SPHERES} spheres, got more")
         if not rows:
             raise ValueError(f"{path}: a clump needs at least one line 'x y z r' [mm], got none")
         spheres = np.array(rows) * _MILLIMETER
@@ -223,6 +230,9 @@ def _parse_sphere(words: list[str], place: str) -> list[float]:
         row = []
     if len(row) != 4 or not np.isfinite(row).all() or row[3] <= 0.0:
         rule = "a sphere is four finite numbers 'x y z r' [mm] with r > 0"
+        raise ValueError(f"{place}: {rule}, got {' '.join(words)!r}")
+    if max(map(abs, row)) > _LARGEST or row[3] < _SMALLEST:
+        rule = f"a sphere lies within {_LARGEST:g} mm, and its r is at least {_SMALLEST:g} mm"
         raise ValueError(f"{place}: {rule}, got {' '.join(words)!r}")
     return row
 

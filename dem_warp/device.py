@@ -28,8 +28,16 @@ def resolve_device(device: str | None) -> str:
         return "cuda:0" if wp.is_cuda_available() else "cpu"
     name = "cuda:0" if device == "cuda" else device
     if name not in known:
-        raise ValueError(f"device: must be one of {known}, got {device!r}")
+        raise ValueError(_absent(device, known))
     return name
+
+
+def _absent(device: str, known: list[str]) -> str:
+    """Say why a device is not there."""
+    gpus = [name for name in known if name.startswith("cuda")]
+    if device.startswith("cuda") and not gpus:
+        return f"no NVIDIA GPU with a CUDA driver was found, so the device must be cpu, not {device}"
+    return f"the device must be one of {', '.join(known)}, not {device}"
 
 
 def _start_warp() -> None:

@@ -1,6 +1,7 @@
 """Bulk materials, pairs of surfaces, and the contact constants that follow from them."""
 
 import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 
@@ -144,3 +145,66 @@ def damping_coefficient(restitution: float) -> float:
     _require(0.0 < restitution <= 1.0, "above 0 and at most 1", "restitution", restitution)
     log_restitution = math.log(restitution)
     return 2.0 * math.sqrt(5.0 / 6.0) * abs(log_restitution) / math.hypot(log_restitution, math.pi)
+
+
+TSUJI_POLYNOMIAL = (4.8218, -18.022, 27.467, -22.348, 11.087, -4.2783, 1.2728)
+"""LAMMPS' fit of Tsuji's damping over sqrt(4/3 E* sqrt(R* d) m*), highest power of the restitution first."""
+
+THORNTON_POLYNOMIAL = (
+    -1489.915, 6276.757, -11342.18, 11494.29, -7206.864, 2928.711, -796.4559, 146.8049, -16.41105, -6.918798,
+    0.0,
+)  # fmt: skip
+"""Thornton's fit of the exponent that Yade takes the damping ratio from, highest power first."""
+
+
+def tsuji_damping(restitution: float) -> float:
+    """Dimensionless damping that LAMMPS takes for a restitution, as `damping_coefficient` has it.
+
+    Raises
+    ------
+    ValueError
+        If the restitution lies outside its range.
+
+    References
+    ----------
+    LAMMPS (2022-01-06), src/GRANULAR/pair_granular.cpp, lines 987-991, damping tsuji.
+    """
+    _require(0.0 < restitution <= 1.0, "above 0 and at most 1", "restitution", restitution)
+    return math.sqrt(2.0 / 3.0) * max(_polynomial(TSUJI_POLYNOMIAL, restitution), 0.0)
+
+
+def thornton_damping(restitution: float) -> float:
+    """Dimensionless damping that Yade takes for a restitution, as `damping_coefficient` has it.
+
+    It gives the restitution to a damping that never attracts.
+
+    Raises
+    ------
+    ValueError
+        If the restitution lies outside its range.
+
+    References
+    ----------
+    C. Thornton, S. J. Cummins and P. W. Cleary, Powder Technology 233 (2013) 30-46, equations B6 and B7;
+    Yade, pkg/dem/HertzMindlin.cpp, Ip2_FrictMat_FrictMat_MindlinPhys::go.
+    """
+    _require(0.0 < restitution <= 1.0, "above 0 and at most 1", "restitution", restitution)
+    if restitution == 1.0:
+        return 0.0
+    exponent = _polynomial(THORNTON_POLYNOMIAL, restitution)
+    return 2.0 * math.sqrt(1.0 / (1.0 - (1.0 + restitution) ** 2 * math.exp(exponent)) - 1.0)
+
+
+def _polynomial(coefficients: tuple[float, ...], x: float) -> float:
+    total = 0.0
+    for coefficient in coefficients:
+        total = total * x + coefficient
+    return total
+
+
+DAMPINGS: Mapping[str, Callable[[float], float]] = {
+    "closed_form": damping_coefficient,
+    "polynomial": tsuji_damping,
+    "thornton": thornton_damping,
+}
+"""Dimensionless damping from the restitution, by the name that the conventions give it."""

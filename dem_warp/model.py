@@ -8,15 +8,19 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from dem_warp.clumps import ClumpShape
-from dem_warp.laws.contact_law import Mechanisms
+from dem_warp.laws.contact_law import Mechanisms, check_forms
+from dem_warp.laws.conventions import BASE_FORMS, EDEM, ContactLaws, LawForms
 from dem_warp.laws.library import MECHANISMS
 from dem_warp.laws.mechanism import Mechanism, clashes
-from dem_warp.materials import Interaction, Material, damping_coefficient, effective_moduli
+from dem_warp.materials import DAMPINGS, Interaction, Material, effective_moduli
 from dem_warp.types import MAX_PARTNERS, MAX_SPHERES_PER_GRAIN
 from dem_warp.walls import Wall
 
 GRAVITY = 9.81
 """[m/s2]"""
+
+ROLLING_OVERLAP = 0.01
+"""Overlap of equal spheres, over their radius, at which a rolling spring is as stiff as the tangential."""
 
 AT_ONCE = 0
 """Release step of a grain that is free from the start."""
@@ -37,8 +41,12 @@ class ContactCoefficients:
     """Keeps the damping from attracting at the end of an impact."""
     mechanisms: tuple[Mechanism, ...] = ()
     """Mechanisms beside the base law."""
-    tangential_damping: bool = True
-    """Damps the tangential spring."""
+    tangential_damping: float = 1.0
+    """Damping of the tangential spring over what the same constant makes of its own stiffness."""
+    rolling_spring: float = 0.0
+    """Spring of a rolling resistance that takes one: a factor [1], a spring [N/m] or a torque's [N m/rad]."""
+    rolling_dashpot: float = 0.0
+    """Its dashpot [kg/s], or its damping ratio [1]."""
 
     def __post_init__(self) -> None:
         names = [mechanism.name for mechanism in self.mechanisms]
@@ -53,29 +61,66 @@ class ContactCoefficients:
         a: Material,
         b: Material,
         interaction: Interaction,
-        clamp_attraction: bool = False,
+        laws: ContactLaws = EDEM,
         mechanisms: tuple[Mechanism, ...] = (),
-        tangential_damping: bool = True,
+        radius: float = 0.0,
+        mass: float = 0.0,
     ) -> "ContactCoefficients":
-        """Coefficients of two materials in contact."""
+        """Coefficients of two materials in contact under some laws.
+
+        Reduced radius [m] and mass [kg] are those that a rolling spring of one stiffness is made for.
+        """
         modulus, shear_modulus = effective_moduli(a, b)
+        # the area of the overlap circle is twice Hertz's, 2 R* d
+        wider = math.sqrt(2.0) if laws.normal == "overlap_circle" else 1.0
+        rate = laws.damping_rate
+        spring, dashpot = _rolling_spring(laws, shear_modulus, radius, mass)
         return cls(
-            modulus,
-            shear_modulus,
-            damping_coefficient(interaction.restitution),
+            modulus * wider,
+            shear_modulus * wider,
+            DAMPINGS[laws.restitution](interaction.restitution) if rate is None else rate,
             interaction.static_friction,
             interaction.rolling_friction,
-            clamp_attraction,
+            laws.attraction == "clamped",
             mechanisms,
-            tangential_damping,
+            _tangential_share(laws, modulus, shear_modulus),
+            spring,
+            dashpot,
         )
 
     @property
     def parameters(self) -> dict[str, float]:
         """Fields of `ContactParams`; a mechanism that is not there is at its null."""
-        base = {f.name: float(getattr(self, f.name)) for f in fields(self) if f.name != "mechanisms"}
+        apart = ("mechanisms", "rolling_spring", "rolling_dashpot")
+        base = {f.name: float(getattr(self, f.name)) for f in fields(self) if f.name not in apart}
+        # laws that take a spring or a dashpot share the places of the mechanism that has both
+        rolling = {"rolling_stiffness": self.rolling_spring, "rolling_damping": self.rolling_dashpot}
         own = {name: value for m in self.mechanisms for name, value in m.parameters.items()}
-        return base | _nulls() | own
+        return base | _nulls() | rolling | own
+
+
+def _tangential_share(laws: ContactLaws, modulus: float, shear_modulus: float) -> float:
+    """Tangential damping over what the constant makes of its own stiffness, or over the normal damping."""
+    if laws.tangential_damping == "normal":
+        # sqrt(S_n / S_t) makes the normal damping of the tangential one
+        return math.sqrt(modulus / (4.0 * shear_modulus)) if laws.normal_damping == "tsuji" else 1.0
+    return {"tsuji": 1.0, "deme": math.sqrt(2.0), "none": 0.0}[laws.tangential_damping]
+
+
+def _rolling_spring(
+    laws: ContactLaws, shear_modulus: float, radius: float, mass: float
+) -> tuple[float, float]:
+    """Spring and dashpot of a rolling resistance, in its own units; none for those that make their own."""
+    if laws.rolling == "elastic_plastic":
+        return laws.rolling_stiffness, laws.rolling_damping
+    if laws.rolling not in ("sds", "yade"):
+        return 0.0, 0.0
+    own = laws.rolling_spring
+    spring = 8.0 * shear_modulus * radius * math.sqrt(2.0 * ROLLING_OVERLAP) if own is None else own
+    if laws.rolling == "yade":
+        return spring * radius**2, 0.0
+    dashpot = math.sqrt(spring * mass) if laws.rolling_dashpot is None else laws.rolling_dashpot
+    return spring, dashpot
 
 
 @functools.cache
@@ -150,6 +195,8 @@ class WorldSetup:
     """Rate at which the air takes a grain's velocity, whatever its size [1/s]."""
     rolling_holds: bool = True
     """Lets rolling resistance stop a spin at most, and never reverse it."""
+    forms: LawForms = BASE_FORMS
+    """Forms of the contact law."""
     weighed: int | None = None
     """Number of the wall whose impulse is summed up in every step (`Solver.impulses`)."""
 
@@ -164,6 +211,7 @@ class WorldSetup:
             )
         if not np.all(np.subtract(self.domain[1], self.domain[0]) > 0):
             raise ValueError(f"WorldSetup.domain: lower corner must lie below the upper, got {self.domain!r}")
+        check_forms(self.mechanisms, self.forms)
         for wall, pair in self.walls:
             if not 1 <= pair < len(self.contacts):
                 raise ValueError(

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from typing import Any
 
-from dem_warp.batch import Batch
+from dem_warp.batch import begin
 from dem_warp.case import Case
 from dem_warp.checkpoint import Checkpoints
 from dem_warp.device import resolve_device
@@ -43,7 +43,9 @@ def _wait_for_parent() -> None:
 
 def _run_case(index: int, case: Case, checkpoints: Checkpoints | None) -> CaseResult:
     """Run one case in a worker, leaving its progress in the shared memory."""
-    batch = Batch([case], resolve_device("cpu"), checkpoints)
+    batch, _, refused = begin([case], resolve_device("cpu"), checkpoints)
+    if batch is None:
+        return refused[0]
     while True:
         ended = batch.advance()
         if ended:

@@ -28,7 +28,7 @@ class CaseResult:
     """End of one case."""
 
     status: str
-    """"finished", "diverged", "overflow", or "failed"."""
+    """"finished", "diverged", "overflow", or "failed"; of another program also "no-answer"."""
     reason: str
     """Cause of the end, and a remedy; empty when finished."""
     positions: np.ndarray
@@ -42,8 +42,7 @@ class CaseResult:
     """Local centre and radius of each sphere of each shape [m]; a shape of fewer than S spheres is filled
     up with radii of 0, which are no spheres, shape (shapes, S, 4)."""
     observables: dict[str, float] = field(default_factory=dict)
-    """Those of the scene, in the units that it says. Beside them `rebuilds` of the neighbour lists, and
-    `late_rebuilds`: 1 when a grain may have outrun its list."""
+    """Those of the scene, in the units that it says, and beside them `rebuilds` of the neighbour lists."""
     phases: list[dict[str, Any]] = field(default_factory=list)
     """Name, time [s] and steps of each phase."""
     provenance: dict[str, Any] = field(default_factory=dict)

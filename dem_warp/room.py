@@ -9,7 +9,13 @@ from dem_warp.triangles import meshes_of, most_within
 
 
 def neighbour_room(world: WorldSetup) -> tuple[int, int]:
-    """Partners of a sphere and entries of a grain that no packing of the world's grains should pass."""
+    """Partners of a sphere and entries of a grain that no packing of the world's grains should pass.
+
+    Raises
+    ------
+    ValueError
+        If there are more than the lists of a world can have.
+    """
     found, listed = 16, 32
     for shape, others in product(world.shapes, repeat=2):
         reach = shape.radii.mean() + others.radii.mean() + world.skin + world.reach
@@ -19,6 +25,12 @@ def neighbour_room(world: WorldSetup) -> tuple[int, int]:
         listed = max(listed, int(shape.sphere_count * around * 0.7) + 32)
     triangles = _triangles_near(world)
     listed += triangles * max(shape.sphere_count for shape in world.shapes)
+    # two lists, whose places are counted in 32 bits
+    if 2 * world.grains.count * (listed + 8) >= 2**31:
+        raise ValueError(
+            f"WorldSetup.skin: lists of {listed:,} neighbours for each of {world.grains.count:,} grains are "
+            f"too long, got a skin of {world.skin:g} [m]: lower it"
+        )
     return found + triangles, -(-listed // 8) * 8
 
 

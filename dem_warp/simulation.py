@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from dem_warp.batch import Batch
+from dem_warp.batch import begin
 from dem_warp.case import Case
 from dem_warp.checkpoint import CHECKPOINT_EVERY, Checkpoints
 from dem_warp.device import resolve_device
@@ -88,13 +88,17 @@ def _run_batches(
     fractions, phases = [0.0] * len(cases), ["waiting"] * len(cases)
     reported = time.perf_counter()
     for members in batches(cases, one_each=device == "cpu"):
-        batch = Batch([cases[i] for i in members], device, checkpoints)
-        while batch.running:
+        batch, begun, refused = begin([cases[i] for i in members], device, checkpoints)
+        for number, result in refused.items():
+            fractions[members[number]] = 1.0
+            keep(members[number], result)
+        worlds = [members[number] for number in begun]
+        while batch and batch.running:
             for w, result in batch.advance():
-                keep(members[w], result)
+                keep(worlds[w], result)
             if not batch.running or time.perf_counter() - reported > REPORT_EVERY:
                 reported = time.perf_counter()
-                for w, i in enumerate(members):
+                for w, i in enumerate(worlds):
                     fractions[i], phases[i] = batch.fraction(w), batch.phase(w)
                 report(fractions, phases)
 
@@ -110,6 +114,7 @@ def batches(cases: Sequence[Case], one_each: bool) -> list[list[int]]:
     groups: dict[Any, list[int]] = {}
     for i, case in enumerate(cases):
         mechanisms = frozenset(mechanism.name for mechanism in case.mechanisms)
-        build = (type(case.scene), case.numerics.precision, case.grains.sphere_count, mechanisms)
+        kind, forms = type(case.scene), case.laws.forms
+        build = (kind, case.numerics.precision, case.grains.sphere_count, mechanisms, forms)
         groups.setdefault(build, []).append(i)
     return list(groups.values())

@@ -13,14 +13,17 @@ from typing import Any
 
 import numpy as np
 
-from dem_warp.solver import Solver
+from dem_warp.solver import CHUNK, Solver
 from dem_warp.state import arrays_of
-from dem_warp.types import SPHERE_MASK
+from dem_warp.types import SPHERE_BITS, SPHERE_MASK
 
 Snapshot = dict[str, np.ndarray]
 """Part of a world in each array of the state, by the array's name."""
 
 STEP, COUNT, ENTRY = "grains.step", "neighbours.count", "neighbours.entry"
+WALLS = "world.walls"
+FIXED_OF_WALLS = ("kind", "pair", "axis", "radius", "upper_radius", "length", "reach", "weighed")
+"""Fields of a wall that no motion changes."""
 LISTS = 2
 
 
@@ -42,8 +45,8 @@ def put_snapshot(solver: Solver, world: int, snapshot: Snapshot) -> None:
     Raises
     ------
     ValueError
-        When the snapshot is none of such a world, or its neighbour lists are longer than the batch's. The
-        world is then as it was before.
+        When the snapshot is none of such a world, its neighbour lists are longer than the batch's, or a value
+        in it can be none of a run's. The world is then as it was before.
     """
     if COUNT not in snapshot:
         raise ValueError(f"a snapshot must have {COUNT}, got {sorted(snapshot)}")
@@ -53,6 +56,7 @@ def put_snapshot(solver: Solver, world: int, snapshot: Snapshot) -> None:
     in_batch, in_snapshot = _first_walls(solver, world)
     numbered = snapshot | {ENTRY: _renumbered(snapshot[ENTRY], in_snapshot, in_batch)}
     filled = [field.filled(numbered[field.name]) for field in fields]
+    _check_values(solver, world, snapshot, in_snapshot)
     for field, whole in zip(fields, filled, strict=True):
         for part in field.parts:
             part.assign(whole)
@@ -97,8 +101,8 @@ def _fields(solver: Solver, world: int, counts: np.ndarray) -> Iterator[_Field]:
     listed = np.zeros((slots, capacity), dtype=bool)
     listed[:grains] = np.arange(capacity) < counts[:, None]
     walls = solver.model.wall.reshape((layout.world_count, -1))[world]
-    yield _Field("world.walls", (walls,), (layout.wall_count,), slice(None))
-    for name, arrays in _state(solver).items():
+    yield _Field(WALLS, (walls,), (layout.wall_count,), slice(None))
+    for name, arrays in state_arrays(solver).items():
         of_lists = name.startswith("neighbours.") and arrays[0].size % (LISTS * layout.grain_total) == 0
         lists, place = (LISTS, (held, world)) if of_lists else (1, (0, world))
         parts = tuple(array.reshape((lists, layout.world_count, -1))[place] for array in arrays)
@@ -111,7 +115,29 @@ def _fields(solver: Solver, world: int, counts: np.ndarray) -> Iterator[_Field]:
             yield _Field(name, parts, (1,), slice(1))
 
 
-def _state(solver: Solver) -> dict[str, tuple[Any, ...]]:
+def _check_values(solver: Solver, world: int, snapshot: Snapshot, first_wall: int) -> None:
+    """Refuse what steps would look up outside of their arrays, and what is no number."""
+    for name, values in snapshot.items():
+        if values.dtype.kind == "f" and not np.isfinite(values).all():
+            raise ValueError(f"{name}: must be finite")
+    step, entries = int(snapshot[STEP].item()), snapshot[ENTRY]
+    if step < 0 or step % CHUNK or (snapshot[COUNT] < 0).any():
+        raise ValueError(f"a snapshot must be of whole chunks of {CHUNK} steps, got step {step}")
+    partners = first_wall + len(solver.worlds[world].walls) + solver.worlds[world].triangle_count
+    own, partner = entries >> SPHERE_BITS, entries & SPHERE_MASK
+    if entries.size and ((entries < 0) | (own >= solver.layout.sphere_count) | (partner >= partners)).any():
+        raise ValueError(f"{ENTRY}: must name spheres, walls or triangles of the world")
+    walls, present = snapshot[WALLS], _fields_of_walls(solver, world)
+    for name in FIXED_OF_WALLS:
+        if not np.array_equal(walls[name].ravel(), present[name].ravel()):
+            raise ValueError(f"{WALLS}: must be those of the world, got another {name}")
+
+
+def _fields_of_walls(solver: Solver, world: int) -> np.ndarray:
+    return solver.model.wall.reshape((solver.layout.world_count, -1))[world].numpy()
+
+
+def state_arrays(solver: Solver) -> dict[str, tuple[Any, ...]]:
     """Every array that steps change, with its copies; those that a build leaves out have no elements."""
     first, second = (arrays_of(grains) for grains in solver.grains)
     state: dict[str, tuple[Any, ...]] = {

@@ -1,6 +1,7 @@
 """Grain contours to fill with spheres: closed triangle meshes from files or from measured dimensions."""
 
 import inspect
+import io
 import math
 from collections.abc import Callable
 from pathlib import Path
@@ -15,6 +16,12 @@ if TYPE_CHECKING:
 _FACETS = 48  # sides of a round section: its area is 0.3 % short of the circle's
 MILLIMETER = 1e-3
 
+MESH_KINDS = ("stl", "obj", "ply", "off")
+"""Endings of mesh files that are read: each holds one surface, and no other file."""
+
+LARGEST_MESH = 50_000_000
+"""Bytes of the largest mesh file that is read."""
+
 
 def read_mesh(path: str | Path, unit: float = MILLIMETER) -> "Trimesh":
     """Read a closed surface from a mesh file.
@@ -22,7 +29,7 @@ def read_mesh(path: str | Path, unit: float = MILLIMETER) -> "Trimesh":
     Parameters
     ----------
     path
-        STL, OBJ, PLY, OFF or another format that trimesh reads.
+        STL, OBJ, PLY or OFF, of at most `LARGEST_MESH` bytes.
     unit
         Length of the file's unit [m].
 
@@ -38,20 +45,38 @@ def read_mesh(path: str | Path, unit: float = MILLIMETER) -> "Trimesh":
     FileNotFoundError
         If there is no such file.
     """
-    import trimesh
-
     if not (math.isfinite(unit) and unit > 0.0):
         raise ValueError(f"unit must be finite and positive [m], got {unit!r}")
+    kind = Path(path).suffix.lower().removeprefix(".")
     if not Path(path).is_file():
         raise FileNotFoundError(f"no mesh file {path}")
+    if kind not in MESH_KINDS:
+        raise ValueError(f"{path}: a mesh file is one of {', '.join(MESH_KINDS)}, got {kind or 'no ending'}")
+    if (size := Path(path).stat().st_size) > LARGEST_MESH:
+        raise ValueError(f"{path}: a mesh file has at most {LARGEST_MESH:,} bytes, got {size:,}")
     try:
-        mesh = trimesh.load_mesh(path)
+        mesh = _surface(Path(path).read_bytes(), kind)
     except Exception as error:  # each reader of trimesh raises what it likes
         raise ValueError(f"{path}: a mesh file that trimesh reads is needed, got {error!r}") from error
-    if not mesh.is_watertight:
+    if mesh is None:
         raise ValueError(f"{path}: the surface must be closed, got one with open or doubled edges")
-    mesh.fix_normals()
+    if not (np.isfinite(mesh.vertices).all() and np.isfinite(mesh.volume) and mesh.volume > 0.0):
+        raise ValueError(f"{path}: the corners must be finite, and the volume positive, got {mesh.volume!r}")
     return mesh.apply_scale(unit)
+
+
+def _surface(content: bytes, kind: str) -> "Trimesh | None":
+    """Return the surface of a file with its faces turned outward; None where it is not closed."""
+    import trimesh
+
+    # from memory, so that a file names no other files to be read
+    mesh = trimesh.load_mesh(io.BytesIO(content), file_type=kind)
+    if not isinstance(mesh, trimesh.Trimesh):
+        raise TypeError(f"a {type(mesh).__name__}")
+    if not mesh.is_watertight:
+        return None
+    mesh.fix_normals()
+    return mesh
 
 
 def sphere_mesh(diameter: float) -> "Trimesh":

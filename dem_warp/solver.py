@@ -49,6 +49,9 @@ for more lanes a grain, which shorten a step."""
 
 MOST_LANES = 16
 
+ANY_PACE = 1.0e9
+"""Speed that no grain reaches [m/s]: with it every entry of a list is near."""
+
 
 class Solver:
     """A batch of worlds on one device.
@@ -81,21 +84,23 @@ class Solver:
         layout = self.layout
         self.build = Build(
             self.precision, layout.sphere_count, layout.wall_count, self.device.is_cuda,
-            layout.mechanisms, layout.has_mesh,
+            layout.mechanisms, layout.has_mesh, layout.forms,
         )  # fmt: skip
         self._step_kernels = step_kernels(self.build)
-        self._cell_kernels = cell_kernels(self.build.without_mechanisms)
-        self._wall_kernels = wall_kernels(self.build.without_mechanisms)
+        self._cell_kernels = cell_kernels(self.build.without_forces)
+        self._wall_kernels = wall_kernels(self.build.without_forces)
         self._list_kernels = neighbour_kernels(self.build)
         room = [neighbour_room(world) for world in worlds]
         self._watch_kernels = watch_kernels(self.build)
         self.cycle_limit = LONGEST_CYCLE
+        self.careful = False
+        """Take the shortest cycles, each with lists of its own: slow, and nothing is seen late."""
         with wp.ScopedDevice(self.device):
             self._build_state([(found, capacity or listed) for found, listed in room])
         self._running = list(range(len(worlds)))
         self._pace = np.array([(w.time_step, w.skin, np.linalg.norm(w.gravity)) for w in worlds]).T
         self._impulse_of_count = np.array([w.time_step / w.force_rate for w in worlds])
-        self._graphs: dict[tuple[int, int, int], Any] = {}
+        self._graphs: dict[tuple[int, int, int, bool], Any] = {}
         self._place()
 
     def _build_state(self, room: Sequence[tuple[int, int]]) -> None:
@@ -106,7 +111,7 @@ class Solver:
         first = build_grains(self.worlds, layout, self.precision, device)
         self.grains = (first, copy_grains(first, self.precision))
         self.neighbours = build_neighbours(
-            layout, capacity, memory_size(layout.mechanisms), self.precision, device
+            layout, capacity, memory_size(layout.mechanisms, layout.forms), self.precision, device
         )
         self.alive = living_grains(self.worlds, layout, device)
         self.flags, self.stale, self.idle, self.rebuilds, self.running = (
@@ -198,6 +203,9 @@ class Solver:
         """See to it that the next steps meet every contact."""
         watch, grains, total = self._watch_kernels, self.grains[read], self.layout.grain_total
         self._place_walls(steps, read)
+        if self.careful:
+            self.stale.fill_(1)
+            self.any_stale.fill_(1)
         seen = [self.model, grains, self.alive, self.idle]
         inputs = [steps, *seen, self.fastest, self.neighbours, self.stale, self.any_stale]
         self._launch(watch.mark_stale, total, inputs)
@@ -205,6 +213,8 @@ class Solver:
         threads = total * WARP if self.device.is_cuda else total
         striking = [steps, self.model, self.alive, self.idle, self.fastest, self.neighbours]
         self._launch(watch.heed_neighbours, threads, striking)
+        if self.careful:
+            self.neighbours.near.pace.fill_(ANY_PACE)
         self._launch(watch.select_near, threads, [steps, *seen, self.neighbours, self.fastest])
 
     def _look_back(self, read: int) -> None:
@@ -223,7 +233,7 @@ class Solver:
         self._look_back((read + steps) % 2)
 
     def _graph(self, cycle: int) -> Any:
-        key = (self.lanes, len(self._running), cycle)
+        key = (self.lanes, len(self._running), cycle, self.careful)
         if key not in self._graphs:
             with wp.ScopedCapture(self.device) as capture:
                 for _ in range(self._cycles_captured(cycle)):
@@ -241,6 +251,8 @@ class Solver:
 
         Grains gain speed by their weight for some chunks; what else sets them in motion, the lists allow for.
         """
+        if self.careful:
+            return SHORTEST_CYCLE
         time_step, skin, gravity = self._pace[:, self._running]
         speed = self.fastest.numpy()[self._running] + gravity * chunks * CHUNK * time_step
         with np.errstate(divide="ignore"):

@@ -9,6 +9,7 @@ import warp as wp
 
 from dem_warp.clumps import stack_spheres
 from dem_warp.laws.contact_law import Mechanisms
+from dem_warp.laws.conventions import LawForms
 from dem_warp.model import WorldSetup, shape_table
 from dem_warp.types import FRAMES, Precision, device_structs
 
@@ -24,6 +25,7 @@ class Layout:
     pair_count: int
     mechanisms: Mechanisms
     has_mesh: bool
+    forms: LawForms
 
     @classmethod
     def of(cls, worlds: Sequence[WorldSetup]) -> "Layout":
@@ -32,6 +34,7 @@ class Layout:
             "number of walls": {len(world.walls) for world in worlds},
             "number of contacts": {len(world.contacts) for world in worlds},
             "mechanisms": {world.mechanisms for world in worlds},
+            "forms of the contact law": {world.forms for world in worlds},
             "use of meshes": {world.triangle_count > 0 for world in worlds},
         }
         for name, found in alike.items():
@@ -47,6 +50,7 @@ class Layout:
             len(worlds[0].contacts),
             worlds[0].mechanisms,
             worlds[0].triangle_count > 0,
+            worlds[0].forms,
         )
 
     @property

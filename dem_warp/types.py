@@ -14,6 +14,7 @@ from typing import Any
 import warp as wp
 
 from dem_warp.laws.contact_law import Mechanisms
+from dem_warp.laws.conventions import BASE_FORMS, LawForms
 from dem_warp.laws.library import parameters
 
 SPHERE_BITS = 23
@@ -73,19 +74,25 @@ class Build:
     cooperative: bool
     mechanisms: Mechanisms = ()
     has_mesh: bool = False
+    forms: LawForms = BASE_FORMS
 
     @property
     def name(self) -> str:
         """Name of the compiled module."""
         way = "warp" if self.cooperative else "serial"
         sizes = (self.sphere_count, self.wall_count)
-        extras = (*(m.name for m in self.mechanisms), *("mesh",) * self.has_mesh)
+        extras = (*(m.name for m in self.mechanisms), *self.forms.changed, *("mesh",) * self.has_mesh)
         return "_".join(map(str, (self.precision.name, way, *sizes, *extras)))
 
     @property
-    def without_mechanisms(self) -> "Build":
+    def has_base_law(self) -> bool:
+        """True of contacts that have the base law and nothing beside."""
+        return not self.mechanisms and self.forms == BASE_FORMS
+
+    @property
+    def without_forces(self) -> "Build":
         """The build of kernels that have nothing to do with forces."""
-        return replace(self, mechanisms=())
+        return replace(self, mechanisms=(), forms=BASE_FORMS)
 
 
 PRECISIONS = {precision.name: precision for precision in (MIXED, DOUBLE)}
@@ -125,6 +132,7 @@ def device_structs(precision: Precision) -> SimpleNamespace:
         mass: real  # effective mass m* [kg]
         velocity: vec3  # of the grain's surface relative to the partner's [m/s]
         spin: vec3  # of the grain relative to the partner [rad/s]
+        rolled: vec3  # of some laws: what the two spins slide [m/s], or the grain's own spin [rad/s]
         lever: vec3  # from the grain's centre to the contact [m]
         partner_lever: vec3  # from the centre of a grain that is its partner [m]
         mobility: real  # 1 / (m lever^2) of the grain and of a grain that is its partner, added [1/(kg m2)]

@@ -13,6 +13,7 @@ screened        screen, two_level_effects, steepest_path, climb_table
 fitted          fit_surface, fit_formula, fit_mixture; influence, box_cox, robust_coefficients
 best settings   canonical, ridge_path, stationary_region, maximize, minimize, most_desirable
 compared        compare_means, agreement, noise_floor, curvature_test, joint_fit
+carried over    transfer, transfer_points
 
 ``doe.plots`` draws them.
 """
@@ -55,6 +56,7 @@ from doe.region import Region
 from doe.screening import ScreenResult, aliases, screen
 from doe.steepest import ClimbPath, climb_table, steepest_path
 from doe.surface import Surface, fit_surface
+from doe.transfer import Transfer, transfer, transfer_points
 
 __all__ = [
     "Agreement",
@@ -83,6 +85,7 @@ __all__ = [
     "StationaryPoint",
     "Surface",
     "TargetError",
+    "Transfer",
     "TwoLevelEffects",
     "VarianceRatio",
     "Wish",
@@ -128,6 +131,8 @@ __all__ = [
     "sobol",
     "stationary_region",
     "steepest_path",
+    "transfer",
+    "transfer_points",
     "two_level_effects",
     "variance_ratio",
 ]

@@ -7,10 +7,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from experiments.bridge.corrected_card import write_crossing
+from experiments.bridge.crossing import check_order, cross
+from experiments.bridge.result import Crossing
+from experiments.bridge.source import read_source
 from experiments.calibrate import Campaign
 from experiments.calibrate.campaign import StageHook
-from experiments.cases.engines import engine_named
+from experiments.cases import with_engine
+from experiments.cases.folder import locked
+from experiments.errors import InputError
 from experiments.report.companion import Replay
+from experiments.report.material_card import CARD
 from experiments.runs.campaign import (
     Desk,
     Watch,
@@ -24,7 +31,7 @@ from experiments.runs.choices import chosen_device, chosen_study, default_folder
 from experiments.runs.search import Job, SearchResult, run_search
 from experiments.studyfile import Study
 
-__all__ = ["Calibration", "SearchResult", "calibrate", "discover"]
+__all__ = ["Bridge", "Calibration", "SearchResult", "bridge", "calibrate", "discover"]
 
 
 @dataclass(frozen=True)
@@ -48,6 +55,25 @@ class Calibration:
     def to_dict(self) -> dict[str, Any]:
         """Everything that was found as JSON-able data."""
         return found_by(self.campaign, self.replay)
+
+
+@dataclass(frozen=True)
+class Bridge:
+    """A bridge that has ended."""
+
+    folder: Path
+    """Folder of everything that it wrote."""
+    crossing: Crossing
+    """Shift, scale, the corrected point, and what fresh runs gave."""
+
+    @property
+    def card(self) -> Path | None:
+        """The corrected card; None where no point was found."""
+        return self.folder / CARD if self.crossing.point is not None else None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything that was found as JSON-able data."""
+        return self.crossing.to_dict()
 
 
 def calibrate(
@@ -79,7 +105,7 @@ def calibrate(
     workers
         Processes on the CPU; None: one a core.
     engine
-        Name of an engine from outside (`experiments.cases.ENGINES`); None: `dem_warp.simulate`.
+        Name of an engine (`experiments.cases.ENGINES`); None: that of the study.
     resume
         Go on in the folder of an earlier run: no finished case is simulated again.
     published_replicates
@@ -98,11 +124,12 @@ def calibrate(
     """
     chosen = chosen_study(study, scale, device := chosen_device(device))
     folder = Path(out) if out is not None else default_folder(chosen)
-    chosen = check_runs(chosen, campaign=campaign, paper=published_replicates > 0)
-    desk = Desk.open(chosen, folder, device, workers, resume, watch, engine_named(engine))
-    replay = replay_published(desk, published_replicates) if published_replicates else None
-    found = run_campaign(desk, on_stage, replay) if campaign else None
-    record = record_published(desk, replay, found) if replay is not None else None
+    chosen = check_runs(with_engine(chosen, engine), campaign=campaign, paper=published_replicates > 0)
+    with locked(folder, resume):
+        desk = Desk.open(chosen, folder, device, workers, resume, watch)
+        replay = replay_published(desk, published_replicates) if published_replicates else None
+        found = run_campaign(desk, on_stage, replay) if campaign else None
+        record = record_published(desk, replay, found) if replay is not None else None
     return Calibration(folder, found, replay, record)
 
 
@@ -117,6 +144,7 @@ def discover(
     scale: str | None = None,
     device: str | None = None,
     workers: int | None = None,
+    engine: str | None = None,
     resume: bool = False,
     watch: Watch = lambda title: nullcontext(),
 ) -> SearchResult:
@@ -124,7 +152,7 @@ def discover(
 
     Parameters
     ----------
-    study, out, scale, workers, resume, watch
+    study, out, scale, workers, engine, resume, watch
         As of `calibrate`.
     data
         File of measured heaps; None: only the bank of library waves is made.
@@ -142,7 +170,69 @@ def discover(
     InputError
         When study, data, bank, device or folder break a rule; nothing is written then.
     """
-    chosen = chosen_study(study, scale, device := chosen_device(device, several=True))
+    chosen = with_engine(chosen_study(study, scale, device := chosen_device(device, several=True)), engine)
     folder = Path(out) if out is not None else default_folder(chosen, "discover")
     data, bank = (Path(file) if file is not None else None for file in (data, bank))
     return run_search(Job(chosen, data, folder, bank, photographs_only, device, workers, seed), resume, watch)
+
+
+def bridge(
+    card: str | Path,
+    out: str | Path | None = None,
+    *,
+    engine: str | None = None,
+    command: str | None = None,
+    runs: int = 12,
+    fresh: int = 5,
+    margin: float | None = None,
+    seed: int = 1,
+    workers: int | None = None,
+    time_limit: str | None = None,
+    approximate: bool = False,
+    resume: bool = False,
+    watch: Watch = lambda title: nullcontext(),
+) -> Bridge:
+    """Correct a card for another solver by a few runs there, and verify it by fresh ones.
+
+    Parameters
+    ----------
+    card
+        Material card that `calibrate` wrote.
+    out
+        Folder of the results, new or empty; None: ``out/NAME-bridge``.
+    engine, command
+        The other solver: name of an engine, or command of a program that keeps the folder contract.
+    runs, fresh
+        Runs that the correction is made from, and runs that verify it.
+    margin
+        Difference from the target that does not matter, in the response's unit; None: 0.5 degrees.
+    seed
+        Root of the seeds of all runs.
+    workers
+        Runs at once; None: one a core.
+    time_limit
+        Wall time of a run with its unit, as ``"10 min"``; None: none.
+    approximate
+        Take the nearest for what the other code lacks.
+    resume
+        Go on in the folder of an earlier run: no finished run is simulated again.
+    watch
+        As of `calibrate`.
+
+    Raises
+    ------
+    InputError
+        When card, engine, numbers or folder break a rule; nothing is written then.
+    """
+    source = read_source(Path(card))
+    within = check_order(source, runs, fresh, margin)
+    if engine is None and command is None:
+        raise InputError("a bridge leads to another solver: --engine NAME or --command", "none", "engine")
+    limits = {"time_limit": time_limit, "approximate": approximate or None}
+    study = with_engine(source.study, engine, command, **limits)
+    folder = Path(out) if out is not None else default_folder(study, "bridge")
+    desk = Desk.open(study, folder, None, workers, resume, watch)
+    name = engine or str(getattr(getattr(desk.store.engine, "program", None), "name", command))
+    crossing = cross(source, desk.run, name, runs, fresh, within, seed)
+    write_crossing(crossing, folder)
+    return Bridge(folder, crossing)

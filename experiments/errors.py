@@ -2,9 +2,25 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Self
+
+LONGEST_VALUE, LONGEST_RULE = 120, 600
+"""Characters of a value and of a rule that a message shows: a value may be a file of megabytes."""
+MOST_PROBLEMS = 20
+"""Problems that a message tells of."""
+_DEMAND = re.compile(r"^(?:is|has|names|takes)\b|\b(?:must|needs?|required|unknown|never|only|not both)\b")
+"""A rule in these words cannot be taken for what was found."""
+
+
+def shortened(text: str, most: int = LONGEST_VALUE) -> str:
+    """Text on one line, its middle left out where it is long, and without characters that move a cursor."""
+    line = "".join(character if character.isprintable() else " " for character in text[: 10 * most])
+    if len(text) <= most:
+        return line
+    return f"{line[: most - 20]} ... ({len(text)} characters)"
 
 
 @dataclass(frozen=True)
@@ -19,7 +35,8 @@ class Problem:
     """File, line and key, or the name of the option."""
 
     def __str__(self) -> str:
-        return f"{self.place}: {self.rule} (received {self.value})"
+        rule = self.rule if _DEMAND.search(self.rule) else f"expected: {self.rule}"
+        return f"{self.place}: {shortened(rule, LONGEST_RULE)} (received {shortened(self.value)})"
 
 
 class InputError(ValueError):
@@ -29,7 +46,10 @@ class InputError(ValueError):
         self.rule, self.place = rule, place
         self.value = value if isinstance(value, str) else repr(value)
         self.problems = (Problem(rule, self.value, place), *more)
-        super().__init__("\n".join(str(problem) for problem in self.problems))
+        told = [str(problem) for problem in self.problems[:MOST_PROBLEMS]]
+        if (left := len(self.problems) - len(told)) > 0:
+            told.append(f"... and {left} more")
+        super().__init__("\n".join(told))
 
     @classmethod
     def of(cls, problems: Iterable[Problem]) -> Self:

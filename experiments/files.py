@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -27,6 +28,38 @@ def replacing(path: Path) -> Iterator[Path]:
         temporary.replace(path)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def check_file(path: Path, largest: int) -> None:
+    """Refuse a file, which may come from anyone, before it is opened.
+
+    Raises
+    ------
+    OSError
+        When there is none.
+    InputError
+        When it is no regular file, a pipe or a device for one, or has more bytes than the largest.
+    """
+    facts = path.stat()
+    if not stat.S_ISREG(facts.st_mode):
+        raise InputError("must be a regular file", "a pipe, a device or a folder", str(path))
+    if facts.st_size > largest:
+        raise InputError(f"must have at most {largest:,} bytes", f"{facts.st_size:,}", str(path))
+
+
+def read_file(path: Path, largest: int) -> bytes:
+    """Read a file that `check_file` lets pass.
+
+    Raises
+    ------
+    OSError
+        When it cannot be read.
+    InputError
+        When it is none that is read.
+    """
+    check_file(path, largest)
+    with path.open("rb") as file:
+        return file.read(largest)
 
 
 def existing(path: Path) -> Path:

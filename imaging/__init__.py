@@ -7,7 +7,7 @@ directions of cameras in radians, lengths in metres or, where said so, in pixels
 from imaging.errors import PictureError
 from imaging.finding import find_outline
 from imaging.flanks import FITS, FitSettings
-from imaging.heap import HeapAngle, heap_angle
+from imaging.heap import HeapAngle, HeapOutlines, heap_angle, heap_outlines
 from imaging.outline import Outline
 from imaging.overlay import overlay
 from imaging.pictures import read_picture, save_picture
@@ -23,6 +23,7 @@ __all__ = [
     "Doubt",
     "FitSettings",
     "HeapAngle",
+    "HeapOutlines",
     "HeapShape",
     "Outline",
     "PictureError",
@@ -32,6 +33,7 @@ __all__ = [
     "compare",
     "find_outline",
     "heap_angle",
+    "heap_outlines",
     "heap_shape",
     "measure",
     "measure_photograph",

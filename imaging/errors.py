@@ -2,6 +2,15 @@
 
 from __future__ import annotations
 
+LONGEST_VALUE = 300
+"""Characters of a value that a message shows."""
+
+
+def shortened(value: object) -> str:
+    """Text of a value, its end left out where it is long."""
+    text = str(value)
+    return text if len(text) <= LONGEST_VALUE else f"{text[:LONGEST_VALUE]} ... ({len(text)} characters)"
+
 
 class PictureError(ValueError):
     """A picture without a measurable heap, or a wrong measurement setting.
@@ -17,7 +26,7 @@ class PictureError(ValueError):
     """
 
     def __init__(self, rule: str, value: object, place: str) -> None:
-        super().__init__(f"{place}: {rule}; received {value}")
+        super().__init__(f"{place}: expected: {rule}; received {shortened(value)}")
         self.rule = rule
         self.value = value
         self.place = place

@@ -44,7 +44,8 @@ def _without_shadows(seen: Contrast) -> Contrast:
 def _grains_together(seen: Contrast) -> Contrast:
     """The same picture with grains as light as the wall, between darker and lighter ones, filled up."""
     size = 2 * _grain_reach(seen) + 1
-    values = np.sqrt(cv2.blur(seen.values**2, (size, size)))
+    # the running sums of a blur may fall below zero by their rounding
+    values = np.sqrt(np.maximum(cv2.blur(seen.values**2, (size, size)), 0.0))
     return replace(seen, values=values, thresholds=_cuts(values, seen.noise))
 
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import os
 import warnings
+from contextlib import suppress
 from pathlib import Path
 
 import cv2
@@ -14,6 +16,8 @@ from imaging.geometry import Picture
 
 MAXIMUM_PIXELS = 120_000_000
 """Larger pictures are not read: 360 MB in memory; a file of a few kilobytes may claim as many."""
+LARGEST_FILE = 500_000_000
+"""Bytes of the largest file that is read."""
 HEIC_ENDINGS = (".heic", ".heif")
 FILM_DIAGONAL = math.hypot(36.0, 24.0)
 """Of the film that cameras' focal lengths are converted to [mm]."""
@@ -32,18 +36,20 @@ def read_picture(path: str | Path) -> Picture:
         When there is no such file, when it is no picture, or when it has more than `MAXIMUM_PIXELS`.
     """
     file = Path(path)
-    if not file.is_file():
+    if not os.path.isfile(file):  # a name too long is none, and raises nothing
         raise PictureError("the picture is a file", "no such file", str(path))
     if file.suffix.lower() in HEIC_ENDINGS:
         return _read_heic(file)
-    _check_size(_claimed_size(file), str(path))
-    data = np.frombuffer(file.read_bytes(), dtype=np.uint8)
-    try:
-        picture = cv2.imdecode(data, cv2.IMREAD_COLOR) if len(data) else None
-    except cv2.error:
-        picture = None
+    if (length := file.stat().st_size) > LARGEST_FILE:
+        raise PictureError(f"a picture has at most {LARGEST_FILE:,} bytes", f"{length:,}", str(path))
+    # a file that does not tell its size is not decoded: it may have any
+    size, picture = _claimed_size(file), None
+    if size is not None:
+        _check_size(size, str(path))
+        with suppress(cv2.error):
+            picture = cv2.imdecode(np.frombuffer(file.read_bytes(), dtype=np.uint8), cv2.IMREAD_COLOR)
     if picture is None:
-        raise PictureError("the file is a picture that OpenCV can read", f"{len(data)} bytes", str(path))
+        raise PictureError("the file is a picture that OpenCV can read", f"{length} bytes", str(path))
     return picture.astype(np.uint8, copy=False)
 
 
@@ -62,8 +68,8 @@ def _read_heic(file: Path) -> Picture:
     return np.ascontiguousarray(colors[:, :, ::-1])
 
 
-def _check_size(size: tuple[int, int] | None, place: str) -> None:
-    if size is not None and size[0] * size[1] > MAXIMUM_PIXELS:
+def _check_size(size: tuple[int, int], place: str) -> None:
+    if size[0] * size[1] > MAXIMUM_PIXELS:
         rule = f"a picture has at most {MAXIMUM_PIXELS // 10**6} million pixels: save it smaller"
         raise PictureError(rule, f"{size[0]} x {size[1]}", place)
 
@@ -92,7 +98,7 @@ def focal_length(path: str | Path) -> float | None:
     from PIL import Image, UnidentifiedImageError
 
     try:
-        with Image.open(path) as image:
+        with warnings.catch_warnings(action="ignore"), Image.open(path) as image:
             tags = image.getexif().get_ifd(CAMERA_TAGS)
             size = sorted(image.size)
         film = float(tags.get(FOCAL_LENGTH_TAG, 0))

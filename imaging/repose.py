@@ -119,8 +119,8 @@ def measure(
     """Measure the repose angle of a picture, or of an outline found before.
 
     Each flank runs from the heap's base (see `FitSettings.toe`) to its apex, the column that splits the
-    outline into a roof of two straight lines with the least squared error. theta = atan |k|, where k is the
-    slope of the least-squares line through the part of the flank that `fit` names.
+    outline into a roof of two straight lines with the least squared error. theta = ``atan |k|``, where k is
+    the slope of the least-squares line through the part of the flank that `fit` names.
 
     Parameters
     ----------

@@ -19,9 +19,17 @@ EVIDENCE = shutil.ignore_patterns(
 )
 
 EXPORTER = """
-from experiments.export.contact import Exporter
+from experiments.export.exporter import Exporter
 
 MAGNETS = Exporter("Magnets", "none", "in all", lambda material: (), lambda contact: ())
+"""
+
+FORMAT = """
+import numpy as np
+from experiments.sphere_files.sphere_file import Format, SphereFile
+
+SPHERES = np.array([[0.0, 0.0, 0.0, 2.0]])
+BALL = Format("ball", lambda head: head == "ball", lambda path: SphereFile("a ball", SPHERES))
 """
 
 
@@ -59,7 +67,10 @@ ADDITIONS = {
         "", "", "", "\nOBSERVABLES = (",
         'Observable("spread", "spread", "m", "its width", Instrument.RULER), ',
     ),
-    "exporter": Addition("magnets", EXPORTER, "MAGNETS", "= {", '"magnets": MAGNETS, '),
+    "exporter": Addition("magnets", EXPORTER, "MAGNETS", "_ALL = {", '"magnets": MAGNETS, '),
+    "format of spheres": Addition(
+        "ball", FORMAT, "BALL", "FORMATS: tuple[Format, ...] = (", "BALL, "
+    ),
 }  # fmt: skip
 
 PROGRAM = """
@@ -68,6 +79,7 @@ from experiments.calibrate.screening import screening_design
 from experiments.cli import app
 from experiments.discover.library import library_for
 from experiments.export import EXPORTERS
+from experiments.sphere_files import read_clump
 from experiments.studyfile import load_study
 trial = pathlib.Path("experiments/studies/trial/study.toml")
 magnets, corners = {"magnetism": {"magnetic_force": "0.5 mN"}}, {"screening": {"design": "corners"}}
@@ -77,6 +89,7 @@ written = {key: value for key, value in paper.document.items() if key != "target
 jar = paper.with_document(written | {"scene": {"jar": {"diameter": "28 mm", "height": "28 mm"}}})
 app(["new", str(trial), "--measured"], standalone_mode=False)
 [measured] = pathlib.Path(".").rglob("*-measured.csv")
+pathlib.Path("ball.txt").write_text("ball", encoding="utf-8")
 print(json.dumps({
     "contact law": study.case({}, seed=1).to_dict()["mechanisms"][0]["magnetic_force"],
     "scene": jar.case({}, seed=1).to_dict()["scene"]["kind"],
@@ -84,6 +97,7 @@ print(json.dumps({
     "screening design": len(screening_design(study.factors, study.campaign.screening).dummies),
     "observable": "spread" in measured.read_text(encoding="utf-8"),
     "exporter": EXPORTERS["magnets"].code,
+    "format of spheres": read_clump(pathlib.Path("ball.txt")).shape.sphere_count,
 }))
 """
 
@@ -136,4 +150,5 @@ def test_a_file_and_a_line_are_all_that_a_new_thing_takes(used: dict[str, object
         "screening design": 0,
         "observable": True,
         "exporter": "Magnets",
+        "format of spheres": 1,
     }

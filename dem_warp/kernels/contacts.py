@@ -11,7 +11,7 @@ import warp as wp
 from dem_warp.kernels.lanes import load_pair
 from dem_warp.kernels.packing import packing
 from dem_warp.kernels.walls import wall_functions
-from dem_warp.laws.contact_law import acts_apart, contact_law, memory_size
+from dem_warp.laws.contact_law import acts_apart, contact_law, memory_size, turning_of_partner
 from dem_warp.types import SPHERE_BITS, SPHERE_MASK, Build, device_structs
 
 
@@ -25,13 +25,14 @@ def contact_functions(build: Build) -> SimpleNamespace:
     Model, World, Grains, Neighbours = types.Model, types.World, types.Grains, types.Neighbours
     Contact = types.Contact
     pack = packing(precision)
-    law = contact_law(build.mechanisms)
+    law = contact_law(build.mechanisms, build.forms)
     is_apart = acts_apart(build.mechanisms)
-    memory_each = wp.constant(memory_size(build.mechanisms))
+    turning = turning_of_partner(build.forms)
+    memory_each = wp.constant(memory_size(build.mechanisms, build.forms))
     # the lanes of a warp that meet nothing wait for the others: let them load and work as if, so that nobody
     # waits for the distance before the rest is loaded
-    is_speculative = build.cooperative and not build.mechanisms and not build.has_mesh
-    walls = wall_functions(build.without_mechanisms)
+    is_speculative = build.cooperative and build.has_base_law and not build.has_mesh
+    walls = wall_functions(build.without_forces)
     spheres_each = wp.constant(build.sphere_count)
     walls_each = wp.constant(build.wall_count)
 
@@ -87,12 +88,34 @@ def contact_functions(build: Build) -> SimpleNamespace:
         to_contact = contact.normal * (rb - real(0.5) * contact.overlap)
         lever = lever_of(grains, world, j, b, to_contact)
         contact.velocity = -surface_velocity(grains, j, lever)
+        if wp.static(turning == "own lever"):
+            contact.rolled = -wp.cross(spin_of(grains, j), lever)
         contact.spin = -spin_of(grains, j)
         contact.partner_lever = lever
         mb = pack.load_vec4(grains.velocity, j)[3]
         contact.mobility = real(1.0) / (mb * wp.dot(lever, lever))
         contact.mass = contact.mass * mb / (contact.mass + mb)
         return contact
+
+    @wp.func
+    def add_motion(grains: Grains, contact: Contact, g: int) -> Contact:
+        """Adds the motion of the grain itself to that of its partner."""
+        contact.velocity += surface_velocity(grains, g, contact.lever)
+        contact.spin += spin_of(grains, g)
+        if wp.static(turning == "own lever"):
+            contact.rolled += wp.cross(spin_of(grains, g), contact.lever)
+        if wp.static(turning == "alike"):
+            contact.rolled = spin_of(grains, g)
+        return contact
+
+    @wp.func
+    def torques(contact: Contact, torque: vec3):
+        """Torque on the grain, and the opposite of that on its partner [N m], of what the law gives."""
+        if wp.static(turning == "own lever"):
+            return wp.cross(contact.lever, torque), wp.cross(contact.partner_lever, torque)
+        if wp.static(turning == "alike"):
+            return torque, -torque
+        return torque, torque
 
     @wp.func
     def joined(model: Model, w: int, entry: int, other: int) -> bool:
@@ -219,17 +242,17 @@ def contact_functions(build: Build) -> SimpleNamespace:
         if wp.static(is_speculative) or meets:
             c.lever = lever_of(grains, world, g, a, c.normal * (real(0.5) * c.overlap - radius))
             c.mobility += real(1.0) / (mass * wp.dot(c.lever, c.lever))
-            c.velocity += surface_velocity(grains, g, c.lever)
-            c.spin += spin_of(grains, g)
+            c = add_motion(grains, c, g)
             displacement, is_new = recall(model, world, grains, neighbours, w, g, slot, step)
             c.is_new = is_new
             force, displacement, torque, rolling, partner_rolling = law(
                 model.contact[pair], c, displacement, neighbours.memory, slot * memory_each
             )
+            torque, opposite = torques(c, torque)
             if wp.static(not build.cooperative):
                 if partner < wall_base:
                     j = w * model.grain_count + partner // spheres_each
-                    react(neighbours, j, force, torque + wp.cross(c.partner_lever, force), partner_rolling)
+                    react(neighbours, j, force, opposite + wp.cross(c.partner_lever, force), partner_rolling)
             torque += wp.cross(c.lever, force)
             if meets:
                 pack.store_vec4(neighbours.history, slot, pack.stamp(displacement, step + 1))

@@ -39,7 +39,7 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
     Model, Grains, Neighbours, Cells = types.Model, types.Grains, types.Neighbours, types.Cells
     pack = packing(precision)
     spheres_each = wp.constant(build.sphere_count)
-    memory_each = wp.constant(memory_size(build.mechanisms))
+    memory_each = wp.constant(memory_size(build.mechanisms, build.forms))
     lanes = wp.constant(list_lanes(build))
     module = wp.get_module(f"dem_warp_neighbours_{build.name}")
     wp.set_module_options({"enable_backward": False}, module)

@@ -37,7 +37,7 @@ def step_kernels(build: Build) -> SimpleNamespace:
     )
 
     # five blocks find room on a multiprocessor instead of four; laws beyond the base need the registers
-    is_base = precision.is_fixed_point and not build.mechanisms and not build.has_mesh
+    is_base = precision.is_fixed_point and build.has_base_law and not build.has_mesh
     limits = {"cuda_max_registers": 96} if is_base else {}
 
     @wp.func

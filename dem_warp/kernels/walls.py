@@ -172,6 +172,7 @@ def wall_functions(build: Build) -> SimpleNamespace:
         contact.normal = normal
         contact.radius = radius
         arm = rounded(r) + normal * (real(0.5) * overlap - radius)
+        contact.rolled = -wp.cross(frame.spin, arm)
         contact.velocity = -(frame.velocity + wp.cross(frame.spin, arm))
         contact.spin = -frame.spin
         return contact

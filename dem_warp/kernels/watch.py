@@ -47,7 +47,7 @@ def watch_kernels(build: Build) -> SimpleNamespace:
     Model, World, Grains, Neighbours = types.Model, types.World, types.Grains, types.Neighbours
     pack = packing(precision)
     contacts = contact_functions(build)
-    walls = wall_functions(build.without_mechanisms)
+    walls = wall_functions(build.without_forces)
     spheres_each = wp.constant(build.sphere_count)
     walls_each = wp.constant(build.wall_count)
     lanes = wp.constant(WARP if build.cooperative else 1)

@@ -5,17 +5,42 @@ from typing import Any
 
 import warp as wp
 
+from dem_warp.laws.conventions import BASE_FORMS, LawForms
 from dem_warp.laws.mechanism import Mechanism
-from dem_warp.laws.normal import damped, hertz_force, hertz_stiffness
+from dem_warp.laws.normal import (
+    damped,
+    hertz_force,
+    hertz_stiffness,
+    mass_rate,
+    tsuji_rate,
+    viscoelastic_rate,
+)
 from dem_warp.laws.rolling import rolling_torque
-from dem_warp.laws.tangential import advance_displacement, coulomb_spring, mindlin_stiffness
+from dem_warp.laws.rolling_choices import ROLLING
+from dem_warp.laws.tangential import (
+    advance_displacement,
+    coulomb_spring,
+    free_spring,
+    mindlin_stiffness,
+    stretch_of,
+    sum_spring,
+    unloaded,
+)
 
 Mechanisms = tuple[type[Mechanism], ...]
 
+_DAMPINGS = {"tsuji": tsuji_rate, "mass_velocity": mass_rate, "viscoelastic": viscoelastic_rate}
+_REPLACED = {"rolling": ("rolling",), "slider": ("sliding", "tangential_history")}
+"""Laws whose base choice alone leaves room for a mechanism, by the hook that it has."""
 
-def memory_size(mechanisms: Mechanisms) -> int:
-    """Values that a contact remembers for its mechanisms."""
-    return sum(mechanism.memory_size for mechanism in mechanisms)
+_SPRINGS = {"spring": coulomb_spring, "spring_free": free_spring, "sum": sum_spring}
+
+
+def memory_size(mechanisms: Mechanisms, forms: LawForms = BASE_FORMS) -> int:
+    """Values that a contact remembers for its mechanisms, and after those for its law."""
+    own = sum(mechanism.memory_size for mechanism in mechanisms)
+    rolling = ROLLING[forms.rolling].memory_size if forms.rolling in ROLLING else 0
+    return own + rolling + int(forms.tangential_history.startswith("rescaled"))
 
 
 def acts_apart(mechanisms: Mechanisms) -> bool:
@@ -23,9 +48,40 @@ def acts_apart(mechanisms: Mechanisms) -> bool:
     return any(mechanism.acts_apart for mechanism in mechanisms)
 
 
+def turning_of_partner(forms: LawForms) -> str:
+    """Turning of the partner by a law's torque, `RollingChoice.on_partner`."""
+    return ROLLING[forms.rolling].on_partner if forms.rolling in ROLLING else "opposite"
+
+
+def check_forms(mechanisms: Mechanisms, forms: LawForms) -> None:
+    """Check that no mechanism stands where the law is another than the base's.
+
+    Raises
+    ------
+    ValueError
+        With the mechanism and the law that it does not go with.
+    """
+    base = BASE_FORMS
+    for hook, laws in _REPLACED.items():
+        for law in laws:
+            chosen = getattr(forms, law)
+            clash = [
+                m.name for m in mechanisms if getattr(m, hook) is not None and chosen != getattr(base, law)
+            ]
+            if clash:
+                rule = f"must be {getattr(base, law)!r} beside the mechanism {clash[0]}"
+                raise ValueError(f"ContactLaws.{law}: {rule}, got {chosen!r}")
+    if turning_of_partner(forms) != "opposite" and (
+        clash := [m.name for m in mechanisms if m.torque is not None]
+    ):
+        raise ValueError(
+            f"ContactLaws.rolling: must not be {forms.rolling!r} beside the mechanism {clash[0]}"
+        )
+
+
 @functools.cache
-def contact_law(mechanisms: Mechanisms) -> Any:
-    """Device function of the law with some mechanisms.
+def contact_law(mechanisms: Mechanisms, forms: LawForms = BASE_FORMS) -> Any:
+    """Device function of the law with some mechanisms, in a choice of its forms.
 
     It takes `params` (ContactParams), `contact` (Contact), the tangential displacement so far [m], and an
     array and the index in it at which the mechanisms' memory of this contact begins. It gives the force on
@@ -33,19 +89,28 @@ def contact_law(mechanisms: Mechanisms) -> Any:
     largest torques [N m] that rolling resistance may set against the spin of the grain and of its partner.
     Force and torque on the partner are the opposite ones.
 
-    Both dampings use the same constant 2 sqrt(5/6) |beta|, each with its own stiffness, as in EDEM; the
-    tangential one can be left out.
+    Both dampings use the same constant 2 sqrt(5/6) |beta|, each with its own stiffness, as in EDEM, but for
+    what `params` and the forms say otherwise.
 
     Raises
     ------
     ValueError
-        If several mechanisms stand in place of the rolling resistance, or of the tangential spring.
+        If several mechanisms stand in place of the rolling resistance, or of the tangential spring, or one
+        stands where the forms have another law than the base's.
     """
-    spring, friction, slider = _spring(mechanisms), _friction(mechanisms), _slider(mechanisms)
+    check_forms(mechanisms, forms)
+    spring, friction, slider = _spring(mechanisms), _friction(mechanisms), _slider(mechanisms, forms)
     attraction, torque = _attraction(mechanisms), _torque(mechanisms)
     rolling = _rolling(mechanisms)
+    rate, history, turn = (
+        _DAMPINGS[forms.normal_damping],
+        forms.tangential_history,
+        ROLLING.get(forms.rolling),
+    )
+    roll = turn.torque if turn else _no_torque
+    own_memory, law_memory = memory_size(mechanisms), memory_size(mechanisms, forms)
 
-    @wp.func(name=_name("law", mechanisms))
+    @wp.func(name=_name("law", mechanisms, forms))
     def law(params: Any, contact: Any, displacement: Any, memory: Any, first: int):
         attracting = attraction(params, contact, memory, first)
         if wp.static(acts_apart(mechanisms)):
@@ -55,48 +120,57 @@ def contact_law(mechanisms: Mechanisms) -> Any:
         stiffness = hertz_stiffness(params.modulus, contact.radius, overlap)
         elastic = spring(params, contact, hertz_force(stiffness, overlap), memory, first)
         normal_velocity = wp.dot(contact.velocity, contact.normal)
-        normal_force = damped(
-            elastic,
-            params.damping * wp.sqrt(stiffness * contact.mass),
-            normal_velocity,
-            params.clamp_attraction,
-        )
+        normal_rate = rate(params, contact, stiffness)
+        normal_force = damped(elastic, normal_rate, normal_velocity, params.clamp_attraction)
         support = wp.max(normal_force, zero)
         tangential_velocity = contact.velocity - contact.normal * normal_velocity
+        tangential_stiffness = mindlin_stiffness(params.shear_modulus, contact.radius, overlap)
+        if wp.static(history.startswith("rescaled")):
+            displacement = unloaded(contact, displacement, memory, first + wp.static(law_memory - 1))
+        if wp.static(history.endswith("force")):
+            displacement = stretch_of(displacement, tangential_stiffness)
         displacement = advance_displacement(
             displacement, contact.normal, tangential_velocity, contact.time_step
         )
-        tangential_stiffness = mindlin_stiffness(params.shear_modulus, contact.radius, overlap)
-        coefficient = friction(
-            params,
-            contact,
-            params.static_friction,
-            wp.length(displacement) * tangential_stiffness,
-            support,
-            memory,
-            first,
-        )
+        load = support
+        if wp.static(forms.friction_load == "size"):
+            load = wp.abs(normal_force)
+        held = wp.length(displacement) * tangential_stiffness
+        coefficient = friction(params, contact, params.static_friction, held, load, memory, first)
+        tangential_rate = params.tangential_damping * normal_rate
+        if wp.static(forms.normal_damping == "tsuji"):
+            tangential_rate = (
+                params.tangential_damping * params.damping * wp.sqrt(tangential_stiffness * contact.mass)
+            )
         tangential_force, displacement = slider(
             params,
             contact,
             displacement,
             tangential_stiffness,
-            params.tangential_damping * params.damping * wp.sqrt(tangential_stiffness * contact.mass),
+            tangential_rate,
             tangential_velocity,
-            coefficient * support,
+            coefficient * load,
             memory,
             first,
         )
-        limit = rolling(params, rolling_torque(params.rolling_friction, support, contact.lever))
-        partner_torque = rolling_torque(params.rolling_friction, support, contact.partner_lever)
+        if wp.static(history.endswith("force")):
+            displacement = displacement * (-tangential_stiffness)
+        own_torque = torque(params, contact, support, memory, first)
+        limit = zero
+        partner_limit = zero
+        if wp.static(turn is None):
+            limit = rolling(params, rolling_torque(params.rolling_friction, support, contact.lever))
+            partner_torque = rolling_torque(params.rolling_friction, support, contact.partner_lever)
+            partner_limit = rolling(params, partner_torque)
+        else:
+            rolling_load = support
+            if wp.static(turn is not None and turn.load == "size"):
+                rolling_load = wp.abs(normal_force)
+            if wp.static(turn is not None and turn.load == "elastic"):
+                rolling_load = elastic
+            own_torque += roll(params, contact, rolling_load, memory, first + wp.static(own_memory))
         force = contact.normal * (normal_force - attracting)
-        return (
-            force + tangential_force,
-            displacement,
-            torque(params, contact, support, memory, first),
-            limit,
-            rolling(params, partner_torque),
-        )
+        return force + tangential_force, displacement, own_torque, limit, partner_limit
 
     return law
 
@@ -122,8 +196,8 @@ def _places(mechanisms: Mechanisms, hook: str) -> list[tuple[Any, int, str]]:
     return found
 
 
-def _name(hook: str, mechanisms: Mechanisms) -> str:
-    return "_".join([hook, *(mechanism.name for mechanism in mechanisms)])
+def _name(hook: str, mechanisms: Mechanisms, forms: LawForms = BASE_FORMS) -> str:
+    return "_".join([hook, *(mechanism.name for mechanism in mechanisms), *forms.changed])
 
 
 @wp.func
@@ -153,19 +227,24 @@ def _same_coefficient(
     return coefficient
 
 
-@wp.func
-def _one_spring(
-    params: Any,
-    contact: Any,
-    displacement: Any,
-    stiffness: Any,
-    damping_rate: Any,
-    velocity: Any,
-    limit: Any,
-    memory: Any,
-    first: int,
-):
-    return coulomb_spring(displacement, stiffness, damping_rate, velocity, limit)
+def _one_spring(forms: LawForms) -> Any:
+    spring = _SPRINGS[forms.sliding]
+
+    @wp.func(name=_name("one_spring", (), forms))
+    def one_spring(
+        params: Any,
+        contact: Any,
+        displacement: Any,
+        stiffness: Any,
+        damping_rate: Any,
+        velocity: Any,
+        limit: Any,
+        memory: Any,
+        first: int,
+    ):
+        return spring(displacement, stiffness, damping_rate, velocity, limit)
+
+    return one_spring
 
 
 def _attraction(mechanisms: Mechanisms) -> Any:
@@ -211,10 +290,10 @@ def _require_one(mechanisms: Mechanisms, hook: str, what: str) -> None:
         raise ValueError(f"mechanisms: at most one {what}, got {names}")
 
 
-def _slider(mechanisms: Mechanisms) -> Any:
+def _slider(mechanisms: Mechanisms, forms: LawForms) -> Any:
     _require_one(mechanisms, "slider", "law in place of the tangential spring")
     places = _places(mechanisms, "slider")
-    return _remembering_slider(*places[0]) if places else _one_spring
+    return _remembering_slider(*places[0]) if places else _one_spring(forms)
 
 
 def _remembering_slider(own: Any, offset: int, name: str) -> Any:

@@ -37,3 +37,31 @@ def damped(elastic: Any, damping_rate: Any, normal_velocity: Any, clamp_attracti
     if clamp_attraction > type(elastic)(0.0):
         force = wp.max(force, type(elastic)(0.0))
     return force
+
+
+@wp.func
+def tsuji_rate(params: Any, contact: Any, stiffness: Any):
+    """Damping [N s/m] that grows as the root of the stiffness: one restitution at every speed.
+
+    Source: Tsuji, Tanaka and Ishida, Powder Technology 71 (1992) 239-250.
+    """
+    return params.damping * wp.sqrt(stiffness * contact.mass)
+
+
+@wp.func
+def mass_rate(params: Any, contact: Any, stiffness: Any):
+    """Damping eta m* [N s/m], the same at every overlap.
+
+    Source: LAMMPS (2022-01-06), src/GRANULAR/pair_granular.cpp, lines 365-366, damping mass_velocity.
+    """
+    return params.damping * contact.mass
+
+
+@wp.func
+def viscoelastic_rate(params: Any, contact: Any, stiffness: Any):
+    """Damping eta a m* [N s/m], a = sqrt(R* d); `damping` is that of a = 1 mm.
+
+    Source: LAMMPS (2022-01-06), src/GRANULAR/pair_granular.cpp, lines 367-368, damping viscoelastic.
+    """
+    area = wp.sqrt(contact.radius * contact.overlap)
+    return params.damping * type(area)(1000.0) * area * contact.mass

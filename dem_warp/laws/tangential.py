@@ -53,3 +53,67 @@ def coulomb_spring(
         if size > limit:
             force = force * (limit / size)
     return force, displacement
+
+
+@wp.func
+def free_spring(displacement: Any, stiffness: Any, damping_rate: Any, tangential_velocity: Any, limit: Any):
+    """Tangential force [N] and displacement [m] of a spring under the Coulomb limit, its damping under none.
+
+    A spring that slides is not damped.
+
+    Source: LIGGGHTS-PUBLIC 3.8.0, src/tangential_model_history.h, lines 161-218; Yade,
+    pkg/dem/HertzMindlin.cpp, Law2_ScGeom_MindlinPhys_Mindlin::go, "MOHR-COULOMB law".
+    """
+    force = displacement * (-stiffness)
+    size = wp.length(force)
+    if size > limit:
+        keep = limit / size
+        displacement = displacement * keep
+        force = force * keep
+    else:
+        force = force - tangential_velocity * damping_rate
+    return force, displacement
+
+
+@wp.func
+def sum_spring(displacement: Any, stiffness: Any, damping_rate: Any, tangential_velocity: Any, limit: Any):
+    """Tangential force [N] and displacement [m] of spring and damping whose sum is under the Coulomb limit.
+
+    Where it slides, the displacement becomes what makes the sum equal to the limit.
+
+    Source: LAMMPS (2022-01-06), src/GRANULAR/pair_granular.cpp, lines 494-533; DEM-Engine 3.0.19,
+    FullHertzianForceModel.cu, "Tangential force part"; S. Luding, Granular Matter 10 (2008) 235-246.
+    """
+    force = displacement * (-stiffness) - tangential_velocity * damping_rate
+    size = wp.length(force)
+    if size > limit:
+        force = force * (limit / size)
+        if stiffness > type(limit)(0.0):
+            displacement = (force + tangential_velocity * damping_rate) * (type(limit)(-1.0) / stiffness)
+    return force, displacement
+
+
+@wp.func
+def stretch_of(force: Any, stiffness: Any):
+    """Displacement [m] of a spring from its force [N], which a contact remembers in its place.
+
+    Source: Yade, pkg/dem/HertzMindlin.cpp, Law2_ScGeom_MindlinPhys_Mindlin::go, "SHEAR FORCE"; LAMMPS
+    (2022-01-06), src/GRANULAR/pair_granular.cpp, lines 483-489, tangential mindlin/force.
+    """
+    if stiffness > type(stiffness)(0.0):
+        return force * (type(stiffness)(-1.0) / stiffness)
+    return force * type(stiffness)(0.0)
+
+
+@wp.func
+def unloaded(contact: Any, history: Any, memory: Any, at: int):
+    """Displacement [m] or force [N] of the spring, scaled down by what the contact radius has just shrunk.
+
+    Source: LAMMPS (2022-01-06), src/GRANULAR/pair_granular.cpp, lines 434-446, tangential mindlin_rescale;
+    C. Thornton, S. J. Cummins and P. W. Cleary, Powder Technology 233 (2013) 30-46.
+    """
+    radius = wp.sqrt(contact.radius * contact.overlap)
+    if not contact.is_new and radius < memory[at]:
+        history = history * (radius / memory[at])
+    memory[at] = radius
+    return history

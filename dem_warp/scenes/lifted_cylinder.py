@@ -33,6 +33,8 @@ CLOGGED = 0.02
 """Part of the grains from which on a tube that takes them along is clogged: no heap."""
 
 
+NOTHING_LEFT = "no grain is left on the plate, so there is no heap: lower the tilt, or widen the plate"
+
 LIFT_OBSERVABLES = {
     "time_to_rest": Observable("s", "from the start of the lift until the heap rests"),
     "grains_lost": Observable("1", "grains that left the plate, or rose with the tube"),
@@ -242,7 +244,7 @@ class LiftController(PouredController[Lift]):
         over = self.scene.duration is not None or (calm and self.rests(view))
         if over:
             self._finish(view, elapsed)
-            return Decision(done=True)
+            return Decision(done=True, failure="" if view.alive.any() else NOTHING_LEFT)
         if rise > GONE * self.scene.height and view.highest > rise:
             riding = view.alive & (view.positions[:, 2] > rise)
             count = np.count_nonzero(riding)

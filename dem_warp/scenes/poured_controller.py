@@ -20,7 +20,10 @@ HEAPED = 4
 CALM = 10.0
 """Grains rest when their root mean square speed is below `rest_speed` and none passes CALM times that."""
 
-UNREST = "grains that tremble in place without end want a lower time_step_fraction"
+UNREST = (
+    "grains that tremble in place without end want a lower time_step_fraction, and grains that lose no "
+    "energy (restitution 1, friction 0) never rest"
+)
 """Advice where grains did not come to rest: damping over too long a step feeds a motion."""
 
 

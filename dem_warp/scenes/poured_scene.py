@@ -12,6 +12,7 @@ from dem_warp.model import GRAVITY, ContactCoefficients, Grains, WorldSetup
 from dem_warp.parameters import Parameter, check_parameters
 from dem_warp.scenes.rain import CrossSection, Rain, place_rain
 from dem_warp.scenes.scene import Controller, Observable
+from dem_warp.types import MAX_PARTNERS
 from dem_warp.walls import Wall
 
 FREEBOARD = 1.2
@@ -123,9 +124,22 @@ class PouredScene(ABC):
     # ---- the world before the first step -------------------------------------------------------------------
 
     def supply(self, case: Case[Any]) -> int:
-        """Grains kept ready."""
+        """Grains kept ready.
+
+        Raises
+        ------
+        ValueError
+            If they are more than a world can have.
+        """
         mean_volume = case.grains.mean(lambda shape: shape.volume)
-        return self.grain_count or int(np.ceil(self.densest_fill * self.volume / mean_volume))
+        count = self.grain_count or np.ceil(self.densest_fill * self.volume / mean_volume)
+        most = MAX_PARTNERS // case.grains.sphere_count
+        if not count <= most:
+            raise ValueError(
+                f"{type(self).__name__}: must hold at most {most:,} grains of {case.grains.sphere_count} "
+                f"spheres, got {count:.4g}: lower grain_count, or make the container smaller"
+            )
+        return int(count)
 
     def prepare(self, cases: Sequence[Case[Any]], device: Any) -> list[WorldSetup]:
         """Worlds of cases that share this kind of scene; sizes, grains and counts may differ."""
@@ -163,7 +177,8 @@ def _world(case: Case[Any], rain: Rain) -> WorldSetup:
         ),
         gravity=scene.gravity,
         air_drag=scene.air_drag,
-        rolling_holds=case.numerics.rolling_holds,
+        rolling_holds=case.laws.rolling != "own_spin_whole_step",
+        forms=case.laws.forms,
         weighed=scene.weighed,
     )
 

@@ -2,7 +2,8 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple, Protocol, TypeVar
+from math import isfinite
+from typing import Any, NamedTuple, Protocol, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
 
@@ -54,6 +55,39 @@ class Course:
         steps = view.step - sum(done["steps"] for done in self.phases)
         self.phases.append({"name": self.phase, "time": view.time - self.phase_start, "steps": steps})
         self.phase, self.phase_start, self.slow_since = phase, view.time, None
+
+
+def course_of(kind: type[Any], values: Mapping[str, Any]) -> Any:
+    """Build the course of a kind from the plain values that a checkpoint kept.
+
+    Raises
+    ------
+    ValueError
+        When there are other fields, or a value is of another type.
+    """
+    hints = get_type_hints(kind)
+    if odd := sorted(values.keys() ^ hints.keys()):
+        raise ValueError(f"{kind.__name__}: must have its fields, got a difference in {odd}")
+    for name, value in values.items():
+        if not _fits(value, hints[name]):
+            raise ValueError(f"{kind.__name__}.{name}: must be {hints[name]}, got {value!r}")
+    return kind(**values)
+
+
+def _fits(value: Any, hint: Any) -> bool:
+    """Tell that a plain value is of an annotated type, its numbers finite."""
+    inner = get_args(hint)
+    if hint is float:
+        return type(value) in (int, float) and isfinite(value)
+    match get_origin(hint):
+        case None:
+            return hint is Any or isinstance(value, hint)
+        case origin if origin is list:
+            return isinstance(value, list) and all(_fits(item, inner[0]) for item in value)
+        case origin if origin is dict:
+            return isinstance(value, dict) and all(_fits(item, inner[1]) for item in value.values())
+        case _:
+            return any(_fits(value, each) for each in inner)
 
 
 CourseT = TypeVar("CourseT", bound=Course)

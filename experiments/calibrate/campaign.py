@@ -137,13 +137,14 @@ def _verdict(
     ]
     found = f"At {listed(optimum.point)} fresh cases gave {'; '.join(gave)}"
     if missed := [r.name for r, test in tests if test.different]:
-        return Outcome.NOT_VERIFIED, f"{found}: the chosen point misses the target of {', '.join(missed)}."
+        return Outcome.MISSED, f"{found}: the chosen point misses the target of {', '.join(missed)}."
     shown, unproven = (
         [f"{r.name} within {quantity(test.margin or 0.0, r.unit)}" for r, test in tests if equal(test)]
         for equal in (lambda test: test.equivalent, lambda test: not test.equivalent)
     )
     said = [f"equivalence is shown for {', '.join(shown)}"] if shown else []
-    said += [f"equivalence is not shown for {', '.join(unproven)}"] if unproven else []
+    as_good = f"{optimum.region.fraction:.0%} of the settings that the surface covers are compatible with it."
     if verification.verified:
-        return Outcome.CALIBRATED, f"{found}; {'; '.join(said)}."
-    return Outcome.NOT_VERIFIED, f"{found}, but {said[-1]}, which the study requires: add replicates."
+        return Outcome.CALIBRATED, f"{found}; {'; '.join(said)}. {as_good}"
+    said += [f"equivalence is not shown for {', '.join(unproven)}: add replicates"]
+    return Outcome.NOT_TOLD_APART, f"{found}: no difference is found, but {'; '.join(said)}. {as_good}"

@@ -28,10 +28,15 @@ Found = TypeVar("Found")
 
 
 class Outcome(StrEnum):
-    """Ending of a campaign."""
+    """Ending of a campaign.
+
+    Fresh cases at the chosen point are shown to be equivalent to the target (calibrated), they differ from it
+    (missed), or there are too few of either to tell; the others end before.
+    """
 
     CALIBRATED = "calibrated"
-    NOT_VERIFIED = "not-verified"
+    NOT_TOLD_APART = "not-told-apart"
+    MISSED = "missed"
     NO_SIGNIFICANT_FACTOR = "no-significant-factor"
     TARGET_NOT_REACHED = "target-not-reached"
     PLATEAU = "plateau"
@@ -293,6 +298,7 @@ class VerificationResult(_ByResponse[Comparison]):
 
     cases: pd.DataFrame
     verified: bool
+    """True where equivalence with every target is shown, and no difference is found."""
     decisions: tuple[Decision, ...]
 
     def tables(self) -> dict[str, pd.DataFrame]:

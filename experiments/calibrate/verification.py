@@ -30,10 +30,7 @@ def verify(study: Study, optimum: OptimumResult, target: TargetResult, runner: R
         margin = settings.margin_sds * aim.sd if margin is None else margin
         values = values_of(cases, STAGE, response)
         tests[response.name] = compare_means(values, aim, margin=margin, alpha=alpha)
-    verified = all(
-        not test.different and (test.equivalent or not settings.require_equivalence)
-        for test in tests.values()
-    )
+    verified = all(test.equivalent and not test.different for test in tests.values())
     decisions = [_decision(response, tests[response.name], cases) for response in responses]
     return VerificationResult(tests, cases, verified, tuple(decisions))
 

@@ -1,30 +1,20 @@
-"""Engines from outside: whatever turns cases into results in place of `dem_warp.simulate`."""
+"""Engines by name, those that ship and those of packages from outside, and the engine of a study."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Protocol
+from typing import Any
 
-from dem_warp import Case, CaseResult
+from dem_warp import simulate
 from dem_warp.registry import Registry
-from dem_warp.result import OnProgress, OnResult
-from experiments.errors import InputError
-
-
-class Engine(Protocol):
-    """A function of cases, as `dem_warp.simulate` is one."""
-
-    def __call__(
-        self,
-        cases: Sequence[Case],
-        device: str | None = None,
-        workers: int | None = None,
-        on_result: OnResult | None = None,
-        on_progress: OnProgress | None = None,
-        checkpoint: str | Path | None = None,
-    ) -> list[CaseResult]:
-        """Simulate cases; results in their order, each handed to `on_result` with its index as it ends."""
+from experiments.cases.contract import command_program
+from experiments.cases.driver import Driver
+from experiments.cases.engine import Engine
+from experiments.cases.program import ProgramEngine
+from experiments.errors import InputError, StudyError
+from experiments.studyfile import Study
+from experiments.studyfile.engine_section import EngineSection, quoted
 
 
 def _check(name: str, engine: object, known: object) -> None:
@@ -32,21 +22,87 @@ def _check(name: str, engine: object, known: object) -> None:
         raise TypeError(f"must be a function of cases, got {engine!r}")
 
 
-ENGINES: Registry[Engine] = Registry("dem_warp.engines", {}, _check)
-"""Engines of installed packages, by name."""
+_DRIVERS = {name: ProgramEngine(Driver(name)) for name in ("liggghts", "lammps", "yade")}
+
+ENGINES: Registry[Engine] = Registry("dem_warp.engines", _DRIVERS, _check)
+"""Engines by name: drivers of other codes, and those of installed packages."""
 
 
-def engine_named(name: str | None) -> Engine | None:
-    """Find an engine by its name; None is that of dem-warp.
+def with_engine(study: Study, name: str | None = None, command: str | None = None, **limits: Any) -> Study:
+    """Return a study whose cases another engine simulates, by its name or its command; None: its own.
+
+    Further keys of the section, such as ``time_limit``, are laid over the study's; None leaves one as it is.
+    A command's files are looked for in the current folder.
 
     Raises
     ------
     InputError
-        When no installed package has one of this name.
+        When there is none of this name, the command is no command, or both are given.
     """
-    if name is None:
+    if name is None and command is None:
+        return study
+    if name is not None and command is not None:
+        raise InputError("an engine is given by its name or by its command", f"{name}; {command}", "engine")
+    if name is not None and name not in ENGINES:
+        raise InputError(f"must be one of {', '.join(ENGINES) or 'none'}", name, "engine")
+    document = study.document
+    kept = {key: value for key, value in document.get("engine", {}).items() if key not in ("name", "command")}
+    if command is not None:
+        words = command_program(command, Path.cwd(), "--command").words
+        chosen = {"command": " ".join(map(quoted, words))}
+    else:
+        chosen = {"name": str(name)}
+    given = {key: value for key, value in limits.items() if value is not None}
+    return study.with_document(document | {"engine": kept | chosen | given})
+
+
+def engine_of(study: Study) -> Engine | None:
+    """Engine that a study names; None is that of dem-warp.
+
+    Raises
+    ------
+    StudyError
+        When there is none of its name, its program is not there, it cannot simulate the study's cases, or a
+        rule for programs is given to what is none.
+    """
+    section, place = study.engine, f"{study.file}: engine"
+    if section is None:
         return None
-    if name not in ENGINES:
-        known = ", ".join(ENGINES) or "none, no package adds any"
-        raise InputError(f"must be one of {known}", name, "engine")
-    return ENGINES[name]
+    if section.command is not None:
+        more = (section.version, section.observables)
+        command = command_program(section.command, study.file.parent, f"{place}.command", *more)
+        return ProgramEngine(command, section.workers, section.time_limit)
+    engine = _engine_named(section, place)
+    check = getattr(engine, "check", None)
+    if check is not None:
+        try:
+            check(study.case({}, seed=0))
+        except ValueError as error:
+            raise StudyError(f"{section.name} cannot run this study: {error}", section.name, place) from None
+    return engine
+
+
+def _engine_named(section: EngineSection, place: str) -> Engine:
+    """Engine of a section's name, with the section's limits."""
+    if section.name is None or section.name not in ENGINES:
+        rule = f"must be one of {', '.join(ENGINES) or 'none'}"
+        raise StudyError(rule, section.name, f"{place}.name")
+    engine = ENGINES[section.name]
+    if section.version or section.observables:
+        rule = "version and observables belong to a command; an engine of a name knows its own"
+        raise StudyError(rule, section.version or list(section.observables), place)
+    driver = engine.program if isinstance(engine, ProgramEngine) else None
+    if section.approximate and not isinstance(driver, Driver):
+        raise StudyError("belongs to the codes that a case is exported to", True, f"{place}.approximate")
+    if isinstance(driver, Driver):
+        return ProgramEngine(Driver(driver.name, section.approximate), section.workers, section.time_limit)
+    if isinstance(engine, ProgramEngine):
+        return replace(engine, workers=section.workers, time_limit=section.time_limit)
+    if section.time_limit is not None:
+        raise StudyError("this engine runs no program that a limit could end", section.time_limit, place)
+    return engine
+
+
+def simulator_of(study: Study) -> Engine:
+    """Engine of a study, dem-warp's own where it names none; errors as by `engine_of`."""
+    return engine_of(study) or simulate

@@ -13,6 +13,7 @@ from typing import Any
 import pandas as pd
 
 from dem_warp import Case, CaseResult, Progress, simulate
+from experiments.cases.engine import NO_ANSWER
 from experiments.cases.store import Store
 from experiments.errors import StudyError
 from experiments.measurement.observables import ANGLE
@@ -45,7 +46,8 @@ def run_cases(
         the name of its ``scene`` (without that column, all are of the study's own), and any further columns,
         which are carried over.
     store
-        Store of the results; each is saved as it ends, failed ones too: the same case fails again. A run
+        Store of the results; each is saved as it ends, failed ones too: the same case fails again. Only
+        what another program gave no valid answer to is not saved, and so tried again by the next run. A run
         that the machine ends raises, and leaves no result of what was running. Checkpoints of the running
         cases are kept there too: what an interrupted run had begun goes on where it was.
     device, workers, progress
@@ -137,7 +139,8 @@ def _simulate_missing(
 
     def keep(index: int, result: CaseResult) -> None:
         key = missing[index]
-        store.save(key, result)
+        if result.status != NO_ANSWER:
+            store.save(key, result)
         outcomes[key] = pool.submit(measure, key, result)
 
     if missing:

@@ -1,36 +1,69 @@
-"""The folder of a campaign: which study made it, and whether a run may go on in it."""
+"""The folder of a run: which study made it, whether a run may go on in it, one run at a time."""
 
 from __future__ import annotations
 
-import hashlib
-import json
-from collections.abc import Iterator, Mapping
+import logging
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
-from experiments.cases.engines import Engine
+from filelock import FileLock, Timeout
+
+from experiments.cases.engines import engine_of
+from experiments.cases.manifest import MANIFEST, describe, differences, read_manifest, write_manifest
+from experiments.cases.outputs import changed_outputs
 from experiments.cases.store import Store
 from experiments.errors import StoreError
-from experiments.files import write_text
 from experiments.studyfile import Study
-from experiments.studyfile.places import KeyPath, dotted
-
-MANIFEST = "study.json"
-"""File that says which study the folder belongs to."""
 
 CASES = "cases"
 """Folder of the stored cases."""
 
+LOCK = ".lock"
+"""File that a run holds while it works in a folder; it stays, and is no result."""
 
-def open_folder(
-    folder: Path, study: Study, resume: bool = False, engine: Engine | None = None
-) -> tuple[Store, list[str]]:
-    """Make a campaign's folder, or go on in an existing one.
+_log = logging.getLogger(__name__)
+
+
+@contextmanager
+def locked(folder: Path, resume: bool = False) -> Iterator[None]:
+    """Keep every other run out of a folder, which is made when it is missing and no run is to go on in it.
+
+    Raises
+    ------
+    StoreError
+        When another run is at work in it, or it is in use and not to be resumed, or there is nothing to
+        resume. Nothing is written then.
+    """
+    _require_usable(folder, resume)
+    lock = FileLock(folder / LOCK, timeout=0)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        lock.acquire()
+    except Timeout:
+        raise StoreError("one run at a time works in a folder", "another at work", str(folder)) from None
+    except OSError as error:
+        rule = "a folder of results must be one that can be made and written to"
+        raise StoreError(rule, error.strerror or "none", str(folder)) from error
+    try:
+        # another run may have come and gone since
+        _require_usable(folder, resume)
+        yield
+    finally:
+        lock.release()
+
+
+def open_folder(folder: Path, study: Study, resume: bool = False) -> tuple[Store, list[str]]:
+    """Make a run's folder, or go on in an existing one.
+
+    What an earlier run of another study left there, its ``study.json`` with it, stays until `publishing`
+    replaces all of it.
 
     Returns
     -------
     store
-        Store of the cases.
+        Store of the cases, which has the study's engine.
     changes
         Differences from the study that the folder was made with, one line a key. Cases that a change does
         not touch are used again: each is stored under all that determines it.
@@ -38,22 +71,27 @@ def open_folder(
     Raises
     ------
     StoreError
-        When the folder is in use and not to be resumed, or is no campaign's. Nothing is written then.
+        When the folder is in use and not to be resumed, or is no run's. Nothing is written then.
+    StudyError
+        When the study's engine cannot be used.
     """
-    manifest = folder / MANIFEST
-    described = describe(study)
+    engine = engine_of(study)
+    _require_usable(folder, resume)
     changes: list[str] = []
-    if not resume:
-        require_unused(folder, "; --resume goes on in it")
-    elif is_used(folder):
-        changes = list(differences(_read_manifest(manifest), described))
-    write_text(manifest, json.dumps(described, indent=1, allow_nan=False))
+    if resume:
+        changes = list(differences(read_manifest(folder), describe(study)))
+        for name in changed_outputs(folder):
+            _log.warning("%s is not as the earlier run wrote it, and will be written anew", folder / name)
+    else:
+        write_manifest(folder, study)
     return Store(folder / CASES, engine), changes
 
 
 def is_used(folder: Path) -> bool:
     """Tell that a folder, or a file of that name, holds something."""
-    return folder.exists() and (not folder.is_dir() or any(folder.iterdir()))
+    if not folder.is_dir():
+        return os.path.lexists(folder)
+    return any(path.name != LOCK for path in folder.iterdir())
 
 
 def require_unused(folder: Path, advice: str = "") -> None:
@@ -68,31 +106,21 @@ def require_unused(folder: Path, advice: str = "") -> None:
         raise StoreError(f"the output folder must be new or empty{advice}", "a used one", str(folder))
 
 
-def describe(study: Study) -> dict[str, Any]:
-    """Everything that a study says, its clumps included, as JSON-able data."""
-    digests = [hashlib.sha256(clump.read_bytes()).hexdigest() for clump in study.grain.clump_files]
-    return {"study": study.document, "scale": study.scale, "clump_sha256": digests}
+def _require_usable(folder: Path, resume: bool) -> None:
+    if not resume:
+        require_unused(folder, "; --resume goes on in it")
+    elif not is_used(folder):
+        rule = "a folder to resume must be that of an earlier run: without --resume, a new one is made"
+        raise StoreError(rule, "none" if not folder.exists() else "an empty one", str(folder))
+    elif not folder.is_dir():
+        raise StoreError(f"a folder to resume must hold a {MANIFEST}", "a file", str(folder))
+    else:
+        _require_no_links(folder)
 
 
-def differences(old: object, new: object, path: KeyPath = ()) -> Iterator[str]:
-    """Name every key whose value differs, as ``key: old -> new``."""
-    if isinstance(old, Mapping) and isinstance(new, Mapping):
-        for key in [*old, *(key for key in new if key not in old)]:
-            yield from differences(old.get(key), new.get(key), (*path, key))
-    elif isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
-        for index, (before, after) in enumerate(zip(old, new, strict=True)):
-            yield from differences(before, after, (*path, index))
-    elif old != new:
-        yield f"{dotted(path)}: {_shown(old)} -> {_shown(new)}"
-
-
-def _shown(value: object) -> str:
-    return "not given" if value is None else json.dumps(value)
-
-
-def _read_manifest(path: Path) -> dict[str, Any]:
-    try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        rule = f"a folder to resume must hold the {MANIFEST} of the run that made it"
-        raise StoreError(rule, "none that can be read", str(path)) from None
+def _require_no_links(folder: Path) -> None:
+    """Refuse links in a folder, which may come from anyone: what is written there must stay there."""
+    for place, folders, files in os.walk(folder):
+        for name in (*folders, *files):
+            if (path := Path(place, name)).is_symlink():
+                raise StoreError("a folder to resume must hold no links", "a link", str(path))

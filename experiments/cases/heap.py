@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from dem_warp import CaseResult, Progress, simulate
+from dem_warp import CaseResult, Progress
+from experiments.cases.engines import simulator_of
 from experiments.files import replacing, write_text
 from experiments.measurement.observables import observables_of
 from experiments.measurement.states import Observed, observe
@@ -86,14 +87,17 @@ def simulate_heap(
     progress: Callable[[Progress], None] | None = None,
     scene: str = TARGET_SCENE,
 ) -> Heap:
-    """Simulate one case and measure its heap; settings, seed and scene are those of `Study.case`.
+    """Simulate one case with the study's engine, and measure its heap.
+
+    Settings, seed and scene are those of `Study.case`.
 
     Raises
     ------
     StudyError
         When there is no such factor or scene, or a value leaves what is physical.
     """
-    [result] = simulate([study.case(settings, seed, scene)], device=device, workers=1, on_progress=progress)
+    run, case = simulator_of(study), study.case(settings, seed, scene)
+    [result] = run([case], device=device, workers=1, on_progress=progress)
     values = {factor.name: settings.get(factor.name, factor.center) for factor in study.factors}
     observed = observe(study.measurement, result, study.scenes[scene].leaves_a_heap)
     return Heap(study, values, seed, result, observed, scene)

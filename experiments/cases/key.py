@@ -10,7 +10,7 @@ import numpy as np
 
 from dem_warp import Case
 from dem_warp.provenance import engine_fingerprint
-from experiments.cases.engines import Engine
+from experiments.cases.engine import Engine
 
 SHAPE_DIGITS = 12
 """Digits of the spheres of a shape, relative to its size, that make another case.
@@ -25,12 +25,22 @@ def case_key(case: Case, engine: Engine | None = None, **more: object) -> str:
     Spheres of its shapes that agree to `SHAPE_DIGITS` count as the same. ``more`` is whatever else determines
     what is kept under the key, as JSON-able data.
     """
-    outside = [] if engine is None else [engine]
-    if engine is not None:
-        more["simulated by"] = getattr(engine, "__qualname__", type(engine).__qualname__)
-    determined_by = {"case": described(case), "engine": engine_fingerprint(*case.kinds, *outside), **more}
+    determined_by = {"case": described(case), **_made_by(case, engine), **more}
     text = json.dumps(determined_by, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+def engine_identity(engine: Engine) -> Any:
+    """All that an engine tells of what determines its results, or else its name."""
+    return getattr(engine, "identity", None) or getattr(engine, "__qualname__", type(engine).__qualname__)
+
+
+def _made_by(case: Case, engine: Engine | None) -> dict[str, Any]:
+    """Code that makes the result; an engine that tells its identity does without dem-warp's solver."""
+    if engine is None:
+        return {"engine": engine_fingerprint(*case.kinds)}
+    own = () if getattr(engine, "identity", None) else (*case.kinds, engine)
+    return ({"engine": engine_fingerprint(*own)} if own else {}) | {"simulated by": engine_identity(engine)}
 
 
 def described(case: Case) -> dict[str, Any]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import zipfile
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from dem_warp import Case, CaseResult
-from experiments.cases.engines import Engine
+from dem_warp.reading import read_arrays
+from experiments.cases.engine import Engine
 from experiments.cases.key import case_key
 from experiments.errors import StoreError
 from experiments.files import replacing
@@ -83,25 +83,36 @@ class Store:
 
         Raises
         ------
-        KeyError
-            When the case is not stored.
         StoreError
-            When its file is damaged.
+            When the case is not stored, or its file is damaged.
         """
         path = self.path(key)
         if not path.is_file():
-            raise KeyError(key)
+            raise StoreError("a stored case must stay until the run has ended", "no such file", str(path))
         try:
             values = _read_values(path)
             found = (values.pop("key"), values.pop("format"))
             if found != (key, FORMAT):
                 raise ValueError(f"it holds the case {found[0]} in format {found[1]}")
-            return CaseResult(**values)
-        except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
+            result = CaseResult(**values)
+            _check(result)
+            return result
+        except (ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
             raise StoreError("a stored case must be whole", f"a damaged file: {error}", str(path)) from error
 
 
 def _read_values(path: Path) -> dict[str, Any]:
-    with np.load(path, allow_pickle=False) as archive:
-        values: dict[str, Any] = {name: archive[name] for name in archive.files if name != _RECORD}
-        return values | json.loads(archive[_RECORD].tobytes())
+    values: dict[str, Any] = read_arrays(path)
+    return values | json.loads(values.pop(_RECORD).tobytes())
+
+
+def _check(result: CaseResult) -> None:
+    """See to it that the arrays of a result fit each other."""
+    count, shapes = len(result.sizes), len(result.clumps)
+    found = (result.positions.shape, result.orientations.shape, result.sizes.shape, result.shapes.shape)
+    if found != ((count, 3), (count, 4), (count,), (count,)) or result.clumps.shape[2:] != (4,):
+        raise ValueError(f"its arrays have the shapes {found}")
+    if count and not 0 <= result.shapes.min() <= result.shapes.max() < shapes:
+        raise ValueError(f"its grains have other shapes than its {shapes}")
+    if not (isinstance(result.status, str) and isinstance(result.observables, dict)):
+        raise ValueError("its status or its observables are none")

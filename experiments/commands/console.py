@@ -2,53 +2,171 @@
 
 from __future__ import annotations
 
+import errno
 import logging
+import shlex
+import signal
+import sys
+import threading
 from collections.abc import Iterator
+from concurrent.futures import BrokenExecutor
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn
+from unicodedata import category
 
 import typer
 from rich.console import Console
-from rich.markup import escape
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn
+from rich.text import Text
 
 if TYPE_CHECKING:
     from dem_warp import Progress as BatchProgress
 
-BAD_INPUT, FAILED_RUN, INTERRUPTED = 2, 1, 130
+BAD_INPUT, FAILED_RUN, INTERRUPTED, TERMINATED = 2, 1, 130, 143
 """Exit codes."""
 
 QUIET_START = 2.0
 """Least duration that shows progress [s]."""
 FIRST_GUESS = 0.01
 """Part of the work that is done before the time left is guessed."""
+MANIFEST = "study.json"
+"""File of a folder that a run can go on in; `experiments.cases.manifest` writes it."""
+
 LINE_EVERY = 10.0
 """Time between two lines of progress where there is no terminal [s]."""
 
-messages = Console(stderr=True, highlight=False, soft_wrap=True)
+HIDDEN = ("Cc", "Cf", "Cs", "Zl", "Zp")
+"""Kinds of characters that steer a terminal or the order of its text."""
+
+WAYS_OUT = {
+    errno.ENOSPC: "free some room on the disk",
+    errno.EDQUOT: "free some room in your quota",
+    errno.EACCES: "see to the permissions, or name another place",
+    errno.EPERM: "see to the permissions, or name another place",
+    errno.EROFS: "name a place that can be written to",
+    errno.ENOENT: "see to it that nothing is moved or removed while a command runs",
+}
+"""Advice for errors of the system by their number."""
+
+
+def plain(text: str) -> str:
+    """Return text in which characters that steer a terminal stand as their escapes, ``\\x1b`` for one."""
+    return "".join(
+        character if character in "\n\t" or category(character) not in HIDDEN
+        else character.encode("unicode_escape", "surrogatepass").decode()
+        for character in text
+    )  # fmt: skip
+
+
+class Messages(Console):
+    """Console of a person's messages: text is shown as it is, without markup."""
+
+    def print(self, *objects: Any, **options: Any) -> None:
+        """Show texts plainly, and whatever Rich draws."""
+        shown = (plain(each) if isinstance(each, str) else each for each in objects)
+        super().print(*shown, **({"markup": False} | options))
+
+
+messages = Messages(stderr=True, highlight=False, soft_wrap=True)
 """Console of progress and errors; results go to standard output."""
 
 
-@contextmanager
-def clear_errors(resume: str | None = None) -> Iterator[None]:
-    """Turn errors into a message and an exit code: 2 for bad input, 130 for Ctrl-C, with how to resume."""
-    from doe import DesignError
-    from experiments.errors import InputError
-    from imaging import PictureError
+class _PlainFormatter(logging.Formatter):
+    def format(self, record: logging.LogRecord) -> str:
+        return plain(super().format(record))
 
-    logging.basicConfig(format="%(message)s", level=logging.WARNING)
+
+class Terminated(KeyboardInterrupt):
+    """The command was told to end by SIGTERM, as schedulers do."""
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """A command that leaves a folder which it can go on in."""
+
+    command: str
+    """The command with all its options, quoted."""
+    folder: Path
+    """Its folder."""
+
+    @classmethod
+    def of(cls, command: str, *files: Path | None, out: Path, **options: object) -> Attempt:
+        """Write a command with its files and options; those that were not given are left out."""
+        words = ["dem-warp", command, *(str(file) for file in files if file)]
+        for name, value in {"out": out, **options}.items():
+            if value is not None and value is not False:
+                words += [f"--{name.replace('_', '-')}", *([] if value is True else [str(value)])]
+        return cls(shlex.join(words), out)
+
+    def __str__(self) -> str:
+        """Say how to go on."""
+        begun = (self.folder / MANIFEST).is_file()
+        return f"Resume with: {self.command} --resume" if begun else f"Begin again with: {self.command}"
+
+
+@contextmanager
+def clear_errors(advice: object = "") -> Iterator[None]:
+    """Turn errors into a message and an exit code, with the advice how to go on as it then reads.
+
+    2 is for bad input, 1 for a run that the machine ended, 130 for Ctrl-C, 143 for SIGTERM.
+    """
+    # SIGTERM first: the libraries take their time
+    with _ended_by_sigterm():
+        handler = logging.StreamHandler()
+        handler.setFormatter(_PlainFormatter("%(message)s"))
+        logging.basicConfig(handlers=[handler], level=logging.WARNING)
+        try:
+            yield
+        except Terminated:
+            messages.print(f"Ended by SIGTERM. {advice}")
+            raise typer.Exit(TERMINATED) from None
+        except KeyboardInterrupt:
+            messages.print(f"Interrupted. {advice}")
+            raise typer.Exit(INTERRUPTED) from None
+        except BrokenExecutor:
+            rule = "a process was ended from outside, perhaps for lack of memory: fewer --workers need less."
+            fail(f"{rule} {advice}", FAILED_RUN)
+        except MemoryError:
+            fail(f"there is not enough memory: fewer --workers need less. {advice}", FAILED_RUN)
+        except OSError as error:
+            place = f"{error.filename}: " if error.filename is not None else ""
+            way_out = WAYS_OUT.get(error.errno or 0, "see to the file, or name another")
+            fail(f"{place}{error.strerror or error}: {way_out}. {advice}", FAILED_RUN)
+        except ValueError as error:
+            if not _is_input(error):
+                raise
+            fail(str(error))
+
+
+@contextmanager
+def _ended_by_sigterm() -> Iterator[None]:
+    """Let SIGTERM raise `Terminated`, where signals are received."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def end(*_: object) -> None:
+        raise Terminated
+
+    before = signal.signal(signal.SIGTERM, end)
     try:
         yield
-    except (InputError, PictureError, DesignError) as error:
-        fail(str(error))
-    except KeyboardInterrupt:
-        messages.print(f"Interrupted. Resume with: {resume}" if resume else "Interrupted.")
-        raise typer.Exit(INTERRUPTED) from None
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
-def fail(message: str, code: int = BAD_INPUT) -> None:
+def _is_input(error: ValueError) -> bool:
+    """Tell that an error is of the input: those of libraries that were never loaded cannot be."""
+    kinds = [("experiments.errors", "InputError"), ("imaging", "PictureError"), ("doe", "DesignError")]
+    loaded = (getattr(sys.modules.get(module), name, ()) for module, name in kinds)
+    return isinstance(error, tuple(kind for kind in loaded if kind))
+
+
+def fail(message: str, code: int = BAD_INPUT) -> NoReturn:
     """Say what is wrong and end the command by typer.Exit."""
-    messages.print(f"[bold red]Error:[/] {escape(message)}")
+    messages.print(Text.assemble(("Error:", "bold red"), " ", plain(message)))
     raise typer.Exit(code)
 
 
@@ -61,7 +179,7 @@ class CaseProgress:
         self._first: BatchProgress | None = None
         self._bar = Progress(
             SpinnerColumn(),
-            TextColumn("{task.description}"),
+            TextColumn("{task.description}", markup=False),
             BarColumn(bar_width=16),
             TextColumn("{task.percentage:3.0f} %  {task.fields[state]}"),
             console=messages,

@@ -1,4 +1,4 @@
-"""Photographs of heaps to repose angles, and these to the target of a calibration."""
+"""Pictures and files of heaps to repose angles, and these to the target of a calibration."""
 
 from __future__ import annotations
 
@@ -7,12 +7,14 @@ import io
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 from scipy import special
 
+from experiments.commands.heap_files import HeapSettings, is_heap_file, measure_heap_file, values_of
 from experiments.errors import InputError
 from experiments.files import replacing
 from imaging import (
@@ -25,6 +27,7 @@ from imaging import (
     read_picture,
     save_picture,
 )
+from imaging.geometry import Picture
 
 LEVEL = 0.95
 """Of all intervals."""
@@ -84,13 +87,14 @@ def measure_pictures(
     fit: str = "flank",
     overlay_folder: Path | None = None,
     view: View | None = None,
+    heaps: HeapSettings | None = None,
 ) -> list[dict[str, Any]]:
     """Measure the repose angle of each picture; one that cannot be measured costs the others nothing.
 
     Parameters
     ----------
     pictures
-        Picture files.
+        Picture files, and files of spheres that hold a heap of LIGGGHTS, LAMMPS, Yade or another code.
     fit
         Name of a fit, one of ``imaging.FITS``.
     overlay_folder
@@ -98,11 +102,14 @@ def measure_pictures(
         name before where two have one name.
     view
         What is known of every picture beforehand.
+    heaps
+        What is known of every file of spheres beforehand.
 
     Returns
     -------
     list of dict
-        For each picture: ``picture``, ``fit``, ``left``, ``right``, ``mean``, ``se``, the ends ``low`` and
+        For each picture: ``picture``, ``source`` (photograph, or the format of a heap's file and what was
+        taken from it), ``fit``, ``left``, ``right``, ``mean``, ``se``, the ends ``low`` and
         ``high`` of the 95 % interval, ``tilt`` and ``elevation`` of the camera [degrees], its ``distance``
         [heap widths] where it is known, the ``plate``'s line (x1, y1, x2, y2) and the heap's width
         ``heap_pixels`` [pixels], all None where it could not be measured; ``doubts``, a list of sentences;
@@ -121,25 +128,39 @@ def measure_pictures(
     names = drawn_names(pictures)
     rows = []
     for picture, name in zip(pictures, names, strict=True):
-        row: dict[str, Any] = {"picture": str(picture), "fit": fit, **dict.fromkeys(ROW_VALUES)}
+        row: dict[str, Any] = {"picture": str(picture), "source": "photograph", "fit": fit}
+        row |= dict.fromkeys(ROW_VALUES)
         row |= {"doubts": [], "overlay": None, "reason": ""}
         rows.append(row)
         # A picture may break a decoder, memory or a fit in ways that nobody thought of: it is a row, no end.
         try:
-            angle = measure_photograph(picture, fit, view)
-            row |= _values(angle)
+            if is_heap_file(picture):
+                row["source"] = "file of spheres"
+                heap = measure_heap_file(picture, fit, heaps or HeapSettings())
+                row |= values_of(heap, LEVEL)
+                drawn = heap.picture
+            else:
+                angle = measure_photograph(picture, fit, view)
+                row |= _values(angle)
+                drawn = partial(_drawn_photograph, picture, angle)
             if overlay_folder:
                 with replacing(overlay_folder / name) as temporary:
-                    save_picture(temporary, overlay(read_picture(picture), angle))
+                    save_picture(temporary, drawn())
                 row["overlay"] = str(overlay_folder / name)
-        except PictureError as error:
-            row["reason"] = str(error)
+        except (PictureError, InputError) as error:
+            row["reason"] = str(error) if str(picture) in str(error) else f"{picture}: {error}"
         except MemoryError:
-            row["reason"] = f"{picture}: the picture fits into memory; received one that does not"
+            row["reason"] = (
+                f"{picture}: expected: a picture that fits into memory; received one that does not"
+            )
         except Exception as error:
             task = "drawing" if row["mean"] is not None else "measuring"
             row["reason"] = f"{picture}: {task} failed: {type(error).__name__}: {error}"
     return rows
+
+
+def _drawn_photograph(picture: Path, angle: ReposeAngle) -> Picture:
+    return overlay(read_picture(picture), angle)
 
 
 def drawn_names(pictures: Sequence[Path]) -> list[str]:

@@ -8,18 +8,28 @@ from typing import TYPE_CHECKING, Any
 import typer
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
-from experiments.commands.console import messages
+from experiments.commands.console import messages, plain
 
 if TYPE_CHECKING:
     from experiments.calibrate.results import StageResult
     from experiments.cases import Heap
+    from experiments.commands.clump_search import Trial
+    from experiments.studyfile import Study
 
 
 def show_stage(name: str, result: StageResult) -> None:
     """Show what a stage decided, as it ends."""
     for decision in result.decisions:
-        messages.print(f"{name.replace('_', ' ')}: {decision.outcome}", markup=False)
+        messages.print(f"{name.replace('_', ' ')}: {decision.outcome}")
+
+
+def print_study(study: Study, device: str) -> None:
+    """Say which study runs where, and what is doubtful about it."""
+    messages.print(f"{study.name}, on {device}", study.note, sep="\n")
+    if narrow := study.narrowness():
+        messages.print(f"Doubtful: {narrow}")
 
 
 def print_clump(facts: Mapping[str, Any]) -> None:
@@ -32,6 +42,21 @@ def print_clump(facts: Mapping[str, Any]) -> None:
         typer.echo(f"mass {facts['mass_mg']:.4f} mg")
     if facts["coverage"] is not None:
         typer.echo(f"covers {facts['coverage']:.1%} of the solid, passes it by {facts['overshoot']:.1%}")
+        typer.echo(_quality(facts["trials"][-1]))
+
+
+def print_trial(trial: Trial) -> None:
+    """Show a number of spheres as it was tried."""
+    messages.print(f"{trial.spheres:3d} spheres: {_quality(trial.to_dict())}")
+
+
+def _quality(trial: Mapping[str, Any]) -> str:
+    """Errors of a clump, against its solid."""
+    return (
+        f"volume {trial['volume_error']:+.1%}, inertia {trial['inertia_error']:.1%} off, surface "
+        f"{trial['surface_distance_mm']:.3f} mm ({trial['surface_error']:.1%}) off, "
+        f"protrusion {trial['protrusion_mm']:.3f} mm"
+    )
 
 
 def print_measured(simulated: Heap) -> None:
@@ -55,6 +80,16 @@ def print_angles(rows: Sequence[Mapping[str, Any]], fit: str) -> None:
         if row["mean"] is not None:
             values = [f"{row[name]:.2f}" for name in ("left", "right", "mean", "se")]
             doubts = ", ".join(doubt.partition(":")[0] for doubt in row["doubts"])
-            table.add_row(row["picture"], *values, doubts)
+            table.add_row(Text(plain(row["picture"])), *values, doubts)
     if table.row_count:
-        Console().print(table)
+        # Names of files may have brackets, which are no markup.
+        Console(markup=False).print(table)
+
+
+def print_findings(rows: Sequence[Mapping[str, Any]]) -> None:
+    """Say how files of heaps were read, and why angles are doubtful."""
+    for row in rows:
+        if row["mean"] is not None and row["source"] != "photograph":
+            messages.print(f"Read: {row['picture']}: {row['source']}")
+        for doubt in row["doubts"]:
+            messages.print(f"Doubtful: {row['picture']}: {doubt}")

@@ -2,18 +2,46 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from dem_warp import ClumpShape
 from dem_warp.clump_fitting import ClumpFit, fit_clump
 from dem_warp.solids import parse_solid, read_mesh
+from experiments.commands.clump_picture import draw_clump
+from experiments.commands.clump_search import Trial, fit_by_volume, fit_within
 from experiments.errors import InputError
 from experiments.files import replacing
+from experiments.sphere_files import format_of, length_unit, read_clump
+from experiments.sphere_files.clump_file import check_grain_size
 
-SPHERE_FILES = (".txt", ".csv", ".dat")
-"""Endings of files that hold spheres; any other file is a mesh."""
+if TYPE_CHECKING:
+    from trimesh import Trimesh
+
+MESH_FILES = (".stl", ".obj", ".ply", ".off", ".3mf", ".glb", ".gltf", ".dae", ".stp", ".step")
+"""Endings of meshes; any other file may hold spheres, and its content tells."""
+LARGEST_VOLUME_ERROR = 0.1
+"""Error of a clump's volume over which a person is told."""
+
+
+@dataclass(frozen=True)
+class ClumpRequest:
+    """What a person asks of a clump."""
+
+    source: str
+    """A file of spheres, a mesh, or a solid by its dimensions in mm (``tri-pyramid:5.90x3.93``)."""
+    sphere_count: int | None = None
+    """Spheres to fill a solid with."""
+    tolerance: float | None = None
+    """Instead: largest error of volume, inertia and surface, see `fit_within`."""
+    protrusion: float | None = 0.0
+    """Distance by which a sphere may pass the surface [m]; None: the one that keeps the volume."""
+    unit: str | None = None
+    """Unit of a file; None: the one that it names, or mm."""
 
 
 @dataclass(frozen=True)
@@ -22,8 +50,14 @@ class Clump:
 
     shape: ClumpShape
     """The spheres."""
-    fit: ClumpFit | None
+    fit: ClumpFit | None = None
     """Quality of the fit; None for spheres that were given."""
+    told: str = ""
+    """Format and unit of a file of spheres."""
+    solid: Trimesh | None = None
+    """The solid; None for spheres that were given."""
+    trials: tuple[Trial, ...] = ()
+    """Numbers of spheres that were tried, the last one taken; empty for spheres that were given."""
 
     def to_dict(self, density: float | None = None) -> dict[str, Any]:
         """Describe the clump as JSON-able data, in mm and mg; with a density [kg/m3], its mass too."""
@@ -40,34 +74,107 @@ class Clump:
             "bounding_radius_mm": 1e3 * shape.bounding_radius,
             "coverage": fit.coverage if fit else None,
             "overshoot": fit.overshoot if fit else None,
+            "trials": [trial.to_dict() for trial in self.trials],
             "spheres_mm": spheres,
         }
 
+    @property
+    def advice(self) -> str:
+        """Say that the clump's mass is far from the solid's; empty where it is not, or no solid is known."""
+        if self.fit is None or abs(self.fit.volume_error) <= LARGEST_VOLUME_ERROR:
+            return ""
+        share, more = 100.0 * abs(self.fit.volume_error), self.fit.volume_error > 0.0
+        told = f"the clump has {share:.0f} % {'more' if more else 'less'} volume, and mass, than the solid"
+        return f"{told}: --protrusion auto keeps the volume, --tolerance finds the number of spheres too"
 
-def make_clump(source: str, sphere_count: int | None = None, protrusion: float = 0.0) -> Clump:
-    """Read a clump from a file of spheres (``x y z r`` in mm), or fit one to a solid.
+    def draw(self, path: Path) -> None:
+        """Draw the clump, beside its solid; see `draw_clump`."""
+        own = np.column_stack([self.shape.centers, self.shape.radii])
+        draw_clump(path, self.fit.spheres if self.fit else own, self.solid)
 
-    A solid is a mesh file in mm, or named by its dimensions in mm (``tri-pyramid:5.90x3.93``). A sphere may
-    pass its surface by the ``protrusion`` [m].
+
+def make_clump(request: ClumpRequest, watch: Callable[[Trial], None] = lambda trial: None) -> Clump:
+    """Read a clump from a file of spheres, or fit one to a solid.
 
     Raises
     ------
     InputError
-        When the source is none of these, or the sphere count is missing or not needed.
+        When the source is neither, the number of spheres is missing or not needed, or no clump is within the
+        tolerance.
     """
-    given = ":" not in source and Path(source).suffix.lower() in SPHERE_FILES
-    if given != (sphere_count is None):
-        rule = "a solid is filled with a number of spheres"
-        rule = "spheres that are given are not fitted" if given else rule
-        raise InputError(rule, sphere_count or "none", "--spheres")
+    source, unit = request.source, request.unit
+    named = ":" in source and not Path(source).is_file()
+    wanted = [each for each in (request.sphere_count, request.tolerance) if each is not None]
+    given = not named and _holds_spheres(Path(source), bool(wanted))
+    if given and wanted:
+        raise InputError("spheres that are given are not fitted", wanted[0], "--spheres, --tolerance")
+    if not given and len(wanted) != 1:
+        rule = "a solid is filled with a number of spheres, or within a tolerance"
+        raise InputError(rule, "both" if wanted else "none", "--spheres, --tolerance")
+    if named and unit is not None:
+        raise InputError("the dimensions of a solid are in mm", unit, "--unit")
+    if unit is not None:
+        _check_unit(unit)
+    if given:
+        read = read_clump(Path(source), unit)
+        return Clump(read.shape, told=read.told)
     try:
-        if sphere_count is None:
-            return Clump(ClumpShape.read(source), None)
-        solid = parse_solid(source) if ":" in source else read_mesh(source)
-        fit = fit_clump(solid, sphere_count, protrusion)
+        solid = parse_solid(source) if named else _mesh(Path(source), unit)
+        fit, trials = _fitted(solid, request, watch)
+    except InputError:
+        raise
     except (ValueError, OSError) as error:
         raise InputError(str(error), source, "SHAPE") from None
-    return Clump(fit.shape, fit)
+    return Clump(fit.shape, fit, solid=solid, trials=tuple(trials))
+
+
+def _fitted(
+    solid: Trimesh, request: ClumpRequest, watch: Callable[[Trial], None]
+) -> tuple[ClumpFit, list[Trial]]:
+    if request.tolerance is not None:
+        return fit_within(solid, request.tolerance, request.protrusion, watch)
+    count, reach = request.sphere_count or 1, request.protrusion
+    if reach is None:
+        fit, reach = fit_by_volume(solid, count)
+    else:
+        fit = fit_clump(solid, count, reach)
+    return fit, [Trial.of(fit, reach)]
+
+
+def _holds_spheres(path: Path, to_fit: bool) -> bool:
+    """Tell by ending and content that a file holds spheres; in doubt, what is to be fitted is a mesh."""
+    if path.suffix.lower() in MESH_FILES:
+        return False
+    return not to_fit or (path.is_file() and format_of(path) is not None)
+
+
+def _check_unit(unit: str) -> None:
+    try:
+        length_unit(unit)
+    except ValueError as error:
+        raise InputError(str(error), unit, "--unit") from None
+
+
+def _mesh(path: Path, unit: str | None) -> Trimesh:
+    """Read one closed body of a grain's size."""
+    mesh = read_mesh(path, length_unit(unit or "mm"))
+    if mesh.body_count > 1:
+        raise InputError("a grain is one closed body", f"{mesh.body_count} bodies in the mesh", str(path))
+    if unit is None:
+        check_grain_size(float(mesh.extents.max()), str(path), "read in mm")
+    return mesh
+
+
+def require_new(path: Path) -> None:
+    """Refuse a file that exists.
+
+    Raises
+    ------
+    InputError
+        When it does.
+    """
+    if path.exists():
+        raise InputError("a clump never overwrites a file", "one that exists", str(path))
 
 
 def write_clump(shape: ClumpShape, path: Path) -> None:
@@ -78,7 +185,6 @@ def write_clump(shape: ClumpShape, path: Path) -> None:
     InputError
         When the file exists.
     """
-    if path.exists():
-        raise InputError("a clump never overwrites a file", "one that exists", str(path))
+    require_new(path)
     with replacing(path) as temporary:
         shape.write(temporary)

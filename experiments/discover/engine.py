@@ -9,17 +9,18 @@ import numpy as np
 
 from dem_warp import Case, CaseResult, Progress
 from doe.discrepancy import Outcomes, Point
+from experiments.cases import engine_of
 from experiments.cases.key import case_key
 from experiments.discover.library import Mechanism, with_mechanisms
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.wave import WaveRunner
 from experiments.errors import StudyError
-from experiments.measurement.observables import NAMES, VERSION
+from experiments.measurement.observables import NAMES, PHOTOGRAPHED, VERSION
 from experiments.studyfile import Study
 
 
 class EngineSimulator:
-    """Answers points of a study with the observables of simulated heaps.
+    """Answers points of a study with the observables of heaps, simulated by the study's engine.
 
     All points of a call are simulated in as few launches as possible; they are measured in processes of their
     own while the next are simulated, and kept. A point whose case a study refuses has that as its reason.
@@ -36,9 +37,12 @@ class EngineSimulator:
         Where outcomes are kept; what is there already is not simulated again.
     device, workers, worlds, drivers, progress
         As of `WaveRunner`, a wave being all points of a call that are not kept yet.
-    """
 
-    observables = NAMES
+    Raises
+    ------
+    StudyError
+        When the study's engine cannot be used.
+    """
 
     def __init__(
         self,
@@ -51,8 +55,21 @@ class EngineSimulator:
         drivers: int | None = None,
         progress: Callable[[Progress], None] | None = None,
     ) -> None:
-        self.study, self.table = study, table
-        self._runner = WaveRunner(study.measurement, table, device, workers, worlds, drivers, progress)
+        self.study, self.table, self.engine = study, table, engine_of(study)
+        told = getattr(self.engine, "observables", NAMES)
+        self.observables = tuple(name for name in NAMES if name in (*PHOTOGRAPHED, *told))
+        """Names of what it answers with."""
+        self._runner = WaveRunner(
+            study.measurement,
+            table,
+            device,
+            workers,
+            worlds,
+            drivers,
+            progress,
+            self.engine,
+            self.observables,
+        )
         self._library = {mechanism.name: mechanism for mechanism in library}
         self._factors = [factor.name for factor in study.factors]
         self._conditions = [condition.name for condition in study.conditions]
@@ -86,10 +103,10 @@ class EngineSimulator:
                 cases[keys[-1]] = case
             except StudyError as error:
                 keys.append(f"refused: {error}")
-                refused[keys[-1]] = (np.full(len(NAMES), np.nan), error.rule)
+                refused[keys[-1]] = (np.full(len(self.observables), np.nan), error.rule)
         found = self.table.load(list(cases)) | refused
         found |= self._runner.run({key: case for key, case in cases.items() if key not in found})
-        values = np.array([found[key][0] for key in keys]).reshape(len(keys), len(NAMES))
+        values = np.array([found[key][0] for key in keys]).reshape(len(keys), len(self.observables))
         return Outcomes(values, tuple(found[key][1] for key in keys))
 
     def heaps(self, points: Sequence[Point]) -> list[CaseResult]:
@@ -126,7 +143,8 @@ class EngineSimulator:
 
     def key(self, case: Case) -> str:
         """Key of a case: a hash of all that determines its observables."""
-        return case_key(case, measurement=self.study.measurement.model_dump(), observables=VERSION)
+        reading = {"measurement": self.study.measurement.model_dump(), "observables": VERSION}
+        return case_key(case, self.engine, **reading)
 
     def _extend(self, names: tuple[str, ...], condition: str) -> Study:
         mechanisms = [self._library[name] for name in names]

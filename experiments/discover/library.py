@@ -25,8 +25,8 @@ from experiments.studyfile.places import Places, drop, nested, value_at
 from experiments.studyfile.schema import Section, field_at, validated
 from experiments.studyfile.sections import Physics
 from experiments.studyfile.setters import setter_at
-from experiments.studyfile.toml_files import read_toml
 from experiments.studyfile.units import Quantity
+from experiments.toml_files import read_toml
 
 FORMER_NAMES = {"contact_cohesion": "contact_adhesion"}
 """Names by which older studies and banks know mechanisms."""

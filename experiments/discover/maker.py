@@ -2,22 +2,34 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 from collections.abc import Mapping
 from datetime import date
 
 from dem_warp.provenance import engine_fingerprint
+from experiments.cases import Engine
+from experiments.cases.key import engine_identity
 
 
-def maker_of_today(commit: str = "") -> dict[str, str]:
-    """Name this engine by its fingerprint, the day, and the commit of the source, empty where unknown."""
-    return {"engine": engine_fingerprint(), "day": date.today().isoformat(), "commit": commit}
+def fingerprint_of(engine: Engine | None) -> str:
+    """Hash of an engine: of its identity, or of dem-warp's own code where it is None."""
+    if engine is None:
+        return engine_fingerprint()
+    text = json.dumps(engine_identity(engine), sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
-def notes_on(maker: Mapping[str, str]) -> list[str]:
+def maker_of_today(commit: str = "", engine: Engine | None = None) -> dict[str, str]:
+    """Name an engine by its fingerprint, the day, and the commit of the source, empty where unknown."""
+    return {"engine": fingerprint_of(engine), "day": date.today().isoformat(), "commit": commit}
+
+
+def notes_on(maker: Mapping[str, str], engine: Engine | None = None) -> list[str]:
     """Say that a bank comes from another engine than fresh runs, or that it does not tell."""
     if not maker:
         return ["the bank does not say which engine made it"]
-    if maker["engine"] == engine_fingerprint():
+    if maker["engine"] == fingerprint_of(engine):
         return []
     commit = f" (commit {maker['commit']})" if maker.get("commit") else ""
     return [f"the bank was made on {maker['day']} by another engine{commit} than the fresh runs"]

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from dem_warp import EDEM
 from doe.discrepancy import (
     Analysis,
     Bank,
@@ -23,15 +24,19 @@ from doe.discrepancy import (
     make_bank,
     settings_of,
 )
-from experiments.cases.folder import describe
+from experiments.cases import engine_of
+from experiments.cases.key import engine_identity
+from experiments.cases.manifest import describe
 from experiments.discover.library import FORMER_NAMES, Mechanism, library_for
 from experiments.discover.maker import notes_on
 from experiments.errors import InputError, StudyError
 from experiments.studyfile import Study
 from experiments.studyfile.schema import nearest_name
 
-WITHOUT_EFFECT = ("name", "note", "companion", "target", "response", "campaign", "discover", "factor")
-"""Keys of a study that change no heap at given factors."""
+WITHOUT_EFFECT = (
+    "name", "note", "companion", "target", "response", "campaign", "discover", "factor", "engine",
+)  # fmt: skip
+"""Keys of a study that change no heap at given factors; of its engine, the identity does."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +86,11 @@ class Search:
         """Hash of all of the study that determines a heap at given factors."""
         described = describe(self.study)
         document = {key: value for key, value in described["study"].items() if key not in WITHOUT_EFFECT}
-        text = json.dumps([document, described["clump_sha256"]], sort_keys=True)
+        if self.study.solver.laws == EDEM:
+            document.pop("solver", None)  # as from before laws had names
+        engine = engine_of(self.study)
+        others = [] if engine is None else [engine_identity(engine)]
+        text = json.dumps([document, described["clump_sha256"], *others], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
 
     def make_bank(self, simulator: Simulator, maker: Mapping[str, str] | None = None) -> Bank:
@@ -116,7 +125,7 @@ class Search:
         foreign = [one.name for one in emulator.space.mechanisms if one not in known]
         lacking = [one.name for one in known if one not in bank.space.mechanisms]
         notes = [f"{name} is not in the bank, so it was not looked for" for name in lacking]
-        notes += notes_on(bank.maker)
+        notes += notes_on(bank.maker, engine_of(self.study))
         emulator = replace(emulator.without(*foreign), notes=(*emulator.notes, *notes))
         return analyse(measured, emulator, self.settings, seed)
 

@@ -4,19 +4,24 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import shutil
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from multiprocessing.queues import Queue
+from pathlib import Path
 
 from dem_warp import Case, CaseResult, Progress, simulate
 from dem_warp.device import resolve_device
 from dem_warp.processes import end_with_parent
 from dem_warp.simulation import batches
+from experiments.cases import Engine
+from experiments.cases.engine import NO_ANSWER
 from experiments.discover.devices import resolve_devices
 from experiments.discover.outcome_table import Outcome, OutcomeTable
+from experiments.measurement.observables import NAMES
 from experiments.measurement.states import measure
 from experiments.studyfile.study import MeasurementSection
 
@@ -57,6 +62,11 @@ class WaveRunner:
         Launches at once; None: `DRIVERS` on each GPU, one on the CPU.
     progress
         Called with the progress of a wave.
+    engine
+        Simulates in the place of dem-warp; a wave is then one call. What it has finished lies in a folder
+        beside the table until the wave is kept.
+    observables
+        Names of what is measured.
     """
 
     def __init__(
@@ -68,11 +78,15 @@ class WaveRunner:
         worlds: int | None = None,
         drivers: int | None = None,
         progress: Callable[[Progress], None] | None = None,
+        engine: Engine | None = None,
+        observables: Sequence[str] = NAMES,
     ) -> None:
         self._settings, self._table, self._progress = settings, table, progress
+        self._engine, self._observables = engine, tuple(observables)
         self._devices = resolve_devices(device)
         self._workers, self._worlds = workers, worlds
         count = drivers or (1 if self._on_cpu else DRIVERS * len(self._devices))
+        count = count if engine is None else 1
         self.drivers = [self._devices[number % len(self._devices)] for number in range(count)]
         """Device of each process that drives launches."""
 
@@ -92,7 +106,7 @@ class WaveRunner:
         """Simulate a few cases, measure nothing and keep nothing."""
         if self._drives:
             return [result for (result,) in self._driven.map(_simulate_here, [[case] for case in cases])]
-        return simulate(cases, device=self._devices[0], workers=self._workers)
+        return (self._engine or simulate)(cases, device=self._devices[0], workers=self._workers)
 
     def run(self, cases: Mapping[str, Case]) -> dict[str, Outcome]:
         """Simulate and measure cases by their keys in the table, and keep the outcomes."""
@@ -103,9 +117,13 @@ class WaveRunner:
         launches = self._launches(cases)
         several = min(len(launches), len(self.drivers)) > 1
         launch_all = self._drive if several or self._drives else self._launch
+        if self._engine is not None:
+            launch_all = self._call_engine
         try:
             launch_all(launches, cases, measured, clock)
-            return measured.finish()
+            found = measured.finish()
+            shutil.rmtree(self._unfinished, ignore_errors=True)
+            return found
         except BaseException:
             self.close()
             raise
@@ -139,7 +157,7 @@ class WaveRunner:
         The small ones come last, so that no driver is left alone with a large one.
         """
         keys = list(cases)
-        if self._on_cpu and self._worlds is None:
+        if self._engine is not None or (self._on_cpu and self._worlds is None):
             return [keys]
         worlds = self._worlds or WORLDS
         launches = [
@@ -174,8 +192,29 @@ class WaveRunner:
                 self._take(measured, keys, index, result)
             clock.pass_launch(len(keys))
 
+    def _call_engine(
+        self, launches: Sequence[list[str]], cases: Mapping[str, Case], measured: _Measured, clock: _Clock
+    ) -> None:
+        """Let another engine simulate all cases."""
+        [keys], engine = launches, self._engine or simulate
+        engine(
+            [cases[key] for key in keys],
+            device=self._devices[0],
+            workers=self._workers,
+            on_result=partial(self._take, measured, keys),
+            on_progress=partial(clock.report, len(keys)),
+            checkpoint=self._unfinished,
+        )
+        clock.pass_launch(len(keys))
+
+    @property
+    def _unfinished(self) -> Path:
+        """Folder of what an engine has under way."""
+        return self._table.path.with_name("unfinished")
+
     def _take(self, measured: _Measured, keys: Sequence[str], index: int, result: CaseResult) -> None:
-        measured.add(keys[index], self._measurers.submit(measure, self._settings, result))
+        outcome = self._measurers.submit(measure, self._settings, result, self._observables)
+        measured.add(keys[index], outcome, keep=result.status != NO_ANSWER)
 
 
 def _begin_measuring() -> None:
@@ -234,11 +273,14 @@ class _Measured:
         self._table = table
         self._waiting: dict[str, Future[Outcome]] = {}
         self._outcomes: dict[str, Outcome] = {}
+        self._passing: set[str] = set()
         self._saved = time.monotonic()
 
-    def add(self, key: str, outcome: Future[Outcome]) -> None:
-        """Await an outcome."""
+    def add(self, key: str, outcome: Future[Outcome], keep: bool = True) -> None:
+        """Await an outcome; one that is not to be kept is tried again by the next run."""
         self._waiting[key] = outcome
+        if not keep:
+            self._passing.add(key)
         self._keep_in_time()
 
     def finish(self) -> dict[str, Outcome]:
@@ -253,9 +295,9 @@ class _Measured:
         """Save what has been measured since."""
         ready = [key for key, outcome in self._waiting.items() if _is_measured(outcome)]
         fresh = {key: self._waiting.pop(key).result() for key in ready}
-        if fresh:
-            self._table.save(fresh)
-            self._outcomes |= fresh
+        if lasting := {key: outcome for key, outcome in fresh.items() if key not in self._passing}:
+            self._table.save(lasting)
+        self._outcomes |= fresh
         self._saved = time.monotonic()
 
     def _keep_in_time(self) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,7 +16,7 @@ class Contact:
     Raises
     ------
     ValueError
-        When the contact has more than the base law: no other code has the same mechanisms or clamps alike.
+        When the contact has a mechanism: no other code has the same.
     """
 
     first: Material
@@ -34,8 +33,6 @@ class Contact:
     def __post_init__(self) -> None:
         if names := [mechanism.name for mechanism in self.coefficients.mechanisms]:
             raise ValueError(f"Contact: other codes have terms for the base law alone, got {names}")
-        if self.coefficients.clamp_attraction:
-            raise ValueError("Contact: other codes have a damping that may attract, got a clamped one")
 
 
 def contacts_of(case: Case[Any], radius: float, mass: float) -> tuple[Contact, Contact]:
@@ -46,7 +43,7 @@ def contacts_of(case: Case[Any], radius: float, mass: float) -> tuple[Contact, C
     Raises
     ------
     ValueError
-        When the case has a mechanism beside the base law, or a clamped damping.
+        When the case has a mechanism beside the base law.
     """
     grain, wall = case.grain_material, case.scene.wall_material
     among, with_wall = case.contacts(wall)
@@ -74,19 +71,3 @@ class Term:
 def values(terms: tuple[Term, ...]) -> dict[str, float]:
     """Values of terms by their names."""
     return {term.name: term.value for term in terms}
-
-
-@dataclass(frozen=True)
-class Exporter:
-    """Translation of materials and contacts into the terms of another code."""
-
-    code: str
-    """Its name."""
-    laws: str
-    """Names of its laws that the terms are for."""
-    differs: str
-    """Differences between those laws and ours."""
-    material_terms: Callable[[Material], tuple[Term, ...]]
-    """Terms of one material; empty where all belong to contacts."""
-    contact_terms: Callable[[Contact], tuple[Term, ...]]
-    """Terms of one contact."""

@@ -1,13 +1,41 @@
-"""Terms of LAMMPS: ``pair_style granular`` with Hertz, Mindlin's spring with history and Tsuji's damping."""
+"""LAMMPS: ``pair_style granular`` with Hertz, Mindlin's spring with history and Tsuji's damping."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from scipy.optimize import brentq
 
-from experiments.export.contact import Contact, Exporter, Term, values
+from experiments.export.contact import Contact, Term, contacts_of, values
+from experiments.export.exporter import ExportedTest, Exporter, Translation
+from experiments.export.lammps_input import translate_lift
+from experiments.export.laws import LawsOfCode, mechanism_warnings
+from experiments.export.lift import Lift
+
+CONVENTIONS = LawsOfCode(
+    "LAMMPS",
+    {
+        "normal": {"hertz": "hertz/material"},
+        "restitution": {"polynomial": "", "closed_form": "", "thornton": ""},
+        "normal_damping": {"tsuji": "damping tsuji"},
+        "attraction": {"free": "", "clamped": "limit_damping"},
+        "tangential_damping": {"normal": "", "tsuji": "", "none": "", "deme": ""},
+        "tangential_history": {
+            "displacement": "mindlin",
+            "force": "mindlin/force",
+            "rescaled_displacement": "mindlin_rescale",
+            "rescaled_force": "mindlin_rescale/force",
+        },
+        "sliding": {"sum": ""},
+        "friction_load": {"size": ""},
+        "rolling": {"sds": "rolling sds"},
+    },
+    {},
+)
+"""LAMMPS has all restitutions and tangential dampings: it is given the numbers that come to them."""
 
 TSUJI = (4.8218, -18.022, 27.467, -22.348, 11.087, -4.2783, 1.2728)
 """Polynomial of the restitution that LAMMPS makes the coefficient of Tsuji's damping from."""
@@ -31,10 +59,10 @@ def contact_terms(contact: Contact) -> tuple[Term, ...]:
     """
     law = contact.coefficients
     spring = 8.0 * law.shear_modulus
-    rolling = spring * contact.radius * math.sqrt(2.0 * ROLLING_OVERLAP)
+    rolling = law.rolling_spring or spring * contact.radius * math.sqrt(2.0 * ROLLING_OVERLAP)
     # the tangential damping is given as a multiple of the normal one
     share = 2.0 * math.sqrt(law.shear_modulus / law.modulus) * law.tangential_damping
-    damping = math.sqrt(rolling * contact.mass)
+    damping = law.rolling_dashpot or math.sqrt(rolling * contact.mass)
     stiffness = "8 G* R* sqrt(2 x overlap / R), at an overlap of 0.01 R"
     return (
         Term("E", 2.0 * law.modulus, "Pa", "2 E*", _SOURCE),
@@ -49,14 +77,38 @@ def contact_terms(contact: Contact) -> tuple[Term, ...]:
     )
 
 
-def granular_words(contact: Contact) -> str:
-    """LAMMPS' words for a contact, after ``pair_coeff * *`` or ``wall/gran granular``."""
+def granular_words(contact: Contact, words: Mapping[str, str] | None = None) -> str:
+    """LAMMPS' words for a contact, after ``pair_coeff * *`` or ``wall/gran granular``.
+
+    `words` are those for each law; left out, Mindlin's spring remembers its displacement and damping may
+    attract.
+    """
+    words = words or {"tangential_history": "mindlin", "attraction": ""}
     terms = values(contact_terms(contact))
     return (
         f"hertz/material {terms['E']!r} {terms['e']!r} 0 "
-        f"tangential mindlin {terms['k_t']!r} {terms['x_gamma,t']!r} {terms['mu_s']!r} "
-        f"rolling sds {terms['k_roll']!r} {terms['gamma_roll']!r} {terms['mu_roll']!r} damping tsuji"
-    )
+        f"tangential {words['tangential_history']} {terms['k_t']!r} {terms['x_gamma,t']!r} {terms['mu_s']!r} "
+        f"rolling sds {terms['k_roll']!r} {terms['gamma_roll']!r} {terms['mu_roll']!r} "
+        f"{words['attraction']} damping tsuji"
+    ).replace("  ", " ")
+
+
+def translate(test: ExportedTest) -> Translation:
+    """Write the input of a lifted cylinder.
+
+    Raises
+    ------
+    InputError
+        When the test is another one.
+    """
+    lift, laws = Lift(test), test.case.laws
+    words = CONVENTIONS.words(laws)
+    case = replace(lift.case, mechanisms=(), laws=CONVENTIONS.nearest_laws(laws))
+    among, tube = contacts_of(case, lift.largest_radius, max(t.mass for t in lift.templates))
+    plate = replace(tube, coefficients=lift.scene.contacts(case)[2])
+    contacts = [granular_words(contact, words) for contact in (among, tube, plate)]
+    warnings = CONVENTIONS.warnings(laws) + mechanism_warnings(test.case, "LAMMPS")
+    return translate_lift(lift, contacts, warnings, CONVENTIONS.translated(laws))
 
 
 def tsuji_restitution(damping: float) -> float:
@@ -79,4 +131,6 @@ LAMMPS = Exporter(
     "Its resistance to rolling is a spring of its own with a slider; only the limit is the case's.",
     lambda material: (),  # LAMMPS has all terms by contact
     contact_terms,
+    translate,
+    CONVENTIONS,
 )

@@ -1,14 +1,37 @@
-"""Terms of Yade: ``FrictMat`` and ``Ip2_FrictMat_FrictMat_MindlinPhys``."""
+"""Yade: ``FrictMat``, ``Ip2_FrictMat_FrictMat_MindlinPhys`` and ``Law2_ScGeom_MindlinPhys_Mindlin``."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from dem_warp import Material
-from experiments.export.contact import Contact, Exporter, Term
+from experiments.export.contact import Contact, Term, contacts_of, values
+from experiments.export.exporter import ExportedTest, Exporter, Translation
+from experiments.export.laws import LawsOfCode, mechanism_warnings
+from experiments.export.lift import Lift
+from experiments.export.lift_rows import lift_warnings
+from experiments.export.yade_input import translate_lift
+
+CONVENTIONS = LawsOfCode(
+    "Yade",
+    {
+        "normal": {"hertz": "hertzian=True on facets"},
+        "restitution": {"thornton": "betan", "closed_form": "betan", "polynomial": "betan"},
+        "normal_damping": {"tsuji": "betan"},
+        "attraction": {"clamped": ""},
+        "tangential_damping": {"tsuji": "betas", "none": "betas = 0", "normal": "betas", "deme": "betas"},
+        "tangential_history": {"force": ""},
+        "sliding": {"spring_free": ""},
+        "friction_load": {"push": "", "size": ""},
+        "rolling": {"yade": "includeMoment, MindlinPhys.kr and .maxBendPl"},
+    },
+    {},
+)
 
 _MATERIAL = "Yade documentation, FrictMat"
 _PHYSICS = "Yade documentation, Ip2_FrictMat_FrictMat_MindlinPhys"
+_BENDING = "Yade documentation, MindlinPhys; pkg/dem/HertzMindlin.cpp"
 
 
 def material_terms(material: Material) -> tuple[Term, ...]:
@@ -30,10 +53,43 @@ def contact_terms(contact: Contact) -> tuple[Term, ...]:
     )
 
 
+def rolling_terms(contact: Contact) -> tuple[Term, ...]:
+    """Terms of the resistance to rolling: the limit's coefficient, and the spring in every contact."""
+    law = contact.coefficients
+    return (
+        Term("maxBendPl", law.rolling_friction, "1", "mu_r, times R*", _BENDING),
+        Term("kr", law.rolling_spring, "N m/rad", "k R*^2", _BENDING),
+    )
+
+
+def translate(test: ExportedTest) -> Translation:
+    """Write the program of a lifted cylinder.
+
+    Raises
+    ------
+    InputError
+        When the test is another one.
+    """
+    lift, laws = Lift(test), test.case.laws
+    case = replace(lift.case, mechanisms=(), laws=CONVENTIONS.nearest_laws(laws))
+    scene = lift.scene
+    warnings = (
+        CONVENTIONS.warnings(laws)
+        + mechanism_warnings(test.case, "Yade")
+        + lift_warnings(lift, ends_in_time=True)
+    )
+    among, tube = contacts_of(case, lift.largest_radius, max(t.mass for t in lift.templates))
+    plate = replace(tube, coefficients=scene.contacts(case)[2])
+    materials = [values(material_terms(each)) for each in (among.first, tube.second, plate.second)]
+    contacts = [values(contact_terms(each) + rolling_terms(each)) for each in (among, tube, plate)]
+    return translate_lift(lift, materials, contacts, warnings, CONVENTIONS.translated(laws))
+
+
 YADE = Exporter(
     "Yade",
     "MindlinPhys, Law2_ScGeom_MindlinPhys_Mindlin",
-    "Resistance to rolling is left out: Yade's is a spring without damping, in which grains go on to swing.",
+    "No attraction; forces are remembered, not displacements; rolling is resisted by a spring, undamped.",
     material_terms,
     contact_terms,
+    translate,
 )

@@ -87,7 +87,23 @@ class _Found:
         """Raise an error with all that is wrong if a row cannot be read, or wrong units leave no value."""
         if self.problems or (self.doubts and not any(self.heaps.values())):
             wrong = sorted([*self.problems, *self.doubts], key=itemgetter(0))
-            raise InputError.of(problem for _, problem in wrong)
+            raise InputError.of(_told_once(wrong))
+
+
+def _told_once(wrong: Sequence[tuple[int, Problem]]) -> Iterator[Problem]:
+    """Tell one problem for all rows whose cell of one column breaks the same rule."""
+    alike: dict[tuple[str, str], list[tuple[int, Problem]]] = {}
+    for line, problem in wrong:
+        column = problem.place.rpartition(": ")[2]
+        alike.setdefault((problem.rule, column), []).append((line, problem))
+    for rows in alike.values():
+        first = rows[0][1]
+        if len(rows) == 1:
+            yield first
+            continue
+        values = list(dict.fromkeys(problem.value for _, problem in rows))
+        shown = ", ".join(values[:3]) + (", ..." if len(values) > 3 else "")
+        yield Problem(first.rule, shown, f"{first.place}, {_rows([line for line, _ in rows])}")
 
 
 def _heap_of(row: Row, conditions: Collection[str]) -> tuple[str, str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from glob import glob
@@ -48,7 +49,7 @@ def find_pictures(pattern: str, folder: Path, place: str) -> list[Path]:
         When there are fewer than two.
     """
     named = folder / pattern
-    if named.is_dir():
+    if os.path.isdir(named):  # a name too long is none, and raises nothing
         found = sorted(path for path in named.iterdir() if path.suffix.lower() in SUFFIXES)
     else:
         found = sorted(map(Path, glob(str(named))))

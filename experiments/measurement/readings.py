@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -94,7 +95,7 @@ def _seen(row: Row, size: SizeOfTest, fit: str) -> Iterator[Reading]:
     path, name = row.file.parent / row["picture"], row["observable"]
     if name and not BY_NAME[name].by_photograph:
         raise row.error("needs a value: no photograph shows it", "observable")
-    if not path.is_file():
+    if not os.path.isfile(path):  # a name too long is none, and raises nothing
         raise row.error(f"must name a picture file, relative to this one (looked for {path})", "picture")
     pixel = _pixel(row)
     if name and pixel is None and BY_NAME[name].unit == "m":

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from dem_warp import CaseResult
-from experiments.measurement.observables import NAMES, OBSERVABLES, View
+from experiments.measurement.observables import BY_NAME, NAMES, OBSERVABLES, View
 from experiments.studyfile.study import MeasurementSection
 from imaging import HeapAngle, PictureError, heap_angle
 
@@ -39,6 +39,7 @@ def measure_heap(settings: MeasurementSection, result: CaseResult) -> HeapAngle:
         azimuths=settings.azimuths,
         fit=settings.fit,
         pixels=settings.pixels,
+        grain_count=len(result.positions),
     )
 
 
@@ -61,17 +62,21 @@ def observe(settings: MeasurementSection, result: CaseResult, leaves_a_heap: boo
     return Observed(seen | told, heap)
 
 
-def measure(settings: MeasurementSection, result: CaseResult) -> tuple[np.ndarray, str]:
-    """Measure all `OBSERVABLES` of a heap, or none.
+def measure(
+    settings: MeasurementSection, result: CaseResult, names: Sequence[str] = NAMES
+) -> tuple[np.ndarray, str]:
+    """Measure named observables of a heap, left out all of `OBSERVABLES`, or none.
 
     Returns
     -------
     values : (observables,) array
         In their units; NaN, all of them, for a case that has none.
     reason : str
-        Why a case has none: it failed, or its heap cannot be measured; else empty.
+        Why a case has none: it failed, its heap cannot be measured, or one was not told; else empty.
     """
     found = observe(settings, result)
-    if found.angle is None:
-        return np.full(len(NAMES), np.nan), found.reason
-    return np.array([found.observables[each.column] for each in OBSERVABLES]), ""
+    columns = [BY_NAME[name].column for name in names]
+    untold = [column for column in columns if column not in found.observables]
+    if found.angle is None or untold:
+        return np.full(len(names), np.nan), found.reason or f"was not told: {', '.join(untold)}"
+    return np.array([found.observables[column] for column in columns]), ""

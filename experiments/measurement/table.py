@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import csv
+import io
+import re
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from experiments.errors import InputError
 from experiments.studyfile.schema import nearest_name
+from experiments.texts import read_text
 
 
 @dataclass(frozen=True)
@@ -52,15 +55,31 @@ def read_rows(path: Path, needed: Collection[str], known: Collection[str]) -> It
 
 
 def _lines(path: Path) -> Iterator[tuple[int, list[str]]]:
+    """Lines of cells; where semicolons or tabs separate them, as in German, numbers may have commas."""
+    text = read_text(path)
+    delimiter = _delimiter(text)
     try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            reader = csv.reader(file)
-            for row in reader:
-                cells = [cell.strip() for cell in row]
-                if any(cells) and not cells[0].startswith("#"):
-                    yield reader.line_num, cells
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise InputError("must be a readable CSV file in UTF-8", str(error), str(path)) from None
+        reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter)
+        for row in reader:
+            cells = [cell.strip() for cell in row]
+            if delimiter != ",":
+                cells = [_with_point(cell) for cell in cells]
+            if any(cells) and not cells[0].startswith("#"):
+                yield reader.line_num, cells
+    except csv.Error as error:
+        raise InputError("must be a readable CSV file", str(error), str(path)) from None
+
+
+def _delimiter(text: str) -> str:
+    """Separator of the first row of cells: a semicolon, a tab, or a comma."""
+    lines = (line.strip() for line in text.splitlines())
+    header = next((line for line in lines if line and not line.lstrip('"').startswith("#")), "")
+    return next((mark for mark in ";\t" if mark in header), ",")
+
+
+def _with_point(cell: str) -> str:
+    """A number with a decimal comma, alone or before its unit, with a point."""
+    return re.sub(r"^([+-]?\d+),(\d+(?:[eE][+-]?\d+)?)(?=\s|$)", r"\1.\2", cell)
 
 
 def _check_header(

@@ -8,6 +8,7 @@ from typing import Any
 from experiments.calibrate.results import STAGES, Campaign, Outcome
 from experiments.report.companion import Replay, companion_of
 from experiments.report.kit import html
+from experiments.report.other_codes import other_codes_chapter
 from experiments.report.pictures import HeapPicture
 from experiments.report.sections import TITLES, Context, chapter, failed_chapter, stage_chapters
 from experiments.report.study_facts import study_facts
@@ -15,7 +16,8 @@ from experiments.studyfile import Study
 
 OUTCOMES = {
     Outcome.CALIBRATED: "Calibrated",
-    Outcome.NOT_VERIFIED: "Not verified",
+    Outcome.NOT_TOLD_APART: "Not told apart",
+    Outcome.MISSED: "Target missed",
     Outcome.NO_SIGNIFICANT_FACTOR: "No significant factor",
     Outcome.TARGET_NOT_REACHED: "Target not reached",
     Outcome.PLATEAU: "Plateau before the target",
@@ -49,6 +51,8 @@ def render_page(
     labels = {section.name: section.label for section in study.factor_sections}
     context = Context(campaign, labels, companion.published())
     chapters = stage_chapters(context)
+    if campaign.optimum is not None:
+        chapters.append(other_codes_chapter(study, campaign.optimum))
     if pictures:
         chapters.append(chapter("heaps"))
     chapters.append(failed_chapter(campaign))

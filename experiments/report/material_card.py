@@ -10,12 +10,16 @@ import numpy as np
 
 from doe import Region, Sample
 from experiments.calibrate.results import Campaign, OptimumResult
-from experiments.files import copy_file, write_text
+from experiments.cases.manifest import study_hash
+from experiments.files import write_text
+from experiments.report.clump_files import gather_clumps
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import Response
-from experiments.studyfile.card import MATERIAL, SECTIONS, shapes_of
+from experiments.studyfile.card import MATERIAL, SECTIONS
+from experiments.studyfile.card_surface import SURFACE, surface_table
 from experiments.studyfile.factor_section import with_factor_values
-from experiments.studyfile.toml_files import toml_text
+from experiments.studyfile.solver_section import LAWS, written
+from experiments.toml_files import toml_text
 
 CARD = "material.toml"
 
@@ -27,8 +31,8 @@ MOST_POINTS = 60
 
 HEAD = """\
 # Material card, written by dem-warp calibrate. A study takes its values by  material = "{card}"
-# They hold together with the contact law, the clump and the estimator that they were found with. Every point
-# of [compatible] is as good as the chosen one; not so every combination of the ranges.
+# They hold together with the contact laws [material.solver], the clump and the estimator that they were found
+# with. Every point of [compatible] is as good as the chosen one; not so every combination of the ranges.
 
 """
 
@@ -38,10 +42,7 @@ def write_material_card(campaign: Campaign, study: Study, folder: Path) -> Path 
     if campaign.optimum is None:
         return None
     card = material_card(campaign, campaign.optimum, study)
-    for shape in shapes_of(card[MATERIAL]):
-        source = study.file.parent / shape["clump"]
-        shape["clump"] = f"material-{source.name}"
-        copy_file(source, folder / shape["clump"])
+    gather_clumps(card[MATERIAL], study.file.parent, folder, "material-")
     write_text(folder / CARD, HEAD.format(card=CARD) + toml_text(card))
     return folder / CARD
 
@@ -49,12 +50,14 @@ def write_material_card(campaign: Campaign, study: Study, folder: Path) -> Path 
 def material_card(campaign: Campaign, optimum: OptimumResult, study: Study) -> dict[str, Any]:
     """Lay out a card as nested tables; clump files as the study names them."""
     chosen = with_factor_values(study.document, study.factor_sections, optimum.settings)
+    chosen["solver"] = {LAWS: written(study.solver.laws)}
     return {
         "format": FORMAT,
         "name": study.name,
-        "fitted": _fitted(campaign, study),
+        "fitted": _fitted(campaign, study) | {"test": chosen["scene"]},
         "factor": _factors(optimum, study),
-        "compatible": _compatible(optimum.region),
+        "compatible": compatible_points(optimum.region),
+        SURFACE: _surfaces(campaign),
         MATERIAL: copy.deepcopy({key: chosen[key] for key in SECTIONS if key in chosen}),
     }
 
@@ -66,10 +69,10 @@ def _fitted(campaign: Campaign, study: Study) -> dict[str, Any]:
         "outcome": campaign.outcome.value,
         "reason": campaign.reason,
         "scale": study.scale,
-        "test": study.document["scene"],
+        "study": study_hash(study),
         "estimator": f"repose angle, {measurement.fit!r} fit, mean of {measurement.azimuths} views",
-        "modulus_scale": numerics.modulus_scale,
-        "time_step_fraction": numerics.time_step_fraction,
+        "measurement": measurement.model_dump(),
+        "numerics": numerics.model_dump(exclude_none=True),
         "response": {response.name: _response(campaign, response) for response in campaign.responses},
     }
     scenes, document = {response.scene for response in campaign.responses}, study.document
@@ -83,17 +86,18 @@ def _response(campaign: Campaign, response: Response) -> dict[str, Any]:
     """Target of a response, and what fresh cases gave."""
     facts: dict[str, Any] = {"observable": response.observable, "scene": response.scene}
     if campaign.target is not None:
-        facts |= _written(campaign.target.responses[response.name], response.unit)
+        facts |= sample_table(campaign.target.responses[response.name], response.unit)
     if campaign.verification is not None:
         test, unit = campaign.verification.responses[response.name], response.unit
-        interval = [_quantity(end, unit) for end in test.interval]
-        difference = {"difference": _quantity(test.difference, unit), "interval": interval}
-        facts["fresh"] = _written(test.a, unit) | difference
+        interval = [quantity_text(end, unit) for end in test.interval]
+        difference = {"difference": quantity_text(test.difference, unit), "interval": interval}
+        facts["fresh"] = sample_table(test.a, unit) | difference
     return facts
 
 
-def _written(sample: Sample, unit: str) -> dict[str, Any]:
-    return {"mean": _quantity(sample.mean, unit), "sd": _quantity(sample.sd, unit), "n": sample.n}
+def sample_table(sample: Sample, unit: str) -> dict[str, Any]:
+    """Write a sample as a card has it."""
+    return {"mean": quantity_text(sample.mean, unit), "sd": quantity_text(sample.sd, unit), "n": sample.n}
 
 
 def _factors(optimum: OptimumResult, study: Study) -> dict[str, Any]:
@@ -104,33 +108,41 @@ def _factors(optimum: OptimumResult, study: Study) -> dict[str, Any]:
         factor.name: {
             "parameter": ", ".join(parameters[factor.name]),
             "unit": factor.unit,
-            "chosen": _short(optimum.point[factor.name]),
-            "low": _short(region.ranges["low"][factor.name]) if found else None,
-            "high": _short(region.ranges["high"][factor.name]) if found else None,
+            "chosen": short(optimum.point[factor.name]),
+            "low": short(region.ranges["low"][factor.name]) if found else None,
+            "high": short(region.ranges["high"][factor.name]) if found else None,
             "identified": factor.name not in optimum.unidentified,
         }
         for factor in region.factors
     }
 
 
-def _compatible(region: Region) -> dict[str, Any]:
-    """Points all over the compatible region."""
+def _surfaces(campaign: Campaign) -> dict[str, Any]:
+    """Runs that each response's surface was fitted to, and the terms that stayed: enough to fit it again."""
+    if campaign.surface is None:
+        return {}
+    return {name: surface_table(found.reduced) for name, found in campaign.surface.responses.items()}
+
+
+def compatible_points(region: Region) -> dict[str, Any]:
+    """List points all over a compatible region, as a card does."""
     inside = np.flatnonzero(region.mask)
     count = min(len(inside), MOST_POINTS)
     points = region.natural.to_numpy()[inside[np.linspace(0, len(inside) - 1, count).astype(int)]]
     return {
-        "share_of_design": _short(region.fraction),
+        "share_of_design": short(region.fraction),
         "factors": [factor.name for factor in region.factors],
-        "points": [[_short(value) for value in point] for point in points],
+        "points": [[short(value) for value in point] for point in points],
     }
 
 
-def _short(value: float) -> float:
+def short(value: float) -> float:
+    """Round to the four digits that a card writes."""
     return float(f"{value:.4g}")
 
 
-def _quantity(value: float, unit: str) -> str | float:
+def quantity_text(value: float, unit: str) -> str | float:
     """Write a value as a study file has it: angles with three decimals, others with four digits."""
     if unit == "1":
-        return _short(value)
+        return short(value)
     return f"{value:.3f} deg" if unit == "deg" else f"{value:.4g} {unit}"

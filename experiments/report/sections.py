@@ -37,6 +37,7 @@ TITLES = {
     "optimum": "Optimum and compatible region",
     "responses": "Several responses",
     "verification": "Verification",
+    "other_codes": "Enter these values in your DEM code",
     "heaps": "Heaps",
     "failed": "Failed runs",
     "provenance": "Settings and provenance",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from dem_warp import EDEM, ContactLaws
 from experiments.studyfile import Study
 
 
@@ -25,10 +26,19 @@ def study_facts(study: Study) -> dict[str, str]:
         "Scale": study.scale or "the study as written",
         **test,
         "Grains": f"{grains}, {spheres} each",
+        "Contact laws": _laws_text(study.solver.laws),
         "Shear modulus": softened,
         "Time step": f"{100.0 * numerics.time_step_fraction:g} % of the Rayleigh time",
         "Angle": f"“{measurement.fit}” fit, mean of {measurement.azimuths} views of a heap, both flanks",
     } | {f"Scene “{name}”": _scene_text(scene) for name, scene in further.items()}
+
+
+def _laws_text(laws: ContactLaws) -> str:
+    """Name a set of laws, and every choice of it that is not the base law's."""
+    base = EDEM.to_dict()
+    own = {law: value for law, value in laws.to_dict().items() if value != base[law]}
+    told = ", ".join(f"{law.replace('_', ' ')} {value}" for law, value in own.items())
+    return f"{laws.name}: {told or 'the base law'}"
 
 
 def _scene_text(scene: Mapping[str, Any]) -> str:

@@ -14,6 +14,7 @@ import pandas as pd
 from dem_warp import __version__
 from experiments.calibrate.export import jsonable
 from experiments.calibrate.results import Campaign
+from experiments.cases.manifest import study_hash
 from experiments.files import write_text
 from experiments.report.campaign_page import render_page
 from experiments.report.companion import Replay
@@ -52,7 +53,7 @@ def write_report(
         The page.
     """
     folder = Path(out_dir)
-    made_by = {**(provenance or {}), "versions": library_versions()}
+    made_by = {**(provenance or {}), "study": study_hash(study), "versions": library_versions()}
     page = render_page(campaign, study, pictures, made_by, replay)
     tables = campaign.tables() | (replay.tables() if replay else {})
     write_files(folder, study, page, {"campaign": campaign.to_dict()}, made_by, tables)
@@ -69,7 +70,13 @@ def write_files(
     tables: Mapping[str, pd.DataFrame],
 ) -> None:
     """Write a page, and beside it its results, between the study and what made them, and its tables."""
-    about = {"name": study.name, "file": study.file.name, "scale": study.scale, "document": study.document}
+    about = {
+        "name": study.name,
+        "file": study.file.name,
+        "scale": study.scale,
+        "sha256": study_hash(study),
+        "document": study.document,
+    }
     whole = {"study": about, **results, "provenance": jsonable(made_by)}
     text = json.dumps(whole, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
     for name, table in tables.items():

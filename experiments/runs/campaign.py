@@ -19,7 +19,9 @@ from experiments.calibrate import Campaign, calibrate
 from experiments.calibrate.campaign import StageHook
 from experiments.calibrate.checks import check_study
 from experiments.calibrate.export import jsonable
-from experiments.cases import Engine, Store, open_folder, run_cases
+from experiments.cases import Store, open_folder, run_cases
+from experiments.cases.key import engine_identity
+from experiments.cases.outputs import publishing
 from experiments.errors import InputError, StudyError
 from experiments.files import write_text
 from experiments.measurement.target import with_measurements
@@ -61,7 +63,6 @@ class Desk:
         workers: int | None = None,
         resume: bool = False,
         watch: Watch = lambda title: nullcontext(),
-        engine: Engine | None = None,
     ) -> Desk:
         """Make the folder of a study, or go on in it; parameters as of `experiments.api.calibrate`.
 
@@ -70,7 +71,7 @@ class Desk:
         StoreError
             When the folder is in use, or is not one to resume; nothing is written then.
         """
-        store, changes = open_folder(folder, study, resume, engine)
+        store, changes = open_folder(folder, study, resume)
         for change in changes:
             _log.warning("The study has changed since the earlier run: %s", change)
         return cls(study, folder, store, device, workers, watch)
@@ -83,6 +84,11 @@ class Desk:
         if simulated := len(self.store) - before:
             self._note_wall_time(title, simulated, time.perf_counter() - started)
         return cases
+
+    def publishing(self) -> AbstractContextManager[Path]:
+        """Folder for drafts of outputs, which take their places when the block ends well."""
+        engine = self.store.engine
+        return publishing(self.folder, self.study, simulated_by=engine and engine_identity(engine))
 
     @property
     def wall_times(self) -> pd.DataFrame:
@@ -113,7 +119,8 @@ def run_campaign(desk: Desk, on_stage: StageHook | None = None, replay: Replay |
         "engine": _engine(desk, campaign.cases),
     }
     pictures = heap_pictures(campaign, desk.study, desk.store.load)
-    write_report(campaign, desk.study, desk.folder, pictures, provenance, replay)
+    with desk.publishing() as drafts:
+        write_report(campaign, desk.study, drafts, pictures, provenance, replay)
     return campaign
 
 
@@ -135,9 +142,10 @@ def replay_published(desk: Desk, replicates: int) -> Replay:
 
 def record_published(desk: Desk, replay: Replay, campaign: Campaign | None = None) -> Path:
     """Write the page on published runs, its tables and its picture into the folder ``record``."""
-    return replay.write_record(
-        desk.folder / RECORD, desk.study, desk.store.load, _provenance(desk, replay), campaign
-    )
+    made_by = _provenance(desk, replay)
+    with desk.publishing() as drafts:
+        page = replay.write_record(drafts / RECORD, desk.study, desk.store.load, made_by, campaign)
+    return desk.folder / page.relative_to(drafts)
 
 
 def found_by(campaign: Campaign | None, replay: Replay | None) -> dict[str, Any]:

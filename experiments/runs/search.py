@@ -5,24 +5,26 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable, Sequence
-from contextlib import nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from dem_warp import Progress
-from dem_warp.provenance import engine_fingerprint
 from dem_warp.version import source_commit
 from doe.discrepancy import Bank, Discovery, Fit, Measured, Outcomes, Point, drive
-from experiments.cases import open_folder, require_unused
+from experiments.cases import engine_of, open_folder, require_unused
+from experiments.cases.folder import locked
+from experiments.cases.outputs import publishing, sha256_of
 from experiments.discover.engine import EngineSimulator
-from experiments.discover.maker import maker_of_today
+from experiments.discover.maker import fingerprint_of, maker_of_today
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.search import Search
+from experiments.files import replacing
 from experiments.measurement.measured_file import read_measured
 from experiments.measurement.observables import OBSERVABLES, PHOTOGRAPHED
 from experiments.report import HeapPicture
-from experiments.report.companion import companion_of
+from experiments.report.companion import Companion, companion_of
 from experiments.report.discovery import Terms, write_discovery
 from experiments.report.discovery.pictures import photograph, simulated_heaps
 from experiments.runs.campaign import Watch
@@ -62,13 +64,12 @@ class SearchResult:
 class _Watched:
     """The engine, with a display for every wave."""
 
-    observables = EngineSimulator.observables
-
     def __init__(self, search: Search, job: Job, watch: Watch) -> None:
         table = OutcomeTable(job.folder / OUTCOMES)
         self.engine = EngineSimulator(
             search.study, search.library, table, job.device, job.workers, progress=self._report
         )
+        self.observables = self.engine.observables
         self.title = "library waves"
         self.waves: list[dict[str, Any]] = []
         self._watch = watch
@@ -104,17 +105,34 @@ def run_search(job: Job, resume: bool = False, watch: Watch = lambda title: null
     terms = Terms.of(search.library, OBSERVABLES, job.study.factor_sections)
     bank = _known_bank(job, search)
     measured = _measured(job)
-    for change in open_folder(job.folder, job.study, resume)[1]:
-        _log.warning("The study has changed since the earlier run: %s", change)
     for note in measured.notes if measured else ():
         _log.warning("The data: %s", note)
-    search.settings.write(job.folder / SETTINGS)
+    with locked(job.folder, resume):
+        for change in open_folder(job.folder, job.study, resume)[1]:
+            _log.warning("The study has changed since the earlier run: %s", change)
+        return _search(job, search, companion, terms, bank, measured, watch)
+
+
+def _search(
+    job: Job,
+    search: Search,
+    companion: Companion,
+    terms: Terms,
+    bank: Bank | None,
+    measured: Measured | None,
+    watch: Watch,
+) -> SearchResult:
+    """Simulate and analyse in an open folder, and make the outputs."""
     simulator = _Watched(search, job, watch)
     with simulator.engine:
         if bank is None:
-            bank = search.make_bank(simulator, maker_of_today(source_commit()))
-            bank.save(job.folder / BANK)
+            maker = maker_of_today(source_commit(), simulator.engine.engine)
+            bank = search.make_bank(simulator, maker)
+            with replacing(job.folder / BANK) as temporary:
+                bank.save(temporary)
         if measured is None:
+            with _publishing(job) as drafts:
+                search.settings.write(drafts / SETTINGS)
             return SearchResult(None, terms, job.folder / BANK)
         simulator.title, started = "fresh runs", time.perf_counter()
         found = drive(search.analysis(measured, bank, job.seed), simulator)
@@ -122,8 +140,15 @@ def run_search(job: Job, resume: bool = False, watch: Watch = lambda title: null
         pictures = heaps_side_by_side(simulator.engine, found, terms, measured, job)
     further = companion.discovery_chapters(found, terms, job.measured) if job.measured else ()
     made = _provenance(job, bank, waves)
-    page = write_discovery(found, job.study, terms, search.settings, job.folder, pictures, made, further)
-    return SearchResult(found, terms, page)
+    with _publishing(job) as drafts:
+        search.settings.write(drafts / SETTINGS)
+        page = write_discovery(found, job.study, terms, search.settings, drafts, pictures, made, further)
+    return SearchResult(found, terms, job.folder / page.relative_to(drafts))
+
+
+def _publishing(job: Job) -> AbstractContextManager[Path]:
+    data = sha256_of(job.measured) if job.measured else None
+    return publishing(job.folder, job.study, data=data, photographs_only=job.photographs_only, seed=job.seed)
 
 
 def heaps_side_by_side(
@@ -170,7 +195,7 @@ def _provenance(job: Job, bank: Bank, waves: Sequence[dict[str, Any]]) -> dict[s
         "device": job.device,
         "workers": job.workers,
         "commit": source_commit(),
-        "engine": engine_fingerprint(),
+        "engine": fingerprint_of(engine_of(job.study)),
         "bank": dict(bank.maker) or None,
         "photographs only": job.photographs_only,
         "data": job.measured.name if job.measured else None,

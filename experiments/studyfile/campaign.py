@@ -176,8 +176,6 @@ class VerificationSettings(Section):
     """Margin in standard deviations of the target; of the leading response when ``margin`` is left out."""
     alpha: float = Field(default=0.05, gt=0.0, lt=1.0)
     """Level of the t-test and of each one-sided test."""
-    require_equivalence: bool = False
-    """Call the campaign calibrated only when equivalence is shown, not merely no difference found."""
 
 
 class CampaignSettings(Section):

@@ -10,36 +10,66 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from pydantic import ValidationError
+
 from experiments.errors import StudyError
 from experiments.studyfile.factor_section import merge
 from experiments.studyfile.places import drop
-from experiments.studyfile.toml_files import read_toml
+from experiments.studyfile.solver_section import CARD_LAWS, LAWS, laws_of
+from experiments.toml_files import read_toml
 
 MATERIAL = "material"
 """Key of a study that names a card, and table of a card that holds the sections."""
 
-SECTIONS = ("grain", "wall", "contact", "mechanism")
-"""Sections of a study that describe a material."""
+SECTIONS = ("grain", "wall", "contact", "mechanism", "solver")
+"""Sections of a study that describe a material, and the laws that its values hold for."""
 
 
 def with_material(document: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     """Lay a study document over the card that it names, relative to a folder, if it names one.
 
+    The laws of the card hold where the study names none.
+
     Raises
     ------
     StudyError
-        When there is no such card, or the file is none.
+        When there is no such card, the file is none, or its values were found with other laws than the
+        study's and the study does not say so.
     """
     own = {key: value for key, value in document.items() if key != MATERIAL}
     if MATERIAL not in document:
         return own
     path = folder / str(document[MATERIAL])
     sections = read_card(path)
+    check_laws(own, sections, path)
     for factor in document.get("factor", []):
         places = factor.get("parameter", "")
         for place in places if isinstance(places, list) else [places]:
             drop(sections, str(place).split("."))
     return merge(sections, own)
+
+
+def check_laws(document: Mapping[str, Any], sections: Mapping[str, Any], path: Path) -> None:
+    """Check that a study has the laws of its card, or says which others the card has, ``solver.card_laws``.
+
+    Raises
+    ------
+    StudyError
+        When it has others and does not say so.
+    """
+    solver = document.get("solver", {})
+    if not isinstance(solver, Mapping) or LAWS not in solver:
+        return
+    try:
+        own, others = laws_of(solver), laws_of(sections.get("solver", {}))
+    except ValidationError:
+        return  # the study's sections are checked next, with their places
+    if own != others and solver.get(CARD_LAWS) != others.name:
+        rule = (
+            f"the values of the card hold for the laws {others.name!r} and mean something else in these: "
+            f'take those, or say {CARD_LAWS} = "{others.name}" beside them to take the values as they are'
+        )
+        raise StudyError(rule, solver[LAWS], f"solver.{LAWS}, with the card {path}")
 
 
 def read_card(path: Path) -> dict[str, Any]:
@@ -58,6 +88,31 @@ def read_card(path: Path) -> dict[str, Any]:
     for shape in shapes_of(sections):
         shape["clump"] = str(path.parent.resolve() / shape["clump"])
     return sections
+
+
+FITTED = ("measurement", "numerics")
+"""Further sections of a study that a card keeps, among what it was fitted to."""
+
+
+def is_card(path: Path) -> bool:
+    """Tell a card from a study; raises `StudyError` when the file cannot be read."""
+    return isinstance(read_toml(path)[1].get(MATERIAL), Mapping)
+
+
+def card_document(card: Mapping[str, Any], path: Path) -> dict[str, Any]:
+    """Lay out the study of a card's own test, from what the card at a path says.
+
+    Raises
+    ------
+    StudyError
+        When it is no card, or does not say which test it was fitted to.
+    """
+    fitted = card.get("fitted", {})
+    if not isinstance(fitted, Mapping) or "test" not in fitted:
+        raise StudyError("a card says which test it was fitted to, [fitted.test.NAME]", fitted, str(path))
+    kept = {name: fitted[name] for name in FITTED if name in fitted}
+    name = str(card.get("name", path.stem))
+    return {"name": name, "scene": fitted["test"]} | kept | read_card(path)
 
 
 def shapes_of(sections: Mapping[str, Any]) -> list[dict[str, Any]]:

@@ -18,7 +18,7 @@ from annotated_types import Ge, Gt, Le, Lt
 from pydantic import AfterValidator, BaseModel
 from pydantic.fields import FieldInfo
 
-from experiments.studyfile.schema import dimension_of, fields_of, marks_of, section_of
+from experiments.studyfile.schema import Generated, dimension_of, fields_of, marks_of, section_of
 from experiments.studyfile.study import Study
 from experiments.studyfile.units import UNITS, Quantity
 
@@ -81,9 +81,13 @@ def _rows(section: type[BaseModel], path: str, array: bool = False) -> Iterator[
     yield Row(head, "", meaning=_sentence(described))
     keys = [(key, name, field, section_of(field)) for key, (name, field) in fields_of(section).items()]
     texts = meanings(described) if any(inner is None for *_, inner in keys) else {}
+    if described is not section:
+        texts = meanings(section.__bases__[0]) | texts
     for key, name, field, inner in keys:
         if inner is None:
             yield Row(head, key, _kind(field), _default(field), _rule(field), texts.get(name, ""))
+        elif default := _name(field):
+            yield Row(head, key, "text", json.dumps(default), "", texts.get(name, ""))
     for key, _, field, inner in keys:
         below = f"{path}.{key}".removeprefix(".")
         if key == "response-scene":
@@ -131,6 +135,11 @@ def _default(field: FieldInfo) -> str:
         written = math.degrees(value) if AfterValidator(math.radians) in field.metadata else value
         return f"{written:g} {next(iter(UNITS[dimension.name]))}"
     return json.dumps(value)
+
+
+def _name(field: FieldInfo) -> str:
+    """Default of a field that takes a name as well as a section; empty for any other."""
+    return next((mark.name for mark in marks_of(field) if isinstance(mark, Generated)), "")
 
 
 def _rule(field: FieldInfo) -> str:

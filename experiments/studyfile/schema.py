@@ -15,6 +15,7 @@ from pydantic import (
     PlainValidator,
     ValidationError,
     ValidationInfo,
+    field_validator,
 )
 from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
@@ -76,6 +77,7 @@ Number = Annotated[float, Dimension("")]
 Length = Annotated[float, Dimension("length")]
 Pressure = Annotated[float, Dimension("pressure")]
 Density = Annotated[float, Dimension("density")]
+Time = Annotated[float, Dimension("time")]
 Angle = Annotated[float, Dimension("angle")]
 """A measured angle, in degrees."""
 RawQuantity = Annotated[Quantity, PlainValidator(Quantity.parse)]
@@ -87,6 +89,19 @@ class Section(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
+    @field_validator("*", mode="before")
+    @classmethod
+    def _number_is_no_truth_value(cls, value: object, info: ValidationInfo) -> object:
+        """Refuse true and false for a number: Python counts with them."""
+        if isinstance(value, bool) and info.field_name is not None:
+            kind = cls.model_fields[info.field_name].annotation
+            kinds = [kind, *get_args(kind)]
+            if int in kinds or any(
+                get_origin(each) is Annotated and get_args(each)[0] is int for each in kinds
+            ):
+                raise ValueError("must be a whole number, not true or false")
+        return value
+
 
 @dataclass(frozen=True)
 class Generated:
@@ -94,6 +109,8 @@ class Generated:
 
     section: Callable[[], type[Section]]
     """Builds the section."""
+    name: str = ""
+    """Default of a field that takes a name as well as a section."""
 
     def read(self, value: object, info: ValidationInfo) -> Section:
         """Validate the section."""

@@ -5,6 +5,7 @@ A field's type names its dimension; its bounds are the hard physical limits, for
 
 from __future__ import annotations
 
+import os
 from functools import lru_cache, partial
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -12,11 +13,14 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from dem_warp import Case, ClumpShape, GrainPopulation, Interaction, Material, Numerics, ShapeMixture
+from dem_warp.laws.contact_law import check_forms
 from dem_warp.population import FRACTION_TOLERANCE, size_of_mean_mass
 from experiments.studyfile.generated import section_for
 from experiments.studyfile.mechanisms import MechanismsSection, mechanisms_section
+from experiments.studyfile.proportions import narrowness
 from experiments.studyfile.scene_sections import SceneSection, scene_section
-from experiments.studyfile.schema import Density, Generated, Length, Number, Pressure, Section
+from experiments.studyfile.schema import Density, Generated, Length, Number, Pressure, Section, nested_error
+from experiments.studyfile.solver_section import SolverSection
 
 
 class MaterialSection(Section):
@@ -38,7 +42,10 @@ class ShapeSection(Section):
     """Source of a shape: a file of spheres, or the radius of one."""
 
     clump: Path | None = None
-    """File with the clump's spheres (x y z r in mm), relative to the study file."""
+    """File with the clump's spheres, relative to the study file: x y z r a line, or a table, text or VTK file
+    of LIGGGHTS, Yade, EDEM or DEM-Engine."""
+    clump_unit: str | None = None
+    """Unit of that file (mm, m, ...), or the length that is 1 in it; left out: the one it names, or mm."""
     sphere: Length | None = Field(default=None, gt=0.0)
     """Radius of spherical grains, instead of a clump."""
 
@@ -48,18 +55,29 @@ class ShapeSection(Section):
         if clump is None:
             return None
         path = Path((info.context or {}).get("folder", ".")) / clump
-        if not path.is_file():
+        if not os.path.isfile(path):  # a name too long is none, and raises nothing
             raise ValueError(f"must name an existing clump file (looked for {path})")
         return path
+
+    @field_validator("clump_unit")
+    @classmethod
+    def _is_a_length(cls, unit: str | None) -> str | None:
+        from experiments.sphere_files import length_unit
+
+        if unit is not None:
+            length_unit(unit)
+        return unit
 
     def one_shape(self) -> ClumpShape:
         """Build the shape."""
         if self.clump is not None and self.sphere is not None:
             raise ValueError("takes a clump (a file) or a sphere (a radius), not both")
+        if self.clump_unit is not None and self.clump is None:
+            raise ValueError("takes clump_unit only with a clump (a file)")
         if self.sphere is not None:
             return _sphere(self.sphere)
         if self.clump is not None:
-            return _read_clump(self.clump, self.clump.stat().st_mtime_ns)
+            return _read_clump(self.clump, self.clump_unit, self.clump.stat().st_mtime_ns)
         raise ValueError("needs a clump (a file) or a sphere (a radius)")
 
 
@@ -131,8 +149,11 @@ class GrainSection(MaterialSection, ShapeSection):
 
 # The integrals over a shape take milliseconds, and every case of a campaign needs them.
 @lru_cache(maxsize=32)
-def _read_clump(path: Path, modified: int) -> ClumpShape:
-    return ClumpShape.read(path)
+def _read_clump(path: Path, unit: str | None, modified: int) -> ClumpShape:
+    # The readers of files know the units of this package.
+    from experiments.sphere_files import read_clump
+
+    return read_clump(path, unit).shape
 
 
 _elongated = lru_cache(maxsize=32)(ClumpShape.elongated)
@@ -180,6 +201,8 @@ class Physics(Section):
     """The physical test."""
     numerics: Annotated[Any, Generated(partial(section_for, Numerics))] = section_for(Numerics)()
     """Time step, softening, precision."""
+    solver: SolverSection = SolverSection()
+    """Conventions of the contact law."""
     mechanism: Annotated[MechanismsSection, Generated(mechanisms_section)] = Field(
         default_factory=lambda: mechanisms_section()()
     )
@@ -187,8 +210,27 @@ class Physics(Section):
 
     @model_validator(mode="after")
     def _mechanisms_are_physical(self) -> Self:
-        self.mechanism.mechanisms()
+        for kind in ("grains", "walls"):
+            own = (one for one in self.mechanism.mechanisms() if one.acts_between(kind))
+            try:
+                check_forms(tuple(type(one) for one in own), self.solver.laws.forms)
+            except ValueError as error:
+                at = {"type": "value_error", "loc": ("solver", "laws"), "msg": str(error)}
+                raise nested_error([at]) from None
         return self
+
+    @model_validator(mode="after")
+    def _container_holds_grains(self) -> Self:
+        try:
+            self.narrowness()
+        except ValueError as error:
+            raise nested_error([{"loc": ("scene",), "type": "value_error", "msg": str(error)}]) from None
+        return self
+
+    def narrowness(self) -> str:
+        """Say that the container is narrow for its grains; empty where it is not."""
+        scene = self.scene.scene(self.wall.material())
+        return narrowness(getattr(scene, "diameter", None), self.grain.shape(), self.grain.size_mean)
 
     def build_case(self, seed: int) -> Case:
         """Build one case of the engine."""
@@ -200,4 +242,5 @@ class Physics(Section):
             seed=seed,
             numerics=self.numerics.build(),
             mechanisms=self.mechanism.mechanisms(),
+            laws=self.solver.laws,
         )

@@ -63,7 +63,8 @@ def setter_at(parameter: str) -> Setter:
 @cache
 def _compiled(parameter: str, *libraries: type[Section]) -> Setter:
     path = tuple(parameter.split("."))
-    trail = steps(Physics, path)
+    # laws are choices, which no factor varies; a set is named as a whole
+    trail = steps(Physics, path) if path[0] != "solver" else []
     field = trail[-1][1] if trail else None
     dimension = dimension_of(field) if field else None
     if field is None or dimension is None:

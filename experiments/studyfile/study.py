@@ -19,8 +19,9 @@ from dem_warp import Case
 from doe import Factor
 from experiments.errors import StudyError
 from experiments.studyfile.campaign import TARGET_SCENE, CampaignSettings, Target
-from experiments.studyfile.card import with_material
+from experiments.studyfile.card import card_document, with_material
 from experiments.studyfile.conditions import BASE, Condition, Conditions, under_condition
+from experiments.studyfile.engine_section import EngineSection
 from experiments.studyfile.factor_section import (
     FactorSection,
     FactorTable,
@@ -30,12 +31,13 @@ from experiments.studyfile.factor_section import (
     with_factor_values,
 )
 from experiments.studyfile.places import Places
+from experiments.studyfile.reserved_names import check_factor_names
 from experiments.studyfile.scene_sections import SceneSection
 from experiments.studyfile.schema import Section, nearest_name, validated
 from experiments.studyfile.sections import Physics, Scene
 from experiments.studyfile.setters import changed
 from experiments.studyfile.target_section import ResponseSection, TargetSection, build_target
-from experiments.studyfile.toml_files import read_toml
+from experiments.toml_files import read_toml
 from imaging import FITS
 
 BUCKWHEAT = Path(__file__).parents[1] / "studies" / "buckwheat" / "study.toml"
@@ -47,7 +49,7 @@ class MeasurementSection(Section):
 
     fit: str = "flank"
     """Part of the flank that the line is fitted to, one of ``imaging.FITS``."""
-    azimuths: int = Field(default=8, ge=2)
+    azimuths: int = Field(default=8, ge=2, le=360)
     """Views of one heap, over half a turn."""
     pixels: int = Field(default=800, ge=50, le=4000)
     """Width of the heap in a view."""
@@ -94,6 +96,8 @@ class Study(Physics):
     """Every decision of the campaign."""
     discover: DiscoverSection = DiscoverSection()
     """The search for a missing effect."""
+    engine: EngineSection | None = None
+    """The program that simulates the cases; left out: dem-warp itself."""
 
     _document: dict[str, Any] = PrivateAttr(default_factory=dict)
     _places: Places = PrivateAttr(default_factory=lambda: Places(BUCKWHEAT, {}))
@@ -273,13 +277,28 @@ def load_study(
     return _build(with_material(merge(document, changes or {}), path.parent), places)
 
 
+def load_card(path: Path) -> Study:
+    """Read a material card as the study of its own test, at the values that it chose.
+
+    Raises
+    ------
+    StudyError
+        When the file cannot be read, is no card, or does not say which test it was fitted to.
+    """
+    text, card = read_toml(path, "a material card")
+    return _build(card_document(card, path), Places.read(path, text))
+
+
 def _build(document: dict[str, Any], places: Places) -> Study:
     """Build a study, and each of its conditions, so that a wrong one is named at once."""
     sections = validated(FactorTable, {"factor": document.get("factor", [])}, places).factor
+    names = [section.name for section in sections]
+    check_factor_names(names, places)
     check_one_home(document, sections, places)
     middle = with_factor_values(document, sections, {}) | {"factor": sections}
     study = validated(Study, middle, places, natural_value=partial(natural_value, sections))
     study._document, study._places = document, places
+    _check_restitution(study)
     for name in study.condition_sections:
         study.under(name)
     for name in study.response_scenes:
@@ -288,8 +307,19 @@ def _build(document: dict[str, Any], places: Places) -> Study:
             raise StudyError(rule, name, places.of(("response-scene", name)))
     held_out = [condition.name for condition in study.conditions if condition.held_out]
     target, responses = study.target_section, study.response_sections
+    titles = [section.title for section in (*([target] if target else []), *responses)]
+    check_factor_names(names, places, study.scenes.values(), titles)
     study._target = build_target(target, responses, study.scenes, held_out, places)
     return study
+
+
+def _check_restitution(study: Study) -> None:
+    """Refuse a factor that varies a restitution which the laws make nothing of."""
+    for section in study.factor_sections if study.solver.laws.damping_rate is not None else ():
+        if any(path[-1] == "restitution" for path in section.paths):
+            damping = study.solver.laws.normal_damping
+            rule = f"varies a restitution, and the damping {damping!r} takes none: leave the factor out"
+            raise StudyError(rule, section.name, f"{study.file}: factor {section.name}")
 
 
 def study_scales(path: str | Path | None = None) -> tuple[str, ...]:

@@ -27,7 +27,13 @@ UNITS: dict[str, dict[str, float]] = {
 }
 """Size of each unit in the base unit of its dimension (SI; degrees for angles)."""
 
-_TEXT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\S.*?)?\s*")
+_SPELLINGS = str.maketrans({"²": "^2", "³": "^3", "µ": "u", "μ": "u", "°": "deg", "−": "-"})
+_POWER = re.compile(r"\b([a-z]*m)(?:\*\*)?([23])\b")
+_COMMA = re.compile(r"[+-]?\d+,\d+(?:[eE][+-]?\d+)?(?:\s+\S.*|[^\s\d].*)?")
+_TEXT = re.compile(r"([+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*)")
+
+LONGEST = 100
+"""Characters of the longest text that is read as a quantity."""
 
 
 @dataclass(frozen=True)
@@ -49,9 +55,11 @@ class Quantity:
         if isinstance(value, cls):
             quantity = value
         elif isinstance(value, (int, float)) and not isinstance(value, bool):
-            quantity = cls(float(value))
-        elif isinstance(value, str) and (match := _TEXT.fullmatch(value)):
-            quantity = cls(float(match[1]), match[2] or "")
+            quantity = cls(_float(value))
+        elif (text := _spelled(value)) and _COMMA.fullmatch(text):
+            raise ValueError(f'must have a decimal point, not a comma: "{text.replace(",", ".", 1)}"')
+        elif text and (match := _TEXT.fullmatch(text)):
+            quantity = cls(float(match[1]), _POWER.sub(r"\1^\2", match[2]))
         else:
             raise ValueError('must be a number, or text with a number and its unit such as "110 mm"')
         if not math.isfinite(quantity.number):
@@ -78,6 +86,14 @@ class Quantity:
         # Dividing by a whole number gives the float nearest to 28 mm in metres; multiplying by 1e-3 may not.
         inverse = round(1.0 / size) if size < 1.0 else 1
         return self.number / inverse if math.isclose(inverse * size, 1.0) else self.number * size
+
+
+def _float(value: float) -> float:
+    """Return a number as a float; an integer beyond all floats is infinite."""
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf
 
 
 def dimension_of_unit(unit: str) -> str:
@@ -111,3 +127,8 @@ def unit_size(unit: str, dimension: str) -> float:
         example = f'"1.5 {next(iter(known))}"'
         raise ValueError(f"needs a unit of {dimension} ({', '.join(known)}), for example {example}")
     return known[unit]
+
+
+def _spelled(value: object) -> str:
+    """Return the text of a quantity in plain characters; empty where it cannot be one."""
+    return value.strip().translate(_SPELLINGS) if isinstance(value, str) and len(value) <= LONGEST else ""

@@ -27,7 +27,7 @@ from experiments.discover.search import Search
 from experiments.errors import InputError
 from experiments.runs.choices import chosen_device
 from experiments.studyfile import Study, load_study
-from experiments.studyfile.toml_files import read_toml
+from experiments.toml_files import read_toml
 from experiments.trials.declaration import Declaration, declared_effects, read_declaration, with_names
 from experiments.trials.drawing import Declared, Plan, draw
 from experiments.trials.folder import Folder, noted_run
@@ -128,7 +128,7 @@ def measure(
     workers: Annotated[int | None, typer.Option(help="Processes.")] = None,
 ) -> None:
     """Simulate and measure the heaps of the trials."""
-    with clear_errors("the same command"):
+    with clear_errors("Resume with the same command."):
         place, device = Folder(folder), chosen_device(device, several=True)
         declaration = read_declaration(place.declared)
         sealed = [trial for trial in read_sealed(place.sealed) if part in (None, trial.part)]

@@ -115,7 +115,7 @@ def main(
     plan_only: Annotated[bool, typer.Option("--plan-only", help="Count the cases, run nothing.")] = False,
 ) -> None:
     """Analyse the trials that have not been."""
-    with clear_errors("the same command"):
+    with clear_errors("Resume with the same command."):
         if view not in (None, *VIEWS):
             raise InputError(f"must be one of {', '.join(VIEWS)}", view, "--view")
         place, views = Folder(folder), VIEWS if view is None else (view,)

@@ -1,15 +1,19 @@
 """Problems of the verification: each is one file of `problems` and one line here."""
 
 from experiments.verification.problems.beverloo import beverloo
+from experiments.verification.problems.deme_contacts import deme_contacts
 from experiments.verification.problems.energy import energy
 from experiments.verification.problems.friction_and_rolling import friction_and_rolling
 from experiments.verification.problems.heap_angle import heap_angle
 from experiments.verification.problems.janssen import janssen
+from experiments.verification.problems.lammps_contacts import lammps_contacts
+from experiments.verification.problems.liggghts_contacts import liggghts_contacts
 from experiments.verification.problems.micro_slip import micro_slip
 from experiments.verification.problems.normal_impact import elastic_impact, restitution
 from experiments.verification.problems.oblique_impact import oblique_impact, spinning_impact
 from experiments.verification.problems.rigid_body import rigid_body
 from experiments.verification.problems.stability import stability
+from experiments.verification.problems.yade_contacts import yade_contacts
 from experiments.verification.result import Problem
 
 PROBLEMS: dict[str, Problem] = {
@@ -20,6 +24,10 @@ PROBLEMS: dict[str, Problem] = {
     "spinning-impact": spinning_impact,
     "friction-and-rolling": friction_and_rolling,
     "rigid-body": rigid_body,
+    "liggghts-contacts": liggghts_contacts,
+    "lammps-contacts": lammps_contacts,
+    "yade-contacts": yade_contacts,
+    "deme-contacts": deme_contacts,
     "energy": energy,
     "janssen": janssen,
     "beverloo": beverloo,
@@ -27,5 +35,8 @@ PROBLEMS: dict[str, Problem] = {
     "stability": stability,
 }
 
-HEAVY = ("beverloo", "heap-angle", "stability")
-"""Problems that run only when they are named: minutes on a GPU, up to hours on two cores."""
+PEERS = ("liggghts-contacts", "lammps-contacts", "yade-contacts", "deme-contacts")
+"""Problems that run another code, which must be installed."""
+
+HEAVY = ("beverloo", "heap-angle", "stability", *PEERS)
+"""Problems that run only when they are named: minutes on a GPU, up to hours on two cores, or another code."""

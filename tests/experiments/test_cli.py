@@ -12,10 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import pyvista
-from typer.testing import CliRunner
+from commandline import dem_warp
 
 from experiments import api
-from experiments.cli import app
 from experiments.commands.console import CaseProgress, describe_progress, duration
 from experiments.runs import campaign as run
 from imaging import save_picture
@@ -23,13 +22,6 @@ from imaging import save_picture
 WriteStudy = Callable[..., Path]
 
 COMMANDS = ("calibrate", "heap", "angle", "clump", "new", "discover")
-
-
-def dem_warp(*arguments: object) -> tuple[int, str, str]:
-    """Run a command; return its exit code, what it says on standard output, and on standard error."""
-    result = CliRunner().invoke(app, [str(argument) for argument in arguments])
-    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
-    return result.exit_code, result.stdout, result.stderr
 
 
 def last_line_of(program: str) -> str:
@@ -65,6 +57,22 @@ def test_help_imports_nothing_heavy() -> None:
         "print(sorted({'warp', 'numpy', 'cv2', 'pandas', 'statsmodels', 'pyvista'} & set(sys.modules)))"
     )
     assert last_line_of(program) == "[]"
+
+
+@pytest.mark.parametrize("command", ["calibrate", "discover", "heap"])
+@pytest.mark.parametrize("content", [None, "name = ", "[scale.other]\n"])
+def test_a_file_that_is_no_study_is_answered_before_any_library_is_imported(
+    tmp_path: Path, command: str, content: str | None
+) -> None:
+    path = tmp_path / "wrong.toml"
+    if content is not None:
+        path.write_text(content, encoding="utf-8")
+    words = [command, str(path), "--scale", "bench"]
+    program = (
+        f"import sys; from experiments.cli import app; code = app({words!r}, standalone_mode=False); "
+        "print(code, sorted({'warp', 'numpy', 'cv2', 'pandas', 'scipy'} & set(sys.modules)))"
+    )
+    assert last_line_of(program) == "2 []"
 
 
 def test_a_calibration_does_not_need_pyvista() -> None:
@@ -184,9 +192,22 @@ def test_an_interruption_says_how_to_go_on(write_study: WriteStudy, monkeypatch:
 
     monkeypatch.setattr(api, "run_campaign", interrupt)
     path = write_study()
-    code, _, err = dem_warp("calibrate", path, "--scale", "stiff", "--device", "cpu", "--out", "results")
+    command = (
+        "calibrate",
+        path,
+        "--out",
+        "my results",
+        "--scale",
+        "stiff",
+        "--device",
+        "cpu",
+        "--workers",
+        2,
+    )
+    code, _, err = dem_warp(*command, "--json")
     assert code == 130
-    assert f"dem-warp calibrate {path} --out results --scale stiff --device cpu --resume" in err
+    written = f"dem-warp calibrate {path} --out 'my results' --scale stiff --device cpu --workers 2 --json"
+    assert f"Interrupted. Resume with: {written} --resume" in err
 
 
 def test_a_small_real_heap_is_simulated_and_written(write_study: WriteStudy) -> None:

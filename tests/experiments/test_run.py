@@ -96,6 +96,7 @@ def test_a_campaign_leaves_its_report_results_and_tables(
     assert stages[0] == "target"
     assert stages[-1] == "verification"
     assert {
+        "files.json",
         "report.html",
         "results.json",
         "study.json",

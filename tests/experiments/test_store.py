@@ -104,7 +104,7 @@ def test_an_absent_case_is_absent(tmp_path: Path) -> None:
     store = Store(tmp_path / "new")
     assert not store.has("k")
     assert store.damage("k") is None
-    with pytest.raises(KeyError):
+    with pytest.raises(StoreError, match="must stay until the run has ended"):
         store.load("k")
     assert not store.folder.exists()
 

@@ -19,6 +19,7 @@ from dem_warp.scenes.library import SCENES
 from experiments.calibrate.screening import DESIGNS
 from experiments.cases import ENGINES, Store
 from experiments.discover.library import library_for, with_mechanisms
+from experiments.export import EXPORTERS
 from experiments.studyfile import load_study
 
 
@@ -34,6 +35,7 @@ found = {
     "scenes": list(SCENES),
     "designs": list(DESIGNS),
     "engines": list(ENGINES),
+    "exporters": list(EXPORTERS),
     "key": Store("cases").key(case),
     "approach": approach(),
 }

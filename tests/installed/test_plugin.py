@@ -91,7 +91,13 @@ def together(plugged: Installed) -> dict[str, Any]:
 def test_what_a_package_adds_stands_after_what_was_there(
     alone: dict[str, Any], together: dict[str, Any]
 ) -> None:
-    added = {"laws": "magnetism", "scenes": "jar", "designs": "corners", "engines": "cones"}
+    added = {
+        "laws": "magnetism",
+        "scenes": "jar",
+        "designs": "corners",
+        "engines": "cones",
+        "exporters": "leaflet",
+    }
     assert alone["warnings"] == []
     for kind, name in added.items():
         assert together[kind] == [*alone[kind], name]
@@ -126,6 +132,12 @@ def test_a_scene_is_simulated(plugged: Installed) -> None:
     assert (heap["status"], heap["observables"]["grain_count"]) == ("finished", 10.0)
     # Ten spheres of 2 mm in a jar of 12 mm lie in three layers at the most.
     assert 1e-3 < heap["observables"]["fill_height"] < 6e-3
+
+
+def test_a_study_is_exported(plugged: Installed) -> None:
+    (plugged.work / "leaves.toml").write_text(STUDY + TUBE, encoding="utf-8")
+    plugged.dem_warp("export", "leaves.toml", "--to", "leaflet", "--out", "leaflet")
+    assert "mu = " in (plugged.work / "leaflet" / "leaflet.txt").read_text(encoding="utf-8")
 
 
 def test_a_campaign_runs_with_its_design_on_its_engine(plugged: Installed) -> None:

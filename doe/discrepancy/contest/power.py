@@ -51,6 +51,9 @@ class Effects:
         """
         stack, theta = fitted.stack, fitted.x[: len(fitted.model.emulator.space.factors)]
         shape = (len(seen.names), len(KNOTS), len(fitted.covariance))
+        if not seen.names:  # none does anything, or all were left out
+            none = np.empty((0, len(CODED_SIZES)))
+            return cls((), np.empty((*none.shape, shape[-1])), none, none, seen.correlations)
         extra = np.reshape(
             [secants(stack.model.emulator, stack.blocks, theta, name, KNOTS) for name in seen.names], shape
         )

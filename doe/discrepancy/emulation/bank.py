@@ -7,10 +7,13 @@ vary its size together with the factors.
 
 from __future__ import annotations
 
+import io
 import json
+import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.stats import qmc
@@ -19,6 +22,9 @@ from doe.discrepancy.problem.settings import Settings
 from doe.discrepancy.problem.simulator import Outcomes, Point
 from doe.discrepancy.problem.space import MechanismRange, SearchSpace
 from doe.errors import RuleError
+
+LARGEST = 500_000_000
+"""Bytes of the arrays of the largest bank that is read."""
 
 
 def sobol_points(count: int, columns: int, seed: int) -> np.ndarray:
@@ -82,8 +88,31 @@ class Bank:
         if self.values.shape != (len(self.theta), len(self.observables)):
             rule = "needs a row a case and a column an observable"
             raise RuleError(rule, self.values.shape, "Bank.values")
+        self._check_columns()
         if not np.isfinite(self.values[self.finished]).all():
             raise RuleError("is finite wherever a case finished", "NaN", "Bank.values")
+
+    def _check_columns(self) -> None:
+        rows = len(self.theta)
+        space = self.space
+        shapes = {
+            "theta": (rows, len(space.factors)),
+            **dict.fromkeys(("mechanism", "coded_size", "condition", "reasons"), (rows,)),
+        }
+        for name, shape in shapes.items():
+            if (found := getattr(self, name).shape) != shape:
+                raise RuleError(f"has the shape {shape}", found, f"Bank.{name}")
+        if rows == 0:
+            raise RuleError("has at least one case", "none", "Bank.values")
+        ranges = {"mechanism": (-1, len(space.names)), "condition": (0, len(space.conditions))}
+        for name, (least, end) in ranges.items():
+            numbers = getattr(self, name)
+            if numbers.dtype.kind not in "iu" or not (least <= numbers.min() <= numbers.max() < end):
+                raise RuleError(f"numbers from {least} to {end - 1}", numbers.dtype, f"Bank.{name}")
+        if not (np.isfinite(self.theta).all() and np.isfinite(self.coded_size).all()):
+            raise RuleError("is finite", "NaN", "Bank.theta, Bank.coded_size")
+        if self.reasons.dtype.kind != "U":
+            raise RuleError("is text", self.reasons.dtype, "Bank.reasons")
 
     @property
     def finished(self) -> np.ndarray:
@@ -125,8 +154,7 @@ def load_bank(path: Path) -> Bank:
         When the file is no bank.
     """
     try:
-        with np.load(path, allow_pickle=False) as file:
-            columns = {name: file[name] for name in file.files}
+        columns = _read_columns(path)
         document = json.loads(str(columns.pop("space")))
         ranges = tuple(MechanismRange(**entry) for entry in document.pop("mechanisms"))
         space = SearchSpace(**{name: tuple(value) for name, value in document.items()}, mechanisms=ranges)
@@ -136,8 +164,25 @@ def load_bank(path: Path) -> Bank:
         made_for = str(columns.pop("study", ""))
         made_by = json.loads(str(columns.pop("maker", "null"))) or {}
         return Bank(space, names, **columns, study=made_for, maker=made_by)
-    except (KeyError, TypeError, ValueError, OSError) as error:
+    except Exception as error:
+        # the libraries raise whatever their parsers happen to meet in a damaged file
         raise RuleError("must be a bank that this program wrote", str(error), str(path)) from error
+
+
+def _read_columns(path: Path) -> dict[str, Any]:
+    """Arrays of a file by name, no more than a bank can have, their checksums verified."""
+    if not path.is_file():
+        raise ValueError("no regular file")
+    with zipfile.ZipFile(path) as archive:
+        members = archive.infolist()
+        # a damaged directory may end early, which zipfile does not notice
+        if len(members) != int.from_bytes(path.read_bytes()[-12:-10], "little"):
+            raise ValueError("its directory has another number of arrays than it states")
+        if (size := sum(member.file_size for member in members)) > LARGEST:
+            raise ValueError(f"arrays of {size:,} bytes, at most {LARGEST:,}")
+        # whole, so that its checksum is looked at
+        content = {member.filename.removesuffix(".npy"): archive.read(member) for member in members}
+    return {name: np.load(io.BytesIO(array), allow_pickle=False) for name, array in content.items()}
 
 
 def make_bank(

@@ -10,7 +10,8 @@ from __future__ import annotations
 import argparse
 import csv
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,8 @@ COLUMNS = (
 )  # fmt: skip
 TILE, TILES_ACROSS, SHEET_TILES = (300, 220), 6, 36
 Row = dict[str, Any]
+Task = tuple[Callable[[Any], tuple[Row, Picture]], Any]
+"""Function that measures one picture, and the seed or the file of the picture."""
 
 
 def measured(picture: Picture) -> tuple[str, ReposeAngle | None, str]:
@@ -41,52 +44,65 @@ def measured(picture: Picture) -> tuple[str, ReposeAngle | None, str]:
     return "measured", angle, ""
 
 
-def with_heaps(first: int, count: int) -> Iterator[tuple[Row, Picture]]:
-    """Rows of photographs of heaps, with what is to be shown of them."""
-    for seed in range(first, first + count):
-        shot = photograph(seed)
-        outcome, angle, why = measured(shot.picture)
-        row: Row = {
-            "kind": shot.setting,
-            "seed": seed,
-            "outcome": outcome,
-            "truth": shot.truth.mean,
-            "why": why,
-        }
-        row |= {
-            "elevation": shot.camera.elevation,
-            "distance": 0.5 * shot.camera.distance,
-            "shadow": shot.shadow,
-        }
-        shown = shot.picture
-        if angle is not None:
-            low, high = angle.interval()
-            row |= {"mean": angle.mean, "error": angle.mean - shot.truth.mean, "se": angle.se}
-            row |= {"covered": low <= shot.truth.mean <= high, "seen_elevation": angle.outline.elevation}
-            shown = overlay(shot.picture, angle)
-        yield row, shown
+def with_heap(seed: int) -> tuple[Row, Picture]:
+    """Row of a photograph of a heap, with what is to be shown of it."""
+    shot = photograph(seed)
+    outcome, angle, why = measured(shot.picture)
+    row: Row = {
+        "kind": shot.setting,
+        "seed": seed,
+        "outcome": outcome,
+        "truth": shot.truth.mean,
+        "why": why,
+        "elevation": shot.camera.elevation,
+        "distance": 0.5 * shot.camera.distance,
+        "shadow": shot.shadow,
+    }
+    if angle is None:
+        return row, shot.picture
+    low, high = angle.interval()
+    row |= {"mean": angle.mean, "error": angle.mean - shot.truth.mean, "se": angle.se}
+    row |= {"covered": low <= shot.truth.mean <= high, "seen_elevation": angle.outline.elevation}
+    return row, overlay(shot.picture, angle)
 
 
-def without_heaps(first: int, count: int, folder: Path | None) -> Iterator[tuple[Row, Picture]]:
-    """Rows of drawn pictures without a heap, and of those in a folder."""
-    pictures = ((seed, *picture_without_heap(seed)) for seed in range(first, first + count))
-    files = sorted(folder.iterdir()) if folder else []
-    found = ((number, path.name, read_picture(path)) for number, path in enumerate(files))
-    for source in (pictures, found):
-        for seed, kind, picture in source:
-            outcome, angle, why = measured(picture)
-            row: Row = {"kind": kind, "seed": seed, "outcome": outcome, "why": why}
-            if angle is not None:
-                row |= {"mean": angle.mean, "se": angle.se}
-            yield row, picture
+def without_heap(source: int | Path) -> tuple[Row, Picture]:
+    """Row of a drawn picture without a heap, by its seed, or of one in a file."""
+    if isinstance(source, Path):
+        seed, kind, picture = "", source.name, read_picture(source)
+    else:
+        seed, (kind, picture) = str(source), picture_without_heap(source)
+    outcome, angle, why = measured(picture)
+    row: Row = {
+        "kind": kind,
+        "seed": seed,
+        "outcome": outcome,
+        "why": why,
+    }
+    if angle is not None:
+        row |= {"mean": angle.mean, "se": angle.se}
+    return row, picture
+
+
+def small_copy(picture: Picture) -> Picture:
+    """Copy of a picture that fits into a tile."""
+    scale = min(TILE[0] / picture.shape[1], TILE[1] / picture.shape[0])
+    copy = cv2.resize(picture, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+    return np.asarray(copy, dtype=np.uint8)
+
+
+def one(task: Task) -> tuple[Row, Picture]:
+    """Row and small copy of one picture."""
+    make, source = task
+    cv2.setNumThreads(1)
+    row, picture = make(source)
+    return row, small_copy(picture)
 
 
 def contact_sheet(tiles: list[tuple[str, Picture]]) -> Picture:
-    """Small copies side by side, each with its caption."""
+    """Lay small copies side by side, each with its caption."""
     small = []
-    for caption, picture in tiles:
-        scale = min(TILE[0] / picture.shape[1], TILE[1] / picture.shape[0])
-        copy = cv2.resize(picture, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+    for caption, copy in tiles:
         page = np.full((TILE[1] + 20, TILE[0] + 6, 3), 255, np.uint8)
         page[20 : 20 + copy.shape[0], : copy.shape[1]] = copy
         cv2.putText(page, caption, (3, 14), cv2.FONT_HERSHEY_SIMPLEX, 0.42, (0, 0, 0), 1, cv2.LINE_AA)
@@ -129,29 +145,54 @@ def main() -> None:
     parser.add_argument("--heaps", type=int, default=500)
     parser.add_argument("--others", type=int, default=200)
     parser.add_argument("--folder", type=Path, help="more pictures without a heap")
+    parser.add_argument("--workers", type=int, help="processes; left out: one a core")
     parser.add_argument("--out", type=Path, required=True)
     chosen = parser.parse_args()
-    cv2.setNumThreads(1)
     chosen.out.mkdir(parents=True, exist_ok=True)
-    rows: list[list[Row]] = []
-    for name, source, total in (
-        ("heaps", with_heaps(chosen.first, chosen.heaps), chosen.heaps),
-        ("others", without_heaps(chosen.first, chosen.others, chosen.folder), chosen.others),
-    ):
-        found: list[Row] = []
-        tiles: list[tuple[str, Picture]] = []
-        for row, picture in source:
-            found.append(row)
-            if len(found) % max(1, total // SHEET_TILES) == 0 and len(tiles) < SHEET_TILES:
-                error = f" {row['mean']:.1f} ({row['truth']:.1f})" if "error" in row else ""
-                tiles.append((f"{row['kind']} {row['seed']}: {row['outcome']}{error}", picture))
-        rows.append(found)
-        save_picture(chosen.out / f"{name}.jpg", contact_sheet(tiles))
-        with (chosen.out / f"{name}.csv").open("w", encoding="utf-8", newline="") as file:
-            writer = csv.DictWriter(file, COLUMNS, restval="", lineterminator="\n")
-            writer.writeheader()
-            writer.writerows({key: _short(value) for key, value in row.items()} for row in found)
-    print(summary(*rows))
+    found = sorted(chosen.folder.iterdir()) if chosen.folder else []
+    seeds = range(chosen.first, chosen.first + max(chosen.heaps, chosen.others))
+    tasks: dict[str, list[Task]] = {
+        "heaps": [(with_heap, seed) for seed in seeds[: chosen.heaps]],
+        "others": [(without_heap, source) for source in (*seeds[: chosen.others], *found)],
+    }
+    with ProcessPoolExecutor(chosen.workers) as pool:
+        seen = {name: list(pool.map(one, each, chunksize=4)) for name, each in tasks.items()}
+    for name, pairs in seen.items():
+        write(chosen.out, name, pairs)
+    figures = summary(*([row for row, _ in pairs] for pairs in seen.values()))
+    (chosen.out / "README.md").write_text(page(figures, chosen), encoding="utf-8")
+    print(figures)
+
+
+def write(folder: Path, name: str, pairs: list[tuple[Row, Picture]]) -> None:
+    """Write the rows as a table, and some of the pictures as a contact sheet."""
+    tiles = []
+    for row, copy in pairs[:: max(1, len(pairs) // SHEET_TILES)][:SHEET_TILES]:
+        error = f" {row['mean']:.1f} ({row['truth']:.1f})" if "error" in row else ""
+        tiles.append((f"{row['kind']} {row['seed']}: {row['outcome']}{error}", copy))
+    save_picture(folder / f"{name}.jpg", contact_sheet(tiles))
+    with (folder / f"{name}.csv").open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, COLUMNS, restval="", lineterminator="\n")
+        writer.writeheader()
+        writer.writerows({key: _short(value) for key, value in row.items()} for row, _ in pairs)
+
+
+def page(figures: str, chosen: argparse.Namespace) -> str:
+    """Page of a record."""
+    command = f"--first {chosen.first} --heaps {chosen.heaps} --others {chosen.others}"
+    return f"""# Photograph-like pictures, measured
+
+    python -m experiments.benchmarks.photographs.run {command} --out RECORD
+
+{figures}
+
+Seeds below 1000 were used while the rules were made; these are others. A *marked* angle is shown with its
+doubt and left out of a mean. Every picture has a row in `heaps.csv` or `others.csv`.
+
+![Some of the heaps; in brackets the true angle](heaps.jpg)
+
+![Some of the pictures without a heap](others.jpg)
+"""
 
 
 def _short(value: Any) -> Any:

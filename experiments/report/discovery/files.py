@@ -9,6 +9,7 @@ from typing import Any
 
 from doe.discrepancy import Discovery, Settings
 from experiments.calibrate.export import jsonable
+from experiments.cases.manifest import study_hash
 from experiments.report.discovery.discovery_page import render_discovery
 from experiments.report.discovery.study_file import write_study_files
 from experiments.report.discovery.tables import frames
@@ -46,7 +47,7 @@ def write_discovery(
     Path
         The page.
     """
-    made_by = {**(provenance or {}), "versions": library_versions()}
+    made_by = {**(provenance or {}), "study": study_hash(study), "versions": library_versions()}
     files = [path.name for path in write_study_files(found, study, terms, folder)]
     page = render_discovery(found, study, terms, settings, pictures, files, made_by, further)
     results = results_of(found, terms) | {"settings": asdict(settings)}

@@ -10,19 +10,21 @@ import numpy as np
 
 from doe import Sample
 from doe.discrepancy import Candidate, Data, Discovery, Fit, Interval, Verdict
+from experiments.cases.manifest import study_hash
 from experiments.discover.library import Mechanism, with_mechanisms
-from experiments.files import copy_file, write_text
+from experiments.files import write_text
 from experiments.measurement.target import Replicated, target_tables
+from experiments.report.clump_files import gather_clumps
 from experiments.report.discovery.terms import Terms
 from experiments.report.discovery.verdict import tied
 from experiments.studyfile import Study
-from experiments.studyfile.card import shapes_of
-from experiments.studyfile.toml_files import toml_text
+from experiments.toml_files import toml_text
 
 HEAD = """\
 # Written by dem-warp discover: {name}, with {title} added as a factor that ranges over its 90 % interval.
 # All that was measured more than once is to be matched; held-out conditions only judge.
 # Run it with  dem-warp calibrate {file}
+# Study that it was found in: {study}
 
 """
 
@@ -39,13 +41,10 @@ def write_study_files(found: Discovery, study: Study, terms: Terms, folder: Path
     for candidate in _standing(found):
         added = {terms.mechanisms[name]: size for name, size in candidate}
         document = extended_document(study, added, found.data)
-        for shape in shapes_of(document):
-            source = study.file.parent / shape["clump"]
-            shape["clump"] = source.name
-            copy_file(source, folder / source.name)
+        gather_clumps(document, study.file.parent, folder)
         path = folder / f"study-with-{'-and-'.join(name for name, _ in candidate)}.toml"
         title = terms.titles(name for name, _ in candidate)
-        head = HEAD.format(name=study.name, title=title, file=path.name)
+        head = HEAD.format(name=study.name, title=title, file=path.name, study=study_hash(study))
         write_text(path, head + toml_text(document))
         written.append(path)
     return written

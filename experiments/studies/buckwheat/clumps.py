@@ -63,12 +63,13 @@ def extents(shape: ClumpShape) -> list[float]:
 CLUMPS = {
     "flat-9": Recipe(9, face=1.0),
     "keeled-9": Recipe(9, face=0.6),
+    "swelling-9": Recipe(9, face=1.15),
     "bulging-9": Recipe(9, face=1.35),
     "flat-5": Recipe(5, face=1.0),
     "flat-15": Recipe(15, face=1.0),
     "flat-30": Recipe(30, face=1.0),
 }
-"""Clumps by the name of their file: three of nine spheres, and three of other counts in the flat solid."""
+"""Clumps by the name of their file: four of nine spheres, and three of other counts in the flat solid."""
 
 
 def main() -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dem_warp import ClumpShape, Interaction, Material, Mechanism
+from dem_warp import ClumpShape, ContactLaws, Interaction, Material, Mechanism
 from dem_warp.model import ContactCoefficients, Grains, WorldSetup
 from dem_warp.solver import Solver
 from dem_warp.walls import Plane, Wall
@@ -42,7 +42,8 @@ def contact(
     clamp: bool = False, mechanisms: tuple[Mechanism, ...] = (),
 ) -> ContactCoefficients:  # fmt: skip
     """Contact of two materials."""
-    return ContactCoefficients.of_pair(a, b, Interaction(restitution, friction, rolling), clamp, mechanisms)
+    laws = ContactLaws(attraction="clamped" if clamp else "free")
+    return ContactCoefficients.of_pair(a, b, Interaction(restitution, friction, rolling), laws, mechanisms)
 
 
 def bodies(

@@ -174,7 +174,9 @@ def test_a_unit_of_the_right_kind_is_converted(read) -> None:
 
 
 def test_wrong_units_that_leave_no_value_are_refused(read) -> None:
-    with pytest.raises(InputError, match=r"3: value: .* is the unit right\? \(received 41 m\)"):
+    with pytest.raises(
+        InputError, match=r"2: value, rows 2, 3: .* is the unit right\? \(received 40 m, 41 m\)"
+    ):
         read("base,1,height,40,m\nbase,2,height,41,m\n")
 
 
@@ -206,7 +208,7 @@ def test_every_wrong_row_is_named_at_once(read) -> None:
 
 @pytest.mark.parametrize(
     ("text", "message"),
-    [("condition;replicate;observable;value\n", "commas"), (HEADER.replace("unit", "units"), "known column")],
+    [("condition|replicate|observable|value\n", "commas"), (HEADER.replace("unit", "units"), "known column")],
 )
 def test_a_wrong_header_is_refused(read, text: str, message: str) -> None:
     with pytest.raises(InputError, match=message):

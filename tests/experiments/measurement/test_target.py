@@ -117,7 +117,7 @@ def test_a_file_measured_under_held_out_conditions_alone_leads_nowhere(from_sour
         (f'{NUMBERS}fit = "middle"', "target.fit", "measured with the same fit"),
         (f'{NUMBERS}fit = "midle"', "target.fit", "the fit is one of"),
         ('pictures = "photos"', "target.pictures", "at least two pictures"),
-        ('file = "none.csv"', "none.csv", "readable CSV file"),
+        ('file = "none.csv"', "none.csv", "readable file"),
     ],
 )
 def test_measurements_that_cannot_be_used_are_refused(

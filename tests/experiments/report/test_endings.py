@@ -35,7 +35,7 @@ ENDINGS = {
         {},
         {"selection": {"keep": ("E", "F")}, "surface": {"center": {"E": 0.36, "F": 0.25}}},
     ),
-    Outcome.NOT_VERIFIED: (
+    Outcome.MISSED: (
         {
             "angle": lambda row: (
                 26.0

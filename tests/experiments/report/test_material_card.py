@@ -13,9 +13,10 @@ import pytest
 from doe import Sample
 from experiments.calibrate import Campaign
 from experiments.errors import StudyError
+from experiments.report.clump_files import gather_clumps
 from experiments.report.material_card import CARD, material_card, write_material_card
 from experiments.studyfile import Study, load_study
-from experiments.studyfile.toml_files import toml_text
+from experiments.toml_files import toml_text
 
 TEST = """
 name = "Another test of the same material"
@@ -119,3 +120,16 @@ def test_what_is_written_as_toml_reads_back() -> None:
         "f g": {"h": {"i": "x"}, "j": 0.1}, "k": {},
     }  # fmt: skip
     assert tomllib.loads(toml_text(document | {"none": None})) == document
+
+
+def test_two_clumps_of_one_name_stay_two(tmp_path: Path) -> None:
+    files = {"a/grain.txt": "0 0 0 1\n", "b/grain.txt": "0 0 0 2\n", "c/grain.txt": "0 0 0 1\n"}
+    for name, text in files.items():
+        (tmp_path / name).parent.mkdir()
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    sections = {"grain": {"shapes": {name: {"clump": name} for name in files}}}
+    folder = tmp_path / "out"
+    gather_clumps(sections, tmp_path, folder, "material-")
+    copies = {name: shape["clump"] for name, shape in sections["grain"]["shapes"].items()}
+    assert {name: (folder / copy).read_text(encoding="utf-8") for name, copy in copies.items()} == files
+    assert sorted({*copies.values()}) == ["material-grain-2.txt", "material-grain.txt"]

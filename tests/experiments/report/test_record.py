@@ -16,6 +16,7 @@ from experiments.report import render_page
 from experiments.report.kit.markdown import markdown_table
 from experiments.report.kit.table import Column, make_table
 from experiments.report.material_card import CARD, write_material_card
+from experiments.studies.buckwheat.bases.grid import bases, grid
 from experiments.studies.buckwheat.companion import COMPANION
 from experiments.studies.buckwheat.records import paper_record
 from experiments.studies.buckwheat.records.paper_page import (
@@ -101,9 +102,16 @@ def test_a_record_takes_in_a_card_scales_sensitivities_and_notes(
         plan.assign(status="finished", reason="", angle=plan["published"] + 1.0).to_csv(
             varied / f"{name}.csv"
         )
+    tried = tmp_path / "tried"
+    tried.mkdir()
+    (tried / "settings.json").write_bytes((varied / "settings.json").read_bytes())
+    for name, off in (("edem-printed-endless", 3.0), ("relative-flat-round", -1.0)):
+        plan = bases()[name].variant.planned_cases(1).assign(status="finished", reason="")
+        read = {f"angle_{option.name}": plan["published"] + off for option in grid().estimator[:1]}
+        plan.assign(**read).to_csv(tried / f"{name}.csv")
     record.mkdir()
     (record / "notes.md").write_text("What we make of it.", encoding="utf-8")
-    paper_record.main(tmp_path / "paper", [f"bench={bench}"], varied, "abc123", record)
+    paper_record.main(tmp_path / "paper", [f"bench={bench}"], varied, tried, "abc123", record)
     page = (record / PAGE).read_text(encoding="utf-8")
     assert "What we make of it." in page
     assert f"]({CARD})" in page
@@ -117,7 +125,9 @@ def test_a_record_takes_in_a_card_scales_sensitivities_and_notes(
     shown = {row[1]: row for row in numbers_of(page, "What the paper does not say")}
     assert shown["nine spheres in a pyramid of flat faces"][2] == "0.00"
     assert shown["thirty spheres in the flat pyramid"][-1] == "not run"
-    paper_record.main(None, None, None, None, record)
+    section = "The base, chosen by leaving tables out"
+    assert numbers_of(page, section)[0][:4] == ["**relative**", "flat", "round", "flank"]
+    paper_record.main(None, None, None, None, None, record)
     assert (record / PAGE).read_text(encoding="utf-8") == page
 
 

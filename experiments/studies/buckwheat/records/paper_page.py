@@ -21,6 +21,8 @@ from experiments.report.kit.markdown import facts_list, markdown_page, markdown_
 from experiments.report.kit.table import Column, Layout, Table, columns, make_table
 from experiments.report.material_card import CARD
 from experiments.report.pictures import heap_row
+from experiments.studies.buckwheat.bases.choice import BaseChoice
+from experiments.studies.buckwheat.bases.choice_tables import choice_tables
 from experiments.studies.buckwheat.replay.replay import RUN, Replay
 from experiments.studies.buckwheat.replay.replay_tables import ranking_sentence, replay_tables
 from experiments.studies.buckwheat.replay.runs import DESIGNS, TABLES
@@ -31,8 +33,8 @@ from imaging import save_picture
 
 PAGE, RUNS, PROVENANCE, CAMPAIGN = "README.md", "runs.csv", "provenance.json", "campaign.json"
 HEAPS, SCATTER, NOTES = "heaps.png", "agreement.png", "notes.md"
-SENSITIVITIES = "sensitivities"
-"""Folder of the variants' angles."""
+SENSITIVITIES, BASES = "sensitivities", "bases"
+"""Folders of the variants' angles, and of those of the bases that were tried."""
 
 SHOWN = {"Screening 3": ("screening", 3), "Screening 12": ("screening", 12), "Optimum": ("verification", 1)}
 """Runs in the picture of heaps."""
@@ -54,6 +56,7 @@ class Record:
     scales: Mapping[str, Replay] = field(default_factory=dict)
     """The same runs at smaller scales, by name."""
     sensitivities: Sensitivities | None = None
+    bases: BaseChoice | None = None
     picture: bool = False
     """There is a picture of heaps."""
     notes: str = ""
@@ -71,6 +74,7 @@ class Record:
             (folder / CARD).is_file(),
             {name: Replay(pd.read_csv(path)) for name, path in scales.items()},
             Sensitivities.read(folder / SENSITIVITIES),
+            BaseChoice.read(folder / BASES),
             (folder / HEAPS).is_file(),
             (folder / NOTES).read_text(encoding="utf-8") if (folder / NOTES).is_file() else "",
         )
@@ -161,6 +165,7 @@ def record_page(record: Record) -> str:
         *_campaign(record),
         *_scales(record),
         *_sensitivities(record.sensitivities),
+        *_bases(record.bases),
         "## Every run",
         markdown_table(tables["runs"]),
         f"Every heap, with its seed, stands in [{RUNS}]({RUNS}).",
@@ -216,6 +221,16 @@ def _sensitivities(found: Sensitivities | None) -> list[str]:
         return []
     tables = sensitivity_tables(found)
     return ["## What the paper does not say", *(markdown_table(table) for table in tables.values())]
+
+
+def _bases(found: BaseChoice | None) -> list[str]:
+    if found is None:
+        return []
+    tables = choice_tables(found)
+    return [
+        "## The base, chosen by leaving tables out",
+        *(markdown_table(table) for table in tables.values()),
+    ]
 
 
 def _json(value: Mapping[str, Any]) -> str:

@@ -3,8 +3,10 @@
     dem-warp calibrate --scale paper --follow-paper --out out/paper
     python -m experiments.studies.buckwheat.sensitivity --modulus-scale 10 --out out/sensitivities
     dem-warp calibrate --scale bench --only-paper --out out/bench
+    python -m experiments.studies.buckwheat.bases simulate --modulus-scale 100 --out out/bases
+    python -m experiments.studies.buckwheat.bases measure --out out/bases
     python -m experiments.studies.buckwheat.records.paper_record --paper out/paper \\
-        --smaller bench=out/bench --sensitivities out/sensitivities
+        --smaller bench=out/bench --sensitivities out/sensitivities --bases out/bases
 
 Without a folder it writes the page again from the tables of the record. The record lies in
 ``experiments/studies/buckwheat/record``.
@@ -22,7 +24,10 @@ from experiments.files import copy_file, write_text
 from experiments.report.material_card import CARD
 from experiments.runs.campaign import RECORD
 from experiments.studies.buckwheat import paper
+from experiments.studies.buckwheat.bases.grid import bases
+from experiments.studies.buckwheat.bases.simulation import Folder
 from experiments.studies.buckwheat.records.paper_page import (
+    BASES,
     CAMPAIGN,
     HEAPS,
     PROVENANCE,
@@ -30,7 +35,7 @@ from experiments.studies.buckwheat.records.paper_page import (
     SENSITIVITIES,
     write_record_page,
 )
-from experiments.studies.buckwheat.sensitivity.sensitivities import SETTINGS
+from experiments.studies.buckwheat.sensitivity.folder import SETTINGS
 from experiments.studies.buckwheat.sensitivity.variants import variants
 
 FOLDER = Path(paper.__file__).with_name(RECORD)
@@ -67,6 +72,14 @@ def gather_sensitivities(source: Path, record: Path) -> None:
             copy_file(source / f"{name}.csv", record / SENSITIVITIES / f"{name}.csv")
 
 
+def gather_bases(source: Path, record: Path) -> None:
+    """Take over the angles of every base that was simulated and read."""
+    copy_file(source / SETTINGS, record / BASES / SETTINGS)
+    for path in (Folder(source).table(base) for base in bases().values()):
+        if path.is_file():
+            copy_file(path, record / BASES / path.name)
+
+
 def main(
     paper_folder: Annotated[
         Path | None, typer.Option("--paper", help="Folder of a calibration with the paper's runs.")
@@ -75,6 +88,7 @@ def main(
         list[str] | None, typer.Option(metavar="NAME=FOLDER", help="The same at a smaller scale.")
     ] = None,
     sensitivities: Annotated[Path | None, typer.Option(help="Folder of the variants.")] = None,
+    tried: Annotated[Path | None, typer.Option("--bases", help="Folder of the bases.")] = None,
     commit: Annotated[str | None, typer.Option(help="Commit that made the paper's runs.")] = None,
     out: Annotated[Path, typer.Option(help="Folder of the record.")] = FOLDER,
 ) -> None:
@@ -86,6 +100,8 @@ def main(
         gather_scale(name, Path(source), out)
     if sensitivities:
         gather_sensitivities(sensitivities, out)
+    if tried:
+        gather_bases(tried, out)
     print(write_record_page(out))
 
 

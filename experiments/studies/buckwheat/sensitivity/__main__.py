@@ -9,7 +9,6 @@ base. With --variant, several times if you like, only those run.
 
 from __future__ import annotations
 
-import json
 import time
 from pathlib import Path
 from typing import Annotated, Any
@@ -18,9 +17,9 @@ import pandas as pd
 import typer
 
 from experiments.cases import Store, run_cases
-from experiments.errors import StoreError
 from experiments.files import write_text
-from experiments.studies.buckwheat.sensitivity.sensitivities import SETTINGS, Sensitivities
+from experiments.studies.buckwheat.sensitivity.folder import open_settings
+from experiments.studies.buckwheat.sensitivity.sensitivities import Sensitivities
 from experiments.studies.buckwheat.sensitivity.variants import BASE, Variant, chosen_variants
 
 COLUMNS = (
@@ -41,22 +40,6 @@ def run_variant(
     study = variant.load_study(settings["scale"], settings["modulus_scale"])
     cases = run_cases(study, variant.planned_cases(settings["replicates"]), store, device)
     return cases.reindex(columns=COLUMNS)
-
-
-def open_settings(folder: Path, settings: dict[str, Any]) -> None:
-    """Note in a folder how its variants are simulated.
-
-    Raises
-    ------
-    StoreError
-        When the folder holds variants that were simulated otherwise.
-    """
-    path = folder / SETTINGS
-    if path.is_file() and (found := json.loads(path.read_text(encoding="utf-8"))) != settings:
-        raise StoreError(
-            f"all variants of a folder are simulated as one another: {found}", settings, str(path)
-        )
-    write_text(path, json.dumps(settings, indent=1) + "\n")
 
 
 def main(

@@ -13,10 +13,8 @@ import pandas as pd
 
 from experiments.studies.buckwheat.replay.replay import LEAST_RUNS, Replay
 from experiments.studies.buckwheat.replay.runs import DESIGNS
+from experiments.studies.buckwheat.sensitivity.folder import SETTINGS
 from experiments.studies.buckwheat.sensitivity.variants import BASE, variants
-
-SETTINGS = "settings.json"
-"""File that says how all variants of a folder were simulated."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from experiments.errors import StudyError
+from experiments.errors import InputError, StudyError
+from experiments.texts import read_text
+
+DEEPEST = 20
+"""Levels of tables and lists in each other that a file may have."""
+
+LONGEST_SHOWN = 200
+"""Characters of a wrong line that are shown."""
 
 
 def read_toml(path: Path, what: str = "the study") -> tuple[str, dict[str, Any]]:
@@ -21,17 +28,35 @@ def read_toml(path: Path, what: str = "the study") -> tuple[str, dict[str, Any]]
         When it cannot be read, or is no TOML.
     """
     try:
-        text = path.read_text(encoding="utf-8")
-        return text, tomllib.loads(text)
+        text = read_text(path).replace("\r\n", "\n")
+        document = tomllib.loads(text)
+        _check(document)
+        return text, document
     except tomllib.TOMLDecodeError as error:
         found = re.search(r"at line (\d+)", str(error))
         number = int(found[1]) if found else len(text.splitlines())
-        shown = text.splitlines()[number - 1].strip()
+        # another rule for what ends a line may know fewer of them
+        shown = "".join(text.split("\n")[number - 1 : number]).strip()[:LONGEST_SHOWN]
         raise StudyError(f"must be valid TOML: {error}", shown, f"{path}:{number}") from None
-    except UnicodeDecodeError:
-        raise StudyError("must be a text file in UTF-8", "other bytes", str(path)) from None
-    except OSError as error:
-        raise StudyError(f"{what} must be a readable file", error.strerror or "none", str(path)) from None
+    except RecursionError:
+        raise StudyError("must be TOML of a few levels", "a table far deeper", str(path)) from None
+    except InputError as error:
+        raise StudyError(f"{what} {error.rule}", error.value, error.place) from None
+    except ValueError as error:
+        # an integer of thousands of digits, for one
+        raise StudyError("must be valid TOML", str(error), str(path)) from None
+
+
+def _check(document: Mapping[str, Any]) -> None:
+    """Refuse, without recursion, what is nested too deep, and integers that TOML does not have."""
+    level: list[Any] = [document]
+    for _ in range(DEEPEST):
+        inner = [value for each in level for value in (each.values() if isinstance(each, Mapping) else each)]
+        if large := [value for value in inner if isinstance(value, int) and not -(2**63) <= value < 2**63]:
+            raise ValueError(f"integers have 64 bits, not {str(large[0])[:40]} ...")
+        level = [value for value in inner if isinstance(value, Mapping | list)]
+    if level:
+        raise RecursionError
 
 
 def toml_text(document: Mapping[str, Any], path: tuple[str, ...] = (), array: bool = False) -> str:
@@ -58,7 +83,12 @@ def _holds_tables(value: Any) -> bool:
 
 
 def _key(key: str) -> str:
-    return key if re.fullmatch(r"[\w-]+", key, re.ASCII) else json.dumps(key, ensure_ascii=False)
+    return key if re.fullmatch(r"[\w-]+", key, re.ASCII) else _text(key)
+
+
+def _text(text: str) -> str:
+    # TOML takes all that JSON takes, save the one control character that JSON does not escape
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def _value(value: Any) -> str:
@@ -66,7 +96,7 @@ def _value(value: Any) -> str:
         case bool():
             return "true" if value else "false"
         case str():
-            return json.dumps(value, ensure_ascii=False)
+            return _text(value)
         case int() | float():
             return repr(value)
         case list() | tuple():

@@ -1,0 +1,75 @@
+"""The documentation: ``sphinx-build -W -b html docs out/site`` runs every command on its pages."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+from docutils import nodes
+
+ROOT = Path(__file__).parents[1]
+sys.path[:0] = [str(ROOT), str(Path(__file__).parent)]
+# Pages run in folders of their own: their commands are those of this environment and of this tree.
+os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+os.environ["PYTHONPATH"] = str(ROOT)
+os.environ["DEM_WARP"] = str(ROOT)
+os.environ["COLUMNS"] = "100"
+os.environ["TERM"] = "dumb"
+
+from generate import write_pages  # noqa: E402
+
+from dem_warp import __version__  # noqa: E402
+
+project = "dem-warp"
+author = "the dem-warp developers"
+project_copyright = author
+version = release = __version__
+
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_copybutton"]
+exclude_patterns = ["notebooks/*.py"]
+html_theme = "furo"
+html_title = "dem-warp"
+html_static_path = ["static"]
+html_css_files = ["style.css"]
+html_show_sphinx = False
+copybutton_exclude = ".linenos, .gp, .go"
+
+myst_enable_extensions = ["dollarmath", "attrs_inline", "colon_fence"]
+myst_heading_anchors = 3
+nb_execution_mode = "force"
+nb_execution_excludepatterns = ["notebooks/*"]  # executed where they are made, docs/notebooks/build.py
+nb_execution_in_temp = True
+nb_execution_raise_on_error = True
+nb_execution_show_tb = True
+nb_execution_timeout = 900
+nb_merge_streams = True
+suppress_warnings = ["myst-nb.lexer"]  # of cells that are shell, see `show_as_typed`
+
+autodoc_member_order = "bysource"
+autodoc_typehints = "description"
+autodoc_preserve_defaults = True
+napoleon_google_docstring = False
+napoleon_use_rtype = False
+
+write_pages(Path(__file__).parent / "generated")
+
+
+def show_as_typed(app: Any, doctree: nodes.document) -> None:
+    """Show a cell that IPython runs by its first line as what it holds: commands, or a file with its name."""
+    for block in list(doctree.findall(nodes.literal_block)):
+        first, _, rest = block.rawsource.partition("\n")
+        if first == "%%bash":
+            shown, language = rest, "bash"
+        elif first.startswith("%%writefile "):
+            name = first.split()[1]
+            shown, language = f"# {name}\n{rest}", Path(name).suffix.removeprefix(".") or "text"
+        else:
+            continue
+        block.replace_self(nodes.literal_block(shown, shown, language=language))
+
+
+def setup(app: Any) -> None:
+    """Connect the transformation."""
+    app.connect("doctree-read", show_as_typed)

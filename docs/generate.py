@@ -1,0 +1,103 @@
+"""Reference pages, made from the program itself: the study file, the command line, observables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from itertools import groupby
+from pathlib import Path
+
+import typer
+from typer.main import get_command
+
+from experiments.cli import app
+from experiments.measurement.observables import OBSERVABLES
+from experiments.studyfile.reference import study_reference
+
+
+def escaped(text: str) -> str:
+    """Text that may stand in a cell."""
+    return text.replace("|", "\\|").replace("<", "&lt;").replace("\n", " ")
+
+
+def markdown_table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
+    """Write rows as a table."""
+    lines = [head, tuple("---" for _ in head), *rows]
+    return "\n".join(f"| {' | '.join(escaped(cell) or ' ' for cell in line)} |" for line in lines)
+
+
+def study_page() -> str:
+    """Every section and key of a study file."""
+    parts = [
+        "# The study file",
+        "Every section and every key, as the program checks them. Write a quantity with its unit, "
+        '`"110 mm"`. A misspelt key is an error.',
+    ]
+    for section, found in groupby(study_reference(), lambda row: row.section):
+        rows = list(found)
+        about = " ".join(row.meaning for row in rows if not row.key)
+        parts.append(f"## `{section}`" if section else "## At the top")
+        parts += [about] if about else []
+        keys = [
+            (f"`{row.key}`", row.kind, f"`{row.default}`" if row.default else "", row.bounds, row.meaning)
+            for row in rows
+            if row.key
+        ]
+        if keys:
+            parts.append(markdown_table(("key", "written as", "left out", "rule", "meaning"), keys))
+    return "\n\n".join(parts)
+
+
+def commands_page() -> str:
+    """Every command with its arguments and options."""
+    codes = "0 done, 1 a run that failed, 2 bad input, 130 interrupted, 143 ended by a scheduler"
+    parts = ["# The command line", f"Every command has `--help`. Exit codes: {codes}."]
+    group = get_command(app)
+    context = typer.Context(group, info_name="dem-warp")
+    for name in group.list_commands(context):
+        command = group.get_command(context, name)
+        inner = typer.Context(command, info_name=name, parent=context)
+        parts += [
+            f"## dem-warp {name}",
+            command.help or "",
+            f"`{command.get_usage(inner).removeprefix('Usage: ')}`",
+        ]
+        rows = []
+        for parameter in command.get_params(inner):
+            record = parameter.get_help_record(inner)
+            if record and parameter.name != "help":
+                rows.append((f"`{record[0].strip()}`", record[1]))
+        parts.append(markdown_table(("option", "meaning"), rows))
+    return "\n\n".join(parts)
+
+
+def observables_page() -> str:
+    """Numbers that a test yields."""
+    rows = [
+        (
+            f"`{each.alias or each.name}`",
+            each.title,
+            each.unit,
+            each.instrument.value if each.instrument else "",
+            each.definition,
+        )
+        for each in OBSERVABLES
+    ]
+    return "\n\n".join(
+        [
+            "# Observables",
+            "An observable is a number that a test yields. A study's target and responses name them, and so "
+            "does a file of measured heaps. One definition holds for a picture, a balance and a simulated state.",
+            markdown_table(("name", "meaning", "unit", "instrument", "definition"), rows),
+        ]
+    )
+
+
+def write_pages(folder: Path) -> None:
+    """Write the pages into a folder."""
+    folder.mkdir(exist_ok=True)
+    for name, text in {
+        "study": study_page,
+        "commands": commands_page,
+        "observables": observables_page,
+    }.items():
+        (folder / f"{name}.md").write_text(text() + "\n", encoding="utf-8")

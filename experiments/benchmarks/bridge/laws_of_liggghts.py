@@ -1,0 +1,75 @@
+"""Bench campaigns in the laws of LIGGGHTS, proven there: the exported input is run at the optimum.
+
+    python -m experiments.benchmarks.bridge.laws_of_liggghts --out DIR [--study FILE --scale bench]
+
+Each study is calibrated by dem-warp in the laws of LIGGGHTS; the card's own test is then run in LIGGGHTS with
+fresh seeds. The angle is to be within a degree of the target, plus the noise of both.
+"""
+
+from pathlib import Path
+from typing import Annotated
+
+import pandas as pd
+import typer
+
+from doe import compare_means
+from experiments import api
+from experiments.bridge.source import read_source
+from experiments.cases import open_folder, run_cases, with_engine
+from experiments.commands.console import CaseProgress, clear_errors
+from experiments.studyfile import Study, load_study
+
+HERE = Path(__file__).parent
+
+MARGIN = 1.0
+"""Difference between the codes that does not matter [deg]."""
+
+COLUMNS = ("study", "target", "mean", "sd", "n", "difference", "low", "high", "met", "equivalent")
+
+
+def in_laws(file: Path, scale: str | None, laws: str) -> Study:
+    """Load a study in other laws."""
+    return load_study(file, scale, {"solver": {"laws": laws}})
+
+
+def prove(study: Study, folder: Path, laws: str, seeds: int, workers: int | None) -> dict[str, object]:
+    """Calibrate a study, and run its card's test in LIGGGHTS; what is finished in the folder is kept."""
+    card = folder / "campaign" / "material.toml"
+    if not card.is_file():
+        resume = card.parent.is_dir()
+        api.calibrate(study, card.parent, device="cpu", workers=workers, resume=resume, watch=CaseProgress)
+    source = read_source(card)
+    there = with_engine(source.study, "liggghts")
+    store, _ = open_folder(folder / "liggghts", there, resume=True)
+    table = pd.DataFrame([source.point] * seeds).assign(seed=range(1001, 1001 + seeds))
+    with CaseProgress("LIGGGHTS") as progress:
+        cases = run_cases(there, table, store, workers=workers, progress=progress)
+    good = cases[cases["status"] == "finished"].dropna(subset=[source.observable])
+    test = compare_means(good[source.observable].to_numpy(), source.target, margin=MARGIN)
+    low, high = test.interval
+    met = low <= MARGIN and high >= -MARGIN
+    named = f"{study.name}, laws {laws}"
+    numbers = (source.target.mean, test.a.mean, test.a.sd, test.a.n, test.difference, low, high)
+    return dict(zip(COLUMNS, (named, *numbers, met, test.equivalent), strict=True))
+
+
+def main(
+    out: Annotated[Path, typer.Option(help="Folder of campaigns and heaps; it may have some of them.")],
+    studies: Annotated[list[Path] | None, typer.Option("--study", help="Left out: those here.")] = None,
+    scale: Annotated[str | None, typer.Option(help="Scale of the studies.")] = None,
+    laws: Annotated[str, typer.Option(help="Name of a set of LIGGGHTS' laws.")] = "liggghts",
+    seeds: Annotated[int, typer.Option(min=2, help="Heaps in LIGGGHTS.")] = 5,
+    workers: Annotated[int | None, typer.Option(min=1, help="Cases at once. Left out: one a core.")] = None,
+) -> None:
+    """Prove every study, and write ``end_to_end.csv``."""
+    rows = []
+    for file in studies or sorted(HERE.glob("*.toml")):
+        with clear_errors():
+            study = in_laws(file, scale, laws)
+            rows.append(prove(study, out / f"{file.stem}-{laws}", laws, seeds, workers))
+        typer.echo(rows[-1])
+    pd.DataFrame(rows).round(4).to_csv(out / "end_to_end.csv", index=False)
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -1,0 +1,73 @@
+"""Proof that a card travels: heaps here and in other codes, compared.
+
+    python -m experiments.benchmarks.travel ours --device cuda --out out/travel
+    python -m experiments.benchmarks.travel theirs --code liggghts --workers 16 --out out/travel
+    python -m experiments.benchmarks.travel page --out out/travel --record FOLDER
+
+The page of the last recorded run is record/README.md.
+
+Every heap is stored as it ends: a command that was stopped goes on, and any part may be run anywhere.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from experiments.benchmarks.travel.cards import CARDS, CODES, OWN_SEEDS, SEEDS
+from experiments.benchmarks.travel.heaps import run_theirs, simulate_ours, stored_heaps
+from experiments.benchmarks.travel.travel_page import write_page
+
+app = typer.Typer(add_completion=False, help=__doc__)
+
+Out = Annotated[Path, typer.Option(help="Folder of the stored heaps.")]
+Cards = Annotated[list[str] | None, typer.Option("--card", help="A card; may be repeated. Left out: all.")]
+Seeds = Annotated[int | None, typer.Option(min=2, help="How many seeds. Left out: all.")]
+
+
+@app.command()
+def ours(
+    out: Out,
+    code: Annotated[list[str] | None, typer.Option(help="Code whose laws hold; may be repeated.")] = None,
+    card: Cards = None,
+    seeds: Seeds = None,
+    device: Annotated[str, typer.Option(help="cpu or cuda.")] = "cpu",
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes on the CPU.")] = None,
+) -> None:
+    """Simulate the cards here, under the laws of each code."""
+    simulate_ours(out, _known(code, CODES), _known(card, CARDS), OWN_SEEDS[:seeds], device, workers)
+
+
+@app.command()
+def theirs(
+    out: Out,
+    code: Annotated[str, typer.Option(help="Code to run.")],
+    card: Cards = None,
+    seeds: Seeds = None,
+    workers: Annotated[int, typer.Option(min=1, help="Runs at once.")] = 1,
+    programs: Annotated[Path | None, typer.Option(help="Folder with its programs, before the PATH.")] = None,
+) -> None:
+    """Run the exported cards in another code."""
+    [known] = _known([code], CODES)
+    run_theirs(out, known, _known(card, CARDS), SEEDS[:seeds], workers, programs)
+
+
+@app.command()
+def page(
+    out: Out, record: Annotated[Path | None, typer.Option(help="Folder of the page; left out: OUT.")] = None
+) -> None:
+    """Compare what is stored and write the page."""
+    print(write_page(stored_heaps(out), record or out))
+
+
+def _known(names: list[str] | None, known: dict) -> list[str]:
+    """Names that were asked for, all of them where none was."""
+    if strange := sorted(set(names or ()) - set(known)):
+        raise typer.BadParameter(f"must be one of {', '.join(known)}, got {', '.join(strange)}")
+    return list(names or known)
+
+
+if __name__ == "__main__":
+    app()

@@ -1,0 +1,91 @@
+"""The card that a bridge starts from: its test with its factors free again, its surface, its target."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from doe import DesignError, Sample, Surface
+from experiments.errors import StudyError
+from experiments.studyfile import Study, load_card
+from experiments.studyfile.card_surface import SURFACE, card_surfaces
+from experiments.studyfile.places import drop
+from experiments.studyfile.units import Quantity
+from experiments.toml_files import read_toml
+
+BRIDGE = "bridge"
+"""Table of a card whose values a bridge has corrected."""
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """A card, taken apart."""
+
+    path: Path
+    card: dict[str, Any]
+    study: Study
+    """Its own test; the factors that it chose vary as its surface does, all else has its values."""
+    response: str
+    """Name of the response that it was fitted to."""
+    observable: str
+    """Column of the cases that holds it."""
+    unit: str
+    target: Sample
+    surface: Surface
+    point: dict[str, float]
+    """Chosen value of every factor, natural unit."""
+
+
+def read_source(path: Path) -> Source:
+    """Read the card of a bridge.
+
+    Raises
+    ------
+    StudyError
+        When the file is no card, a bridge has written it, it has no surface, or several responses were
+        matched together.
+    """
+    _, card = read_toml(path, "a material card")
+    own = load_card(path)
+    if BRIDGE in card:
+        rule = "a bridge starts from a card that dem-warp calibrate wrote, not from one that is corrected"
+        raise StudyError(rule, card[BRIDGE].get("engine", "a corrected one"), f"{path}: {BRIDGE}")
+    surfaces = card_surfaces(card, path)
+    if len(surfaces) != 1:
+        rule = "a bridge corrects the surface of one response, which the card has in [surface.NAME]"
+        raise StudyError(rule, ", ".join(surfaces) or "none", f"{path}: {SURFACE}")
+    [(response, surface)] = surfaces.items()
+    facts = card.get("fitted", {}).get("response", {}).get(response, {})
+    if facts.get("scene", "target") != "target":
+        rule = "a bridge runs the card's own test, and its response is that of a further scene"
+        raise StudyError(rule, facts["scene"], f"{path}: fitted.response.{response}")
+    target, unit = _target(facts, f"{path}: fitted.response.{response}")
+    chosen = {name: card["factor"][name]["chosen"] for name in surface.design.names}
+    study = _with_factors(own, card, surface)
+    return Source(path, card, study, response, facts["observable"], unit, target, surface, chosen)
+
+
+def _target(facts: dict[str, Any], place: str) -> tuple[Sample, str]:
+    try:
+        mean, sd = (Quantity.parse(facts[name]) for name in ("mean", "sd"))
+        return Sample(mean.number, sd.number, facts["n"]), mean.unit or "1"
+    except (DesignError, KeyError, ValueError) as error:
+        rule = "a card says what was measured: mean, sd and n, and of which observable"
+        raise StudyError(rule, f"{type(error).__name__}: {error}", place) from None
+
+
+def _with_factors(study: Study, card: dict[str, Any], surface: Surface) -> Study:
+    """Free the factors of a surface in a card's study."""
+    document, factors = study.document, []
+    for factor in surface.design.factors:
+        told = card["factor"][factor.name]
+        parameters = [name.strip() for name in told["parameter"].split(",")]
+        for parameter in parameters:
+            drop(document, parameter.split("."))
+        low, high = (
+            str(Quantity(end, factor.unit)) if factor.unit else end for end in (factor.low, factor.high)
+        )
+        row = {"name": factor.name, "label": factor.name, "parameter": parameters, "low": low, "high": high}
+        factors.append(row)
+    return study.with_document(document | {"factor": factors})

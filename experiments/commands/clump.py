@@ -1,0 +1,99 @@
+"""``dem-warp clump``: grain shapes from meshes, dimensions and other codes' files."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from experiments.commands.console import clear_errors, messages
+from experiments.commands.options import AsJson, quantity, share
+from experiments.commands.results import print_clump, print_trial
+
+if TYPE_CHECKING:
+    from experiments.commands.shapes import Clump
+
+CLUMP_EXAMPLE = "Example: [bold]dem-warp clump tri-pyramid:5.90x3.93 --spheres 9 --out clump.txt[/]"
+
+
+def clump(
+    shape: Annotated[
+        str,
+        typer.Argument(
+            metavar="SHAPE",
+            help="A mesh file in mm; a solid by its dimensions in mm (sphere:D, ellipsoid:LxWxT, "
+            "cylinder:LxD, capsule:LxD, tri-pyramid:HxEDGE); or a file of spheres of dem-warp, LIGGGHTS, "
+            "Yade, EDEM or DEM-Engine, to be described.",
+        ),
+    ],
+    spheres: Annotated[
+        int | None, typer.Option(min=1, max=256, help="Spheres to fill the solid with.")
+    ] = None,
+    tolerance: Annotated[
+        str | None,
+        typer.Option(
+            metavar="PERCENT",
+            help="Instead: the least spheres whose volume, inertia and surface are within it, as 5%.",
+        ),
+    ] = None,
+    unit: Annotated[
+        str | None,
+        typer.Option(help='Unit of a file, as m, or the length that is 1 in it, as "2.5 mm". Left out: mm.'),
+    ] = None,
+    protrusion: Annotated[
+        str | None,
+        typer.Option(
+            help="How far a sphere may pass the surface; auto: until the volume is the solid's. Left out: "
+            "0 mm, and auto with --tolerance."
+        ),
+    ] = None,
+    density: Annotated[str | None, typer.Option(help='For the mass, as "698 kg/m^3".')] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="File of spheres to write, for a study's grain.clump.")
+    ] = None,
+    picture: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Draw the clump beside the solid, as a .png.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Make a grain of spheres from a mesh or measured dimensions: volume, mass, inertia, spheres."""
+    with clear_errors():
+        from experiments.commands.clump_picture import require_picture
+        from experiments.commands.shapes import ClumpRequest, make_clump, require_new, write_clump
+
+        if out:
+            require_new(out)
+        if picture:
+            require_picture(picture)
+        request = ClumpRequest(
+            shape, spheres, share(tolerance, "--tolerance") if tolerance else None,
+            _reach(protrusion, tolerance), unit,
+        )  # fmt: skip
+        mass_density = quantity(density, "density", "--density") if density else None
+        made = make_clump(request, print_trial if tolerance else lambda trial: None)
+        if out:
+            write_clump(made.shape, out)
+        if picture:
+            made.draw(picture)
+    if as_json:
+        typer.echo(json.dumps(made.to_dict(mass_density), allow_nan=False))
+    else:
+        print_clump(made.to_dict(mass_density))
+    _print_remarks(made, shape)
+
+
+def _print_remarks(made: Clump, source: str) -> None:
+    """Say how a file was read, and what may be done about a poor fit."""
+    if made.told:
+        messages.print(f"Read: {source}: {made.told}")
+    if made.advice:
+        messages.print(f"Advice: {made.advice}")
+
+
+def _reach(protrusion: str | None, tolerance: str | None) -> float | None:
+    """Protrusion [m]; None: the one that keeps the volume."""
+    if protrusion is None:
+        return None if tolerance else 0.0
+    return None if protrusion == "auto" else quantity(protrusion, "length", "--protrusion")

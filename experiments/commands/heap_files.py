@@ -1,0 +1,146 @@
+"""Heaps of other codes to repose angles, by the code that measures dem-warp's own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from experiments.errors import InputError
+from experiments.sphere_files import format_of, length_unit, read_spheres
+from experiments.studyfile.study import MeasurementSection
+from experiments.studyfile.units import Quantity
+from imaging import Doubt, HeapAngle, heap_angle, overlay, snapshot
+from imaging.doubts import GREATEST_ANGLE, LARGEST_ERROR, LEAST_ANGLE
+from imaging.geometry import Picture, Spheres
+from imaging.ground import find_ground
+
+DEFAULT_UNIT = "m"
+"""Unit of a heap's file that names none; angles do not depend on it."""
+BELOW = 0.5
+"""Depth under the plate, in radii, from which a sphere has fallen off it."""
+
+
+@dataclass(frozen=True)
+class HeapSettings:
+    """What is known of the files of heaps beforehand."""
+
+    unit: float | None = None
+    """Unit of length [m]; None: the one that a file names, or metres."""
+    plate_height: float | None = None
+    """Height of the plate [m]; None: it is found."""
+
+
+@dataclass(frozen=True)
+class MeasuredHeap:
+    """A heap of a file, and its angle."""
+
+    angle: HeapAngle
+    """The angle."""
+    told: str
+    """Format of the file, and what was measured of it."""
+    spheres: Spheres
+    """Spheres [m] on the plate z = 0."""
+
+    def picture(self) -> Picture:
+        """Draw the heap with the flanks fitted in its first view."""
+        settings = MeasurementSection()
+        shaded = snapshot(
+            self.spheres.centers, self.spheres.radii, azimuth=self.angle.azimuths[0], pixels=settings.pixels
+        )
+        return overlay(shaded, self.angle.views[0])
+
+
+def heap_settings(unit: str | None, plate_height: str | None) -> HeapSettings:
+    """Read what a person says of the files.
+
+    Raises
+    ------
+    InputError
+        When the unit is no unit of length, or the height no length.
+    """
+    try:
+        size = None if unit is None else length_unit(unit)
+    except ValueError as error:
+        raise InputError(str(error), unit, "--unit") from None
+    try:
+        height = None if plate_height is None else Quantity.parse(plate_height).to_base("length")
+    except ValueError as error:
+        raise InputError(str(error), plate_height, "--plate-height") from None
+    return HeapSettings(size, height)
+
+
+@lru_cache(maxsize=1024)
+def is_heap_file(path: Path) -> bool:
+    """Tell by its content that a file holds spheres, and is no picture; one that is not there is none."""
+    return path.is_file() and format_of(path) is not None
+
+
+def measure_heap_file(path: Path, fit: str, settings: HeapSettings) -> MeasuredHeap:
+    """Measure the repose angle of the heap in a file of spheres.
+
+    Raises
+    ------
+    InputError
+        When the file breaks a rule of its format.
+    imaging.PictureError
+        When it holds no measurable heap.
+    """
+    file = read_spheres(path)
+    if settings.unit is not None and file.unit is not None and settings.unit != file.unit:
+        rule = "the unit given is that which the file names"
+        raise InputError(rule, f"{settings.unit:g} m for {file.unit:g} m", f"{path}, --unit")
+    size = settings.unit or file.unit or length_unit(DEFAULT_UNIT)
+    spheres = Spheres.of(file.spheres[:, :3] * size, file.spheres[:, 3] * size)
+    height = find_ground(spheres) if settings.plate_height is None else settings.plate_height
+    standing = spheres.centers[:, 2] > height - BELOW * spheres.radii
+    if not standing.any():
+        raise InputError(
+            "spheres stand on the plate", f"none above {1e3 * height:g} mm", f"{path}, --plate-height"
+        )
+    heap = Spheres(spheres.centers[standing] - np.array([0.0, 0.0, height]), spheres.radii[standing])
+    settled = MeasurementSection()
+    bodies = len(heap.radii) if file.bodies is None else len(np.unique(file.bodies[standing]))
+    angle = heap_angle(heap.centers, heap.radii, settled.azimuths, fit, settled.pixels, grain_count=bodies)
+    said = [
+        file.told,
+        f"{len(heap.radii)} spheres of {_span(heap.radii)} radius"
+        + ("" if file.bodies is None else f" in {bodies} grains"),
+        f"plate {'found' if settings.plate_height is None else 'given'} at {1e3 * height:.4g} mm",
+    ]
+    if fallen := int(np.count_nonzero(~standing)):
+        said.append(f"{fallen} below it left out")
+    return MeasuredHeap(angle, "; ".join(said), heap)
+
+
+def _span(radii: np.ndarray) -> str:
+    low, high = 1e3 * radii.min(), 1e3 * radii.max()
+    return f"{low:.3g} mm" if high - low < 1e-3 * high else f"{low:.3g} to {high:.3g} mm"
+
+
+def values_of(heap: MeasuredHeap, level: float) -> dict[str, Any]:
+    """Values of a heap's row: flanks are means over its views, and what only a camera has is left out."""
+    low, high = heap.angle.interval(level)
+    views = heap.angle.views
+    return {
+        "left": float(np.mean([view.left for view in views])),
+        "right": float(np.mean([view.right for view in views])),
+        "mean": heap.angle.mean,
+        "se": heap.angle.se,
+        "low": low,
+        "high": high,
+        "source": heap.told,
+        "doubts": [str(doubt) for doubt in _doubts(heap.angle)],
+    }
+
+
+def _doubts(angle: HeapAngle) -> Iterator[Doubt]:
+    """Reasons to doubt an angle that need no camera."""
+    if not LEAST_ANGLE <= angle.mean <= GREATEST_ANGLE:
+        yield Doubt("range", f"{angle.mean:.1f} degrees, outside {LEAST_ANGLE:g} to {GREATEST_ANGLE:g}")
+    if angle.se > LARGEST_ERROR:
+        yield Doubt("error", f"a standard error of {angle.se:.2f} degrees, over {LARGEST_ERROR:g}")

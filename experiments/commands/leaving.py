@@ -1,0 +1,48 @@
+"""Cards and studies that leave for another code."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from experiments.export import ExportedTest
+from experiments.studyfile import Study, load_card, load_study
+from experiments.studyfile.campaign import TARGET_SCENE
+from experiments.studyfile.card import is_card
+
+
+def study_of(path: Path | None, scale: str | None) -> Study:
+    """Load a study at a scale, or the study of a material card's own test; None is the paper's buckwheat.
+
+    Raises
+    ------
+    StudyError
+        When the file cannot be read or breaks a rule, or a card is asked for a scale.
+    """
+    if path is not None and scale is None and is_card(path):
+        return load_card(path)
+    return load_study(path, scale)
+
+
+def exported_test(
+    study: Study, values: Mapping[str, float], seed: int, scene: str = TARGET_SCENE
+) -> ExportedTest:
+    """Choose one case of a study to leave: values by factor name in natural units, the middle where left out.
+
+    Raises
+    ------
+    StudyError
+        When there is no such factor or scene, or a value leaves what is physical.
+    """
+    settings = {
+        factor.name: f"{values.get(factor.name, factor.center):.6g} {factor.unit}".rstrip()
+        for factor in study.factors
+    }
+    measurement, at = study.measurement, f", scale {study.scale}" if study.scale else ""
+    return ExportedTest(
+        name=study.name,
+        case=study.case(values, seed, scene),
+        source=f"{study.file.name}{at}",
+        settings=settings,
+        estimator=f"{measurement.fit!r} fit, mean of {measurement.azimuths} views",
+    )

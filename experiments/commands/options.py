@@ -1,0 +1,73 @@
+"""Options that several commands have."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+StudyFile = Annotated[
+    Path | None, typer.Argument(metavar="[STUDY.toml]", help="Study file; left out: the paper's buckwheat.")
+]
+Scale = Annotated[
+    str | None,
+    typer.Option(
+        help="A scale of the study; the paper's has bench, soft and paper. Left out: paper with a CUDA "
+        "device, bench without, where the study has it.",
+    ),
+]
+Device = Annotated[str | None, typer.Option(help="cpu, cuda or cuda:N. Left out: the GPU if there is one.")]
+Devices = Annotated[
+    str | None,
+    typer.Option(
+        "--device",
+        help="cpu, cuda, cuda:N or several GPUs, as cuda:0,cuda:1. Left out: the GPU if there is one.",
+    ),
+]
+Workers = Annotated[int | None, typer.Option(min=1, help="Processes on the CPU. Left out: one a core.")]
+EngineName = Annotated[
+    str | None,
+    typer.Option(
+        "--engine", metavar="NAME", help="Engine that simulates. Left out: the study's, or dem-warp's own."
+    ),
+]
+Out = Annotated[Path | None, typer.Option(help="Folder of the results, new or empty.")]
+Resume = Annotated[bool, typer.Option("--resume", help="Go on in the folder of an earlier run.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Write the result to standard output as JSON.")]
+
+
+def assignments(texts: list[str]) -> dict[str, str]:
+    """Split ``NAME=VALUE`` options."""
+    from experiments.errors import InputError
+
+    pairs = [text.partition("=") for text in texts]
+    for text, (name, equals, value) in zip(texts, pairs, strict=True):
+        if not (name.strip() and equals and value.strip()):
+            raise InputError("needs NAME=VALUE, for example E=0.48", text, "--set")
+    return {name.strip(): value.strip() for name, _, value in pairs}
+
+
+def quantity(text: str, dimension: str, option: str) -> float:
+    """Read an option's quantity in SI."""
+    from experiments.errors import InputError
+    from experiments.studyfile.units import Quantity
+
+    try:
+        return Quantity.parse(text).to_base(dimension)
+    except ValueError as error:
+        raise InputError(str(error), text, option) from None
+
+
+def share(text: str, option: str) -> float:
+    """Read a share between 0 and 1, as ``5%`` or ``0.05``."""
+    from experiments.errors import InputError
+
+    words = text.strip()
+    try:
+        value = float(words.removesuffix("%")) / (100.0 if words.endswith("%") else 1.0)
+    except ValueError:
+        value = 0.0
+    if not 0.0 < value < 1.0:
+        raise InputError("must be a share above 0 and below 1, as 5% or 0.05", text, option)
+    return value

@@ -1,0 +1,264 @@
+"""The lifted cylinder as the input of another code needs it: templates of grains, walls, rain, phases."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from dem_warp import Case, ClumpShape, LiftedCylinder
+from dem_warp.scenes.lifted_cylinder import LiftController
+from dem_warp.scenes.poured_controller import CALM, HEAPED
+from experiments.errors import InputError
+from experiments.export.exporter import ExportedTest
+from experiments.export.sizes import size_classes
+
+FIRST_SEED = 10_000
+"""LIGGGHTS wants primes above it."""
+
+RAIN_DENSITY = 0.12
+"""Largest solid fraction of the rain: in a denser one not all grains find a place at random, and codes that
+place the largest first then leave out small ones."""
+
+RAIN_HEIGHT = 3.0
+"""Height of the space that the rain is put in, in diameters of the largest grain."""
+
+SIDES = 60
+"""Sides of the prism that stands for the tube; it touches the cylinder from outside, and its edges stand out
+of it by 0.14 % of the radius."""
+
+LOOK = 5e-3
+"""Time between two looks at the grains [s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Template:
+    """One of the grains that stand for the population: a shape at a size."""
+
+    shape: ClumpShape
+    size: float
+    fraction: float
+    """Part of the number of grains."""
+    density: float
+
+    @property
+    def centers(self) -> np.ndarray:
+        """Centres of the spheres about the centre of mass, along the principal axes [m], (S, 3)."""
+        return self.shape.centers * self.size
+
+    @property
+    def radii(self) -> np.ndarray:
+        """Their radii [m], (S,)."""
+        return self.shape.radii * self.size
+
+    @property
+    def mass(self) -> float:
+        """Mass of the union of the spheres [kg]."""
+        return self.density * self.shape.volume * self.size**3
+
+    @property
+    def inertia(self) -> np.ndarray:
+        """Principal moments of the union [kg m2], (3,)."""
+        return self.mass * self.shape.inertia_over_mass * self.size**2
+
+    @property
+    def reach(self) -> float:
+        """Bounding radius [m]."""
+        return self.shape.bounding_radius * self.size
+
+
+@dataclass(frozen=True)
+class Lift:
+    """A lifted cylinder with what follows from its case.
+
+    Raises
+    ------
+    InputError
+        When the test is another one.
+    """
+
+    test: ExportedTest
+
+    def __post_init__(self) -> None:
+        scene = self.test.case.scene
+        if not isinstance(scene, LiftedCylinder):
+            rule = "the test must be a lifted-cylinder, the only one that is exported"
+            raise InputError(rule, getattr(scene, "name", type(scene).__name__), self.test.source)
+
+    @property
+    def case(self) -> Case[LiftedCylinder]:
+        """The case."""
+        return self.test.case
+
+    @property
+    def scene(self) -> LiftedCylinder:
+        """Its scene."""
+        return self.case.scene
+
+    @cached_property
+    def templates(self) -> tuple[Template, ...]:
+        """Templates of every shape in every class of size."""
+        grains, density = self.case.grains, self.case.grain_material.density
+        return tuple(
+            Template(shape, size, part * share, density)
+            for shape, part in zip(grains.mixture.shapes, grains.mixture.fractions, strict=True)
+            for size, share in size_classes(grains.size_mean, grains.size_sd)
+        )
+
+    @property
+    def is_of_spheres(self) -> bool:
+        """True where every grain is one sphere."""
+        return all(template.shape.sphere_count == 1 for template in self.templates)
+
+    @property
+    def reach(self) -> float:
+        """Largest bounding radius [m]."""
+        return max(template.reach for template in self.templates)
+
+    @property
+    def largest_radius(self) -> float:
+        """Largest sphere radius [m]."""
+        return max(float(template.radii.max()) for template in self.templates)
+
+    @property
+    def skin(self) -> float:
+        """Reach of the neighbour lists beyond contact [m]."""
+        return 0.4 * min(float(template.radii.mean()) for template in self.templates)
+
+    def seeds(self, count: int) -> tuple[int, ...]:
+        """Draw distinct primes above 10000, the same from the same seed of the case."""
+        drawn = np.random.default_rng([self.case.seed, FIRST_SEED]).integers(FIRST_SEED, 10**7, count)
+        seeds: list[int] = []
+        for number in drawn.tolist():
+            while not _is_prime(number) or number in seeds:
+                number += 1
+            seeds.append(number)
+        return tuple(seeds)
+
+    def steps(self, time: float) -> int:
+        """Steps that a time [s] takes."""
+        return max(round(time / self.case.time_step), 1)
+
+    # ---- the rain ----------------------------------------------------------------------------------------
+
+    @property
+    def count(self) -> int:
+        """Grains to pour, or kept ready where the tube is filled to its rim."""
+        return self.scene.supply(self.case)
+
+    @property
+    def rain_radius(self) -> float:
+        """Radius about the axis that the rain stays in [m]."""
+        return self.scene.diameter / 2 - 0.5 * self.skin
+
+    @property
+    def rain_bottom(self) -> float:
+        """Lowest height that a grain is put at [m]."""
+        return self.scene.height + self.reach + self.skin
+
+    @property
+    def rain_height(self) -> float:
+        """Height of the space that grains are put in [m]."""
+        return RAIN_HEIGHT * 2.0 * self.reach
+
+    @property
+    def rain_period(self) -> float:
+        """Time in which grains leave that space at the speed of the rain [s]."""
+        return self.rain_height / self.scene.rain_speed
+
+    @property
+    def rain_rate(self) -> float:
+        """Grains a second: the scene's, or the most that find a place."""
+        volume = self.case.grains.mean(lambda shape: shape.volume)
+        area = math.pi * max(self.rain_radius - self.reach, 0.3 * self.rain_radius) ** 2
+        return min(self.scene.rain_rate, RAIN_DENSITY * self.scene.rain_speed * area / volume)
+
+    # ---- the phases ----------------------------------------------------------------------------------------
+
+    @property
+    def fill_limit(self) -> float:
+        """Time after which the filling has failed [s]."""
+        return self.count / self.rain_rate + LiftController.FILL_MARGIN
+
+    @property
+    def settle_limit(self) -> float:
+        """Time after which the settling has failed [s]."""
+        return LiftController.SETTLE_LIMIT
+
+    @property
+    def rest_limit(self) -> float:
+        """Time after the tube's rise by its height in which the heap must come to rest [s]."""
+        return LiftController.LIFT_MARGIN
+
+    @property
+    def calm_speed(self) -> float:
+        """No grain at rest passes it [m/s]."""
+        return CALM * self.scene.rest_speed
+
+    @property
+    def heaped(self) -> int:
+        """Slow grains above the rim that show the tube to be full."""
+        return HEAPED
+
+    @property
+    def strike(self) -> float:
+        """Height above which spheres' centres are struck off with their grains [m].
+
+        Codes strike off by spheres, not by grains: as many are struck off this way, in the mean.
+        """
+        return self.scene.height + self.rise_of_spheres
+
+    @cached_property
+    def rise_of_spheres(self) -> float:
+        """Mean height of a grain's highest sphere centre above its centre, over all directions [m]."""
+        directions = np.random.default_rng(FIRST_SEED).normal(size=(4096, 3))
+        directions /= np.linalg.norm(directions, axis=1)[:, None]
+        rises = [(directions @ template.centers.T).max(axis=1).mean() for template in self.templates]
+        return float(np.dot([template.fraction for template in self.templates], rises))
+
+
+def prism(radius: float, height: float, sides: int = SIDES) -> np.ndarray:
+    """Triangles of a prism around a tube that stands on z = 0 [m].
+
+    Returns
+    -------
+    numpy.ndarray
+        Corners, (2 sides, 3, 3); the sides touch the tube from outside.
+    """
+    turns = np.linspace(0.0, 2.0 * np.pi, sides, endpoint=False)
+    corner = radius / np.cos(np.pi / sides)
+    low = np.column_stack([corner * np.cos(turns), corner * np.sin(turns), np.zeros(sides)])
+    high = low + np.array([0.0, 0.0, height])
+    next_low, next_high = np.roll(low, -1, axis=0), np.roll(high, -1, axis=0)
+    halves = [(low, next_low, next_high), (low, next_high, high)]
+    return np.concatenate([np.stack(corners, axis=1) for corners in halves])
+
+
+def disc(radius: float, sides: int = SIDES) -> np.ndarray:
+    """Triangles of a regular polygon at z = 0 whose area is that of a disc [m], (sides, 3, 3)."""
+    turns = np.linspace(0.0, 2.0 * np.pi, sides, endpoint=False)
+    corner = radius * math.sqrt(2.0 * np.pi / (sides * math.sin(2.0 * np.pi / sides)))
+    rim = np.column_stack([corner * np.cos(turns), corner * np.sin(turns), np.zeros(sides)])
+    return np.stack([np.zeros_like(rim), rim, np.roll(rim, -1, axis=0)], axis=1)
+
+
+def stl_text(name: str, triangles: np.ndarray) -> str:
+    """Write triangles as an STL file in text, in metres."""
+    lines = [f"solid {name}"]
+    for corners in triangles:
+        normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+        normal /= np.linalg.norm(normal)
+        lines.append(f"facet normal {_numbers(normal)}\n outer loop")
+        lines += [f"  vertex {_numbers(corner)}" for corner in corners]
+        lines.append(" endloop\nendfacet")
+    return "\n".join([*lines, f"endsolid {name}\n"])
+
+
+def _numbers(values: np.ndarray) -> str:
+    return " ".join(f"{value:.9g}" for value in values)
+
+
+def _is_prime(number: int) -> bool:
+    return number > 1 and all(number % divisor for divisor in range(2, math.isqrt(number) + 1))

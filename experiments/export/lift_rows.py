@@ -1,0 +1,58 @@
+"""Rows of the README that every input of the lifted cylinder has, and what none of them has."""
+
+from __future__ import annotations
+
+from experiments.export.lift import SIDES, Lift
+from experiments.export.translated import Translated
+
+
+def lift_rows(lift: Lift, exact_tube: bool = False) -> tuple[Translated, ...]:
+    """Say what became of the test's parts, where all codes do alike; the tube is a prism or exact."""
+    case, scene = lift.case, lift.scene
+    scale = case.numerics.modulus_scale
+    shear, softened = case.grains.material.shear_modulus, case.grain_material.shear_modulus
+    softening = "as it is" if scale == 1.0 else f"softened by {scale:g}: {softened:.6g} Pa"
+    sizes = f"{case.grains.size_mean:g} +- {case.grains.size_sd:g} of the shape, normal, cut at 3 sd"
+    filled = f"{scene.grain_count} grains" if scene.grain_count else "to the rim, struck off there"
+    rate = f"{lift.rain_rate:.4g} grains a second, {scene.rain_speed:g} m/s"
+    slower = "" if lift.rain_rate == scene.rain_rate else " (so many find a place at random)"
+    prism = f"prism of {SIDES} sides that touch it from outside"
+    return (
+        Translated("shear modulus of the grains", f"{shear:.6g} Pa", f"{softening}; calibrated so, keep it"),
+        Translated("sizes", sizes, f"{len(lift.templates)} templates: mean, variance and mean mass the same"),
+        Translated("mass and inertia", "of the union of the spheres", "the same, given with each template"),
+        Translated("filling", f"{filled}; {scene.rain_rate:g} grains a second", f"{filled}; {rate}{slower}"),
+        Translated("tube", "cylinder", "the same" if exact_tube else prism),
+        Translated("plate", _plate(lift), _plate(lift)),
+        Translated("lift", f"{scene.lift_speed:g} m/s", f"{scene.lift_speed:g} m/s, until clear of the heap"),
+        Translated(
+            "end",
+            f"at rest: rms speed below {scene.rest_speed:g} m/s, none above {lift.calm_speed:g} m/s, for "
+            f"{scene.rest_time:g} s",
+            "the same, of the spheres' speeds",
+        ),
+        Translated("time step", f"{case.time_step:.6g} s", f"{case.time_step:.6g} s"),
+        Translated("gravity", _gravity(lift), _gravity(lift)),
+        Translated("seed", f"{case.seed}", "seeds made from it: another heap of the same kind"),
+    )
+
+
+def lift_warnings(lift: Lift, ends_in_time: bool = False) -> tuple[str, ...]:
+    """Name what no input of the lifted cylinder has; some can end at a given time."""
+    scene = lift.scene
+    left_out = {
+        f"air_drag = {scene.air_drag:g} /s": scene.air_drag > 0.0,
+        f"vibration_amplitude = {scene.vibration_amplitude:g} m": scene.vibration_amplitude > 0.0,
+        f"duration = {scene.duration} s, in place of it the test ends at rest": scene.duration is not None
+        and not ends_in_time,
+    }
+    return tuple(f"scene {name}: left out" for name, present in left_out.items() if present)
+
+
+def _plate(lift: Lift) -> str:
+    diameter = lift.scene.plate_diameter
+    return "endless plane" if diameter is None else f"disc of {diameter:g} m, over whose rim grains are lost"
+
+
+def _gravity(lift: Lift) -> str:
+    return f"({', '.join(f'{part:.4g}' for part in lift.scene.gravity)}) m/s2"

@@ -1,0 +1,144 @@
+"""The lifted cylinder as a driver of MercuryDPM, in C++."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from experiments.export.exporter import Translated, Translation
+from experiments.export.lift import Lift, disc, prism
+from experiments.export.same_rain import (
+    HEAP,
+    RAIN_FILE,
+    clump_texts,
+    phases,
+    rain_text,
+    same_rain_rows,
+    template,
+    test_numbers,
+    world_of,
+)
+
+SOURCE, HEADER = "lift.cpp", "test.h"
+
+_CONTACT = """struct Contact
+{
+    double modulus, dissipation, shearModulus, slidingDissipation, slidingFriction, rollingFriction;
+};"""
+
+_ROWS = (
+    Translated(
+        "this driver",
+        "",
+        "written for MercuryDPM 1.0.0 alpha of July 2024, run there, and in no record: put this folder "
+        "beside `Drivers/Clump/ClumpHeaders`, and build lift.cpp as the drivers there are",
+    ),
+    Translated(
+        "clumps",
+        "rigid, mass properties of the union of the spheres",
+        "`ClumpParticle` of `Drivers/Clump/ClumpHeaders`, mass and moments given; contacts take the mass",
+    ),
+    Translated("edges of the tube's triangles", "none", "joined by the build's `TRIANGLE_WALL_CORRECTION`"),
+    Translated("integration", "velocities, then places", "velocity Verlet"),
+)
+
+
+def translate_lift(
+    lift: Lift, contacts: Sequence[Mapping[str, float]], warnings: tuple[str, ...], laws: Sequence[Translated]
+) -> Translation:
+    """Write the driver and what it reads.
+
+    Parameters
+    ----------
+    lift
+        The test.
+    contacts
+        Terms of the contacts of grains with grains, the tube and the plate.
+    warnings, laws
+        What MercuryDPM lacks of the test, and the rows of the README on its contact laws.
+    """
+    scene, world = lift.scene, world_of(lift)
+    walls = {"tube.csv": prism(scene.diameter / 2, scene.height)}
+    if scene.plate_diameter is not None:
+        walls["plate.csv"] = disc(scene.plate_diameter / 2)
+    files = {
+        SOURCE: template("mercury"),
+        HEADER: header(lift, contacts),
+        RAIN_FILE: rain_text(world),
+        **clump_texts(world),
+        **{name: _table(triangles) for name, triangles in walls.items()},
+    }
+    return Translation(
+        files=files,
+        main=SOURCE,
+        command=("./lift",),
+        heap=HEAP,
+        translated=(*same_rain_rows(lift), *laws, *_ROWS),
+        warnings=warnings,
+        comment="//",
+    )
+
+
+def header(lift: Lift, contacts: Sequence[Mapping[str, float]]) -> str:
+    """Write the numbers of a test as constants of C++, in SI units."""
+    world = world_of(lift)
+    numbers, course = test_numbers(lift, world), phases(lift, world)
+    look = max(round(course.pop("look") / world.time_step), 1)
+    course["duration"] = course["duration"] or 0.0
+    limit = course["fill_limit"] + course["settle_limit"] + course["lift_limit"]
+    single = {
+        "time_step": world.time_step,
+        "time_limit": max(limit, course["duration"] + world.time_step),
+        "look_steps": look,
+        "density": lift.case.grain_material.density,
+        "smallest": lift.case.grains.smallest_sphere,
+        "largest": world.largest_sphere,
+        "has_plane": lift.scene.plate_diameter is None,
+        "shape_count": len(world.shapes),
+        **course,
+    }
+    rows = ",\n    ".join(f"{{{', '.join(f'{value:.17g}' for value in one.values())}}}" for one in contacts)
+    names = ", ".join(f'"{name}"' for name in numbers["clumps"])
+    lines = [
+        "// Numbers of the test, in SI units; lift.cpp says what they are for.",
+        "#pragma once\n\nnamespace test\n{",
+        *(f"constexpr {_kind(value)} {_camel(name)} = {_written(value)};" for name, value in single.items()),
+        _array("gravity", numbers["gravity"]),
+        _array("low", world.domain[0]),
+        _array("high", world.domain[1]),
+        _array("masses", numbers["masses"]),
+        f"constexpr double moments[][3] = {{{', '.join(_braced(row) for row in numbers['moments'])}}};",
+        f"constexpr const char* clumps[] = {{{names}}};",
+        _CONTACT,
+        f"constexpr Contact contacts[] = {{\n    {rows}}};  // with grains, the tube, the plate",
+        "}  // namespace test\n",
+    ]
+    return "\n".join(lines)
+
+
+def _table(triangles: np.ndarray) -> str:
+    rows = triangles.reshape(len(triangles), -1)
+    return "".join(",".join(f"{value:.9g}" for value in row) + "\n" for row in rows)
+
+
+def _array(name: str, values: Sequence[float]) -> str:
+    return f"constexpr double {name}[] = {_braced(values)};"
+
+
+def _braced(values: Sequence[float]) -> str:
+    return f"{{{', '.join(f'{value:.17g}' for value in values)}}}"
+
+
+def _camel(name: str) -> str:
+    return re.sub("_(.)", lambda letter: letter[1].upper(), name)
+
+
+def _kind(value: Any) -> str:
+    return {bool: "bool", int: "int"}.get(type(value), "double")
+
+
+def _written(value: Any) -> str:
+    return str(value).lower() if isinstance(value, bool) else f"{value:.17g}"

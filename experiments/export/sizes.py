@@ -1,0 +1,52 @@
+"""A few classes of size in place of a continuous spread, for codes that know templates of grains."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import eigh_tridiagonal
+from scipy.special import roots_legendre
+
+from dem_warp.population import SIZE_LIMIT
+
+CLASSES = 5
+"""Classes of size; with n of them the first 2 n moments are those of the spread."""
+
+_NODES = 200
+"""Nodes of the quadrature that the moments are integrated by."""
+
+
+def size_classes(mean: float, sd: float, count: int = CLASSES) -> tuple[tuple[float, float], ...]:
+    """Sizes, and the part of the number of grains that each stands for.
+
+    They are the nodes and weights of the Gauss quadrature of the normal distribution that a population draws
+    its sizes from, cut at its limit: mean and variance of the sizes and mean mass are the population's.
+
+    Parameters
+    ----------
+    mean, sd
+        Those of the population, the second before the cut; 0 gives one class.
+    count
+        Classes.
+
+    References
+    ----------
+    Golub and Welsch, Mathematics of Computation 23 (1969) 221-230, by the discretised Stieltjes procedure.
+    """
+    if sd == 0.0:
+        return ((mean, 1.0),)
+    nodes, weights = roots_legendre(_NODES)
+    nodes = nodes * SIZE_LIMIT
+    weights = weights * np.exp(-0.5 * nodes**2)
+    weights /= weights.sum()
+    squares: list[float] = []
+    below, present, norm = np.zeros(_NODES), np.ones(_NODES), 1.0
+    for _ in range(count - 1):
+        # the weight is even: each polynomial is the node times the last one, less a part of the one before
+        above = nodes * present - (squares[-1] if squares else 0.0) * below
+        next_norm = float(weights @ above**2)
+        squares.append(next_norm / norm)
+        below, present, norm = present, above, next_norm
+    sizes, vectors = eigh_tridiagonal(np.zeros(count), np.sqrt(squares))
+    return tuple(
+        (float(mean + sd * size), float(first**2)) for size, first in zip(sizes, vectors[0], strict=True)
+    )

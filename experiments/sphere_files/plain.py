@@ -1,0 +1,49 @@
+"""Lines ``x y z r``: dem-warp's own clumps, multisphere templates of LIGGGHTS, any program's spheres."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from experiments.errors import InputError
+from experiments.sphere_files.sphere_file import (
+    LARGEST,
+    SPHERE_RULE,
+    Columns,
+    Format,
+    SphereFile,
+    content_lines,
+    spheres_of,
+)
+from experiments.studyfile.units import UNITS
+from experiments.texts import delimiter_of, is_number, read_text, split
+
+_NAMED_UNIT = re.compile(rf"^\s*#.*\bx,? y,? z,? r\b.*\bin ({'|'.join(UNITS['length'])})\b", re.MULTILINE)
+"""Comment that names the unit, as dem-warp writes it."""
+
+
+def _recognises(head: str) -> bool:
+    lines = content_lines(head)
+    if not lines:
+        return False
+    line = lines[0][1]
+    delimiter = delimiter_of(line)
+    cells = split(line, delimiter)
+    return len(cells) > 2 and sum(is_number(cell, delimiter) for cell in cells) > 2
+
+
+def _read(path: Path) -> SphereFile:
+    text = read_text(path, LARGEST)
+    lines = content_lines(text)
+    delimiter = delimiter_of(lines[0][1])
+    rows = [(number, split(line, delimiter)) for number, line in lines]
+    for number, cells in rows:
+        if len(cells) != 4:
+            raise InputError(SPHERE_RULE, " ".join(cells), f"{path}, line {number}")
+    spheres, _ = spheres_of(rows, Columns(0, 1, 2, 3), path, delimiter)
+    named = _NAMED_UNIT.search(text)
+    unit = UNITS["length"][named[1]] if named else None
+    return SphereFile("spheres (x y z r, as in multisphere templates of LIGGGHTS)", spheres, unit=unit)
+
+
+PLAIN = Format("spheres, x y z r a line", _recognises, _read)

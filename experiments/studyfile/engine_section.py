@@ -1,0 +1,73 @@
+"""``[engine]``: the program that simulates a study's cases, where it is not dem-warp itself."""
+
+from __future__ import annotations
+
+import shlex
+from typing import Self
+
+from pydantic import Field, field_validator, model_validator
+
+from experiments.measurement.observables import BY_NAME
+from experiments.studyfile.schema import Section, Time
+
+
+class EngineSection(Section):
+    """``[engine]``: another program that simulates the cases; its folder contract is docs/engine.md."""
+
+    name: str | None = None
+    """Name of an engine that ships (liggghts, lammps, yade) or that an installed package adds."""
+    command: str | None = None
+    """Command of any other program, which is started in the folder of a case; no shell reads it."""
+    approximate: bool = False
+    """Take the nearest for what an engine that ships lacks, as dem-warp export --approximate does."""
+    version: str = ""
+    """Version of the program, in any words: results of another one are stored apart."""
+    observables: tuple[str, ...] = ()
+    """Observables of the test that the program tells beside the heap; a search needs to know them before."""
+    workers: int | None = Field(default=None, ge=1)
+    """Cases at once; left out: one a core."""
+    time_limit: Time | None = Field(default=None, gt=0.0)
+    """Wall time of one case, after which it has failed; left out: none."""
+
+    @field_validator("command")
+    @classmethod
+    def _has_words(cls, command: str | None) -> str | None:
+        if command is not None and not words_of(command):
+            raise ValueError("must name a program")
+        return command
+
+    @field_validator("observables")
+    @classmethod
+    def _are_known(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+        if unknown := [name for name in names if name not in BY_NAME or BY_NAME[name].by_photograph]:
+            known = ", ".join(dict.fromkeys(each.name for each in BY_NAME.values() if not each.by_photograph))
+            raise ValueError(f"must be of {known}; the heap shows the others (not {', '.join(unknown)})")
+        return names
+
+    @model_validator(mode="after")
+    def _is_one(self) -> Self:
+        if (self.name is None) == (self.command is None):
+            raise ValueError("has either a name or a command")
+        return self
+
+
+def words_of(command: str) -> list[str]:
+    """Split a command into its words: blanks part them, quotes hold them together, nothing else is special.
+
+    Raises
+    ------
+    ValueError
+        When a quotation is not closed.
+    """
+    lexer = shlex.shlex(command, posix=True, punctuation_chars=False)
+    lexer.whitespace_split, lexer.commenters, lexer.escape = True, "", ""
+    try:
+        return list(lexer)
+    except ValueError:
+        raise ValueError("must close every quotation mark that it opens") from None
+
+
+def quoted(word: str) -> str:
+    """Write a word so that `words_of` reads it as one."""
+    mark = "'" if '"' in word else '"'
+    return f"{mark}{word}{mark}"

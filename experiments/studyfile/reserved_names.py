@@ -1,0 +1,60 @@
+"""Names that no factor may have: columns of the tables that factors stand in."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterable, Iterator, Sequence
+
+from doe.factors import RESERVED_NAMES
+from experiments.errors import Problem, StudyError
+from experiments.measurement.observables import observables_of
+from experiments.studyfile.places import Places
+from experiments.studyfile.scene_sections import SceneSection
+
+LABELS = ("stage", "scene", "run", "replicate", "seed", "step", "piece", "direction", "response", "published")
+"""Columns that say which case, step or response a row is of."""
+
+RESULTS = ("status", "reason", "angle", "angle_se", "case_key", "rebuilds")
+"""Columns that every table of cases gets, beside the observables of its scene."""
+
+STATISTICS = ("predicted", "mean", "sd", "n", "error", "error_percent", "half_width", "span")
+"""Columns of paths and directions."""
+
+DUMMY = "dummy"
+"""Idle columns of screening designs, numbered."""
+
+RESERVED = frozenset({*LABELS, *RESULTS, *STATISTICS, *RESERVED_NAMES})
+"""Names that are taken whatever the study measures."""
+
+
+def check_factor_names(
+    names: Sequence[str],
+    places: Places,
+    scenes: Iterable[SceneSection] = (),
+    responses: Collection[str] = (),
+) -> None:
+    """Refuse factors whose name a table has for something else, be it of these scenes and responses.
+
+    Raises
+    ------
+    StudyError
+        With every such factor, and its place.
+    """
+    measured = {name for scene in scenes for name in observables_of(scene.observables, scene.leaves_a_heap)}
+    taken = RESERVED | measured | set(responses)
+    problems = list(_problems(names, taken, places))
+    if problems:
+        raise StudyError.of(problems)
+
+
+def _problems(names: Sequence[str], taken: Collection[str], places: Places) -> Iterator[Problem]:
+    for index, name in enumerate(names):
+        base = re.sub(r"(_coded|_?\d+)$", "", name)
+        derived = base != name and (
+            base in taken or base == DUMMY or (name == f"{base}_coded" and base in names)
+        )
+        if name in taken or derived:
+            rule = (
+                "is a column of the results' tables: a factor takes another name, 'E' or 'friction' for one"
+            )
+            yield Problem(rule, repr(name), places.of(("factor", index, "name")))

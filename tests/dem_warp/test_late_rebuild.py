@@ -1,0 +1,61 @@
+"""Neighbour lists that a grain outruns: its world takes the steps again, or ends with the reason."""
+
+import pytest
+from worlds import assert_same_result, run_batch, small_case
+
+from dem_warp import batch, simulate, solver
+from dem_warp.rollback import Rollback
+
+
+@pytest.fixture(scope="module")
+def heap():
+    """The heap of a skin that nothing outruns."""
+    return simulate([small_case()], device="cpu", workers=1)[0]
+
+
+@pytest.fixture
+def restored(monkeypatch):
+    """Worlds that were taken back, in order."""
+    worlds, restore = [], Rollback.restore
+
+    def note(self, world):
+        worlds.append(world)
+        restore(self, world)
+
+    monkeypatch.setattr(batch.Rollback, "restore", note)
+    return worlds
+
+
+def test_a_world_that_outran_its_lists_takes_its_steps_again(heap, restored, monkeypatch):
+    # Cycles as long as the fastest grain takes for four skins: what falls outruns its list.
+    monkeypatch.setattr(solver, "SKIN_PER_CYCLE", 4.0)
+    [result] = simulate([small_case()], device="cpu", workers=1)
+    assert len(restored) > 1
+    assert_same_result(result, heap)
+
+
+def test_a_world_that_is_taken_back_changes_no_other(heap, restored, monkeypatch):
+    # The wide skin is hardly outrun: its world goes on while the other takes its steps again.
+    monkeypatch.setattr(solver, "SKIN_PER_CYCLE", 4.0)
+    cases = [small_case(), small_case(seed=2, skin=4e-3)]
+    results = run_batch(cases)
+    assert restored.count(0) > restored.count(1)
+    assert_same_result(results[0], heap)
+    assert_same_result(results[1], simulate(cases[1:], device="cpu", workers=1)[0])
+
+
+@pytest.mark.parametrize("skin", [3e-5, 1e-5, 1e-6])
+def test_no_skin_gives_another_heap(heap, skin):
+    [result] = simulate([small_case(skin=skin)], device="cpu", workers=1)
+    if result.status == "finished":
+        assert_same_result(result, heap)
+    else:
+        assert result.status == "failed"
+        assert "outran the neighbour lists within 2 steps" in result.reason
+        assert "raise the skin" in result.reason
+
+
+def test_a_skin_that_is_too_thin_is_never_finished():
+    # 0.5 m/s times two steps of some microseconds is more than the grains may come.
+    [result] = simulate([small_case(skin=1e-6)], device="cpu", workers=1)
+    assert result.status == "failed"

@@ -1,0 +1,134 @@
+"""Cases that cannot be, and checkpoints that were forged: each ends with its reason, and harms no other."""
+
+import io
+import json
+import math
+import zipfile
+from dataclasses import asdict, replace
+
+import numpy as np
+import pytest
+from worlds import SMALL_TUBE, assert_same_result, small_case
+
+from dem_warp import Case, simulate
+from dem_warp.batch import Batch
+from dem_warp.checkpoint import Checkpoints
+from dem_warp.reading import read_arrays
+from dem_warp.snapshot import COUNT, ENTRY, STEP, take_snapshot
+
+FEW = replace(SMALL_TUBE, grain_count=3)
+
+
+def few(**changes) -> Case:
+    return small_case(scene=replace(FEW, **changes))
+
+
+@pytest.fixture(scope="module")
+def alone():
+    return simulate([few()], device="cpu", workers=1)[0]
+
+
+IMPOSSIBLE = {
+    "skin": (small_case(skin=1000.0), "skin: lists of"),
+    "tall": (few(height=1.0e4, grain_count=None), "must hold at most"),
+    "narrow": (few(diameter=0.002), "the rain finds no free place"),
+    "many": (few(grain_count=10**9), "must hold at most 932,067 grains of 9 spheres"),
+    "fast": (few(rain_speed=100.0), "outran the neighbour lists"),
+}
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_case_that_cannot_be_fails_alone(alone, workers):
+    cases = [few(), *(case for case, _ in IMPOSSIBLE.values())]
+    [whole, *others] = simulate(cases, device="cpu", workers=workers)
+    assert_same_result(whole, alone)
+    for result, (name, (_, reason)) in zip(others, IMPOSSIBLE.items(), strict=True):
+        assert result.status == "failed", name
+        assert reason in result.reason
+
+
+def test_a_plate_that_all_grains_leave_has_no_heap():
+    grainless = few(tilt=math.radians(60.0), plate_diameter=0.02)
+    [result] = simulate([grainless], device="cpu", workers=1)
+    assert (result.status, len(result.positions)) == ("failed", 0)
+    assert "no grain is left on the plate" in result.reason
+
+
+@pytest.fixture
+def kept(tmp_path):
+    """A batch half-way, its checkpoints, and their folder."""
+    batch = Batch([few()], "cpu", Checkpoints(tmp_path, every=1e9))
+    for _ in range(3):
+        batch.advance()
+    return batch, Checkpoints(tmp_path)
+
+
+def forged(kept, name, change):
+    """Save a checkpoint with one array changed, as a program would that knows the format."""
+    batch, checkpoints = kept
+    snapshot = take_snapshot(batch.solver, 0)
+    snapshot[name] = np.array(snapshot[name])
+    change(snapshot[name])
+    checkpoints.save(batch.cases[0], batch.maker, batch.controllers[0].course, snapshot)
+    return checkpoints
+
+
+def put(value):
+    return lambda array: array.__setitem__((0,) * array.ndim, value)
+
+
+def put_field(name, value):
+    return lambda array: array[name].__setitem__((0,) * array.ndim, value)
+
+
+@pytest.mark.parametrize(
+    ("name", "change"),
+    [
+        (ENTRY, put(-1)),
+        (ENTRY, put(2**23 - 1)),
+        (ENTRY, put(2**30)),
+        (COUNT, put(-1)),
+        (COUNT, put(10**6)),
+        (STEP, put(-256)),
+        (STEP, put(255)),
+        ("grains.position", put(np.nan)),
+        ("grains.velocity", put(np.inf)),
+        ("neighbours.history", put(np.nan)),
+        ("world.walls", put_field("pair", 99)),
+        ("world.walls", put_field("kind", 3)),
+    ],
+)
+def test_a_forged_checkpoint_is_not_used(kept, alone, caplog, name, change):
+    checkpoints = forged(kept, name, change)
+    [result] = simulate([few()], device="cpu", workers=1, checkpoint=checkpoints.folder)
+    assert "starts afresh" in caplog.text
+    assert_same_result(result, alone)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"phase": "elsewhere"}, {"phase": 3}, {"surface": ["high"]}, {"observables": []}, {"mass": math.nan},
+     {"more": 1}],
+)  # fmt: skip
+def test_a_forged_course_is_not_used(kept, alone, caplog, change):
+    batch, checkpoints = kept
+    course = asdict(batch.controllers[0].course) | change
+    path = checkpoints.path(batch.cases[0])
+    record = json.dumps({"format": 1, "maker": batch.maker, "course": course}).encode()
+    path.parent.mkdir(exist_ok=True)
+    np.savez(path, **take_snapshot(batch.solver, 0), record=np.frombuffer(record, dtype=np.uint8))
+    [result] = simulate([few()], device="cpu", workers=1, checkpoint=checkpoints.folder)
+    assert "starts afresh" in caplog.text
+    assert_same_result(result, alone)
+
+
+def test_a_small_archive_takes_little_memory(tmp_path):
+    bomb, liar = tmp_path / "bomb.npz", tmp_path / "liar.npz"
+    np.savez_compressed(bomb, zeros=np.zeros(10**7))
+    few_numbers = io.BytesIO()
+    np.save(few_numbers, np.zeros(3))
+    with zipfile.ZipFile(liar, "w") as archive:
+        archive.writestr("few.npy", few_numbers.getvalue().replace(b"(3,), }      ", b"(3000000,), }"))
+    for path in (bomb, liar, tmp_path, tmp_path / "none"):
+        with pytest.raises(ValueError, match="must be a whole archive of arrays"):
+            read_arrays(path)

@@ -1,0 +1,155 @@
+"""Surfaces carried over to another process: recovered, honest about their errors, and well placed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from doe import (
+    DesignError,
+    Factor,
+    Sample,
+    Surface,
+    central_composite,
+    fit_surface,
+    transfer,
+    transfer_points,
+)
+
+E, F = Factor.around("E", 0.4, 0.1), Factor.around("F", 0.05, 0.02)
+DESIGN = central_composite((E, F), "rotatable", 5)
+LEVEL, SHIFT, SCALE = 28.5, -2.0, 0.9
+
+
+def truth(points: pd.DataFrame) -> np.ndarray:
+    x, y = (factor.to_coded(points[factor.name]).to_numpy() for factor in (E, F))
+    return 28.0 + 2.5 * x + 1.2 * y - 0.4 * x**2 + 0.2 * x * y
+
+
+def there(points: pd.DataFrame, noise: np.ndarray | float = 0.0) -> np.ndarray:
+    """Response of the other process."""
+    return LEVEL + SHIFT + SCALE * (truth(points) - LEVEL) + noise
+
+
+def source(noise: float, rng: np.random.Generator) -> Surface:
+    return fit_surface(DESIGN, truth(DESIGN.natural) + rng.normal(0.0, noise, len(DESIGN.coded)))
+
+
+def nearest(surface: Surface) -> dict[str, float]:
+    return dict(surface.nearest(LEVEL, extent=1.4))
+
+
+def test_shift_and_scale_are_recovered_from_runs_with_next_to_no_noise() -> None:
+    rng = np.random.default_rng(0)
+    surface = source(1e-5, rng)
+    runs = transfer_points(surface, nearest(surface), 6)
+    found = transfer(surface, runs, there(runs, rng.normal(0.0, 1e-5, 6)), LEVEL)
+    # A few standard errors of noise of 1e-5.
+    assert (found.shift, found.scale) == pytest.approx((SHIFT, SCALE), abs=1e-4)
+    points = pd.DataFrame({"E": [0.3, 0.45], "F": [0.06, 0.04]})
+    coded = np.column_stack([factor.to_coded(points[factor.name]) for factor in (E, F)])
+    assert found.evaluate(coded)[0] == pytest.approx(there(points), abs=1e-3)
+
+
+def test_the_polynomial_is_the_mean() -> None:
+    rng = np.random.default_rng(1)
+    surface = source(0.6, rng).reduce(0.05)
+    runs = transfer_points(surface, nearest(surface), 12)
+    found = transfer(surface, runs, there(runs, rng.normal(0.0, 0.7, 12)), LEVEL)
+    points = rng.uniform(-1.0, 1.0, (7, 2))
+    np.testing.assert_allclose(found.evaluate(points)[0], found.quadratic_form.value(points), rtol=1e-12)
+    point = found.nearest(LEVEL + found.shift)
+    coded = [[factor.to_coded(point[factor.name]) for factor in (E, F)]]
+    assert found.evaluate(coded)[0][0] == pytest.approx(LEVEL + found.shift, abs=1e-6)
+
+
+def test_without_an_error_of_the_surface_it_is_least_squares() -> None:
+    rng = np.random.default_rng(2)
+    surface = source(1e-9, rng)
+    runs = transfer_points(surface, nearest(surface), 10)
+    response = there(runs, rng.normal(0.0, 0.5, 10))
+    found = transfer(surface, runs, response, LEVEL, scale_sd=np.inf)
+    columns = np.column_stack([np.ones(10), truth(runs) - LEVEL])
+    expected, squares, *_ = np.linalg.lstsq(columns, response - LEVEL, rcond=None)
+    assert (found.shift, found.scale) == pytest.approx(tuple(expected), abs=1e-6)
+    assert found.noise == pytest.approx(np.sqrt(squares[0] / 8), rel=1e-3), "restricted likelihood: n - 2"
+
+
+def test_intervals_and_errors_hold_their_level() -> None:
+    rng, inside, misses, errors = np.random.default_rng(3), [], [], []
+    for _ in range(120):
+        surface = source(0.6, rng)
+        at = nearest(surface)
+        runs = transfer_points(surface, at, 12, extent=1.4)
+        found = transfer(surface, runs, there(runs, rng.normal(0.0, 0.7, 12)), LEVEL)
+        ends = found.intervals()
+        inside.append(
+            [ends["shift"][0] < SHIFT < ends["shift"][1], ends["scale"][0] < SCALE < ends["scale"][1]]
+        )
+        coded = [[factor.to_coded(at[factor.name]) for factor in (E, F)]]
+        mean, error = found.evaluate(coded)
+        misses.append(mean[0] - there(pd.DataFrame([at]))[0])
+        errors.append(error[0])
+    # 120 trials of .95: one of a thousand leaves .95 by .065.
+    assert np.mean(inside, axis=0) == pytest.approx(0.95, abs=0.07)
+    # A standard deviation of 120 values is known to 6.5 %.
+    assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(np.std(misses), rel=0.25)
+
+
+def test_the_region_of_the_carried_surface_holds_its_contour() -> None:
+    rng = np.random.default_rng(4)
+    surface = source(0.3, rng)
+    runs = transfer_points(surface, nearest(surface), 12)
+    found = transfer(surface, runs, there(runs, rng.normal(0.0, 0.3, 12)), LEVEL)
+    region = found.compatible_region(Sample(LEVEL + SHIFT, 0.3, 5), extent=1.4)
+    point = found.nearest(LEVEL + SHIFT, extent=1.4)
+    ranges = region.ranges
+    assert (ranges["low"] <= point).all()
+    assert (point <= ranges["high"]).all()
+
+
+def test_runs_that_tell_nothing_of_the_scale_leave_it_near_one() -> None:
+    rng = np.random.default_rng(8)
+    surface = source(0.6, rng)
+    runs = transfer_points(surface, nearest(surface), 6)
+    scales = [transfer(surface, runs, 26.0 + rng.normal(0.0, 5.0, 6), LEVEL).scale for _ in range(20)]
+    # A run of such noise says next to nothing against a standard deviation of a quarter about 1.
+    assert scales == pytest.approx([1.0] * 20, abs=0.25)
+
+
+def test_runs_lie_there_across_and_along_inside_the_box() -> None:
+    surface = source(1e-9, np.random.default_rng(5))
+    at = nearest(surface)
+    runs = transfer_points(surface, at, 7, step=0.5)
+    coded = np.column_stack([factor.to_coded(runs[factor.name]) for factor in (E, F)])
+    assert np.abs(coded).max() <= 1.0 + 1e-12
+    moves = coded - coded[0]
+    slope = surface.quadratic_form.gradient(coded[0])
+    np.testing.assert_allclose(moves[[0, 5]], 0.0, atol=1e-12)
+    assert (moves[1] @ slope > 0.0, moves[2] @ slope < 0.0) == (True, True)
+    assert moves[[3, 4]] @ slope == pytest.approx(0.0, abs=1e-9)
+    assert np.linalg.norm(moves[1:5], axis=1) == pytest.approx(0.5)
+
+
+def test_one_factor_has_no_direction_along_its_contour() -> None:
+    design = central_composite((E,), "face", 4)
+    noise = np.random.default_rng(7).normal(0.0, 0.1, len(design.coded))
+    surface = fit_surface(design, 28.0 + 2.0 * design.coded["E"] + noise)
+    runs = transfer_points(surface, {"E": 0.4}, 4, step=0.5)
+    assert list(runs["E"]) == pytest.approx([0.4, 0.45, 0.35, 0.4])
+
+
+@pytest.mark.parametrize(
+    ("runs", "response", "rule"),
+    [
+        (pd.DataFrame({"E": [0.4] * 3, "F": [0.05] * 3}), [1.0, 2.0, 3.0], "4 runs or more"),
+        (pd.DataFrame({"E": [0.4] * 4, "F": [0.05] * 4}), [1.0, 2.0, 3.0, 4.0], "where the surface differs"),
+        (pd.DataFrame({"E": [0.3, 0.4, 0.5, 0.4]}), [1.0, 2.0, 3.0, 4.0], "no column for factor 'F'"),
+        (pd.DataFrame({"E": [0.3, 0.4, 0.5, 0.4], "F": [0.05] * 4}), [1.0, 2.0, np.nan, 4.0], "finite"),
+        (pd.DataFrame({"E": [0.3, 0.4, 0.5, 0.4], "F": [0.05] * 4}), [1.0] * 4, "all the same"),
+    ],
+)
+def test_runs_that_tell_nothing_are_refused(runs: pd.DataFrame, response: list[float], rule: str) -> None:
+    with pytest.raises(DesignError, match=rule):
+        transfer(source(0.1, np.random.default_rng(6)), runs, response, LEVEL)

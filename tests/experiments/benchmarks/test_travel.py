@@ -1,0 +1,91 @@
+"""The proof that a card travels: its cards, its comparison on drawn truth, and that it goes on."""
+
+from __future__ import annotations
+
+import stat
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from experiments.benchmarks.travel import heaps as travel
+from experiments.benchmarks.travel.cards import CARDS, CODES, FRICTIONS, SHAPES, VOLUME
+from experiments.benchmarks.travel.heaps import OURS, Heap, run_theirs, stored_heaps
+from experiments.benchmarks.travel.travel_page import compare_cells, write_page
+
+PROGRAM = """\
+#!{python}
+import numpy as np
+# a cone of 30 degrees
+rng = np.random.default_rng(1)
+radius = 0.04 * np.sqrt(rng.random(20000))
+turn = 2 * np.pi * rng.random(20000)
+height = np.tan(np.radians(30.0)) * (0.04 - radius)
+with open("heap.dump", "w") as file:
+    print("ITEM: ATOMS id type x y z radius", file=file)
+    for i, (x, y, z) in enumerate(zip(radius * np.cos(turn), radius * np.sin(turn), height)):
+        print(i + 1, 1, x, y, z, 5e-4, file=file)
+"""
+
+
+def heap(code: str, laws: str, card: str, seed: int, angle: float | None) -> Heap:
+    return Heap(code, laws, card, seed, angle, 100, 0.01, 1.0, "" if angle else "no heap")
+
+
+def test_ten_cards_of_one_volume() -> None:
+    assert len(CARDS) == len(SHAPES) * len(FRICTIONS) == 10
+    for shape in SHAPES.values():
+        assert shape.volume == pytest.approx(VOLUME)
+    for card in CARDS.values():
+        assert len({card.case(code, 1).laws for code in CODES}) == len(CODES)
+
+
+def test_equal_means_are_equivalent_and_shifted_ones_are_not(tmp_path: Path) -> None:
+    rng = np.random.default_rng(4)
+    made = []
+    for card, shift in (("sphere-low", 0.0), ("rod-high", 2.0)):
+        made += [heap(OURS, "lammps", card, i, 20.0 + 0.2 * rng.normal()) for i in range(12)]
+        made += [heap("lammps", "lammps", card, i, 20.0 + shift + 0.2 * rng.normal()) for i in range(5)]
+    # heaps of other laws do not count, nor do those without an angle
+    made += [heap(OURS, "yade", "sphere-low", i, 30.0) for i in range(3)]
+    made += [heap("lammps", "lammps", "sphere-low", 9, None)]
+    cells = compare_cells(made).set_index("card")
+    assert list(cells["equivalent"]) == ["yes", "no"]
+    assert list(cells["n"]) == [5, 5]
+    assert cells.loc["rod-high", "difference"] == pytest.approx(-2.0, abs=0.5)
+    page = write_page(made, tmp_path).read_text(encoding="utf-8")
+    assert "1 of 2 cells are equivalent; 1 heaps are without an angle" in page
+    assert (tmp_path / "cells.csv").exists()
+
+
+def test_a_run_is_measured_stored_and_not_repeated(tmp_path: Path) -> None:
+    programs = tmp_path / "bin"
+    programs.mkdir()
+    program = programs / "liggghts"
+    program.write_text(PROGRAM.format(python=sys.executable), encoding="utf-8")
+    program.chmod(program.stat().st_mode | stat.S_IXUSR)
+    out = tmp_path / "out"
+    run_theirs(out, "liggghts", ["sphere-low"], [1, 2], 2, programs)
+    stored = stored_heaps(out)
+    assert [found.seed for found in stored] == [1, 2]
+    # the flank of a cone; spheres round off its apex and its foot
+    assert stored[0].angle == pytest.approx(30.0, abs=1.0)
+    program.unlink()
+    run_theirs(out, "liggghts", ["sphere-low"], [1, 2], 2, programs)
+    assert stored_heaps(out) == stored
+
+
+def test_a_run_without_a_heap_has_a_reason(tmp_path: Path) -> None:
+    programs = tmp_path / "bin"
+    programs.mkdir()
+    program = programs / "lmp"
+    program.write_text("#!/bin/sh\necho ERROR: lost\nexit 1\n", encoding="utf-8")
+    program.chmod(program.stat().st_mode | stat.S_IXUSR)
+    run_theirs(tmp_path, "lammps", ["rod-low"], [1], 1, programs)
+    [found] = stored_heaps(tmp_path)
+    assert found.angle is None
+    assert "ERROR: lost" in found.reason
+    assert replace(found, reason="") != found
+    assert travel.heap_file(tmp_path, "lammps", "lammps", "rod-low", 1).is_file()

@@ -1,0 +1,220 @@
+"""A bridge to another solver: corrected, verified, written as a card, and refused where it cannot be."""
+
+from __future__ import annotations
+
+import json
+import sys
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from typer.testing import CliRunner
+
+from doe import Factor, Sample, central_composite, fit_surface
+from experiments import api
+from experiments.bridge.crossing import cross
+from experiments.bridge.result import BridgeOutcome
+from experiments.bridge.source import Source, read_source
+from experiments.cli import app
+from experiments.studyfile import load_card, load_study
+
+CONES = Path(__file__).parents[1] / "engines" / "cone_program.py"
+COMMAND = f"'{sys.executable}' '{CONES}'"
+Write = Callable[..., Path]
+
+
+@pytest.fixture(scope="module")
+def card(tmp_path_factory: pytest.TempPathFactory, small_text: str) -> Path:
+    """A card that was calibrated on cones of 15 degrees and 30 more for a friction of 1; the target is 30."""
+    folder = tmp_path_factory.mktemp("card")
+    study = folder / "small.toml"
+    study.write_text(f'{small_text}\n[engine]\ncommand = "{COMMAND}"\nworkers = 2\n', encoding="utf-8")
+    api.calibrate(study, folder / "out", device="cpu")
+    return folder / "out" / "material.toml"
+
+
+def bridge(*words: object) -> tuple[int, str, str]:
+    result = CliRunner().invoke(app, ["bridge", *map(str, words)])
+    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
+    return result.exit_code, result.stdout, result.stderr
+
+
+def test_a_card_is_corrected_for_another_solver_and_verified_there(card: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    words = (card, "--command", f"{COMMAND} flatter", "--out", out, "--workers", 2)
+    code, text, said = bridge(*words, "--json")
+    assert code == 0, said
+    found = json.loads(text)
+    assert found["outcome"] == "met"
+    # Where the cones of the card stand at 30 degrees, those of the other solver stand at 12 + 33/2 = 28.5.
+    low, high = found["shift_interval"]
+    assert low - 0.2 < -1.5 < high + 0.2, "a cone laid out on half a millimetre reads some tenths off"
+    assert found["scale_interval"][0] < 1.1 < found["scale_interval"][1]
+    assert found["point"]["E"] == pytest.approx(found["card_point"]["E"] + 1.5 / 33.0, abs=0.015)
+    assert abs(found["fresh"]["difference"]) < 0.5
+    runs = pd.read_csv(out / "runs.csv")
+    assert runs["stage"].value_counts().to_dict() == {"bridge": 12, "verification": 5}
+    assert runs["seed"].is_unique
+
+    corrected = tomllib.loads((out / "material.toml").read_text())
+    assert corrected["bridge"]["runs"] == 17
+    friction = load_card(out / "material.toml").contact.grain_grain.static_friction
+    assert friction == pytest.approx(found["point"]["E"])
+    assert bridge(out / "material.toml", "--command", COMMAND)[0] == 2, (
+        "a corrected card is not corrected again"
+    )
+
+    log = out / "cases" / "runs.txt"
+    before = log.read_text()
+    assert bridge(*words, "--resume")[0] == 0
+    assert log.read_text() == before, "a bridge that goes on repeats no run"
+
+
+def test_the_card_holds_the_surface_that_was_fitted(card: Path) -> None:
+    source = read_source(card)
+    results = json.loads((card.parent / "results.json").read_text())["campaign"]
+    fitted = results["surface"]["responses"]["angle"]
+    surface = fitted["reduced"]
+    assert source.surface.coefficients.to_dict() == pytest.approx(surface["coefficients"], rel=1e-9)
+    assert source.surface.unselected.r2 == pytest.approx(fitted["full"]["r2"], rel=1e-9)
+    assert [factor.name for factor in source.study.factors] == ["E"]
+
+
+# ---- the course, with a solver that is a formula -----------------------------------------------------------
+
+MU = Factor.around("mu", 0.4, 0.08)
+ROLL = Factor.around("roll", 0.06, 0.02)
+
+
+@pytest.fixture
+def source(write_study: Write, tmp_path: Path) -> Source:
+    second = """
+[[factor]]
+name = "roll"
+label = "rolling"
+parameter = "contact.grain-grain.rolling_friction"
+low = 0.04
+high = 0.08
+"""
+    among = "rolling_friction = 0.05\n\n[contact.grain-wall]"
+    changes = (('name = "E"', 'name = "mu"'), (among, "\n[contact.grain-wall]"))
+    study = load_study(write_study(*changes, add=second))
+    design = central_composite((MU, ROLL), "rotatable", 5)
+    noise = np.random.default_rng(1).normal(0.0, 0.4, len(design.coded))
+    surface = fit_surface(design, truth(design.natural) + noise).reduce(0.05)
+    point = dict(surface.nearest(28.5, extent=1.4))
+    target = Sample(28.5, 0.5, 5)
+    return Source(tmp_path / "material.toml", {}, study, "angle", "angle", "deg", target, surface, point)
+
+
+def truth(points: pd.DataFrame) -> np.ndarray:
+    x, y = (factor.to_coded(points[factor.name]).to_numpy() for factor in (MU, ROLL))
+    return 28.0 + 2.5 * x + 1.2 * y - 0.4 * x**2
+
+
+def solver(shift: float, scale: float, fails: int = 0) -> Callable[[pd.DataFrame, str], pd.DataFrame]:
+    def run(table: pd.DataFrame, title: str) -> pd.DataFrame:
+        noise = [np.random.default_rng(seed).normal(0.0, 0.6) for seed in table["seed"]]
+        angle = 28.5 + shift + scale * (truth(table) - 28.5) + noise
+        failed = np.arange(len(table)) < fails
+        status = np.where(failed, "no-answer", "finished")
+        reason = np.where(failed, "no license was found", "")
+        return table.assign(angle=np.where(failed, np.nan, angle), status=status, reason=reason)
+
+    return run
+
+
+def test_ten_bridges_of_two_factors_meet_the_target_of_which_their_intervals_tell(source: Source) -> None:
+    misses, inside = [], []
+    for seed in range(10):
+        found = cross(source, solver(-1.8, 0.85), "a formula", 12, 5, 0.5, seed)
+        assert found.outcome == BridgeOutcome.MET
+        assert found.carried is not None
+        low, high = found.carried.intervals()["shift"]
+        inside.append(low < -1.8 < high)
+        there = 28.5 - 1.8 + 0.85 * (truth(pd.DataFrame([found.point])) - 28.5)
+        misses.append(float(there[0]) - 28.5)
+    # The noise of 12 runs leaves 0.6 / sqrt(12) = 0.17, and 0.3 with what shift and scale share.
+    assert np.sqrt(np.mean(np.square(misses))) < 0.5
+    assert sum(inside) >= 8, (
+        "of ten intervals of .95 two miss in one of eleven trials, three in one of ninety"
+    )
+
+
+def test_a_failed_run_is_left_out_and_too_many_end_the_bridge(source: Source) -> None:
+    found = cross(source, solver(-1.0, 1.0, fails=1), "a formula", 12, 5, 0.5, 1)
+    assert (found.outcome, found.carried.response.size) == (BridgeOutcome.MET, 10)
+    found = cross(source, solver(-1.0, 1.0, fails=4), "a formula", 12, 5, 0.5, 1)
+    assert found.outcome == BridgeOutcome.TOO_MANY_FAILED_RUNS
+    assert "2 of 6 runs gave the angle" in found.reason
+    assert "no license was found" in found.reason
+    assert (found.point, len(found.runs)) == (None, 6)
+
+
+def test_a_target_that_the_corrected_surface_does_not_reach_ends_the_bridge(source: Source) -> None:
+    found = cross(source, solver(-20.0, 0.3), "a formula", 12, 5, 0.5, 1)
+    assert found.outcome == BridgeOutcome.OUT_OF_REACH
+    assert "Widen the ranges of the factors" in found.reason
+    assert found.to_dict()["point"] is None
+
+
+def test_a_point_that_fresh_runs_do_not_confirm_is_missed(source: Source) -> None:
+    good = solver(-1.0, 1.0)
+
+    def drifting(table: pd.DataFrame, title: str) -> pd.DataFrame:
+        cases = good(table, title)
+        return cases.assign(angle=cases["angle"] - 4.0 * (title == "verification"))
+
+    found = cross(source, drifting, "a formula", 12, 5, 0.5, 1)
+    assert found.outcome == BridgeOutcome.MISSED
+    assert "not within 0.50 deg plus noise" in found.reason
+
+
+# ---- bad input ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ((), "a bridge leads to another solver"),
+        (("--engine", "rocky"), "must be one of"),
+        (("--engine", "liggghts", "--command", "x"), "by its name or by its command"),
+        (("--command", "no-such-solver"), "must begin with a program"),
+        (("--command", COMMAND, "--runs", 3), "6 runs or more"),
+        (("--command", COMMAND, "--fresh", 1), "2 fresh runs or more"),
+        (("--command", COMMAND, "--margin", 0), "must be a positive number"),
+        (("--command", COMMAND, "--time-limit", "10 furlongs"), "needs a unit of time"),
+    ],
+)
+def test_a_wrong_order_ends_with_code_2_and_leaves_nothing(
+    card: Path, tmp_path: Path, words: tuple[object, ...], said: str
+) -> None:
+    code, _, err = bridge(card, *words, "--out", tmp_path / "out")
+    assert (code, (tmp_path / "out").exists()) == (2, False)
+    assert said in " ".join(err.split())
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("format = 1\n", "says which test it was fitted to"),
+        ("[fitted.test.hopper]\noutlet = 1\n", "a material card has the tables"),
+    ],
+)
+def test_a_file_that_is_no_card_is_refused(tmp_path: Path, text: str, said: str) -> None:
+    (tmp_path / "material.toml").write_text(text)
+    code, _, err = bridge(tmp_path / "material.toml", "--command", COMMAND)
+    assert code == 2
+    assert said in " ".join(err.split())
+
+
+def test_a_card_without_its_surface_is_refused(card: Path, tmp_path: Path) -> None:
+    text = card.read_text()
+    start = text.index("[surface.angle]")
+    (tmp_path / "material.toml").write_text(text[:start] + text[text.index("[material.grain]") :])
+    code, _, err = bridge(tmp_path / "material.toml", "--command", COMMAND)
+    assert code == 2
+    assert "a bridge corrects the surface of one response" in " ".join(err.split())

@@ -1,0 +1,58 @@
+"""Factors and the columns of tables: no name has two meanings."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from experiments.calibrate import Campaign
+from experiments.errors import StudyError
+from experiments.studyfile import Study, load_study
+from experiments.studyfile.reserved_names import RESERVED
+
+NAMED = ("seed", "run", "stage", "replicate", "step", "scene", "angle", "status", "case_key")
+"""Names that once spoilt a table, or ended a run without a word."""
+
+
+def with_factor(write_study: Callable[..., Path], name: str) -> Study:
+    return load_study(write_study(('name = "E"', f'name = "{name}"')))
+
+
+@pytest.mark.parametrize(
+    "name", [*NAMED, "solid_fraction", "fill_height", "height", "model", "angle_1", "dummy2"]
+)
+def test_a_factor_cannot_have_the_name_of_a_column(write_study: Callable[..., Path], name: str) -> None:
+    with pytest.raises(StudyError, match=rf"factor\[1\]\.name: is a column .*'{name}'"):
+        with_factor(write_study, name)
+
+
+def test_a_factor_cannot_have_the_name_of_a_response_or_of_a_coded_factor(
+    write_study: Callable[..., Path],
+) -> None:
+    further = '[[response]]\nobservable = "solid_fraction"\nname = "packing"\nmean = 0.6\nsd = 0.01\nn = 3\n'
+    with pytest.raises(StudyError, match="is a column"):
+        load_study(write_study(('name = "E"', 'name = "packing"'), add=further))
+    second = (
+        '[[factor]]\nname = "E_coded"\nlabel = "rolling"\nparameter = "contact.grain-wall.static_friction"\n'
+        "low = 0.1\nhigh = 0.3\n"
+    )
+    with pytest.raises(StudyError, match=r"factor\[2\]\.name: is a column"):
+        load_study(write_study(("static_friction = 0.4\n", ""), add=second))
+
+
+@pytest.mark.parametrize("name", ["E", "friction", "mu_2", "Seed", "seeds"])
+def test_any_other_name_will_do(write_study: Callable[..., Path], name: str) -> None:
+    assert with_factor(write_study, name).factors[0].name == name
+
+
+def test_the_reserved_names_are_those_of_the_tables(campaign: Campaign, study: Study) -> None:
+    beside = {"cases", "climb", "contour", "surface_design", "verification"}
+    factors = {factor.name for factor in campaign.factors}
+    responses = {response.name for response in campaign.responses}
+    taken = RESERVED | factors | responses | set(study.scene.observables)
+    for name in beside:
+        columns = {re.sub(r"_coded$", "", column) for column in campaign.tables()[name]}
+        assert columns <= taken, name
