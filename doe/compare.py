@@ -150,9 +150,9 @@ def compare_means(
         Difference that does not matter: asks for the equivalence test (TOST).
     method : {"welch", "pooled", "guarded", "one-sample"}
         Welch's t with two variances; Student's t with one variance for both, whose level is wrong where they
-        differ (a test of equivalence at .05 may have .15 with 4 and 12 values); as Welch's, with the critical
-        value raised so that the level holds for 2 or 3 values too (``doe.two_errors``: Welch's becomes .12
-        with 2 and 12); a against the number b.
+        differ (a test of equivalence at .05 may have .15 with 4 and 12 values); the rule of
+        ``doe.two_errors``, whose level holds for few values too (at most .0575 for .05, where Welch's becomes
+        .12 with 2 and 12); a against the number b.
     alpha : float
         Level of the tests; 1 - alpha that of the interval. With a margin below .5.
 

@@ -119,8 +119,8 @@ def compatible_region(
 
     A setting belongs when |mean - target| <= c sqrt(se_fit^2 + se_target^2), with c from the degrees of
     freedom of both errors and their shares (``doe.two_errors``). So the true setting belongs with probability
-    1 - alpha at least, where the model holds: .946 to .961 for .95 with 4 measurements or more, up to .972
-    with 3 and .988 with 2. Of a surface whose terms the data chose (``doe.Surface.reduce``) it is the model
+    1 - alpha, where the model holds: .94 to .96 for .95 with 3 measurements or more; with 2 at least .94, up
+    to .98. Of a surface whose terms the data chose (``doe.Surface.reduce``) it is the model
     before the choice that counts.
 
     Parameters

@@ -43,6 +43,8 @@ def central_composite(
     resolution V, so that 5 factors take 16 corners), the axial points -alpha and +alpha of each factor, the
     center runs. With blocks, each block's center runs stand behind it.
 
+    Own code: pyDOE3 1.6.2 has all corners always (50 runs with 5 factors, where 32 do), and no blocks.
+
     Parameters
     ----------
     factors : iterable of Factor

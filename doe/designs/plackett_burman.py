@@ -27,8 +27,8 @@ def plackett_burman(factors: Iterable[Factor], runs: int | None = None, seed: in
     which an interaction of the factors falls least onto another factor. The design's ``notes`` say how much
     that is, and where a design in the same number of runs keeps main effects and interactions apart.
 
-    Own code: pyDOE3 1.6 builds every size above 24 by doubling, which in 40 and 56 runs lays interactions
-    wholly onto factors.
+    Own code: pyDOE3 1.6.2 refuses 28, 36, 44, 52 and 56 runs, and lays interactions wholly onto factors in 24
+    and 48.
 
     Parameters
     ----------

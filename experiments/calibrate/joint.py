@@ -72,7 +72,7 @@ def _agreement(joint: JointFit, point: Mapping[str, float]) -> Decision:
                 " No setting that the design explored agrees with all: fix surface.center nearer to where "
                 "they might, widen surface.half_range, or look for a mechanism that the model lacks."
             )
-    level = joint.alpha / len(joint.goals)
+    level = joint.level(point)
     rule = "A response agrees when its fit at the chosen point differs from its target with p >= "
     return Decision(STAGE, f"{rule}{level:.3g}.", numbers, outcome)
 

@@ -67,7 +67,7 @@ def _compared(sizes: tuple[int, int], ratio: float, number: int) -> Iterator[Fig
 
 def _worst(sizes: tuple[int, int]) -> Figure:
     """Return the largest level of the guarded test over all ratios of the variances, by quadrature."""
-    worst = TwoErrors(sizes[0] - 1.0, sizes[1] - 1.0).worst_level(0.05)
+    _, worst = TwoErrors(sizes[0] - 1.0, sizes[1] - 1.0).extreme_levels(0.05)
     text = f"n = {sizes[0]} and {sizes[1]}, worst ratio (quadrature)"
     return Figure("compare_means, guarded", text, 0.05, AT_MOST, worst, TRIALS)
 
