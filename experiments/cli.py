@@ -27,12 +27,13 @@ from experiments.commands.export import EXPORT_EXAMPLE, export
 from experiments.commands.new import NEW_EXAMPLE, new
 from experiments.commands.options import (
     AsJson,
+    Cluster,
     Device,
-    Devices,
     EngineName,
     Out,
     Resume,
     Scale,
+    Scheduler,
     StudyFile,
     Workers,
     assignments,
@@ -75,6 +76,8 @@ def calibrate(
     scale: Scale = None,
     device: Device = None,
     workers: Workers = None,
+    scheduler: Scheduler = None,
+    cluster: Cluster = None,
     engine: EngineName = None,
     resume: Resume = False,
     follow_paper: Annotated[
@@ -90,23 +93,26 @@ def calibrate(
     with clear_errors():
         check_study_file(study, scale)
         from experiments import api
-        from experiments.runs.choices import chosen_device, chosen_study, default_folder
+        from experiments.runs.choices import chosen_resources, chosen_study, default_folder, resources_for
 
-        device = chosen_device(device)
-        chosen = chosen_study(study, scale, device)
+        resources = chosen_resources(device, workers, scheduler, cluster)
+        chosen = chosen_study(study, scale, resources)
         folder = out or default_folder(chosen)
     go_on = Attempt.of(
-        "calibrate", study, out=folder, scale=chosen.scale, device=device, workers=workers, engine=engine,
+        "calibrate", study, out=folder, scale=chosen.scale, device=device, workers=workers,
+        scheduler=scheduler, cluster=cluster, engine=engine,
         follow_paper=follow_paper, only_paper=only_paper,
         paper_replicates=paper_replicates if follow_paper or only_paper else None, json=as_json,
     )  # fmt: skip
     with clear_errors(go_on):
-        print_study(chosen, device)
+        print_study(chosen, resources_for(chosen, resources))
         ended = api.calibrate(
             chosen,
             folder,
             device=device,
             workers=workers,
+            scheduler=scheduler,
+            cluster=cluster,
             engine=engine,
             resume=resume,
             published_replicates=paper_replicates if follow_paper or only_paper else 0,
@@ -144,8 +150,10 @@ def discover(
     ] = False,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the bootstraps and of the fresh runs.")] = 1,
     scale: Scale = None,
-    device: Devices = None,
+    device: Device = None,
     workers: Workers = None,
+    scheduler: Scheduler = None,
+    cluster: Cluster = None,
     engine: EngineName = None,
     resume: Resume = False,
     as_json: AsJson = False,
@@ -155,17 +163,18 @@ def discover(
         check_study_file(study, scale)
         from experiments import api
         from experiments.report.discovery import results_of, verdict_line
-        from experiments.runs.choices import chosen_device, chosen_study, default_folder
+        from experiments.runs.choices import chosen_resources, chosen_study, default_folder, resources_for
 
-        device = chosen_device(device, several=True)
-        chosen = chosen_study(study, scale, device)
+        resources = chosen_resources(device, workers, scheduler, cluster)
+        chosen = chosen_study(study, scale, resources)
         folder = out or default_folder(chosen, "discover")
     go_on = Attempt.of(
         "discover", study, measured, out=folder, bank=bank, photographs_only=photographs_only, scale=scale,
-        device=device, workers=workers, seed=seed, engine=engine, json=as_json,
+        device=device, workers=workers, scheduler=scheduler, cluster=cluster, seed=seed, engine=engine,
+        json=as_json,
     )  # fmt: skip
     with clear_errors(go_on):
-        print_study(chosen, device)
+        print_study(chosen, resources_for(chosen, resources))
         ended = api.discover(
             chosen,
             measured,
@@ -175,6 +184,8 @@ def discover(
             seed=seed,
             device=device,
             workers=workers,
+            scheduler=scheduler,
+            cluster=cluster,
             engine=engine,
             resume=resume,
             watch=CaseProgress,
@@ -202,6 +213,8 @@ def heap(
     out: Out = None,
     scale: Scale = None,
     device: Device = None,
+    scheduler: Scheduler = None,
+    cluster: Cluster = None,
     engine: EngineName = None,
     as_json: AsJson = False,
 ) -> None:
@@ -212,17 +225,18 @@ def heap(
     """
     with clear_errors():
         check_study_file(study, scale)
-        from experiments.cases import require_unused, simulate_heap, with_engine, write_heap
-        from experiments.runs.choices import chosen_device, chosen_study, default_folder
+        from experiments.cases import open_workers, require_unused, simulate_heap, with_engine, write_heap
+        from experiments.runs.choices import chosen_resources, chosen_study, default_folder, resources_for
         from experiments.studyfile.campaign import TARGET_SCENE
 
-        device = chosen_device(device)
-        chosen = with_engine(chosen_study(study, scale, device), engine)
+        resources = chosen_resources(device, 1, scheduler, cluster)
+        chosen = with_engine(chosen_study(study, scale, resources), engine)
         values = chosen.natural_settings(assignments(settings or []), "--set")
         folder = out or default_folder(chosen, f"{scene or 'heap'}-{seed}")
         require_unused(folder)
-        with CaseProgress(scene or "heap") as progress:
-            simulated = simulate_heap(chosen, values, seed, device, progress, scene or TARGET_SCENE)
+        resources = resources_for(chosen, resources)
+        with open_workers(resources) as crew, CaseProgress(scene or "heap") as progress:
+            simulated = simulate_heap(chosen, values, seed, crew, progress, scene or TARGET_SCENE)
         write_heap(simulated, folder)
     if as_json:
         typer.echo(json.dumps(simulated.to_dict(), allow_nan=False))

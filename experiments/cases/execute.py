@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import math
-import os
 import shutil
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -12,9 +11,11 @@ from typing import Any
 
 import pandas as pd
 
-from dem_warp import Case, CaseResult, Progress, simulate
+from dem_warp import Case, CaseResult, Progress
 from experiments.cases.engine import NO_ANSWER
 from experiments.cases.store import Store
+from experiments.cases.workers.own import THIS_MACHINE
+from experiments.cases.workers.workers import Workers
 from experiments.errors import StudyError
 from experiments.measurement.observables import ANGLE
 from experiments.measurement.states import Observed, observe
@@ -31,8 +32,7 @@ def run_cases(
     study: Study,
     table: pd.DataFrame,
     store: Store,
-    device: str | None = None,
-    workers: int | None = None,
+    workers: Workers = THIS_MACHINE,
     progress: Callable[[Progress], None] | None = None,
 ) -> pd.DataFrame:
     """Simulate every case of a table that is not stored yet, all at once, and measure every heap.
@@ -50,8 +50,10 @@ def run_cases(
         what another program gave no valid answer to is not saved, and so tried again by the next run. A run
         that the machine ends raises, and leaves no result of what was running. Checkpoints of the running
         cases are kept there too: what an interrupted run had begun goes on where it was.
-    device, workers, progress
-        As of `dem_warp.simulate`.
+    workers
+        Workers that simulate; left out: this machine's own.
+    progress
+        Called with the progress now and then.
 
     Returns
     -------
@@ -75,8 +77,8 @@ def run_cases(
         leaves_a_heap = study.scenes[scenes[key]].leaves_a_heap
         return _outcome(result.status, observe(study.measurement, result, leaves_a_heap))
 
-    with ThreadPoolExecutor(max_workers=workers or os.cpu_count()) as pool:
-        outcomes = _simulate_missing(by_key, store, pool, measure, device, workers, progress)
+    with ThreadPoolExecutor(max_workers=workers.helpers) as pool:
+        outcomes = _simulate_missing(by_key, store, pool, measure, workers, progress)
         for key in by_key.keys() - outcomes.keys():
             outcomes[key] = pool.submit(lambda key: measure(key, store.load(key)), key)
         rows = [
@@ -123,8 +125,7 @@ def _simulate_missing(
     store: Store,
     pool: ThreadPoolExecutor,
     measure: Callable[[str, CaseResult], dict[str, Any]],
-    device: str | None,
-    workers: int | None,
+    workers: Workers,
     progress: Callable[[Progress], None] | None,
 ) -> dict[str, Future[dict[str, Any]]]:
     """Simulate what the store lacks, in one call; save each result as it finishes, and measure it.
@@ -144,15 +145,8 @@ def _simulate_missing(
         outcomes[key] = pool.submit(measure, key, result)
 
     if missing:
-        run = store.engine or simulate
-        run(
-            [cases[key] for key in missing],
-            device=device,
-            workers=workers,
-            on_result=keep,
-            on_progress=progress,
-            checkpoint=store.unfinished,
-        )
+        chosen = [cases[key] for key in missing]
+        workers.simulate(chosen, store.engine, keep, progress, store.unfinished)
         shutil.rmtree(store.unfinished, ignore_errors=True)
     return outcomes
 

@@ -12,7 +12,9 @@ from typing import Any
 import numpy as np
 
 from dem_warp import CaseResult, Progress
-from experiments.cases.engines import simulator_of
+from experiments.cases.engines import engine_of
+from experiments.cases.workers.own import THIS_MACHINE
+from experiments.cases.workers.workers import Workers
 from experiments.files import replacing, write_text
 from experiments.measurement.observables import observables_of
 from experiments.measurement.states import Observed, observe
@@ -83,7 +85,7 @@ def simulate_heap(
     study: Study,
     settings: Mapping[str, float],
     seed: int,
-    device: str | None = None,
+    workers: Workers = THIS_MACHINE,
     progress: Callable[[Progress], None] | None = None,
     scene: str = TARGET_SCENE,
 ) -> Heap:
@@ -96,8 +98,8 @@ def simulate_heap(
     StudyError
         When there is no such factor or scene, or a value leaves what is physical.
     """
-    run, case = simulator_of(study), study.case(settings, seed, scene)
-    [result] = run([case], device=device, workers=1, on_progress=progress)
+    case = study.case(settings, seed, scene)
+    [result] = workers.simulate([case], engine_of(study), on_progress=progress)
     values = {factor.name: settings.get(factor.name, factor.center) for factor in study.factors}
     observed = observe(study.measurement, result, study.scenes[scene].leaves_a_heap)
     return Heap(study, values, seed, result, observed, scene)

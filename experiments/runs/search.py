@@ -13,9 +13,10 @@ from typing import Any
 from dem_warp import Progress
 from dem_warp.version import source_commit
 from doe.discrepancy import Bank, Discovery, Fit, Measured, Outcomes, Point, drive
-from experiments.cases import engine_of, open_folder, require_unused
+from experiments.cases import Workers, engine_of, open_folder, require_unused
 from experiments.cases.folder import locked
 from experiments.cases.outputs import publishing, sha256_of
+from experiments.cases.workers.own import THIS_MACHINE
 from experiments.discover.engine import EngineSimulator
 from experiments.discover.maker import fingerprint_of, maker_of_today
 from experiments.discover.outcome_table import OutcomeTable
@@ -45,8 +46,7 @@ class Job:
     folder: Path
     bank: Path | None = None
     photographs_only: bool = False
-    device: str | None = None
-    workers: int | None = None
+    workers: Workers = THIS_MACHINE
     seed: int = 1
 
 
@@ -66,9 +66,7 @@ class _Watched:
 
     def __init__(self, search: Search, job: Job, watch: Watch) -> None:
         table = OutcomeTable(job.folder / OUTCOMES)
-        self.engine = EngineSimulator(
-            search.study, search.library, table, job.device, job.workers, progress=self._report
-        )
+        self.engine = EngineSimulator(search.study, search.library, table, job.workers, self._report)
         self.observables = self.engine.observables
         self.title = "library waves"
         self.waves: list[dict[str, Any]] = []
@@ -192,8 +190,7 @@ def _point(fit: Fit, condition: str, seed: int) -> Point:
 
 def _provenance(job: Job, bank: Bank, waves: Sequence[dict[str, Any]]) -> dict[str, Any]:
     return {
-        "device": job.device,
-        "workers": job.workers,
+        **job.workers.described,
         "commit": source_commit(),
         "engine": fingerprint_of(engine_of(job.study)),
         "bank": dict(bank.maker) or None,
