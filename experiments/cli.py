@@ -6,6 +6,7 @@ Imports of the simulator, the statistics and the pictures are inside the command
 from __future__ import annotations
 
 import json
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -22,6 +23,7 @@ from experiments.commands.console import (
     fail,
     messages,
 )
+from experiments.commands.doctor import DOCTOR_EXAMPLE, doctor
 from experiments.commands.early import check_study_file
 from experiments.commands.export import EXPORT_EXAMPLE, export
 from experiments.commands.new import NEW_EXAMPLE, new
@@ -29,6 +31,7 @@ from experiments.commands.options import (
     AsJson,
     Cluster,
     Device,
+    DryRun,
     EngineName,
     Out,
     Resume,
@@ -38,6 +41,7 @@ from experiments.commands.options import (
     Workers,
     assignments,
 )
+from experiments.commands.plans import show_plan
 from experiments.commands.results import print_measured, print_study, show_stage
 
 app = typer.Typer(
@@ -80,6 +84,7 @@ def calibrate(
     cluster: Cluster = None,
     engine: EngineName = None,
     resume: Resume = False,
+    dry_run: DryRun = False,
     follow_paper: Annotated[
         bool, typer.Option("--follow-paper", help="Simulate the paper's own runs too, and set them beside.")
     ] = False,
@@ -98,6 +103,13 @@ def calibrate(
         resources = chosen_resources(device, workers, scheduler, cluster)
         chosen = chosen_study(study, scale, resources)
         folder = out or default_folder(chosen)
+        if dry_run:
+            from experiments.runs.campaign import check_runs
+            from experiments.runs.plan import plan_calibration
+
+            checked, used = check_runs(chosen), resources_for(chosen, resources)
+            show_plan(used, partial(plan_calibration, checked, used), as_json)
+            return
     go_on = Attempt.of(
         "calibrate", study, out=folder, scale=chosen.scale, device=device, workers=workers,
         scheduler=scheduler, cluster=cluster, engine=engine,
@@ -156,6 +168,7 @@ def discover(
     cluster: Cluster = None,
     engine: EngineName = None,
     resume: Resume = False,
+    dry_run: DryRun = False,
     as_json: AsJson = False,
 ) -> None:
     """Find the effect that a model lacks: calibrate, test the gap, name what explains it, show it closed."""
@@ -168,6 +181,15 @@ def discover(
         resources = chosen_resources(device, workers, scheduler, cluster)
         chosen = chosen_study(study, scale, resources)
         folder = out or default_folder(chosen, "discover")
+        if dry_run:
+            from experiments.runs.plan import plan_search
+            from experiments.runs.search import Job, known_bank
+
+            used = resources_for(chosen, resources)
+            has_bank = known_bank(Job(chosen, measured, folder, bank)) is not None
+            plan = partial(plan_search, chosen, used, has_bank=has_bank, analysed=measured is not None)
+            show_plan(used, plan, as_json)
+            return
     go_on = Attempt.of(
         "discover", study, measured, out=folder, bank=bank, photographs_only=photographs_only, scale=scale,
         device=device, workers=workers, scheduler=scheduler, cluster=cluster, seed=seed, engine=engine,
@@ -216,6 +238,7 @@ def heap(
     scheduler: Scheduler = None,
     cluster: Cluster = None,
     engine: EngineName = None,
+    dry_run: DryRun = False,
     as_json: AsJson = False,
 ) -> None:
     """Simulate one heap: heap.vtp (ParaView), snapshot.png with the fitted flanks, angle.json.
@@ -233,6 +256,12 @@ def heap(
         chosen = with_engine(chosen_study(study, scale, resources), engine)
         values = chosen.natural_settings(assignments(settings or []), "--set")
         folder = out or default_folder(chosen, f"{scene or 'heap'}-{seed}")
+        if dry_run:
+            from experiments.runs.plan import plan_heap
+
+            used, case = resources_for(chosen, resources), chosen.case(values, seed, scene or TARGET_SCENE)
+            show_plan(used, partial(plan_heap, chosen, used, case=case), as_json)
+            return
         require_unused(folder)
         resources = resources_for(chosen, resources)
         with open_workers(resources) as crew, CaseProgress(scene or "heap") as progress:
@@ -252,6 +281,7 @@ app.command(epilog=CLUMP_EXAMPLE)(clump)
 app.command(epilog=NEW_EXAMPLE)(new)
 app.command(epilog=EXPORT_EXAMPLE)(export)
 app.command(epilog=BRIDGE_EXAMPLE)(bridge)
+app.command(epilog=DOCTOR_EXAMPLE)(doctor)
 
 
 def main() -> None:

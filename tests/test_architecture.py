@@ -44,6 +44,7 @@ LAYERS = {
 }  # fmt: skip
 
 DISTRIBUTIONS = {
+    "dask_jobqueue": "dask-jobqueue",
     "PIL": "pillow",
     "cv2": "opencv-python-headless",
     "pillow_heif": "pillow-heif",
@@ -53,6 +54,7 @@ DISTRIBUTIONS = {
 COMES_WITH = {
     "annotated_types": "pydantic",
     "contourpy": "matplotlib",
+    "dask": "distributed",
     "markupsafe": "jinja2",
     "pydantic_core": "pydantic",
     "threadpoolctl": "scikit-learn",

@@ -101,7 +101,7 @@ def run_search(job: Job, resume: bool = False, watch: Watch = lambda title: null
         require_unused(job.folder, "; --resume goes on in it")
     companion, search = companion_of(job.study), Search.of(job.study)
     terms = Terms.of(search.library, OBSERVABLES, job.study.factor_sections)
-    bank = _known_bank(job, search)
+    bank = known_bank(job)
     measured = _measured(job)
     for note in measured.notes if measured else ():
         _log.warning("The data: %s", note)
@@ -168,8 +168,15 @@ def heaps_side_by_side(
     return [picture for picture in taken if picture is not None] + drawn
 
 
-def _known_bank(job: Job, search: Search) -> Bank | None:
-    """The bank that is named, that of the folder, or that which lies beside the study; None: to be made."""
+def known_bank(job: Job) -> Bank | None:
+    """Read the bank that is named, that of the folder, or that beside the study; None: it is to be made.
+
+    Raises
+    ------
+    InputError
+        When it is no bank, or that of another study.
+    """
+    search = Search.of(job.study)
     beside = job.study.file.with_name(f"bank-{job.study.scale}.npz" if job.study.scale else BANK)
     if job.bank is not None:
         return search.read_bank(job.bank)

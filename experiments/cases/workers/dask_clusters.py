@@ -30,7 +30,7 @@ def start_processes(gpus: list[str], count: int) -> SpecCluster:
 
     common = {"host": "127.0.0.1", "protocol": "tls://", "security": Security.temporary()}
     common |= {"dashboard": False}
-    options = common | {"nthreads": 1, "memory_limit": 0}
+    options = common | {"nthreads": 1, "memory_limit": 0, "silence_logs": logging.CRITICAL}
     workers = {
         number: {"cls": Nanny, "options": options | {"env": {"CUDA_VISIBLE_DEVICES": seen}}}
         for number, seen in enumerate(visible(gpus) or [""] * count)

@@ -47,10 +47,11 @@ def open_workers(resources: Resources) -> Iterator[Workers]:
         return
     require_dask()
     import dask
+    import distributed
 
     with ExitStack() as stack, dask.config.set(SETTINGS), warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        logging.getLogger("distributed").setLevel(logging.CRITICAL)
+        logging.getLogger(distributed.__name__).setLevel(logging.CRITICAL)
         yield _opened(resources, stack)
 
 
@@ -62,9 +63,15 @@ def require_dask() -> None:
     InputError
         With the command that installs it.
     """
-    if missing := [name for name in ("distributed", "dask_jobqueue") if find_spec(name) is None]:
+    if missing := missing_libraries():
         names = ", ".join(missing)
-        raise InputError(f"several workers need Dask: {EXTRA}", f"{names}: not installed", "workers")
+        raise InputError(f"several workers need Dask: {EXTRA}", f"not installed: {names}", "workers")
+
+
+def missing_libraries() -> list[str]:
+    """Name what clusters need and is not installed."""
+    needed = ("distributed", "dask_jobqueue", "cryptography")
+    return [name for name in needed if find_spec(name) is None]
 
 
 def _opened(resources: Resources, stack: ExitStack) -> Workers:
