@@ -52,9 +52,7 @@ Out = Annotated[Path | None, typer.Option(help="Folder of the results, new or em
 Resume = Annotated[bool, typer.Option("--resume", help="Go on in the folder of an earlier run.")]
 DryRun = Annotated[
     bool,
-    typer.Option(
-        "--dry-run", help="Show cases, grains, steps, time, memory and disk; run and write nothing."
-    ),
+    typer.Option("--dry-run", help="Show cases, grains, steps, time, memory and disk, and run nothing."),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Write the result to standard output as JSON.")]
 

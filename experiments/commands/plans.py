@@ -38,10 +38,9 @@ def show_plan(resources: Resources, planned: Callable[[Speed], Plan], as_json: b
         numbers = (f"{wave.cases:,}", f"{wave.most:,}", f"{wave.grains:,}", f"{wave.steps:,}")
         table.add_row(wave.name, *numbers, duration(wave.seconds), duration(wave.seconds_most))
     Console(markup=False).print(table)
-    numbers = plan.to_dict()
     typer.echo(
-        f"In all {numbers['cases']:,} cases, at most {numbers['most']:,}: {duration(numbers['seconds'])}, at most "
-        f"{duration(numbers['seconds_most'])}"
+        f"In all {plan.cases:,} cases, at most {plan.most:,}: {duration(plan.seconds)}, at most "
+        f"{duration(plan.seconds_most)}"
     )
     what = "of each GPU" if plan.on_gpu else "of this machine"
     if resources.submits_jobs:

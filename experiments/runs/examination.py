@@ -17,6 +17,7 @@ from dem_warp.device import resolve_device
 from experiments.cases import Resources
 from experiments.cases.workers.opening import EXTRA, missing_libraries
 from experiments.cases.workers.speed import Speed, few_spheres, stored_speed
+from imaging.opengl import opengl_works
 
 
 @dataclass(frozen=True)
@@ -46,7 +47,7 @@ def examine(resources: Resources) -> list[Finding]:
         _memory(),
         _kernels(),
         _tried("simulation", _simulates, needed=True),
-        _tried("OpenGL", _draws),
+        _opengl(),
         _dask(),
         Finding(
             "will be used", True, f"{resources}, at the scale {'paper' if resources.on_gpu else 'bench'}"
@@ -70,7 +71,7 @@ def _gpus() -> list[Finding]:
     return [
         Finding(
             str(gpu.alias), True,
-            f"{gpu.name}, {gpu.free_memory / 1e9:.3g} of {gpu.total_memory / 1e9:.3g} GB free, CUDA driver {driver}",
+            f"{gpu.name}, {gpu.free_memory / 1e9:.3g} of {gpu.total_memory / 1e9:.3g} GB free, driver {driver}",
         )
         for gpu in gpus
     ]  # fmt: skip
@@ -117,17 +118,10 @@ def _simulates() -> str:
     return f"a heap of 30 spheres on {result.provenance['device']} came to rest"
 
 
-def _draws() -> str:
-    # PyVista is slow to import and absent on some machines that only calibrate.
-    import pyvista
-
-    plotter = pyvista.Plotter(off_screen=True, window_size=(16, 16))
-    try:
-        plotter.add_mesh(pyvista.Sphere())
-        plotter.show(auto_close=False)
-        return f"draws ({pyvista.GPUInfo().renderer})"
-    finally:
-        plotter.close()
+def _opengl() -> Finding:
+    if opengl_works():
+        return Finding("OpenGL", True, "draws off screen")
+    return Finding("OpenGL", False, "does not draw off screen: silhouettes are drawn without it, more slowly")
 
 
 def _dask() -> Finding:

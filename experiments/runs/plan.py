@@ -73,13 +73,30 @@ class Plan:
     """Size of the stored cases and pages [bytes]."""
     on_gpu: bool
 
+    @property
+    def cases(self) -> int:
+        """Cases that are expected."""
+        return sum(wave.cases for wave in self.waves)
+
+    @property
+    def most(self) -> int:
+        """Cases at the most."""
+        return sum(wave.most for wave in self.waves)
+
+    @property
+    def seconds(self) -> float:
+        """Wall time expected [s]."""
+        return sum(wave.seconds for wave in self.waves)
+
+    @property
+    def seconds_most(self) -> float:
+        """Wall time of the most cases [s]."""
+        return sum(wave.seconds_most for wave in self.waves)
+
     def to_dict(self) -> dict[str, Any]:
         """Everything as JSON-able data: seconds and bytes."""
-        totals = {name: sum(getattr(wave, name) for wave in self.waves) for name in ("cases", "most")}
-        seconds = {
-            name: sum(getattr(wave, name) for wave in self.waves) for name in ("seconds", "seconds_most")
-        }
-        return asdict(self) | totals | seconds
+        totals = {"cases": self.cases, "most": self.most, "seconds": self.seconds}
+        return asdict(self) | totals | {"seconds_most": self.seconds_most}
 
 
 def measured_speed(resources: Resources, measure: bool = True) -> Speed:
