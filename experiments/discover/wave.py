@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import shutil
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -11,17 +10,14 @@ from functools import cached_property
 from pathlib import Path
 
 from dem_warp import Case, CaseResult, Progress
-from dem_warp.processes import end_with_parent
 from experiments.cases import Engine, Workers
 from experiments.cases.engine import NO_ANSWER
+from experiments.cases.measuring import measuring_processes
 from experiments.cases.workers.own import THIS_MACHINE
 from experiments.discover.outcome_table import Outcome, OutcomeTable
 from experiments.measurement.observables import NAMES
 from experiments.measurement.states import measure
 from experiments.studyfile.study import MeasurementSection
-
-_CONTEXT = multiprocessing.get_context("spawn")
-"""Start of processes: a process with a GPU must not be forked. They end with this one."""
 
 SAVE_EVERY = 5.0
 """Time between two savings of what has been measured [s]."""
@@ -90,21 +86,12 @@ class WaveRunner:
 
     @cached_property
     def _measurers(self) -> ProcessPoolExecutor:
-        # Processes, as measuring holds Python's lock.
-        return ProcessPoolExecutor(self._workers.helpers, _CONTEXT, _begin_measuring)
+        return measuring_processes(self._workers.helpers)
 
     @property
     def _unfinished(self) -> Path:
         """Folder of what is under way."""
         return self._table.path.with_name("unfinished")
-
-
-def _begin_measuring() -> None:
-    """Measure on one thread: there is a process for every core."""
-    from threadpoolctl import threadpool_limits
-
-    end_with_parent()
-    threadpool_limits(1, "blas")
 
 
 class _Measured:

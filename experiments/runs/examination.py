@@ -67,14 +67,13 @@ def _gpus() -> list[Finding]:
     gpus = wp.get_cuda_devices()
     if not gpus:
         return [Finding("GPU", False, "no NVIDIA GPU with a CUDA driver: cases run on the CPU")]
-    driver = ".".join(map(str, wp.get_cuda_driver_version()))
-    return [
-        Finding(
-            str(gpu.alias), True,
-            f"{gpu.name}, {gpu.free_memory / 1e9:.3g} of {gpu.total_memory / 1e9:.3g} GB free, driver {driver}",
-        )
-        for gpu in gpus
-    ]  # fmt: skip
+    driver = ".".join(map(str, wp.get_cuda_driver_version() or ("unknown",)))
+    found = []
+    for gpu in gpus:
+        free, there = gpu.free_memory / 1e9, gpu.total_memory / 1e9
+        text = f"{gpu.name}, {free:.3g} of {there:.3g} GB free, driver {driver}"
+        found.append(Finding(str(gpu.alias), True, text))
+    return found
 
 
 def _processor() -> str:
@@ -92,7 +91,7 @@ def _memory() -> Finding:
 
 def _kernels() -> Finding:
     """See to it that compiled kernels can be kept."""
-    folder = Path(wp.config.kernel_cache_dir)
+    folder = Path(str(wp.config.kernel_cache_dir))
     size = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file()) / 1e6
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -76,6 +76,11 @@ class DaskWorkers:
         return os.cpu_count() or 1
 
     @property
+    def leaves_cores(self) -> bool:
+        """Tell that they leave the cores of this machine to those who measure."""
+        return True
+
+    @property
     def described(self) -> dict[str, Any]:
         """Kind, place and number of the workers."""
         return self._described | {"workers": self.count}

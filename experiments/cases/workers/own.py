@@ -56,6 +56,11 @@ class OwnWorkers:
         return self.workers or os.cpu_count() or 1
 
     @property
+    def leaves_cores(self) -> bool:
+        """Tell that they leave the cores of this machine to those who measure."""
+        return self.on_gpu
+
+    @property
     def described(self) -> dict[str, Any]:
         """Device and number of processes."""
         return {"device": self.name, "workers": self.workers}

@@ -36,6 +36,10 @@ class Workers(Protocol):
         """Processes of this machine that may measure meanwhile."""
 
     @property
+    def leaves_cores(self) -> bool:
+        """Tell that they leave the cores of this machine to those who measure."""
+
+    @property
     def described(self) -> dict[str, Any]:
         """Device and number, for the provenance of results, as JSON-able data."""
 
