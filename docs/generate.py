@@ -86,7 +86,7 @@ def observables_page() -> str:
         [
             "# Observables",
             "An observable is a number that a test yields. A study's target and responses name them, and so "
-            "does a file of measured heaps. One definition holds for a picture, a balance and a simulated state.",
+            "does a file of measured heaps. One definition holds for a picture, a balance and a simulation.",
             markdown_table(("name", "meaning", "unit", "instrument", "definition"), rows),
         ]
     )

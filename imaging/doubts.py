@@ -31,6 +31,10 @@ LEAST_END = 3.0
 """Rise at an end [pixels] below which it is the blur of an edge."""
 LEAST_FOOT_SLOPE = 0.6
 """Slope of a flank's lowest third over the rest's, or the reverse: it lies within for 19 heaps of 20."""
+STEP_PARTS = 8
+LEAST_STEP_SLOPE = 0.35
+"""Slope between parts of a flank over that of its line: where a board's top stands inside an outline it is at
+most 0.2, on 99 heaps of 100 above 0.5."""
 END_WIDTH = 0.02
 """Part of the outline's columns that make its end."""
 LARGEST_SHIFT = 1.0
@@ -69,6 +73,10 @@ def doubts_of(left: FlankLine, right: FlankLine, mean: float, se: float, outline
             yield Doubt(
                 "foot", f"{finding}, beyond a factor of {1.0 / LEAST_FOOT_SLOPE:.2g}: a board, a shadow?"
             )
+    flattest = min(step_slope(line, outline) for line in (left, right))
+    if flattest < LEAST_STEP_SLOPE:
+        finding = f"a part of a flank is {max(flattest, 0.0):.2f} times as steep as its line"
+        yield Doubt("step", f"{finding}, under {LEAST_STEP_SLOPE:g}: the top of a board?")
     end = highest_end(outline)
     if end > LARGEST_END and end * outline.height.max() > LEAST_END:
         yield Doubt(
@@ -100,6 +108,21 @@ def foot_slope(line: FlankLine, outline: Outline) -> float:
         for a, b in ((x[:third], h[:third]), (x[third:], h[third:]))
     )
     return low / high if high > 0.0 else 0.0
+
+
+def step_slope(line: FlankLine, outline: Outline) -> float:
+    """Least slope between parts of a flank over that of its line, its foot and its tip left out."""
+    covered = (outline.position >= line.start) & (outline.position <= line.stop)
+    x, h = outline.position[covered], outline.height[covered]
+    if line.slope < 0.0:
+        x, h = -x[::-1], h[::-1]
+    if len(x) < STEP_PARTS * MINIMUM_FLANK_COLUMNS:
+        return 1.0
+    middles, means = (
+        np.array([part.mean() for part in np.array_split(values, STEP_PARTS)]) for values in (x, h)
+    )
+    slopes = np.diff(means) / np.diff(middles) / abs(line.slope)
+    return float(slopes[1 : STEP_PARTS - 3].min())
 
 
 def highest_end(outline: Outline) -> float:

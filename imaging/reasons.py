@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from imaging.errors import PictureError
 
 DOUBTS = (
-    "lean", "error", "range", "elevation", "straightness", "foot", "ends",
+    "lean", "error", "range", "elevation", "straightness", "foot", "step", "ends",
     "tilt", "border", "plate", "threshold",
 )  # fmt: skip
 """Names of all doubts: of a fitted angle, and of the outline that it was fitted on."""

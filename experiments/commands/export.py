@@ -28,7 +28,8 @@ def export(
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of sizes, places and orientations.")] = 1,
     scene: Annotated[
-        str | None, typer.Option(metavar="NAME", help="A further scene of the study, [response-scene.NAME].")
+        str | None,
+        typer.Option(metavar="NAME", help="A further scene of the study, \\[response-scene.NAME]."),
     ] = None,
     approximate: Annotated[
         bool,

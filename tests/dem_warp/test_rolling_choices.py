@@ -215,7 +215,8 @@ def test_the_torque_of_deme_waits_for_an_impact_s_time():
     steps = math.floor(wait / TIME_STEP)
     seen = torques(spun(laws, (0.0, 50.0, 0.0), steps + 20))[:, 1]
     lever = RADIUS - 0.5 * overlap_of(EDEM)
-    assert np.abs(seen[:steps]).max() == 0.0
+    # On a GPU the roundings of a sum of nothing are left, some 1e-18 N m.
+    assert np.abs(seen[:steps]).max() < 1e-15
     np.testing.assert_allclose(seen[steps:], -MU * lever * WEIGHT, rtol=1e-9)
 
 

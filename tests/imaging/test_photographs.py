@@ -125,14 +125,15 @@ def test_wrong_settings_are_refused(make) -> None:
 
 
 def test_views_that_cannot_be_measured_are_said() -> None:
+    # Told to be many grains, as clumps are told to be few.
     two_balls = [[-0.02, 0.0, 0.01], [0.02, 0.0, 0.01]]
     with pytest.raises(PictureError, match=r"at least two views.*view at 0\.0 degrees.*several pieces"):
-        heap_angle(two_balls, 0.01, azimuths=[0.0, np.pi])
+        heap_angle(two_balls, 0.01, azimuths=[0.0, np.pi], grain_count=30)
     # Seen from where they stand behind one another they are one: such views count, the others are said.
-    some = heap_angle(two_balls, 0.01, azimuths=[0.0, 0.5 * np.pi, 1.5 * np.pi])
+    some = heap_angle(two_balls, 0.01, azimuths=[0.0, 0.5 * np.pi, 1.5 * np.pi], grain_count=30)
     assert (len(some.views), len(some.rejections)) == (2, 1)
 
 
 def test_tower_is_no_heap() -> None:
     with pytest.raises(PictureError, match="radii"):
-        heap_angle([[0.0, 0.0, 1.0]], [0.01])
+        heap_angle([[0.0, 0.0, 1.0]], [0.01], grain_count=30)

@@ -101,8 +101,11 @@ def test_the_settings_of_a_card_are_those_of_the_study(campaign: Campaign, study
     ("content", "rule"),
     [
         (None, "card.toml: a material card must be a readable file"),
-        ("x = 1", r"card.toml: a material card has the tables \[material.grain\]"),
-        ("[material.scene]\nx = 1", r"card.toml: a material card has the tables \[material.grain\]"),
+        ("x = 1", r"card.toml: expected: a material card has the tables \[material.grain\]"),
+        (
+            "[material.scene]\nx = 1",
+            r"card.toml: expected: a material card has the tables \[material.grain\]",
+        ),
         ("x = ", "card.toml:1: must be valid TOML"),
     ],
 )

@@ -1,0 +1,40 @@
+"""Doubts about an angle, by outlines whose heap and board are known."""
+
+import numpy as np
+import pytest
+
+from imaging import measure
+from imaging.outline import Outline
+from imaging.plate import PlateLine
+
+
+def outline(wing: float, step: float = 30.0, half: float = 150.0) -> Outline:
+    """Outline of a heap of 30 degrees, at each side of it so much of a board's top with its bevelled edge."""
+    reach = half + wing
+    position = np.arange(-reach, reach + 1.0)
+    heap = np.tan(np.radians(30.0)) * (half - np.abs(position))
+    board = np.minimum(step, 0.5 * (reach - np.abs(position))) if wing else np.zeros_like(position)
+    height = np.maximum(heap, 0.0) + board + 1.0
+    return Outline(position + reach, height, PlateLine(400.0, 0.0, visible=True), photographed=True)
+
+
+def names(seen: Outline) -> list[str]:
+    return [doubt.name for doubt in measure(seen).doubts]
+
+
+@pytest.mark.parametrize("wing", [85.0, 100.0])
+def test_a_boards_top_inside_the_outline_is_a_step_in_the_flanks(wing: float) -> None:
+    assert "step" in names(outline(wing))
+
+
+def test_a_straight_heap_has_no_step() -> None:
+    assert names(outline(0.0)) == []
+
+
+def test_a_hollow_heap_has_no_step() -> None:
+    # The flank of a heap whose slope falls from 1.3 to 0.7 of its mean towards the foot.
+    flat = outline(0.0)
+    share = flat.height / flat.height.max()
+    hollow = flat.height.max() * (0.7 * share + 0.3 * share**2)
+    seen = Outline(flat.position, hollow + 1.0, flat.plate, photographed=True)
+    assert "step" not in names(seen)
