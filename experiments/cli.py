@@ -22,7 +22,7 @@ from experiments.commands.console import (
     fail,
     messages,
 )
-from experiments.commands.early import check_study_file
+from experiments.commands.early import check_calibration_file, check_study_file
 from experiments.commands.export import EXPORT_EXAMPLE, export
 from experiments.commands.new import NEW_EXAMPLE, new
 from experiments.commands.options import (
@@ -88,7 +88,10 @@ def calibrate(
 ) -> None:
     """Run a whole calibration: noise floor, screening, climb, surface, optimum, verification, report."""
     with clear_errors():
-        check_study_file(study, scale)
+        if only_paper:
+            check_study_file(study, scale, engine)
+        else:
+            check_calibration_file(study, scale, engine)
         from experiments import api
         from experiments.runs.choices import chosen_device, chosen_study, default_folder
 
@@ -152,7 +155,7 @@ def discover(
 ) -> None:
     """Find the effect that a model lacks: calibrate, test the gap, name what explains it, show it closed."""
     with clear_errors():
-        check_study_file(study, scale)
+        check_study_file(study, scale, engine)
         from experiments import api
         from experiments.report.discovery import results_of, verdict_line
         from experiments.runs.choices import chosen_device, chosen_study, default_folder
@@ -211,7 +214,7 @@ def heap(
     --scene with a further scene of the study.
     """
     with clear_errors():
-        check_study_file(study, scale)
+        check_study_file(study, scale, engine)
         from experiments.cases import require_unused, simulate_heap, with_engine, write_heap
         from experiments.runs.choices import chosen_device, chosen_study, default_folder
         from experiments.studyfile.campaign import TARGET_SCENE

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from scipy import optimize, stats
 
 from doe.errors import DesignError
-from doe.factors import natural_points
 from doe.optimum import StationaryPoint
+from doe.points import natural_points
 from doe.quadratic import QuadraticForm
 from doe.surface import Surface
 from doe.terms import term_name

@@ -12,7 +12,7 @@ from scipy.stats import qmc
 
 from doe.designs.optimal import Constraint, allowed
 from doe.errors import DesignError
-from doe.factors import natural_points
+from doe.points import natural_points
 from doe.surface import Surface
 
 STARTS = 6

@@ -6,7 +6,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from dem_warp import simulate
 from dem_warp.registry import Registry
 from experiments.cases.contract import command_program
 from experiments.cases.driver import Driver
@@ -105,4 +104,6 @@ def _engine_named(section: EngineSection, place: str) -> Engine:
 
 def simulator_of(study: Study) -> Engine:
     """Engine of a study, dem-warp's own where it names none; errors as by `engine_of`."""
+    from dem_warp import simulate
+
     return engine_of(study) or simulate

@@ -13,8 +13,8 @@ from experiments.benchmarks.faults.attempt import Attempt, begun, calibrate, con
 MOST = 6
 """Kills of one campaign."""
 
-KINDS = ("parent", "worker")
-"""Processes that are killed: the command itself, or one that simulates for it."""
+KINDS = ("parent", "parent", "parent", "worker")
+"""Processes that are killed: the command itself, or, less often as it takes longer, one of its workers."""
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,23 @@
+"""The public names: each is loaded with its module when it is first used."""
+
+from .engine import Engine
+from .engines import ENGINES, engine_of, with_engine
+from .execute import run_cases
+from .folder import open_folder, require_unused
+from .heap import Heap, heap_picture, simulate_heap, write_heap
+from .store import Store
+
+__all__ = [
+    "ENGINES",
+    "Engine",
+    "Heap",
+    "Store",
+    "engine_of",
+    "heap_picture",
+    "open_folder",
+    "require_unused",
+    "run_cases",
+    "simulate_heap",
+    "with_engine",
+    "write_heap",
+]
