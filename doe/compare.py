@@ -1,5 +1,7 @@
 """Two means: t-tests, the interval of their difference, and equivalence within a margin (TOST)."""
 
+from __future__ import annotations
+
 import math
 import numbers
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Processor time until a wrong study file is answered: `python -m experiments.benchmarks.answers out/answers`."""
+"""Time until a wrong study file is answered: `python -m experiments.benchmarks.answers out/answers`."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ from experiments.benchmarks.results import write_results
 from experiments.report.kit.machine import machine
 from experiments.studyfile import write_template
 
-HEIGHT = 'height = "50 mm"'
-"""A line of the template."""
-
 WRONG: dict[str, tuple[str, str]] = {
-    "no TOML": ("[grain]", "[grain"),
-    "an unknown key": ("poisson_ratio = 0.3\nsize_mean", "poison_ratio = 0.3\nsize_mean"),
+    "no TOML": ("[wall]", "[wall"),
+    "an unknown key": ("size_sd = 0.05", "size_sdd = 0.05"),
     "a wrong unit": ('density = "700 kg/m^3"', 'density = "700 mm"'),
-    "a range reversed": ("low = 0.2\nhigh = 0.6", "low = 0.6\nhigh = 0.2"),
+    "a range reversed": ("low = 0.3\nhigh = 0.6", "low = 0.6\nhigh = 0.3"),
     "a clump file that is not there": ('sphere = "2 mm"', 'clump = "none.txt"'),
     "a clump that is none": ('sphere = "2 mm"', 'clump = "words.txt"'),
     "a factor that leads nowhere": (
         'parameter = "contact.grain-grain.static_friction"',
         'parameter = "contact.grain-grain.stickiness"',
     ),
-    "laws that are none": ("[numerics]", '[solver]\nlaws = "liggghtz"\n\n[numerics]'),
+    "laws that are none": ('laws = "relative"', 'laws = "liggghtz"'),
     "an engine that is none": ("[numerics]", '[engine]\nname = "nobody"\n\n[numerics]'),
-    "a file of measurements without its columns": ("[target]", '[target]\nfile = "words.txt"'),
-    "a decision on no factor": ("[[factor]]", '[campaign]\nselection.keep = ["Z"]\n\n[[factor]]'),
+    "a file of measurements without its columns": (
+        'mean = "30 deg"\nsd = "0.5 deg"\nn = 5',
+        'file = "words.txt"',
+    ),
+    "a decision on no factor": ("at_most = 3", 'at_most = 3\nkeep = ["Z"]'),
 }
 """What is wrong with a study: the template's text, and what stands there instead."""
 
@@ -48,7 +48,7 @@ def wrong_study(folder: Path, kind: str) -> Path:
     """
     path = folder / "study.toml"
     path.unlink(missing_ok=True)
-    write_template(path)
+    write_template("study", folder)
     (folder / "words.txt").write_text("no numbers here\n", encoding="utf-8")
     text = path.read_text(encoding="utf-8")
     old, new = WRONG[kind]

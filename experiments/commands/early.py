@@ -52,6 +52,10 @@ def _readable(path: Path | None, scale: str | None, engine: str | None) -> Study
     if path is None and engine is None:
         return None
     from experiments.errors import InputError
+    from experiments.toml_files import read_toml
+
+    if path is not None:
+        read_toml(path)
     from experiments.studyfile import load_study, study_scales
 
     known = study_scales(path)
@@ -64,8 +68,10 @@ def _readable(path: Path | None, scale: str | None, engine: str | None) -> Study
             faults.append(error)
     if not read:
         raise faults[0]
-    if engine is not None:
-        from experiments.cases import with_engine
+    study = read[0]
+    if engine is not None or study.engine is not None:
+        from experiments.cases import engine_of, with_engine
 
-        return with_engine(read[0], engine)
-    return read[0]
+        study = with_engine(study, engine)
+        engine_of(study)
+    return study

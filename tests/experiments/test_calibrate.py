@@ -24,7 +24,6 @@ FACTORS = (
     Factor("G", 0.03, 0.08),
 )
 Angle = Callable[[Mapping[str, float]], float]
-
 ANGLE = Response("angle", "angle", "deg")
 
 
