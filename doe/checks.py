@@ -6,7 +6,6 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from doe.errors import DesignError
@@ -94,11 +93,13 @@ def real_array(name: str, values: ArrayLike) -> NDArray[np.float64]:
         raise DesignError(f"{name}: a masked value is no measurement, received one at position {place}")
     if isinstance(values, str | bytes | dict | set) or values is None:
         raise DesignError(f"{name} must be numbers, received {values!r}")
-    if isinstance(getattr(values, "dtype", None), pd.CategoricalDtype):
+    if getattr(getattr(values, "dtype", None), "name", "") == "category":
         raise DesignError(f"{name} must be real numbers, received categories")
     try:
         array = np.asarray(values)
         if array.dtype == object:  # pandas' missing values, Python's fractions and decimals, or no numbers
+            import pandas as pd
+
             if any(isinstance(value, str | bytes | bool | complex) for value in array.ravel()):
                 raise TypeError("text, truth values or complex numbers")
             array = np.asarray(pd.DataFrame(array.reshape(array.shape[0], -1)), dtype=np.float64).reshape(

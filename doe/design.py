@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike
 
 from doe.checks import checked_count, real_array
 from doe.errors import DesignError
-from doe.factors import Category, Factor, checked_factors, coded_points, natural_points
+from doe.factors import Category, Factor, checked_factors
 from doe.labels import aligned
+from doe.points import coded_points, natural_points
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from doe.errors import DesignError
-from doe.factors import Factor, coded_points
+from doe.factors import Factor
+from doe.points import coded_points
 from doe.screening import ScreenResult
 from doe.surface import Surface
 

@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from doe.checks import checked_number, real_array
 from doe.design import Design, numbered, observations
 from doe.errors import DesignError
-from doe.factors import Factor, coded_points
+from doe.factors import Factor
+from doe.points import coded_points
 from doe.screening import ScreenResult
 from doe.surface import Surface
 

@@ -14,11 +14,12 @@ from doe import contour, optimum, region
 from doe.analysis.coefficients import anova_by_order, coefficient_table, significant_words, summary_text
 from doe.anova import ErrorTerm, anova_table, block_columns, block_sum, least_squares, pure_error
 from doe.checks import checked_level, real_array
-from doe.compare import Sample
 from doe.design import Design, observations
 from doe.errors import DesignError
-from doe.factors import Category, coded_points, two_level_factors
+from doe.factors import Category, two_level_factors
+from doe.points import coded_points
 from doe.quadratic import QuadraticForm
+from doe.sample import Sample
 from doe.terms import (
     INTERCEPT,
     Term,

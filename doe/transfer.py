@@ -24,11 +24,11 @@ from statsmodels.regression.linear_model import GLS
 
 from doe import optimum, region
 from doe.checks import checked_level, checked_number, real_array
-from doe.compare import Sample
 from doe.design import Design
 from doe.errors import DesignError
-from doe.factors import coded_points, natural_points
+from doe.points import coded_points, natural_points
 from doe.quadratic import QuadraticForm
+from doe.sample import Sample
 from doe.surface import Surface
 from doe.terms import INTERCEPT, model_matrix
 

@@ -24,7 +24,7 @@ from experiments.commands.console import (
     messages,
 )
 from experiments.commands.doctor import DOCTOR_EXAMPLE, doctor
-from experiments.commands.early import check_study_file
+from experiments.commands.early import check_calibration_file, check_study_file
 from experiments.commands.export import EXPORT_EXAMPLE, export
 from experiments.commands.new import NEW_EXAMPLE, new
 from experiments.commands.options import (
@@ -96,7 +96,10 @@ def calibrate(
 ) -> None:
     """Run a whole calibration: noise floor, screening, climb, surface, optimum, verification, report."""
     with clear_errors():
-        check_study_file(study, scale)
+        if only_paper:
+            check_study_file(study, scale, engine)
+        else:
+            check_calibration_file(study, scale, engine)
         from experiments import api
         from experiments.runs.choices import chosen_resources, chosen_study, default_folder, resources_for
 
@@ -173,7 +176,7 @@ def discover(
 ) -> None:
     """Find the effect that a model lacks: calibrate, test the gap, name what explains it, show it closed."""
     with clear_errors():
-        check_study_file(study, scale)
+        check_study_file(study, scale, engine)
         from experiments import api
         from experiments.report.discovery import results_of, verdict_line
         from experiments.runs.choices import chosen_resources, chosen_study, default_folder, resources_for
@@ -247,7 +250,7 @@ def heap(
     --scene with a further scene of the study.
     """
     with clear_errors():
-        check_study_file(study, scale)
+        check_study_file(study, scale, engine)
         from experiments.cases import open_workers, require_unused, simulate_heap, with_engine, write_heap
         from experiments.runs.choices import chosen_resources, chosen_study, default_folder, resources_for
         from experiments.studyfile.campaign import TARGET_SCENE

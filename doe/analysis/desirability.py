@@ -13,7 +13,7 @@ from scipy.stats import qmc
 from doe.checks import checked_kind, checked_number
 from doe.designs.optimal import Constraint, allowed
 from doe.errors import DesignError
-from doe.factors import natural_points
+from doe.points import natural_points
 from doe.surface import Surface
 
 STARTS = 6

@@ -17,13 +17,13 @@ from dem_warp import Progress
 from dem_warp.version import source_commit
 from experiments.calibrate import Campaign, calibrate
 from experiments.calibrate.campaign import StageHook
-from experiments.calibrate.checks import check_study
+from experiments.calibrate.checks import check_calibration
 from experiments.calibrate.export import jsonable
 from experiments.cases import Store, Workers, open_folder, run_cases
 from experiments.cases.key import engine_identity
 from experiments.cases.outputs import publishing
 from experiments.cases.workers.own import THIS_MACHINE
-from experiments.errors import InputError, StudyError
+from experiments.errors import StudyError
 from experiments.files import write_text
 from experiments.measurement.target import with_measurements
 from experiments.report import heap_pictures, write_report
@@ -167,17 +167,10 @@ def check_runs(study: Study, campaign: bool = True, paper: bool = False) -> Stud
         raise _no_published_runs(study)
     if not campaign:
         return study
-    if not study.factors:
-        raise StudyError("a calibration needs at least one [[factor]]", "none", str(study.file))
     study, notes = with_measurements(study)
     for note in notes:
         _log.warning("The measurements: %s", note)
-    try:
-        check_study(study)
-    except InputError:
-        raise
-    except ValueError as error:
-        raise StudyError("the decisions must fit the factors", str(error), str(study.file)) from error
+    check_calibration(study)
     return study
 
 

@@ -10,9 +10,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from experiments.calibrate import Campaign, CampaignSettings, calibrate
+from experiments.calibrate import Campaign, calibrate
 from experiments.report import render_page
 from experiments.studyfile import Study, load_study
+from experiments.studyfile.campaign import CampaignSettings
 
 Angle = Callable[[Mapping[str, float]], float]
 Runner = Callable[[pd.DataFrame], pd.DataFrame]

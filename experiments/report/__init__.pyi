@@ -1,0 +1,12 @@
+"""The public names: each is loaded with its module when it is first used."""
+
+from .campaign_page import render_page
+from .pictures import HeapPicture, heap_pictures
+from .writer import write_report
+
+__all__ = [
+    "HeapPicture",
+    "heap_pictures",
+    "render_page",
+    "write_report",
+]
