@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from imaging.errors import PictureError
-from imaging.geometry import FloatArray, Frame, Picture, Spheres
+from imaging.geometry import FloatArray, Frame, Picture
 from imaging.render import empty_plate, snapshot
 
 KINDS = (".gif", ".mp4")
@@ -58,7 +58,7 @@ class Scenery:
         frame = self.frame
         points, sizes = np.asarray(centers, dtype=float), np.asarray(radii, dtype=float)
         image = empty_plate(frame)
-        if len(points) and len(frame.select(Spheres.of(points, sizes))[1]):
+        if np.any(np.hypot(*points.T[:2]) + sizes <= frame.half_width):
             image = snapshot(points, sizes, backend="raster", frame=frame, grains=grains).image
         for triangles in walls:
             _glaze(image, self._on_picture(triangles))

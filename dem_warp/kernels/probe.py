@@ -81,7 +81,9 @@ def probe_kernels(build: Build) -> SimpleNamespace:
             item = g * neighbours.capacity + k
             neighbours.near.item[item] = wp.vec2i(entry, slot)
             if is_free or contacts.is_free(model, neighbours, w, item, step):
-                force, _, _ = contacts.contact(model, world, grains, neighbours, w, g, item, step)
+                force, _torque, _rolling = contacts.contact(
+                    model, world, grains, neighbours, w, g, item, step
+                )
                 if wp.length_sq(force) > real(0.0):
                     point, normal = meeting_point(model, world, grains, w, g, entry, step)
                     out = place * neighbours.capacity + k

@@ -118,7 +118,7 @@ def _grains(film: Film, frame: Frame) -> pyvista.PolyData:
 
 
 def _contacts(frame: Frame) -> pyvista.PolyData:
-    """One line a contact: from the centre of the grain that the force acts on to its partner's or the wall."""
+    """One line a contact: from the centre of the grain that the force acts on, to its partner or the wall."""
     contacts = frame.contacts
     row = np.full(1 + max(frame.grains.max(initial=0), contacts.partners.max(initial=0)), -1)
     row[frame.grains] = np.arange(len(frame.grains))

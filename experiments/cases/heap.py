@@ -131,9 +131,9 @@ def write_heap(heap: Heap, folder: Path, movie: str = "gif") -> None:
     """Write ``heap.vtp``, pictures and ``angle.json`` into a folder, made when it is missing.
 
     ``snapshot.png`` has the fitted flanks drawn on it; ``snapshot-clean.png``, the same picture without them,
-    can be measured again. Frames, if there are any, come into the folder ``frames``, and as a film of one of
-    the kinds `experiments.cases.movie.MOVIES` beside it. Where no grain is left, as may be in a hopper, there is
-    no picture.
+    can be measured again. Frames, if there are any, come into the folder ``frames``, and as a film, of one of
+    `experiments.cases.movie.MOVIES`, beside it. Where no grain is left, as may be in a hopper, there is no
+    picture.
     """
     if len(heap.result.positions):
         with replacing(folder / "heap.vtp") as temporary:
