@@ -5,7 +5,9 @@ Imports of the simulator, the statistics and the pictures are inside the command
 
 from __future__ import annotations
 
+import io
 import json
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -197,4 +199,8 @@ app.command(epilog=BRIDGE_EXAMPLE)(bridge)
 
 def main() -> None:
     """Run the command line."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            # a console of another encoding than UTF-8 shows an escape for what it lacks
+            stream.reconfigure(errors="backslashreplace")
     app()

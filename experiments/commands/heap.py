@@ -10,7 +10,7 @@ import typer
 from experiments.commands.console import FAILED_RUN, CaseProgress, clear_errors, fail, messages
 from experiments.commands.early import check_study_file
 from experiments.commands.options import AsJson, Device, EngineName, Out, Scale, StudyFile, assignments
-from experiments.commands.results import print_measured
+from experiments.commands.results import print_measured, print_narrowness
 
 HEAP_EXAMPLE = "Example: [bold]dem-warp heap --scale bench --set E=0.48 --set F=0.45 --seed 7 --frames 40[/]"
 
@@ -65,6 +65,7 @@ def heap(
         values = chosen.natural_settings(assignments(settings or []), "--set")
         folder = out or default_folder(chosen, f"{scene or 'heap'}-{seed}")
         require_unused(folder)
+        print_narrowness(chosen)
         with CaseProgress(scene or "heap") as progress:
             simulated = simulate_heap(chosen, values, seed, device, progress, scene or TARGET_SCENE, frames)
         write_heap(simulated, folder, movie or MOVIES[0])

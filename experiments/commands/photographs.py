@@ -36,6 +36,8 @@ ROW_VALUES = (
     "left", "right", "mean", "se", "low", "high", "tilt", "elevation", "distance", "plate", "heap_pixels",
 )  # fmt: skip
 """Measured values of a row."""
+NOT_IN_NAMES = str.maketrans("", "", '/\\:*?"<>|')
+"""Characters that no file's name has on every system."""
 
 
 def view_of(
@@ -170,18 +172,19 @@ def drawn_names(pictures: Sequence[Path]) -> list[str]:
     """Names of the drawn copies: as short as they can be, and all different."""
     names = [f"{picture.stem}-angle.png" for picture in pictures]
     for depth in range(2, 2 + max((len(picture.parts) for picture in pictures), default=0)):
-        count = Counter(names)
+        # as on systems whose names have no case, and without what no name there may have
+        count = Counter(name.casefold() for name in names)
         names = [
-            "_".join((*picture.parts[-depth:-1], name_of(picture))).replace("/", "")
-            if count[name] > 1
+            "_".join((*picture.parts[-depth:-1], name_of(picture))).translate(NOT_IN_NAMES)
+            if count[name.casefold()] > 1
             else name
             for picture, name in zip(pictures, names, strict=True)
         ]
     seen: Counter[str] = Counter()
     different = []
     for name in names:
-        seen[name] += 1
-        different.append(name if seen[name] == 1 else f"{name.removesuffix('.png')}-{seen[name]}.png")
+        times = seen[name.casefold()] = seen[name.casefold()] + 1
+        different.append(name if times == 1 else f"{name.removesuffix('.png')}-{times}.png")
     return different
 
 
