@@ -5,7 +5,9 @@ Imports of the simulator, the statistics and the pictures are inside the command
 
 from __future__ import annotations
 
+import io
 import json
+import sys
 from functools import partial
 from pathlib import Path
 from typing import Annotated
@@ -20,12 +22,12 @@ from experiments.commands.console import (
     Attempt,
     CaseProgress,
     clear_errors,
-    fail,
     messages,
 )
 from experiments.commands.doctor import DOCTOR_EXAMPLE, doctor
 from experiments.commands.early import check_calibration_file, check_study_file
 from experiments.commands.export import EXPORT_EXAMPLE, export
+from experiments.commands.heap import HEAP_EXAMPLE, heap
 from experiments.commands.new import NEW_EXAMPLE, new
 from experiments.commands.options import (
     AsJson,
@@ -39,10 +41,9 @@ from experiments.commands.options import (
     Scheduler,
     StudyFile,
     Workers,
-    assignments,
 )
 from experiments.commands.plans import show_plan
-from experiments.commands.results import print_measured, print_study, show_stage
+from experiments.commands.results import print_study, show_stage
 
 app = typer.Typer(
     name="dem-warp",
@@ -224,61 +225,7 @@ def discover(
     messages.print(f"Report: {ended.page}")
 
 
-@app.command(epilog="Example: [bold]dem-warp heap --scale bench --set E=0.48 --set F=0.45 --seed 7[/]")
-def heap(
-    study: StudyFile = None,
-    settings: Annotated[
-        list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="Value of a factor.")
-    ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of sizes, places and orientations.")] = 1,
-    scene: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", help="A further scene of the study, \\[response-scene.NAME]."),
-    ] = None,
-    out: Out = None,
-    scale: Scale = None,
-    device: Device = None,
-    scheduler: Scheduler = None,
-    cluster: Cluster = None,
-    engine: EngineName = None,
-    dry_run: DryRun = False,
-    as_json: AsJson = False,
-) -> None:
-    """Simulate one heap: heap.vtp (ParaView), snapshot.png with the fitted flanks, angle.json.
-
-    A study of a hopper, a drum or a draw-down gives what that test measures instead of the angle; so does
-    --scene with a further scene of the study.
-    """
-    with clear_errors():
-        check_study_file(study, scale, engine)
-        from experiments.cases import open_workers, require_unused, simulate_heap, with_engine, write_heap
-        from experiments.runs.choices import chosen_resources, chosen_study, default_folder, resources_for
-        from experiments.studyfile.campaign import TARGET_SCENE
-
-        resources = chosen_resources(device, 1, scheduler, cluster)
-        chosen = with_engine(chosen_study(study, scale, resources), engine)
-        values = chosen.natural_settings(assignments(settings or []), "--set")
-        folder = out or default_folder(chosen, f"{scene or 'heap'}-{seed}")
-        if dry_run:
-            from experiments.runs.plan import plan_heap
-
-            used, case = resources_for(chosen, resources), chosen.case(values, seed, scene or TARGET_SCENE)
-            show_plan(used, partial(plan_heap, chosen, used, case=case), as_json)
-            return
-        require_unused(folder)
-        resources = resources_for(chosen, resources)
-        with open_workers(resources) as crew, CaseProgress(scene or "heap") as progress:
-            simulated = simulate_heap(chosen, values, seed, crew, progress, scene or TARGET_SCENE)
-        write_heap(simulated, folder)
-    if as_json:
-        typer.echo(json.dumps(simulated.to_dict(), allow_nan=False))
-    messages.print(f"Files: {folder}")
-    if simulated.reason:
-        fail(f"the case {simulated.result.status}: {simulated.reason}", FAILED_RUN)
-    elif not as_json:
-        print_measured(simulated)
-
-
+app.command(epilog=HEAP_EXAMPLE)(heap)
 app.command(epilog=ANGLE_EXAMPLE)(angle)
 app.command(epilog=CLUMP_EXAMPLE)(clump)
 app.command(epilog=NEW_EXAMPLE)(new)
@@ -289,4 +236,8 @@ app.command(epilog=DOCTOR_EXAMPLE)(doctor)
 
 def main() -> None:
     """Run the command line."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            # a console of another encoding than UTF-8 shows an escape for what it lacks
+            stream.reconfigure(errors="backslashreplace")
     app()
