@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from experiments.calibrate.results import Campaign
-from experiments.report.kit.numbers import enumeration, fixed
+from experiments.report.kit.numbers import capital, enumeration, fixed
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import TARGET_SCENE
 
@@ -41,6 +41,12 @@ def cautions(campaign: Campaign, study: Study) -> list[Caution]:
     return [caution for rule in _RULES for caution in rule(campaign, study)]
 
 
+def study_cautions(study: Study) -> list[Caution]:
+    """List what limits any values found with a study's heaps, whatever they are compared with."""
+    grains = study.case({}, seed=0).scene.grain_count
+    return [*_small(grains), *_narrow(study), *_softened(study)]
+
+
 def _twin(campaign: Campaign, study: Study) -> Iterator[Caution]:
     if campaign.target is not None and campaign.target.truth is not None:
         yield Caution(
@@ -50,12 +56,15 @@ def _twin(campaign: Campaign, study: Study) -> Iterator[Caution]:
         )
 
 
-def _few_grains(campaign: Campaign, study: Study) -> Iterator[Caution]:
+def _heaps(campaign: Campaign, study: Study) -> Iterator[Caution]:
     cases = campaign.cases
-    if "grain_count" not in cases:
-        return
-    grains = cases.loc[cases["scene"] == TARGET_SCENE, "grain_count"].median()
-    if grains < FEW_GRAINS:
+    if "grain_count" in cases:
+        yield from _small(cases.loc[cases["scene"] == TARGET_SCENE, "grain_count"].median())
+    yield from _narrow(study)
+
+
+def _small(grains: float | None) -> Iterator[Caution]:
+    if grains and grains < FEW_GRAINS:
         yield Caution(
             f"Each heap has fewer than {FEW_GRAINS} grains. So small a heap stands flatter and scatters more "
             "than a large one; its values may not carry over.",
@@ -63,12 +72,16 @@ def _few_grains(campaign: Campaign, study: Study) -> Iterator[Caution]:
         )
 
 
-def _narrow(campaign: Campaign, study: Study) -> Iterator[Caution]:
+def _narrow(study: Study) -> Iterator[Caution]:
     if narrow := study.narrowness():
-        yield Caution(f"{narrow[:1].upper()}{narrow[1:].rstrip('.')}.", "summary")
+        yield Caution(f"{capital(narrow).rstrip('.')}.", "summary")
 
 
-def _softened(campaign: Campaign, study: Study) -> Iterator[Caution]:
+def _modulus(campaign: Campaign, study: Study) -> Iterator[Caution]:
+    yield from _softened(study)
+
+
+def _softened(study: Study) -> Iterator[Caution]:
     if study.numerics.modulus_scale != 1.0:
         yield Caution(
             "The shear modulus was softened. Use the values with the same softened modulus, or verify them "
@@ -157,11 +170,10 @@ def _failed(campaign: Campaign, study: Study) -> Iterator[Caution]:
 
 _RULES: tuple[Callable[[Campaign, Study], Iterator[Caution]], ...] = (
     _twin,
-    _few_grains,
-    _narrow,
+    _heaps,
     _open_region,
     _poor_surface,
-    _softened,
+    _modulus,
     _wide_margin,
     _thin_target,
     _beyond_ranges,

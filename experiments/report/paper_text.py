@@ -81,8 +81,8 @@ def paper_table(campaign: Campaign, study: Study) -> Table:
     ]
     level = fixed(100.0 * campaign.settings.optimum.confidence, 0)
     note = (
-        f"Compatible: fit and target agree at the {level} % level. Not every combination of compatible values "
-        "is compatible."
+        f"Compatible: fit and target agree at the {level} % level. Not every combination of compatible "
+        "values is compatible."
     )
     caption = "Contact parameters, as calibrated."
     return make_table("paper", pd.DataFrame(rows), shown, caption, note)
@@ -154,9 +154,9 @@ def _verification(campaign: Campaign, study: Study) -> Iterator[str]:
         level, ends = fixed(100.0 * (1.0 - test.alpha), 0), [quantity(end, unit) for end in test.interval]
         yield (
             f"Fresh cases at these values gave {_words(response)} {_sample(test.a, response)}: a difference "
-            f"of {quantity(test.difference, unit)} ({level} % interval {' to '.join(ends)}; Welch's t-test, p "
-            f"{p_clause(test.p)}; two one-sided tests of equivalence within ± {quantity(test.margin, unit)}, "
-            f"p {p_clause(test.equivalence_p)})."
+            f"of {quantity(test.difference, unit)} ({level} % interval {' to '.join(ends)}; Welch's t-test, "
+            f"p {p_clause(test.p)}; two one-sided tests of equivalence within ± "
+            f"{quantity(test.margin, unit)}, p {p_clause(test.equivalence_p)})."
         )
 
 
