@@ -32,20 +32,30 @@ def pastes(campaign: Campaign, study: Study, provenance: Mapping[str, Any]) -> l
     """Write paragraph and table in Markdown and in LaTeX; none before a point was chosen."""
     if campaign.optimum is None:
         return []
-    paragraph, table = methods_paragraph(campaign, study, provenance), paper_table(campaign, study)
+    paragraph = methods_paragraph(campaign, study, provenance)
+    return pastes_of(paragraph, paper_table(campaign, study), "contact-parameters")
+
+
+def pastes_of(paragraph: str, table: Table, label: str) -> list[Paste]:
+    """Write a paragraph and a table, which LaTeX knows by a label, in Markdown and in LaTeX."""
     return [
         Paste("methods-markdown", "Methods, as Markdown", f"{paragraph}\n"),
         Paste("methods-latex", "Methods, as LaTeX", f"{latex_text(paragraph)}\n"),
         Paste("table-markdown", "Table, as Markdown", markdown_table(table)),
-        Paste("table-latex", "Table, as LaTeX (booktabs)", latex_table(table, "contact-parameters")),
+        Paste("table-latex", "Table, as LaTeX (booktabs)", latex_table(table, label)),
     ]
+
+
+def software(provenance: Mapping[str, Any]) -> str:
+    """Name dem-warp with its version, and its commit where it is known."""
+    commit = provenance.get("commit")
+    return f"dem-warp {__version__}" + (f" (commit {commit})" if commit else "")
 
 
 def methods_paragraph(campaign: Campaign, study: Study, provenance: Mapping[str, Any]) -> str:
     """Say how the values were found, with the numbers that a referee asks for."""
-    commit = provenance.get("commit")
-    by = f"dem-warp {__version__}" + (f" (commit {commit})" if commit else "")
-    sentences = [f"The contact parameters were calibrated with {by}.", *_simulated(study)]
+    begin = f"The contact parameters were calibrated with {software(provenance)}."
+    sentences = [begin, *simulated_sentences(study)]
     for part in (_designs, _choice, _verification):
         sentences += part(campaign, study)
     lost = len(campaign.failed_cases)
@@ -88,7 +98,8 @@ def paper_table(campaign: Campaign, study: Study) -> Table:
     return make_table("paper", pd.DataFrame(rows), shown, caption, note)
 
 
-def _simulated(study: Study) -> Iterator[str]:
+def simulated_sentences(study: Study) -> Iterator[str]:
+    """Say what was simulated, and how its heaps were measured."""
     facts, density = study_facts(study), str(study.document["grain"].get("density", "as in the study"))
     test = facts.get("Test", f"a lifted cylinder ({facts.get('Tube')}; lifted at {facts.get('Lift')})")
     yield f"The test was {test}, with {facts['Grains']} (density {_units(density)})."

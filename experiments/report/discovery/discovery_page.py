@@ -9,6 +9,7 @@ from typing import Any
 from doe.discrepancy import Discovery, Settings, Verdict
 from experiments.report.cautions import Caution, study_cautions
 from experiments.report.discovery import charts, tables
+from experiments.report.discovery.paper_text import search_pastes
 from experiments.report.discovery.terms import Terms, percent
 from experiments.report.discovery.verdict import (
     SETTLED,
@@ -36,6 +37,7 @@ TITLES = {
     "power": "What these data could show",
     "changes": "What would change the verdict",
     "data": "The data",
+    "paper_text": "For your paper",
     "provenance": "Settings and provenance",
 }
 """Headings by chapter, in the order of the page."""
@@ -96,6 +98,7 @@ def render_discovery(
         "next_step": next_step(found, terms),
         "changes": changes(found, terms, settings),
         "cautions": [*study_cautions(study), *(Caution(note, "data") for note in found.notes)],
+        "pastes": search_pastes(found, study, terms, provenance or {}),
         "pictures": pictures,
         "solid": solid,
         "files": files,
@@ -148,6 +151,9 @@ def _chapters(found: Discovery, terms: Terms) -> list[Chapter]:
         "power": _chapter("power", {"power": tables.power_table(found, terms)}) if found.power else None,
         "changes": _chapter("changes"),
         "data": _chapter("data", {"data": tables.data_table(found, terms)}),
+        "paper_text": Chapter("paper_text", TITLES["paper_text"], template="sections/paper_text.html.j2")
+        if found.base
+        else None,
         "provenance": _chapter("provenance"),
     }
     return [chapter for name in TITLES if (chapter := built[name]) is not None]
