@@ -26,7 +26,7 @@ from experiments.cases.workers.own import THIS_MACHINE
 from experiments.errors import StudyError
 from experiments.files import write_text
 from experiments.measurement.target import with_measurements
-from experiments.report import heap_pictures, write_report
+from experiments.report import heap_pictures, verified_heap, write_report
 from experiments.report.companion import Replay, companion_of
 from experiments.report.kit.markdown import WALL_TIMES
 from experiments.report.writer import library_versions
@@ -117,8 +117,9 @@ def run_campaign(desk: Desk, on_stage: StageHook | None = None, replay: Replay |
         "engine": _engine(desk, campaign.cases),
     }
     pictures = heap_pictures(campaign, desk.study, desk.store.load)
+    solid = verified_heap(campaign, desk.store.load)
     with desk.publishing() as drafts:
-        write_report(campaign, desk.study, drafts, pictures, provenance, replay)
+        write_report(campaign, desk.study, drafts, pictures, provenance, replay, solid)
     return campaign
 
 

@@ -24,7 +24,7 @@ from experiments.discover.search import Search
 from experiments.files import replacing
 from experiments.measurement.measured_file import read_measured
 from experiments.measurement.observables import OBSERVABLES, PHOTOGRAPHED
-from experiments.report import HeapPicture
+from experiments.report import HeapPicture, SolidHeap
 from experiments.report.companion import Companion, companion_of
 from experiments.report.discovery import Terms, write_discovery
 from experiments.report.discovery.pictures import photograph, simulated_heaps
@@ -135,12 +135,14 @@ def _search(
         simulator.title, started = "fresh runs", time.perf_counter()
         found = drive(search.analysis(measured, bank, job.seed), simulator)
         waves = [*simulator.waves, {"wave": "analysis, its waves included", "seconds": _since(started)}]
-        pictures = heaps_side_by_side(simulator.engine, found, terms, measured, job)
+        pictures, solid = heaps_side_by_side(simulator.engine, found, terms, measured, job)
     further = companion.discovery_chapters(found, terms, job.measured) if job.measured else ()
     made = _provenance(job, bank, waves)
     with _publishing(job) as drafts:
         search.settings.write(drafts / SETTINGS)
-        page = write_discovery(found, job.study, terms, search.settings, drafts, pictures, made, further)
+        page = write_discovery(
+            found, job.study, terms, search.settings, drafts, pictures, made, further, solid
+        )
     return SearchResult(found, terms, job.folder / page.relative_to(drafts))
 
 
@@ -151,10 +153,13 @@ def _publishing(job: Job) -> AbstractContextManager[Path]:
 
 def heaps_side_by_side(
     engine: EngineSimulator, found: Discovery, terms: Terms, measured: Measured, job: Job
-) -> list[HeapPicture]:
-    """Draw a measured heap, where there is a photograph, that of the base, and that with the mechanism."""
+) -> tuple[list[HeapPicture], SolidHeap | None]:
+    """Draw a measured heap, where there is a photograph, that of the base, and that with the mechanism.
+
+    The last of them comes to be turned, too; None where it is no heap.
+    """
     if found.base is None:
-        return []
+        return [], None
     fitted = [condition.name for condition in job.study.conditions if not condition.held_out]
     training = [name for name in measured.conditions if name in fitted]
     condition = next((name for name in training if measured.pictures.get(name)), training[0])
@@ -165,7 +170,9 @@ def heaps_side_by_side(
     photographs = measured.pictures.get(condition, ())[:1]
     taken = [photograph(path, condition, job.study.measurement.fit) for path in photographs]
     drawn = simulated_heaps(dict(zip(models, results, strict=True)), condition, job.study.under(condition))
-    return [picture for picture in taken if picture is not None] + drawn
+    shown = [picture for picture in taken if picture is not None] + drawn
+    title = list(models)[-1]
+    return shown, SolidHeap.of(f"{title}: a heap under the condition “{condition}”.", results[-1])
 
 
 def known_bank(job: Job) -> Bank | None:

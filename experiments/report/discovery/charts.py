@@ -11,9 +11,7 @@ from experiments.report.discovery.tables import shown_candidates
 from experiments.report.discovery.terms import Terms, condition_name, spaced
 from experiments.report.kit.chart import Chart, add_bars, add_points, new_figure
 from experiments.report.kit.numbers import MISSING, capital, fixed
-
-DIVERGING = [[0.0, "#b35806"], [0.25, "#fdb863"], [0.5, "#f7f7f7"], [0.75, "#92c5de"], [1.0, "#2166ac"]]
-"""Orange below, blue above: even steps of lightness, told apart by colour-blind readers."""
+from experiments.report.kit.theme import DIVERGING
 
 MAP_REACH = 6.0
 """Residual at which the colours of a map end [standard deviations]."""
@@ -172,7 +170,7 @@ def _add_map(
         y=rows,
         zmin=-reach,
         zmax=reach,
-        colorscale=DIVERGING,
+        colorscale=list(zip(np.linspace(0.0, 1.0, len(DIVERGING)), DIVERGING, strict=True)),
         text=texts,
         texttemplate="%{text}",
         hovertemplate="%{y}, %{x}: %{z:.2f}<extra></extra>",

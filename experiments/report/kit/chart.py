@@ -40,8 +40,8 @@ def new_figure(x: str = "", y: str = "", legend: bool = True) -> go.Figure:
     figure.update_layout(
         template="none",
         font={"family": family, "size": 13, "color": INK},
-        paper_bgcolor="#ffffff",
-        plot_bgcolor="#ffffff",
+        paper_bgcolor="rgba(0,0,0,0)",  # that of the page, light or dark
+        plot_bgcolor="rgba(0,0,0,0)",
         margin={"l": 56, "r": 18, "t": 36 if legend else 14, "b": 48},
         showlegend=legend,
         legend=above | {"itemsizing": "constant"},
