@@ -59,7 +59,7 @@ def main(
     found = (
         f"{1e6 * speed.step:.3g} us a step, {1e9 * speed.sphere_step:.3g} ns a sphere, {speed.start:.3g} s"
     )
-    text = f"{os.cpu_count()} cores; {found} to start."
+    text = f"{os.cpu_count()} cores; {found}, {speed.start:.3g} s to start."
     table = pd.DataFrame(rows, columns=columns)
     print(write_results(out, "prediction", [("prediction", text, table)]).read_text(encoding="utf-8"))
 
