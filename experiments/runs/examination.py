@@ -49,11 +49,14 @@ def examine(resources: Resources) -> list[Finding]:
         _tried("simulation", _simulates, needed=True),
         _opengl(),
         _dask(),
-        Finding(
-            "will be used", True, f"{resources}, at the scale {'paper' if resources.on_gpu else 'bench'}"
-        ),
+        Finding("will be used", True, _used(resources)),
         Finding("speed", speed is not None, _speed_text(speed)),
     ]
+
+
+def _used(resources: Resources) -> str:
+    scale = "paper" if resources.on_gpu else "bench"
+    return f"{resources}, {resources.count} at once; the paper's study at the scale {scale}"
 
 
 def cores() -> int:

@@ -128,7 +128,7 @@ class DaskWorkers:
 
     def _memory(self) -> float | None:
         """Least free memory of the workers' GPUs [bytes]; None where a worker has none."""
-        found = [facts["memory"] for facts in self._client.run(describe_worker).values()]
+        found = [facts["memory"] for facts in self._client.run(describe_worker, on_error="ignore").values()]
         return None if not found or None in found else min(found)
 
 
@@ -159,8 +159,8 @@ class _Session:
         while pile or self.running:
             while pile and len(self.running) < most:
                 self._submit(pile.pop())
-            if not self._listen():
-                pile += self._collect()
+            self._listen()
+            pile += self._collect()
 
     def close(self) -> None:
         """Take back what still runs."""
@@ -176,20 +176,23 @@ class _Session:
             simulate_batch, order, key=f"{self.name}-{number}", priority=-number, pure=False
         )
 
-    def _listen(self) -> bool:
-        """Take what the workers say; False when nothing was said."""
+    def _listen(self) -> None:
+        """Take what the workers say, waiting a while for a first word."""
         try:
-            said = [self._queue.get(timeout=LISTEN), *self._queue.get(batch=True)]
+            self._hear(self._queue.get(timeout=LISTEN))
         except TimeoutError:
             self.wave.report()
-            return False
-        for text in said:
-            self._hear(pickle.loads(text))
-        return True
+        self._hear_all()
 
-    def _hear(self, message: Message) -> None:
+    def _hear_all(self) -> None:
+        """Take all that has been said."""
+        for said in self._queue.get(batch=True):
+            self._hear(said)
+
+    def _hear(self, said: bytes) -> None:
         from distributed import Queue
 
+        message: Message = pickle.loads(said)
         members = self.batches[message.number]
         if message.reply:
             places = [place for place, index in enumerate(members) if index not in self.wave.results]
@@ -206,9 +209,8 @@ class _Session:
         """Take leave of batches that have ended; return those that must run once more."""
         again = []
         ended = [(number, future) for number, future in self.running.items() if future.done()]
-        # What they said last may still be on its way.
-        while ended and self._listen():
-            pass
+        if ended:  # they said their last before they ended
+            self._hear_all()
         for number, future in ended:
             del self.running[number]
             members = self.batches[number]
