@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 import xml.etree.ElementTree as ET
 from collections.abc import Callable
 from pathlib import Path
@@ -184,8 +185,8 @@ def test_the_clean_picture_measures_to_the_same_angle(
         (("--frames", "1"), "", "should be greater than or equal to 2"),
         (
             ("--frames", "4"),
-            '[engine]\ncommand = "mine"\n',
-            "must run on dem-warp's own engine (received mine)",
+            f"[engine]\ncommand = '{sys.executable}'\n",
+            "--frames: must run on dem-warp's own engine",
         ),
     ],
 )
