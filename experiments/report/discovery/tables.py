@@ -11,7 +11,7 @@ import pandas as pd
 from doe.discrepancy import BeforeAfter, Candidate, Discovery, Drift, Fit, Interval, Power
 from experiments.report.discovery.terms import GAP, Terms, condition_name
 from experiments.report.kit.numbers import MISSING, estimate, trimmed
-from experiments.report.kit.table import Column, Table, columns, make_table
+from experiments.report.kit.table import Column, Layout, Table, columns, make_table
 
 T = TypeVar("T")
 Entries = dict[Column, Callable[[T], object]]

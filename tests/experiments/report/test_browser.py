@@ -168,13 +168,16 @@ def test_axe_finds_nothing(opened: Opened) -> None:
 
 def test_what_is_too_wide_scrolls_in_its_box_and_says_so(opened: Opened) -> None:
     boxes = opened.page.evaluate(
-        """[...document.querySelectorAll(".table, .sweep")].filter((box) => box.checkVisibility()).map((box) => ({
+        """() => {
+          const boxes = [...document.querySelectorAll(".table, .sweep")];
+          return boxes.filter((box) => box.checkVisibility()).map((box) => ({
             hidden: box.scrollWidth - box.clientWidth,
             cue: getComputedStyle(box, "::before").content.includes("Scroll sideways"),
             fades: getComputedStyle(box).maskImage !== "none",
             scrolls: getComputedStyle(box).overflowX === "auto",
             stop: box.tabIndex === 0,
-        }))"""
+          }));
+        }"""
     )
     cut = [box for box in boxes if box["hidden"] > 1]
     assert len(boxes) > 5
