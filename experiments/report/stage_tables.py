@@ -238,7 +238,7 @@ def values_table(campaign: Campaign, optimum: OptimumResult, labels: Mapping[str
     frame = frame.loc[[*chosen, *(name for name in optimum.settings if name not in chosen)]]
     shown: Layout = [
         *columns(label="parameter", factor="symbol"),
-        Column("value", "value", "free"),
+        Column("value", "value", "level"),
         "unit",
         *columns("free", low="as good from", high="to"),
         Column("how", "how it was found"),

@@ -70,7 +70,7 @@ def confounding_chart(confounding: Confounding, terms: Terms) -> Chart:
         "Correlation of what two mechanisms leave after calibration: near 1 or −1 these data cannot tell them"
         " apart, near 0 they cannot be taken for one another."
     )
-    return Chart("confounding-chart", caption, figure, height="tall")
+    return Chart("confounding-chart", caption, figure, height="tall", broad=True)
 
 
 def gap_chart(found: Discovery) -> Chart:
@@ -153,7 +153,8 @@ def _residual_map(name: str, found: Discovery, fit: Fit, caption: str) -> Chart:
     figure = new_figure(legend=False)
     _add_map(figure, fit.residuals, conditions, observables, MAP_REACH, texts)
     figure.update_xaxes(tickangle=-40)
-    return Chart(name, f"{caption} * : beyond chance after Holm's adjustment (p < {SIGNIFICANT}).", figure)
+    caption += f" * : beyond chance after Holm's adjustment (p < {SIGNIFICANT})."
+    return Chart(name, caption, figure, broad=True)
 
 
 def _add_map(

@@ -97,7 +97,10 @@ def render_discovery(
         "explained": found.named,
         "next_step": next_step(found, terms),
         "changes": changes(found, terms, settings),
-        "cautions": [*study_cautions(study), *(Caution(note, "data") for note in found.notes)],
+        "cautions": [
+            *study_cautions(study),
+            *(Caution(f"{note.rstrip('.')}.", "data") for note in found.notes),
+        ],
         "pastes": search_pastes(found, study, terms, provenance or {}),
         "pictures": pictures,
         "solid": solid,
@@ -164,7 +167,7 @@ def _gap(found: Discovery, terms: Terms) -> Chapter | None:
         return None
     shown = {"parameters": tables.parameters_table(found, terms)}
     if found.drifts:
-        shown["drifts"] = tables.drifts_table(found)
+        shown["drifts"] = tables.drifts_table(found, terms)
     return _chapter("gap", shown, {"maps": charts.residual_maps(found, terms)})
 
 

@@ -44,7 +44,7 @@ class Chapter:
 def render_page(
     kind: str, heading: str, summary: str, chapters: Sequence[Chapter], context: Mapping[str, Any]
 ) -> str:
-    """Render a page.
+    """Render a page: 4.8 MB of plotly.js, and what it holds.
 
     Parameters
     ----------

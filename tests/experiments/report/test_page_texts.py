@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import re
 from collections import Counter
 from collections.abc import Callable
@@ -32,7 +33,7 @@ def section_of(page: str, name: str) -> str:
     begin = page.index(f'<section id="{name}"')
     text = page[begin : page.index("</section>", begin)]
     text = re.sub(r"<(table|script|figure|details|pre)\b.*?</\1>", "", text, flags=re.S)
-    return re.sub(r"<[^>]+>", " ", text)
+    return html.unescape(re.sub(r"<[^>]+>", " ", text))
 
 
 def test_the_verdict_names_its_factors_in_words(campaign: Campaign) -> None:

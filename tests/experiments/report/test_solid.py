@@ -1,4 +1,4 @@
-"""Heaps to be turned: packed without a visible loss, small, and left out where a browser could not draw them."""
+"""Heaps to be turned: packed without a visible loss, small, and left out where no browser could draw them."""
 
 from __future__ import annotations
 

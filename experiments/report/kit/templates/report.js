@@ -30,8 +30,35 @@ const charts = [...document.querySelectorAll("script[data-plot]")].map((source) 
 // Charts follow their place: a turned phone, a narrower window.
 const sizes = new ResizeObserver((changes) => changes.forEach(({ target }) => Plotly.Plots.resize(target)));
 
+const NARROW = 480; // pixels of a chart below which its long names are broken into lines
+const BROKEN = 16; // letters of a line then
+
+/** Break a text between its words. */
+function broken(text) {
+  if (typeof text !== "string" || text.length <= BROKEN || text.includes("<")) return text;
+  return text.split(" ").reduce((lines, word) => {
+    const last = lines.at(-1);
+    if (last !== undefined && last.length + word.length < BROKEN) lines[lines.length - 1] = `${last} ${word}`;
+    else lines.push(word);
+    return lines;
+  }, []).join("<br>");
+}
+
+/** Break the names along the axes of a figure, and their titles, in place. */
+function breakNames({ data, layout }) {
+  for (const trace of data) {
+    for (const axis of ["x", "y"]) if (Array.isArray(trace[axis])) trace[axis] = trace[axis].map(broken);
+  }
+  for (const axis of [layout.xaxis, layout.yaxis]) {
+    for (const names of ["categoryarray", "ticktext"]) if (axis?.[names]) axis[names] = axis[names].map(broken);
+    if (axis?.title?.text) axis.title.text = broken(axis.title.text);
+  }
+}
+
 function draw({ place, figure }, size = {}) {
-  return Plotly.react(place, themed(figure.data), { ...themed(figure.layout), ...size }, options);
+  const shown = { data: themed(figure.data), layout: { ...themed(figure.layout), ...size } };
+  if ((size.width ?? place.clientWidth) < NARROW) breakNames(shown);
+  return Plotly.react(place, shown.data, shown.layout, options);
 }
 
 // A chart is drawn when it comes near the window: a phone need not draw all of them to show the first.
@@ -72,20 +99,20 @@ if (window.matchMedia("(max-width: 75rem)").matches) {
   document.querySelector(".contents details").removeAttribute("open");
 }
 
-/** Mark a table that is wider than its box, and the sides at which it goes on. */
-function mark(table) {
-  const hidden = table.scrollWidth - table.clientWidth;
-  table.classList.toggle("wide", hidden > 1);
-  table.classList.toggle("more-left", hidden > 1 && table.scrollLeft > 1);
-  table.classList.toggle("more-right", hidden > 1 && table.scrollLeft < hidden - 1);
+/** Mark a box that holds something wider, and the sides at which it goes on. */
+function mark(box) {
+  const hidden = box.scrollWidth - box.clientWidth;
+  box.classList.toggle("wide", hidden > 1);
+  box.classList.toggle("more-left", hidden > 1 && box.scrollLeft > 1);
+  box.classList.toggle("more-right", hidden > 1 && box.scrollLeft < hidden - 1);
   // Only what scrolls is a stop of the Tab key.
-  if (hidden > 1) table.tabIndex = 0;
-  else table.removeAttribute("tabindex");
+  if (hidden > 1) box.tabIndex = 0;
+  else box.removeAttribute("tabindex");
 }
 const widths = new ResizeObserver((changes) => changes.forEach(({ target }) => mark(target)));
-for (const table of document.querySelectorAll(".table")) {
-  widths.observe(table);
-  table.addEventListener("scroll", () => mark(table), { passive: true });
+for (const box of document.querySelectorAll(".table, .sweep")) {
+  widths.observe(box);
+  box.addEventListener("scroll", () => mark(box), { passive: true });
 }
 
 for (const button of document.querySelectorAll("button[data-copy]")) {

@@ -78,7 +78,7 @@ function turn(figure) {
   const top = z.reduce((most, value) => Math.max(most, value), 0);
   const place = figure.querySelector(".scene");
   const ink = getComputedStyle(document.documentElement).getPropertyValue("--muted").trim();
-  const bar = { title: { text: "height [mm]", font: { color: ink } }, thickness: 10, len: 0.7, tickfont: { color: ink } };
+  const bar = { title: { text: "height [mm]", font: { color: ink } }, thickness: 10, len: 0.7, x: 0.98, xanchor: "right", tickfont: { color: ink } };
   const lighting = { ambient: 0.45, diffuse: 0.8, specular: 0.08, roughness: 0.9, fresnel: 0 };
   const grains = { type: "mesh3d", x, y, z, i, j, k, intensity: grain, ...COLORS.grain, colorbar: bar,
     hoverinfo: "skip", flatshading: false, lighting, lightposition: { x: 2000, y: -4000, z: 9000 } };
