@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
-from doe.checks import checked_choice, checked_count, checked_level, checked_number, real_array
+from doe.checks import checked_choice, checked_level, checked_number
 from doe.errors import DesignError
 from doe.sample import Sample, Values
 from doe.two_errors import TwoErrors
