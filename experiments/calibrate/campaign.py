@@ -7,6 +7,7 @@ from typing import Any, TypeVar
 
 import pandas as pd
 
+from doe import Design
 from experiments.calibrate.cases import Runner, StageEnd
 from experiments.calibrate.checks import check_study
 from experiments.calibrate.climb import climb, require_crossing
@@ -112,16 +113,21 @@ def _run(study: Study, record: _Record) -> tuple[Outcome, str]:
 def _open(study: Study, record: _Record) -> tuple[TargetResult, NoiseFloorResult, ScreeningResult]:
     """Run the stages that wait for nothing, in one batch: a twin's target, the noise floor, the screening."""
     design = screening_design(study.factors, study.campaign.screening)
-    plans = [plan_noise_floor(study), plan_screening(study, design)]
-    if study.target.twin is not None:
-        plans = [plan_target(study), *plans]
-    finished = record.run(pd.concat(plans, ignore_index=True)).groupby("stage", sort=False)
+    finished = record.run(plan_opening(study, design)).groupby("stage", sort=False)
     *hidden, noise_cases, screening_cases = (cases.reset_index(drop=True) for _, cases in finished)
     target = record.keep("target", settle_target(study, *hidden))
     noise = record.keep("noise_floor", analyse_noise_floor(study, noise_cases))
     name = study.campaign.screening.design
     screening = analyse_screening(design, screening_cases, study.target.fitted, name)
     return target, noise, record.keep("screening", screening)
+
+
+def plan_opening(study: Study, design: Design) -> pd.DataFrame:
+    """Lay out the cases of the stages that wait for nothing."""
+    plans = [plan_noise_floor(study), plan_screening(study, design)]
+    if study.target.twin is not None:
+        plans = [plan_target(study), *plans]
+    return pd.concat(plans, ignore_index=True)
 
 
 def _verdict(study: Study, optimum: OptimumResult, verification: VerificationResult) -> tuple[Outcome, str]:

@@ -13,9 +13,10 @@ from typing import Any
 from dem_warp import Progress
 from dem_warp.version import source_commit
 from doe.discrepancy import Bank, Discovery, Fit, Measured, Outcomes, Point, drive
-from experiments.cases import engine_of, open_folder, require_unused
+from experiments.cases import Workers, engine_of, open_folder, require_unused
 from experiments.cases.folder import locked
 from experiments.cases.outputs import publishing, sha256_of
+from experiments.cases.workers.own import THIS_MACHINE
 from experiments.discover.engine import EngineSimulator
 from experiments.discover.maker import fingerprint_of, maker_of_today
 from experiments.discover.outcome_table import OutcomeTable
@@ -45,8 +46,7 @@ class Job:
     folder: Path
     bank: Path | None = None
     photographs_only: bool = False
-    device: str | None = None
-    workers: int | None = None
+    workers: Workers = THIS_MACHINE
     seed: int = 1
 
 
@@ -66,9 +66,7 @@ class _Watched:
 
     def __init__(self, search: Search, job: Job, watch: Watch) -> None:
         table = OutcomeTable(job.folder / OUTCOMES)
-        self.engine = EngineSimulator(
-            search.study, search.library, table, job.device, job.workers, progress=self._report
-        )
+        self.engine = EngineSimulator(search.study, search.library, table, job.workers, self._report)
         self.observables = self.engine.observables
         self.title = "library waves"
         self.waves: list[dict[str, Any]] = []
@@ -103,7 +101,7 @@ def run_search(job: Job, resume: bool = False, watch: Watch = lambda title: null
         require_unused(job.folder, "; --resume goes on in it")
     companion, search = companion_of(job.study), Search.of(job.study)
     terms = Terms.of(search.library, OBSERVABLES, job.study.factor_sections)
-    bank = _known_bank(job, search)
+    bank = known_bank(job)
     measured = _measured(job)
     for note in measured.notes if measured else ():
         _log.warning("The data: %s", note)
@@ -177,8 +175,15 @@ def heaps_side_by_side(
     return shown, SolidHeap.of(f"{title}: a heap under the condition “{condition}”.", results[-1])
 
 
-def _known_bank(job: Job, search: Search) -> Bank | None:
-    """The bank that is named, that of the folder, or that which lies beside the study; None: to be made."""
+def known_bank(job: Job) -> Bank | None:
+    """Read the bank that is named, that of the folder, or that beside the study; None: it is to be made.
+
+    Raises
+    ------
+    InputError
+        When it is no bank, or that of another study.
+    """
+    search = Search.of(job.study)
     beside = job.study.file.with_name(f"bank-{job.study.scale}.npz" if job.study.scale else BANK)
     if job.bank is not None:
         return search.read_bank(job.bank)
@@ -199,8 +204,7 @@ def _point(fit: Fit, condition: str, seed: int) -> Point:
 
 def _provenance(job: Job, bank: Bank, waves: Sequence[dict[str, Any]]) -> dict[str, Any]:
     return {
-        "device": job.device,
-        "workers": job.workers,
+        **job.workers.described,
         "commit": source_commit(),
         "engine": fingerprint_of(engine_of(job.study)),
         "bank": dict(bank.maker) or None,

@@ -8,11 +8,12 @@ import pandas as pd
 import pytest
 
 from doe import Factor, Sample
-from experiments.calibrate import CampaignSettings, ClimbEnd, Outcome, Response, Target
+from experiments.calibrate import ClimbEnd, Outcome
 from experiments.calibrate.cases import StageEnd
 from experiments.calibrate.optimum import find_optimum
 from experiments.calibrate.results import ClimbResult, SurfaceResult, TargetResult
 from experiments.calibrate.surface import explore_surface, require_slope
+from experiments.studyfile.campaign import CampaignSettings, Response, Target
 
 CENTER = {"E": 1.0, "F": 1.0}
 HALF_RANGE = 0.4

@@ -12,10 +12,11 @@ import pytest
 from discoveries import made_discovery, made_terms
 
 from doe.discrepancy import Discovery, Verdict
-from experiments.calibrate import Campaign, CampaignSettings, calibrate
+from experiments.calibrate import Campaign, calibrate
 from experiments.report import render_page
 from experiments.report.discovery import Terms
 from experiments.studyfile import Study, load_study
+from experiments.studyfile.campaign import CampaignSettings
 
 Angle = Callable[[Mapping[str, float]], float]
 Runner = Callable[[pd.DataFrame], pd.DataFrame]
