@@ -255,7 +255,7 @@ def test_a_climb_whose_start_is_its_bound_says_so() -> None:
     study = AnalyticStudy(campaign=settings(selection={"keep": ["F"]}, climb=fixed))
     campaign = calibrate(study, AnalyticHeaps(two_frictions))
     assert campaign.outcome is Outcome.TARGET_NOT_REACHED
-    assert "cannot leave its start (F = 0.78)" in campaign.reason
+    assert "cannot leave its start (parameter F (F) 0.78)" in campaign.reason
 
 
 def test_a_climb_that_turns_is_a_plateau() -> None:
