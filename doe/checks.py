@@ -6,7 +6,6 @@ from collections.abc import Collection, Iterable, Mapping
 from typing import Any, TypeVar
 
 import numpy as np
-import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from doe.errors import DesignError
@@ -57,7 +56,12 @@ def checked_kind(name: str, value: Any, kind: type[Kind]) -> Kind:
 
 def checked_list(name: str, values: Any) -> list:
     """Return values as a list; raise DesignError when they are none: a text, a mapping, a table."""
-    if not isinstance(values, Iterable) or isinstance(values, str | bytes | Mapping | pd.DataFrame):
+    # a table is told by its columns: pandas need not be loaded to read factors
+    if (
+        not isinstance(values, Iterable)
+        or isinstance(values, str | bytes | Mapping)
+        or hasattr(values, "columns")
+    ):
         raise DesignError(f"{name} must be a list, received {values!r}")
     return list(values)
 
@@ -78,6 +82,8 @@ def checked_choice(name: str, value: Any, choices: Collection[str]) -> str:
 
 def checked_map(name: str, value: Any) -> dict:
     """Return a mapping, or a Series, as a dict; raise DesignError for anything else."""
+    import pandas as pd
+
     if not isinstance(value, Mapping | pd.Series):
         raise DesignError(f"{name} must be a mapping by name, received {value!r}")
     return dict(value)
@@ -130,11 +136,13 @@ def real_array(name: str, values: ArrayLike) -> NDArray[np.float64]:
         raise DesignError(f"{name}: a masked value is no measurement, received one at position {place}")
     if isinstance(values, str | bytes | dict | set) or values is None:
         raise DesignError(f"{name} must be numbers, received {values!r}")
-    if isinstance(getattr(values, "dtype", None), pd.CategoricalDtype):
+    if getattr(getattr(values, "dtype", None), "name", "") == "category":
         raise DesignError(f"{name} must be real numbers, received categories")
     try:
         array = np.asarray(values)
         if array.dtype == object:  # pandas' missing values, Python's fractions and decimals, or no numbers
+            import pandas as pd
+
             if any(isinstance(value, str | bytes | bool | complex) for value in array.ravel()):
                 raise TypeError("text, truth values or complex numbers")
             array = np.asarray(pd.DataFrame(array.reshape(array.shape[0], -1)), dtype=np.float64).reshape(

@@ -6,8 +6,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from doe.checks import checked_count, checked_number
-from doe.factors import natural_points
 from doe.fitted import FittedSurface
+from doe.points import natural_points
 from doe.quadratic import QuadraticForm
 
 CURVE_RESOLUTION = 201

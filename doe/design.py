@@ -19,8 +19,9 @@ from doe.checks import (
     real_array,
 )
 from doe.errors import DesignError
-from doe.factors import Category, Factor, checked_factors, coded_points, natural_points
+from doe.factors import Category, Factor, checked_factors
 from doe.labels import aligned
+from doe.points import coded_points, natural_points
 
 
 @dataclass(frozen=True, eq=False)

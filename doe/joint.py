@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from scipy import optimize
 
 from doe.checks import checked_count, checked_level, checked_map, checked_number
-from doe.compare import Sample
 from doe.errors import DesignError
 from doe.factors import Factor
 from doe.fitted import FittedSurface, unselected
 from doe.region import Region, box_cells, misfit
+from doe.sample import Sample
 from doe.simultaneous import Simultaneous
 from doe.surface import Surface
 from doe.two_errors import TwoErrors

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from scipy import optimize, stats
 
 from doe.checks import checked_count, checked_level, checked_number
-from doe.compare import Sample
 from doe.errors import DesignError
+from doe.sample import Sample
 
 
 @dataclass(frozen=True)

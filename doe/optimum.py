@@ -12,8 +12,8 @@ from scipy import optimize
 from doe.checks import checked_map, checked_number
 from doe.contour import contour_points
 from doe.errors import DesignError, TargetError
-from doe.factors import natural_points
 from doe.fitted import FittedSurface
+from doe.points import natural_points
 from doe.quadratic import QuadraticForm
 from doe.region import box_cells
 

@@ -11,7 +11,8 @@ from scipy import stats
 from doe.checks import checked_count, checked_kind, checked_map, checked_number
 from doe.design import checked_setting
 from doe.errors import DesignError
-from doe.factors import Factor, coded_points
+from doe.factors import Factor
+from doe.points import coded_points
 from doe.screening import ScreenResult
 from doe.surface import Surface
 

@@ -20,7 +20,8 @@ from doe.checks import (
 )
 from doe.design import Design, numbered, observations
 from doe.errors import DesignError
-from doe.factors import Factor, coded_points
+from doe.factors import Factor
+from doe.points import coded_points
 from doe.screening import ScreenResult
 from doe.surface import Surface
 

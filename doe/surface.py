@@ -22,11 +22,12 @@ from doe.checks import (
     checked_points,
     real_array,
 )
-from doe.compare import Sample
 from doe.design import Design, observations
 from doe.errors import DesignError
-from doe.factors import Category, coded_points, two_level_factors
+from doe.factors import Category, two_level_factors
+from doe.points import coded_points
 from doe.quadratic import QuadraticForm
+from doe.sample import Sample
 from doe.terms import (
     INTERCEPT,
     Term,

@@ -34,11 +34,11 @@ from doe.checks import (
     checked_points,
     real_array,
 )
-from doe.compare import Sample
 from doe.design import Design
 from doe.errors import DesignError
-from doe.factors import coded_points, natural_points
+from doe.points import coded_points, natural_points
 from doe.quadratic import QuadraticForm
+from doe.sample import Sample
 from doe.surface import Surface
 from doe.terms import INTERCEPT, model_matrix
 

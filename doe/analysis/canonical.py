@@ -10,8 +10,8 @@ from scipy import optimize, stats
 
 from doe.checks import checked_flag, checked_kind, checked_level, real_array
 from doe.errors import DesignError
-from doe.factors import natural_points
 from doe.optimum import StationaryPoint
+from doe.points import natural_points
 from doe.quadratic import QuadraticForm
 from doe.surface import Surface
 from doe.terms import term_name

@@ -14,7 +14,7 @@ from doe.checks import checked_flag, checked_kind, checked_list, checked_map, ch
 from doe.design import Design
 from doe.designs.optimal import Constraint, allowed
 from doe.errors import DesignError
-from doe.factors import natural_points
+from doe.points import natural_points
 from doe.surface import Surface
 
 STARTS = 6

@@ -14,7 +14,8 @@ from doe.design import Design, numbered
 from doe.designs.augment import join
 from doe.designs.model_columns import model_columns
 from doe.errors import DesignError
-from doe.factors import Category, Factor, checked_factors, natural_points
+from doe.factors import Category, Factor, checked_factors
+from doe.points import natural_points
 
 CANDIDATE_BUDGET = 4_096
 """Most candidate runs; a grid that has more is replaced by Sobol points and the corners."""

@@ -15,7 +15,7 @@ import typer
 from doe import compare_means
 from experiments import api
 from experiments.bridge.source import read_source
-from experiments.cases import open_folder, run_cases, with_engine
+from experiments.cases import OwnWorkers, open_folder, run_cases, with_engine
 from experiments.commands.console import CaseProgress, clear_errors
 from experiments.studyfile import Study, load_study
 
@@ -34,21 +34,25 @@ def in_laws(file: Path, scale: str | None, laws: str) -> Study:
 
 def prove(study: Study, folder: Path, laws: str, seeds: int, workers: int | None) -> dict[str, object]:
     """Calibrate a study, and run its card's test in LIGGGHTS; what is finished in the folder is kept."""
+    named = f"{study.name}, laws {laws}"
     card = folder / "campaign" / "material.toml"
     if not card.is_file():
         resume = card.parent.is_dir()
-        api.calibrate(study, card.parent, device="cpu", workers=workers, resume=resume, watch=CaseProgress)
+        made = api.calibrate(
+            study, card.parent, device="cpu", workers=workers, resume=resume, watch=CaseProgress
+        ).campaign
+        if made is None or made.optimum is None:
+            return {"study": named, "met": False, "why": made and made.reason}
     source = read_source(card)
     there = with_engine(source.study, "liggghts")
     store, _ = open_folder(folder / "liggghts", there, resume=True)
     table = pd.DataFrame([source.point] * seeds).assign(seed=range(1001, 1001 + seeds))
     with CaseProgress("LIGGGHTS") as progress:
-        cases = run_cases(there, table, store, workers=workers, progress=progress)
+        cases = run_cases(there, table, store, OwnWorkers(workers=workers), progress)
     good = cases[cases["status"] == "finished"].dropna(subset=[source.observable])
     test = compare_means(good[source.observable].to_numpy(), source.target, margin=MARGIN)
     low, high = test.interval
     met = low <= MARGIN and high >= -MARGIN
-    named = f"{study.name}, laws {laws}"
     numbers = (source.target.mean, test.a.mean, test.a.sd, test.a.n, test.difference, low, high)
     return dict(zip(COLUMNS, (named, *numbers, met, test.equivalent), strict=True))
 
