@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import stat
 from collections.abc import Iterator
@@ -10,6 +11,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from experiments.errors import InputError
+
+_TEMPORARY = re.compile(r"\..+\.\d+(\.\w+)?")
+"""Names that `replacing` gives."""
 
 
 @contextmanager
@@ -28,6 +32,13 @@ def replacing(path: Path) -> Iterator[Path]:
         temporary.replace(path)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def remove_leftovers(folder: Path) -> None:
+    """Remove what a killed run had half written by `replacing` in a folder, which no other run may use."""
+    for path in folder.rglob(".*"):
+        if _TEMPORARY.fullmatch(path.name) and path.is_file() and not path.is_symlink():
+            path.unlink()
 
 
 def check_file(path: Path, largest: int) -> None:
