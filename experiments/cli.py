@@ -6,6 +6,7 @@ Imports of the simulator, the statistics and the pictures are inside the command
 from __future__ import annotations
 
 import json
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated
 
@@ -30,6 +31,7 @@ from experiments.commands.options import (
     Device,
     Devices,
     EngineName,
+    Live,
     Out,
     Resume,
     Scale,
@@ -38,6 +40,8 @@ from experiments.commands.options import (
     assignments,
 )
 from experiments.commands.results import print_measured, print_study, show_stage
+from experiments.commands.watch import WATCH_EXAMPLE, watch
+from experiments.live.server import live_page
 
 app = typer.Typer(
     name="dem-warp",
@@ -84,6 +88,7 @@ def calibrate(
         bool, typer.Option("--only-paper", help="Simulate the paper's own runs, and no campaign.")
     ] = False,
     paper_replicates: Annotated[int, typer.Option(min=1, help="Heaps of each of the paper's runs.")] = 3,
+    live: Live = False,
     as_json: AsJson = False,
 ) -> None:
     """Run a whole calibration: noise floor, screening, climb, surface, optimum, verification, report."""
@@ -97,10 +102,10 @@ def calibrate(
         folder = out or default_folder(chosen)
     go_on = Attempt.of(
         "calibrate", study, out=folder, scale=chosen.scale, device=device, workers=workers, engine=engine,
-        follow_paper=follow_paper, only_paper=only_paper,
+        follow_paper=follow_paper, only_paper=only_paper, live=live,
         paper_replicates=paper_replicates if follow_paper or only_paper else None, json=as_json,
     )  # fmt: skip
-    with clear_errors(go_on):
+    with clear_errors(go_on), live_page(folder, live, messages.print):
         print_study(chosen, device)
         ended = api.calibrate(
             chosen,
@@ -148,6 +153,7 @@ def discover(
     workers: Workers = None,
     engine: EngineName = None,
     resume: Resume = False,
+    live: Live = False,
     as_json: AsJson = False,
 ) -> None:
     """Find the effect that a model lacks: calibrate, test the gap, name what explains it, show it closed."""
@@ -162,9 +168,9 @@ def discover(
         folder = out or default_folder(chosen, "discover")
     go_on = Attempt.of(
         "discover", study, measured, out=folder, bank=bank, photographs_only=photographs_only, scale=scale,
-        device=device, workers=workers, seed=seed, engine=engine, json=as_json,
+        device=device, workers=workers, seed=seed, engine=engine, live=live, json=as_json,
     )  # fmt: skip
-    with clear_errors(go_on):
+    with clear_errors(go_on), live_page(folder, live, messages.print):
         print_study(chosen, device)
         ended = api.discover(
             chosen,
@@ -203,6 +209,7 @@ def heap(
     scale: Scale = None,
     device: Device = None,
     engine: EngineName = None,
+    live: Live = False,
     as_json: AsJson = False,
 ) -> None:
     """Simulate one heap: heap.vtp (ParaView), snapshot.png with the fitted flanks, angle.json.
@@ -213,6 +220,8 @@ def heap(
     with clear_errors():
         check_study_file(study, scale)
         from experiments.cases import require_unused, simulate_heap, with_engine, write_heap
+        from experiments.live.record.journal import Journal
+        from experiments.runs.campaign import watching
         from experiments.runs.choices import chosen_device, chosen_study, default_folder
         from experiments.studyfile.campaign import TARGET_SCENE
 
@@ -221,9 +230,12 @@ def heap(
         values = chosen.natural_settings(assignments(settings or []), "--set")
         folder = out or default_folder(chosen, f"{scene or 'heap'}-{seed}")
         require_unused(folder)
-        with CaseProgress(scene or "heap") as progress:
-            simulated = simulate_heap(chosen, values, seed, device, progress, scene or TARGET_SCENE)
-        write_heap(simulated, folder)
+        page = live_page(folder, live, messages.print)
+        notes = Journal(folder, "heap", chosen, device=device) if live else nullcontext()
+        with page, notes as journal, watching(scene or "heap", CaseProgress, journal) as progress:
+            glimpses = journal.glimpses if journal else None
+            simulated = simulate_heap(chosen, values, seed, device, progress, scene or TARGET_SCENE, glimpses)
+            write_heap(simulated, folder)
     if as_json:
         typer.echo(json.dumps(simulated.to_dict(), allow_nan=False))
     messages.print(f"Files: {folder}")
@@ -238,6 +250,7 @@ app.command(epilog=CLUMP_EXAMPLE)(clump)
 app.command(epilog=NEW_EXAMPLE)(new)
 app.command(epilog=EXPORT_EXAMPLE)(export)
 app.command(epilog=BRIDGE_EXAMPLE)(bridge)
+app.command(epilog=WATCH_EXAMPLE)(watch)
 
 
 def main() -> None:

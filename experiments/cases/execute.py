@@ -6,13 +6,16 @@ import logging
 import math
 import os
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import Any
+from functools import partial
+from typing import Any, Protocol
 
 import pandas as pd
 
 from dem_warp import Case, CaseResult, Progress, simulate
+from dem_warp.batch import Onlooker
+from dem_warp.checkpoint import case_name
 from experiments.cases.engine import NO_ANSWER
 from experiments.cases.store import Store
 from experiments.errors import StudyError
@@ -27,6 +30,19 @@ RESULT_COLUMNS = ("status", "reason", ANGLE, "angle_se", "case_key")
 _log = logging.getLogger(__name__)
 
 
+class CaseNotes(Protocol):
+    """Takes notes of cases while they run; `experiments.live.record.journal` has one."""
+
+    glimpses: Onlooker
+    """Onlooker of the batches of dem-warp's own engine."""
+
+    def planned(self, table: pd.DataFrame, names: Sequence[str]) -> None:
+        """Note the cases of a table, each with its ``case_key`` and its name while it runs."""
+
+    def ended(self, key: str, outcome: Mapping[str, Any]) -> None:
+        """Note what a case gave; called from any thread."""
+
+
 def run_cases(
     study: Study,
     table: pd.DataFrame,
@@ -34,6 +50,7 @@ def run_cases(
     device: str | None = None,
     workers: int | None = None,
     progress: Callable[[Progress], None] | None = None,
+    notes: CaseNotes | None = None,
 ) -> pd.DataFrame:
     """Simulate every case of a table that is not stored yet, all at once, and measure every heap.
 
@@ -52,6 +69,8 @@ def run_cases(
         cases are kept there too: what an interrupted run had begun goes on where it was.
     device, workers, progress
         As of `dem_warp.simulate`.
+    notes
+        Takes notes of the cases while they run.
 
     Returns
     -------
@@ -73,10 +92,17 @@ def run_cases(
 
     def measure(key: str, result: CaseResult) -> dict[str, Any]:
         leaves_a_heap = study.scenes[scenes[key]].leaves_a_heap
-        return _outcome(result.status, observe(study.measurement, result, leaves_a_heap))
+        outcome = _outcome(result.status, observe(study.measurement, result, leaves_a_heap))
+        if notes:
+            notes.ended(key, outcome)
+        return outcome
+
+    if notes:
+        names = [case_name(case) if case else "" for case in cases]
+        notes.planned(table.assign(case_key=keys), names)
 
     with ThreadPoolExecutor(max_workers=workers or os.cpu_count()) as pool:
-        outcomes = _simulate_missing(by_key, store, pool, measure, device, workers, progress)
+        outcomes = _simulate_missing(by_key, store, pool, measure, device, workers, progress, notes)
         for key in by_key.keys() - outcomes.keys():
             outcomes[key] = pool.submit(lambda key: measure(key, store.load(key)), key)
         rows = [
@@ -126,6 +152,7 @@ def _simulate_missing(
     device: str | None,
     workers: int | None,
     progress: Callable[[Progress], None] | None,
+    notes: CaseNotes | None,
 ) -> dict[str, Future[dict[str, Any]]]:
     """Simulate what the store lacks, in one call; save each result as it finishes, and measure it.
 
@@ -144,7 +171,7 @@ def _simulate_missing(
         outcomes[key] = pool.submit(measure, key, result)
 
     if missing:
-        run = store.engine or simulate
+        run = store.engine or partial(simulate, onlooker=notes.glimpses if notes else None)
         run(
             [cases[key] for key in missing],
             device=device,

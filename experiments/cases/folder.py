@@ -23,6 +23,9 @@ CASES = "cases"
 LOCK = ".lock"
 """File that a run holds while it works in a folder; it stays, and is no result."""
 
+JOURNAL = ".live"
+"""Folder of what a run tells while it works; it stays, and is no result."""
+
 _log = logging.getLogger(__name__)
 
 
@@ -91,7 +94,7 @@ def is_used(folder: Path) -> bool:
     """Tell that a folder, or a file of that name, holds something."""
     if not folder.is_dir():
         return os.path.lexists(folder)
-    return any(path.name != LOCK for path in folder.iterdir())
+    return any(path.name not in (LOCK, JOURNAL) for path in folder.iterdir())
 
 
 def require_unused(folder: Path, advice: str = "") -> None:

@@ -6,12 +6,14 @@ import json
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from dem_warp import CaseResult, Progress
+from dem_warp import CaseResult, Progress, simulate
+from dem_warp.batch import Onlooker
 from experiments.cases.engines import simulator_of
 from experiments.files import replacing, write_text
 from experiments.measurement.observables import observables_of
@@ -86,10 +88,11 @@ def simulate_heap(
     device: str | None = None,
     progress: Callable[[Progress], None] | None = None,
     scene: str = TARGET_SCENE,
+    onlooker: Onlooker | None = None,
 ) -> Heap:
     """Simulate one case with the study's engine, and measure its heap.
 
-    Settings, seed and scene are those of `Study.case`.
+    Settings, seed and scene are those of `Study.case`; an onlooker is that of `dem_warp.simulate`.
 
     Raises
     ------
@@ -97,6 +100,7 @@ def simulate_heap(
         When there is no such factor or scene, or a value leaves what is physical.
     """
     run, case = simulator_of(study), study.case(settings, seed, scene)
+    run = partial(simulate, onlooker=onlooker) if run is simulate else run
     [result] = run([case], device=device, workers=1, on_progress=progress)
     values = {factor.name: settings.get(factor.name, factor.center) for factor in study.factors}
     observed = observe(study.measurement, result, study.scenes[scene].leaves_a_heap)

@@ -8,6 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from dem_warp import Case, CaseResult, Progress
+from dem_warp.batch import Onlooker
 from doe.discrepancy import Outcomes, Point
 from experiments.cases import engine_of
 from experiments.cases.key import case_key
@@ -35,7 +36,7 @@ class EngineSimulator:
         Mechanisms that points may name, from its `library_for`.
     table
         Where outcomes are kept; what is there already is not simulated again.
-    device, workers, worlds, drivers, progress
+    device, workers, worlds, drivers, progress, onlooker
         As of `WaveRunner`, a wave being all points of a call that are not kept yet.
 
     Raises
@@ -54,6 +55,7 @@ class EngineSimulator:
         worlds: int | None = None,
         drivers: int | None = None,
         progress: Callable[[Progress], None] | None = None,
+        onlooker: Onlooker | None = None,
     ) -> None:
         self.study, self.table, self.engine = study, table, engine_of(study)
         told = getattr(self.engine, "observables", NAMES)
@@ -69,6 +71,7 @@ class EngineSimulator:
             progress,
             self.engine,
             self.observables,
+            onlooker,
         )
         self._library = {mechanism.name: mechanism for mechanism in library}
         self._factors = [factor.name for factor in study.factors]

@@ -14,6 +14,7 @@ from multiprocessing.queues import Queue
 from pathlib import Path
 
 from dem_warp import Case, CaseResult, Progress, simulate
+from dem_warp.batch import Onlooker
 from dem_warp.device import resolve_device
 from dem_warp.processes import end_with_parent
 from dem_warp.simulation import batches
@@ -67,6 +68,8 @@ class WaveRunner:
         beside the table until the wave is kept.
     observables
         Names of what is measured.
+    onlooker
+        That of `dem_warp.simulate`, in every process that simulates.
     """
 
     def __init__(
@@ -80,9 +83,10 @@ class WaveRunner:
         progress: Callable[[Progress], None] | None = None,
         engine: Engine | None = None,
         observables: Sequence[str] = NAMES,
+        onlooker: Onlooker | None = None,
     ) -> None:
         self._settings, self._table, self._progress = settings, table, progress
-        self._engine, self._observables = engine, tuple(observables)
+        self._engine, self._observables, self._onlooker = engine, tuple(observables), onlooker
         self._devices = resolve_devices(device)
         self._workers, self._worlds = workers, worlds
         count = drivers or (1 if self._on_cpu else DRIVERS * len(self._devices))
@@ -178,6 +182,7 @@ class WaveRunner:
                 workers=self._workers,
                 on_result=partial(self._take, measured, keys),
                 on_progress=partial(clock.report, len(keys)),
+                onlooker=self._onlooker,
             )
             clock.pass_launch(len(keys))
 
@@ -185,7 +190,10 @@ class WaveRunner:
         self, launches: Sequence[list[str]], cases: Mapping[str, Case], measured: _Measured, clock: _Clock
     ) -> None:
         """Simulate several launches at once, each in a process."""
-        begun = {self._driven.submit(_simulate_here, [cases[key] for key in keys]): keys for keys in launches}
+        begun = {
+            self._driven.submit(_simulate_here, [cases[key] for key in keys], self._onlooker): keys
+            for keys in launches
+        }
         for ended in as_completed(begun):
             keys = begun[ended]
             for index, result in enumerate(ended.result()):
@@ -236,9 +244,9 @@ def _open_device() -> None:
     resolve_device(_mine[0])
 
 
-def _simulate_here(cases: Sequence[Case]) -> list[CaseResult]:
+def _simulate_here(cases: Sequence[Case], onlooker: Onlooker | None = None) -> list[CaseResult]:
     """Simulate on the device of this process."""
-    return simulate(cases, _mine[0], 1)
+    return simulate(cases, _mine[0], 1, onlooker=onlooker)
 
 
 @dataclass

@@ -21,13 +21,14 @@ from experiments.discover.maker import fingerprint_of, maker_of_today
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.search import Search
 from experiments.files import replacing
+from experiments.live.record.journal import Journal
 from experiments.measurement.measured_file import read_measured
 from experiments.measurement.observables import OBSERVABLES, PHOTOGRAPHED
 from experiments.report import HeapPicture
 from experiments.report.companion import Companion, companion_of
 from experiments.report.discovery import Terms, write_discovery
 from experiments.report.discovery.pictures import photograph, simulated_heaps
-from experiments.runs.campaign import Watch
+from experiments.runs.campaign import Watch, watching
 from experiments.studyfile import Study
 
 OUTCOMES, BANK, SETTINGS = "outcomes.sqlite", "bank.npz", "settings.json"
@@ -64,21 +65,22 @@ class SearchResult:
 class _Watched:
     """The engine, with a display for every wave."""
 
-    def __init__(self, search: Search, job: Job, watch: Watch) -> None:
+    def __init__(self, search: Search, job: Job, watch: Watch, journal: Journal) -> None:
         table = OutcomeTable(job.folder / OUTCOMES)
         self.engine = EngineSimulator(
-            search.study, search.library, table, job.device, job.workers, progress=self._report
-        )
+            search.study, search.library, table, job.device, job.workers, progress=self._report,
+            onlooker=journal.glimpses,
+        )  # fmt: skip
         self.observables = self.engine.observables
         self.title = "library waves"
         self.waves: list[dict[str, Any]] = []
-        self._watch = watch
+        self._watch, self._journal = watch, journal
         self._listener: Callable[[Progress], None] | None = None
 
     def __call__(self, points: Sequence[Point]) -> Outcomes:
         """Observables of every point."""
         started, before = time.perf_counter(), len(self.engine.table)
-        with self._watch(self.title) as self._listener:
+        with watching(self.title, self._watch, self._journal) as self._listener:
             outcomes = self.engine(points)
         seconds, simulated = time.perf_counter() - started, len(self.engine.table) - before
         self.waves.append({"wave": self.title, "simulated": simulated, "seconds": round(seconds, 1)})
@@ -107,10 +109,13 @@ def run_search(job: Job, resume: bool = False, watch: Watch = lambda title: null
     measured = _measured(job)
     for note in measured.notes if measured else ():
         _log.warning("The data: %s", note)
-    with locked(job.folder, resume):
+    with (
+        locked(job.folder, resume),
+        Journal(job.folder, "discover", job.study, resume, device=job.device) as journal,
+    ):
         for change in open_folder(job.folder, job.study, resume)[1]:
             _log.warning("The study has changed since the earlier run: %s", change)
-        return _search(job, search, companion, terms, bank, measured, watch)
+        return _search(job, search, companion, terms, bank, measured, watch, journal)
 
 
 def _search(
@@ -121,9 +126,10 @@ def _search(
     bank: Bank | None,
     measured: Measured | None,
     watch: Watch,
+    journal: Journal,
 ) -> SearchResult:
     """Simulate and analyse in an open folder, and make the outputs."""
-    simulator = _Watched(search, job, watch)
+    simulator = _Watched(search, job, watch, journal)
     with simulator.engine:
         if bank is None:
             maker = maker_of_today(source_commit(), simulator.engine.engine)
