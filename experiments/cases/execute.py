@@ -33,8 +33,9 @@ _log = logging.getLogger(__name__)
 class CaseNotes(Protocol):
     """Takes notes of cases while they run; `experiments.live.record.journal` has one."""
 
-    glimpses: Onlooker
-    """Onlooker of the batches of dem-warp's own engine."""
+    @property
+    def glimpses(self) -> Onlooker:
+        """Onlooker of the batches of dem-warp's own engine."""
 
     def planned(self, table: pd.DataFrame, names: Sequence[str]) -> None:
         """Note the cases of a table, each with its ``case_key`` and its name while it runs."""

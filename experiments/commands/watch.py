@@ -22,8 +22,8 @@ def watch(
 ) -> None:
     """Show a run in the browser: its heaps as they form, tables and charts as they fill, time left, log.
 
-    The run may be running, finished or interrupted; nothing in its folder is changed. The page is served to this
-    machine alone, at an address with a secret token; Ctrl-C ends it.
+    The run may be running, finished or interrupted; nothing in its folder is changed. The page is served to
+    this machine alone, at an address with a secret token; Ctrl-C ends it.
 
     A run on another machine: start dem-warp watch DIR --port 8765 there, and here
 

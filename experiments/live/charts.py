@@ -89,19 +89,19 @@ def _climb(
     if target:
         add_target(figure, *target)
     ordered = sorted(steps)
-    points = [(step, value) for step in ordered for value in steps[step]]
-    add_points(figure, *zip(*points, strict=True), "case", BLUE, size=7, opacity=0.6)
-    add_line(
-        figure, ordered, [float(np.mean(steps[step])) for step in ordered], "mean of the step", VERMILION
-    )
+    each = [step for step in ordered for _ in steps[step]]
+    values = [value for step in ordered for value in steps[step]]
+    add_points(figure, each, values, "case", BLUE, size=7, opacity=0.6)
+    means = [float(np.mean(steps[step])) for step in ordered]
+    add_line(figure, ordered, means, "mean of the step", VERMILION)
     figure.update_xaxes(dtick=1)
     return Chart("climb", "The climb towards the target, step by step.", figure)
 
 
 def _effects(state: RunState) -> Chart | None:
     """Draw the effects of the factors, once the screening has ended."""
-    tables = next((s.get("tables", {}) for s in state.stages if s.get("name") == "screening"), {})
-    table = tables.get("screening_effects")
+    screening = next((stage for stage in state.stages if stage.get("name") == "screening"), {})
+    table = screening.get("tables", {}).get("screening_effects")
     if not isinstance(table, dict) or not {"columns", "data"} <= table.keys():
         return None
     found = [dict(zip(table["columns"], row, strict=False)) for row in table["data"]]
@@ -123,7 +123,7 @@ def _over_factors(
     target: tuple[float, float] | None,
 ) -> list[Chart]:
     """Draw the response over each factor that varies."""
-    charts = []
+    charts: list[Chart] = []
     for factor in state.run.get("factors", []):
         name, unit = str(factor.get("name", "")), str(factor.get("unit", "1"))
         some = [row for row in rows if _is_number(row.get(name))]

@@ -1,4 +1,4 @@
-"""The state of a run, as its folder tells it: running, finished, failed, interrupted, or of an older version."""
+"""The state of a run, as its folder tells it: waiting, running, finished, failed or interrupted."""
 
 from __future__ import annotations
 

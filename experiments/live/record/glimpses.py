@@ -30,8 +30,6 @@ WORLDS = 12
 KEPT = 24
 """Files that stay, at most; the oldest go first."""
 
-_RECORD = "record"
-
 
 @dataclass
 class Glimpses:
@@ -69,7 +67,7 @@ class Glimpses:
             self.folder.mkdir(parents=True, exist_ok=True)
             try:
                 with temporary.open("wb") as file:
-                    np.savez(file, **{_RECORD: np.frombuffer(record, np.uint8)}, spheres=spheres_of(result))
+                    np.savez(file, record=np.frombuffer(record, np.uint8), spheres=spheres_of(result))
                 # Not synchronised with the disk: a glimpse that is lost is no loss.
                 temporary.replace(self.folder / f"{name}.npz")
             finally:
@@ -103,7 +101,7 @@ def read_glimpse(path: Path) -> tuple[np.ndarray, dict[str, Any]]:
     """
     arrays = read_arrays(path)
     try:
-        spheres, facts = arrays["spheres"], json.loads(arrays[_RECORD].tobytes())
+        spheres, facts = arrays["spheres"], json.loads(arrays["record"].tobytes())
         found = {"phase": str(facts["phase"]), "fraction": float(facts["fraction"])}
     except (LookupError, TypeError, ValueError, RecursionError) as error:
         raise ValueError(f"must be a glimpse of a case: {error}") from None
