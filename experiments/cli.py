@@ -6,7 +6,6 @@ Imports of the simulator, the statistics and the pictures are inside the command
 from __future__ import annotations
 
 import json
-from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated
 
@@ -40,7 +39,7 @@ from experiments.commands.options import (
     assignments,
 )
 from experiments.commands.results import print_measured, print_study, show_stage
-from experiments.commands.watch import WATCH_EXAMPLE, watch
+from experiments.live.commands import UI_EXAMPLE, WATCH_EXAMPLE, ui, watch
 from experiments.live.server import live_page
 
 app = typer.Typer(
@@ -230,11 +229,11 @@ def heap(
         values = chosen.natural_settings(assignments(settings or []), "--set")
         folder = out or default_folder(chosen, f"{scene or 'heap'}-{seed}")
         require_unused(folder)
-        page = live_page(folder, live, messages.print)
-        notes = Journal(folder, "heap", chosen, device=device) if live else nullcontext()
-        with page, notes as journal, watching(scene or "heap", CaseProgress, journal) as progress:
-            glimpses = journal.glimpses if journal else None
-            simulated = simulate_heap(chosen, values, seed, device, progress, scene or TARGET_SCENE, glimpses)
+        named = scene or TARGET_SCENE
+        chosen.case(values, seed, named)  # what it refuses is refused before anything is written
+        page, notes = live_page(folder, live, messages.print), Journal(folder, "heap", chosen, device=device)
+        with page, notes, watching(scene or "heap", CaseProgress, notes) as progress:
+            simulated = simulate_heap(chosen, values, seed, device, progress, named, notes.glimpses)
             write_heap(simulated, folder)
     if as_json:
         typer.echo(json.dumps(simulated.to_dict(), allow_nan=False))
@@ -251,6 +250,7 @@ app.command(epilog=NEW_EXAMPLE)(new)
 app.command(epilog=EXPORT_EXAMPLE)(export)
 app.command(epilog=BRIDGE_EXAMPLE)(bridge)
 app.command(epilog=WATCH_EXAMPLE)(watch)
+app.command(epilog=UI_EXAMPLE)(ui)
 
 
 def main() -> None:

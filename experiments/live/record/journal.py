@@ -1,7 +1,7 @@
 """The journal of a run: its progress, log, cases and stages, in files that are whole whenever they are read.
 
-It lies in the folder `JOURNAL` of the run's own, and is no result: nothing that a run finds depends on it, and
-a run goes on without where it cannot be written.
+It lies in the folder `JOURNAL` of the run's own, and is no result: nothing that a run finds depends on it,
+and the run goes on where it cannot be written.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ if TYPE_CHECKING:
 
 RUN, PROGRESS, LOG, CASES, STAGES = "run.json", "progress.json", "log.jsonl", "cases.jsonl", "stages.jsonl"
 BEAT, GLIMPSES = "beat", "glimpses"
-"""Files of a journal: the run, how far it is, and, a line each, what was said, the cases, the stages that have
-ended; a file whose time says when the run was last alive; the folder of glimpses."""
+"""Files of a journal: the run, how far it is, and, a line each, what was said, the cases, the stages that
+have ended; a file whose time says when the run was last alive; the folder of glimpses."""
 
 FORMAT = 1
 """Version of the files."""
