@@ -14,6 +14,7 @@ from doe.palette import BLUE, SERIES, VERMILION
 from experiments.calibrate.results import STAGES
 from experiments.errors import InputError
 from experiments.live.folder import inside
+from experiments.live.notes import ResponseNote, SampleNote
 from experiments.live.state import RunState
 from experiments.measurement.observables import ANGLE, OBSERVABLES
 from experiments.report.kit.chart import Chart, add_bars, add_line, add_points, add_target, new_figure
@@ -39,30 +40,24 @@ def charts_of(state: RunState) -> list[Chart]:
     return [chart for chart in drawn if chart is not None]
 
 
-def _leading(state: RunState) -> tuple[str, str, tuple[float, float] | None]:
-    """Column of the leading response, its axis title, and its target's mean and standard deviation."""
-    responses = state.run.get("responses") or [{}]
-    first = responses[0] if isinstance(responses[0], dict) else {}
-    observable, unit = str(first.get("observable", ANGLE)), str(first.get("unit", "deg"))
-    sample = first.get("measured")
-    for stage in state.stages:
-        settled = stage.get("responses")
-        if stage.get("name") == "target" and isinstance(settled, dict) and settled:
-            sample = next(iter(settled.values()))
-    known = isinstance(sample, dict) and all(_is_number(sample.get(name)) for name in ("mean", "sd"))
-    title = f"{first.get('name', 'angle')}{'' if unit == '1' else f' [{unit}]'}".replace("_", " ")
-    return observable, title, (sample["mean"], sample["sd"]) if known and sample else None
+def _leading(state: RunState) -> tuple[str, str, SampleNote | None]:
+    """Column of the leading response, its axis title, and its target."""
+    told = state.run.responses
+    first = told[0] if told else ResponseNote(name="angle", observable=ANGLE, unit="deg")
+    settled = [sample for stage in state.stages for sample in stage.responses.values()]
+    title = f"{first.name}{'' if first.unit == '1' else f' [{first.unit}]'}".replace("_", " ")
+    return first.observable, title, next(iter(settled), first.measured)
 
 
 def _course(
-    rows: Sequence[dict[str, Any]], observable: str, title: str, target: tuple[float, float] | None
+    rows: Sequence[dict[str, Any]], observable: str, title: str, target: SampleNote | None
 ) -> Chart | None:
     """Draw the response of every case in the order in which they ended."""
     if not rows:
         return None
     figure = new_figure("case, in the order of their ends", title)
     if target:
-        add_target(figure, *target)
+        add_target(figure, target.mean, target.sd)
     numbered = list(enumerate(rows, start=1))
     for stage in [*STAGES, None]:
         some = [(number, row) for number, row in numbered if row.get("stage") == stage]
@@ -76,18 +71,18 @@ def _course(
 
 
 def _climb(
-    rows: Sequence[dict[str, Any]], observable: str, title: str, target: tuple[float, float] | None
+    rows: Sequence[dict[str, Any]], observable: str, title: str, target: SampleNote | None
 ) -> Chart | None:
     """Draw the response along the climb."""
     steps: dict[int, list[float]] = {}
     for row in rows:
-        if row.get("stage") == "climb":
-            steps.setdefault(int(row["run"]), []).append(row[observable])
+        if row.get("stage") == "climb" and isinstance(row.get("run"), int):
+            steps.setdefault(row["run"], []).append(row[observable])
     if not steps:
         return None
     figure = new_figure("step of the climb", title)
     if target:
-        add_target(figure, *target)
+        add_target(figure, target.mean, target.sd)
     ordered = sorted(steps)
     each = [step for step in ordered for _ in steps[step]]
     values = [value for step in ordered for value in steps[step]]
@@ -100,11 +95,11 @@ def _climb(
 
 def _effects(state: RunState) -> Chart | None:
     """Draw the effects of the factors, once the screening has ended."""
-    screening = next((stage for stage in state.stages if stage.get("name") == "screening"), {})
-    table = screening.get("tables", {}).get("screening_effects")
-    if not isinstance(table, dict) or not {"columns", "data"} <= table.keys():
+    screening = next((stage for stage in state.stages if stage.name == "screening"), None)
+    table = screening.tables.get("screening_effects") if screening else None
+    if table is None:
         return None
-    found = [dict(zip(table["columns"], row, strict=False)) for row in table["data"]]
+    found = [dict(zip(table.columns, row, strict=False)) for row in table.data]
     leading = [row for row in found if row.get("response") == found[0].get("response")]
     bars = [(str(row.get("factor")), row["effect"]) for row in leading if _is_number(row.get("effect"))]
     if not bars:
@@ -120,18 +115,17 @@ def _over_factors(
     rows: Sequence[dict[str, Any]],
     observable: str,
     title: str,
-    target: tuple[float, float] | None,
+    target: SampleNote | None,
 ) -> list[Chart]:
     """Draw the response over each factor that varies."""
     charts: list[Chart] = []
-    for factor in state.run.get("factors", []):
-        name, unit = str(factor.get("name", "")), str(factor.get("unit", "1"))
+    for name, unit in ((factor.name, factor.unit) for factor in state.run.factors):
         some = [row for row in rows if _is_number(row.get(name))]
         if len({row[name] for row in some}) < 2 or len(charts) == MOST_FACTORS:
             continue
         figure = new_figure(name if unit in ("1", "") else f"{name} [{unit}]", title, legend=False)
         if target:
-            add_target(figure, *target)
+            add_target(figure, target.mean, target.sd)
         x, y = [row[name] for row in some], [row[observable] for row in some]
         add_points(figure, x, y, "case", BLUE, size=7)
         charts.append(Chart(f"over-{name}", f"Every case over {name}.", figure, "low"))

@@ -124,10 +124,10 @@ class Runs:
         state, started = RunState.read(self.folder / name), self._started.get(name)
         told: dict[str, Any] = {
             "folder": name,
-            "study": state.run.get("study", ""),
-            "state": state.progress.get("state"),
-            "message": state.progress.get("message", ""),
-            "left": state.progress.get("left_text", ""),
+            "study": state.run.study,
+            "state": state.progress.state,
+            "message": state.progress.message,
+            "left": state.left,
             "outputs": [each for each in state.outputs if each.endswith(".html") or each == "snapshot.png"],
         }
         if started is None:

@@ -119,12 +119,12 @@ def state_text(folder: Path) -> bytes:
     state = RunState.read(folder)
     told = {
         "folder": str(folder.resolve().name or folder),
-        "run": {key: state.run.get(key) for key in ("command", "study", "scale", "device")},
-        "progress": state.progress,
-        "log": state.log,
+        "run": state.run.model_dump(include={"command", "study", "scale", "device"}),
+        "progress": state.progress.model_dump() | {"left_text": state.left},
+        "log": [line.model_dump() for line in state.log],
         "cases": _case_table(state),
         "heaps": state.heaps,
-        "stages": state.stages,
+        "stages": [stage.model_dump() for stage in state.stages],
         "outputs": state.outputs,
         "charts": [
             {"name": chart.name, "caption": chart.caption, "figure": json.loads(chart.json)}

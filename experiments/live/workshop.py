@@ -52,7 +52,7 @@ class Workshop:
         tests = {
             name: [
                 {"key": row.key, "kind": row.kind, "default": row.default, "bounds": row.bounds,
-                 "meaning": row.meaning}
+                 "meaning": row.meaning, "required": row.required}
                 for row in rows
                 if row.section == f"[scene.{name}]"
             ]

@@ -53,7 +53,7 @@ export function table(columns, rows, caption) {
   const head = element("tr", {}, ...columns.map((name, i) =>
     element("th", { scope: "col", class: kind(i) }, name.replaceAll("_", " "))));
   const body = rows.map((row) => element("tr", {}, ...row.map((value, i) =>
-    element("td", { class: kind(i) }, number(value)))));
+    element("td", { class: typeof value === "string" && value.length > 60 ? "text long" : kind(i) }, number(value)))));
   const whole = element("table", {}, element("thead", {}, head), element("tbody", {}, ...body));
   const attributes = { class: "scroll tall", tabindex: "0", role: "region", "aria-label": caption };
   return element("div", attributes, whole);
@@ -74,7 +74,11 @@ function themed(figure) {
 }
 
 export function drawChart(place, figure) {
-  Plotly.react(place, structuredClone(figure.data), themed(figure), { displayModeBar: false, responsive: true });
+  if (!place.dataset.watched) {
+    place.dataset.watched = "yes";
+    new ResizeObserver(() => place.data && Plotly.Plots.resize(place)).observe(place);
+  }
+  Plotly.react(place, structuredClone(figure.data), themed(figure), { displayModeBar: false });
 }
 
 export const darkness = matchMedia("(prefers-color-scheme: dark)");

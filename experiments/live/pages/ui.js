@@ -20,10 +20,13 @@ const views = {};
 
 const found = (document, place) => place.split(".").reduce((at, key) => (at || {})[key], document);
 
+const PLAIN = ["grain", "scene", "target", "measurement", "numerics", "solver"];
+
 function field(place, initial, hint = "") {
-  const id = `field-${place}`;
-  const words = element("label", { for: id }, place.split(".").slice(-2).join(", ").replaceAll("_", " "));
-  if (hint) words.append(" ", element("span", { class: "hint" }, hint));
+  const id = `field-${place}`, keys = place.split(".");
+  const told = keys.slice(PLAIN.includes(keys[0]) ? -1 : -2).join(" ").replaceAll("_", " ");
+  const words = element("label", { for: id }, told);
+  if (hint) words.append(" ", element("span", { class: "hint" }, hint.replaceAll("`", "")));
   const input = element("input", { type: "text", id, "data-place": place });
   input.value = initial ?? "";
   return element("div", {}, words, input);
@@ -35,12 +38,15 @@ function fill(id, places) {
 }
 
 function fillTest() {
-  const test = value("test");
-  byId("test-fields").replaceChildren(...form.tests[test].map((row) => {
-    const place = `scene.${test}.${row.key}`;
+  const test = value("test"), first = [], further = [];
+  for (const row of form.tests[test]) {
+    const place = `scene.${test}.${row.key}`, initial = found(form.template, place);
     const left = row.default ? ` Left out: ${row.default}.` : "";
-    return field(place, found(form.template, place), `${row.meaning}${left}`);
-  }));
+    const made = field(place, initial, `${row.meaning}${left}`);
+    (initial !== undefined || row.required ? first : further).push(made);
+  }
+  byId("test-fields").replaceChildren(...first);
+  byId("test-further").replaceChildren(...further);
 }
 
 function addFactor(factor = {}) {

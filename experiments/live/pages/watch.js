@@ -96,9 +96,10 @@ function caption(tile) {
   if (!heap.at_rest && state.progress.state !== "running") told = `last seen: ${told}`;
   if (!heap.at_rest && tile.fraction) told += `, ${Math.round(100 * tile.fraction)} %`;
   if (typeof heap.angle === "number") told += `, ${heap.angle.toFixed(1)}°`;
-  else if (heap.reason) told = heap.reason;
+  else if (heap.at_rest) told += ", no angle";
   const tagged = element("span", { class: heap.at_rest ? "tag rest" : "tag forming" }, told);
   tile.words.replaceChildren(tagged, element("br"), heap.title);
+  tile.words.title = heap.reason || "";
   tile.canvas.setAttribute("aria-label", `Heap of ${heap.title}: ${told}. Arrow keys turn it.`);
 }
 

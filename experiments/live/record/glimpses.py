@@ -51,13 +51,16 @@ class Glimpses:
         if time.monotonic() < self._due:
             return
         begun = time.perf_counter()
+        self._take(batch)
+        self._wait(time.perf_counter() - begun)
+
+    def _take(self, batch: Batch) -> None:
         worlds = batch.running[:: max(1, -(-len(batch.running) // WORLDS))]
         for world, view in zip(worlds, batch.solver.view(worlds), strict=True):
             facts = {"phase": batch.phase(world), "fraction": round(batch.fraction(world), 4)}
             # those that still wait for their fall lie in each other
             fallen = _only(batch.result(world), view.released[view.alive])
             self.write(batch.case_name(world), fallen, facts)
-        self._wait(time.perf_counter() - begun)
 
     def write(self, name: str, result: CaseResult, facts: dict[str, Any]) -> None:
         """Write where the spheres of a case are, whole or not at all."""
