@@ -1,4 +1,4 @@
-"""Notes of a journal as the page reads them: a folder may come from anyone, and what is no note is left out."""
+"""Notes of a journal as the page reads them: a folder may come from anyone; what is no note is left out."""
 
 from __future__ import annotations
 

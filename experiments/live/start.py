@@ -84,14 +84,17 @@ def answered(answer: Answer, body: bytes) -> Any:
     """Answer a question; what breaks a rule is told in the command line's own words."""
     try:
         asked = json.loads(body or b"{}")
-        if not isinstance(asked, Mapping):
-            raise TypeError("an object")
-        return answer(dict(asked))
+    except (ValueError, RecursionError):
+        asked = None
+    try:
+        return answer({**asked})
     except InputError as error:
         return problems_of(error)
     except PictureError as error:
         return {"error": str(error), "problems": []}
-    except (LookupError, TypeError, AttributeError, json.JSONDecodeError, RecursionError):
+    except OSError as error:
+        return {"error": f"{error.filename}: {error.strerror}", "problems": []}
+    except (LookupError, TypeError, AttributeError):
         return {"error": "a question must be one of the page's own", "problems": []}
 
 

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -130,7 +131,9 @@ class Workshop:
         density = quantity(asked["density"], "density", "--density") if asked.get("density") else None
         made = make_clump(request)
         if out := asked.get("out"):
-            write_clump(made.shape, self.new_file(out))
+            with TemporaryDirectory() as draft:
+                write_clump(made.shape, Path(draft, "clump.txt"))
+                self.keep(out, Path(draft, "clump.txt").read_bytes())
         own = np.column_stack([made.shape.centers, made.shape.radii])
         spheres = made.fit.spheres if made.fit else own
         return {

@@ -111,7 +111,7 @@ async function preview(out = "") {
   if (chosen("shape") === "sphere") asked.spheres = "1";
   else Object.assign(asked, clumpAsked(asked.source), { out });
   const density = document.querySelector('[data-place="grain.density"]').value;
-  const made = await ask("clump", { ...asked, density });
+  const made = await ask("clump", { ...asked, density: out ? "" : density });
   show("grain", true);
   show("solid-tile", made.faces.length > 0);
   views.solid = views.solid || new View(byId("solid-view"), { plate: false, elevation: 0.4 });

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import shlex
 import sys
@@ -202,10 +203,8 @@ def test_a_bad_shape_gets_the_command_lines_own_message(
 def test_an_upload_stays_in_the_folder(upload: Callable, folder: Path, tmp_path: Path, name: str) -> None:
     (folder / "linked").symlink_to(tmp_path)
     before = sorted(tmp_path.rglob("*"))
-    try:
+    with contextlib.suppress(json.JSONDecodeError):  # the path itself drops the dots: there is no such page
         assert upload(name, b"data")["error"]
-    except json.JSONDecodeError:  # a name that the path itself drops leads past the token: refused
-        pass
     assert sorted(tmp_path.rglob("*")) == before
 
 
@@ -256,7 +255,7 @@ def test_a_bad_photograph_is_a_row_with_its_reason(ask: Ask, upload: Callable) -
 def test_the_command_line_is_the_one_that_is_called(
     ask: Ask, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    script = "import json, sys, pathlib; pathlib.Path('called.json').write_text(json.dumps(sys.argv[1:])); sys.exit(2)"
+    script = "import json, sys; json.dump(sys.argv[1:], open('called.json', 'w')); sys.exit(2)"
     monkeypatch.setattr(started, "PROGRAM", (sys.executable, "-c", script))
     dem_warp("new", "my grain")
     asked = {"command": "calibrate", "file": "my grain.toml", "device": "cpu"}
@@ -279,8 +278,8 @@ def test_the_command_line_is_the_one_that_is_called(
     [
         {"command": "rm", "file": "g.toml"}, {"command": "heap", "file": "none.toml"},
         {"command": "heap", "file": "../g.toml"}, {"command": "heap", "file": "g.toml", "out": "../away"},
-        {"command": "heap", "file": "g.toml", "out": "/tmp/away"}, {"command": "heap", "file": "g.toml", "scale": "x"},
-        {"command": "heap"},
+        {"command": "heap", "file": "g.toml", "out": "/tmp/away"}, {"command": "heap"},
+        {"command": "heap", "file": "g.toml", "scale": "x"},
     ],
 )  # fmt: skip
 def test_what_cannot_be_started_is_refused(
@@ -312,9 +311,6 @@ def test_a_heap_is_started_watched_and_shown(
     spheres = np.frombuffer(client.get(f"/{TOKEN}/run/{place}/-/heap/heap").content, "<f4").reshape(-1, 5)
     assert len(spheres) <= 30
     assert client.get(f"/{TOKEN}/run/{place}/-/file/snapshot.png").headers["content-type"] == "image/png"
-    assert "new or empty" in ask("runs")[0]["messages"] or ask(
-        "start", command="heap", file="small.toml", device="cpu"
-    )
 
 
 def test_a_question_that_is_none_is_no_traceback(client: TestClient) -> None:
