@@ -68,7 +68,7 @@ class Browser:
     def open(self, url: str) -> None:
         """Go to an address, and wait until it is loaded."""
         self.call("Page.navigate", url=url)
-        self.wait("location.href !== 'about:blank' && document.readyState === 'complete'")
+        self.wait("location.href !== 'about:blank' && document.body && document.readyState === 'complete'")
 
     def run(self, script: str) -> Any:
         """Value of an expression in the page."""
@@ -80,7 +80,9 @@ class Browser:
     def wait(self, condition: str) -> None:
         """Wait until an expression is true in the page."""
         ended = time.monotonic() + PATIENCE
-        while not self.run(f"Boolean({condition})"):
+        # what a page does not have yet throws
+        asked = f"(() => {{ try {{ return Boolean({condition}); }} catch {{ return false; }} }})()"
+        while not self.run(asked):
             if time.monotonic() > ended:
                 raise TimeoutError(f"{condition}: not in {PATIENCE} s; errors: {self.errors}")
             self.run("new Promise((done) => setTimeout(done, 50))")
