@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import os
+import random
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -13,6 +14,7 @@ import pytest
 from conftest import KEY, NAME, begin
 
 from dem_warp import CaseResult, Progress
+from experiments.benchmarks.fuzz.mutations import mutated
 from experiments.cases import Store, open_folder
 from experiments.cases.folder import JOURNAL, is_used
 from experiments.live.charts import charts_of
@@ -147,6 +149,18 @@ def test_damaged_notes_are_passed_over(run_folder: Path, small_study: Study, con
     state = RunState.read(run_folder)
     assert len(state.cases) == 2
     assert json.loads(state_text(run_folder))["cases"]["ended"] == 1
+
+
+def test_mutated_journals_are_no_traceback(run_folder: Path, small_study: Study, cone: Cone) -> None:
+    """A folder may come from anyone: whatever is in it, the page has a state."""
+    begin(run_folder, small_study, cone)
+    rng = random.Random(5)
+    for path in [path for path in (run_folder / JOURNAL).iterdir() if path.is_file() and path.name != BEAT]:
+        whole = path.read_bytes()
+        for _ in range(40):
+            path.write_bytes(mutated(whole, [b"1e999", b'{"a": [[]]}'], rng))
+            json.loads(state_text(run_folder), parse_constant=lambda name: pytest.fail(name))
+        path.write_bytes(whole)
 
 
 def test_notes_of_other_kinds_of_values_are_no_traceback(run_folder: Path) -> None:
