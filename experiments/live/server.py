@@ -78,7 +78,7 @@ def ui_app(folder: Path, token: str) -> ASGIApp:
 
 @dataclass(frozen=True)
 class Place:
-    """A socket that is bound, and the token of its address."""
+    """A socket that listens, and the token of its address."""
 
     socket: socket.socket
     token: str
@@ -97,6 +97,7 @@ class Place:
             found.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             found.bind((ADDRESS, port))
+            found.listen()  # who comes before the server has begun waits for it
         except (OSError, OverflowError) as error:
             found.close()
             reason = getattr(error, "strerror", None) or str(error)

@@ -6,6 +6,7 @@ import json
 import os
 import socket
 import sys
+import urllib.request
 from collections.abc import Callable
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from conftest import KEY, NAME, OTHER, begin
 from starlette.testclient import TestClient
 
 from dem_warp import CaseResult
+from experiments import api, cases
 from experiments.errors import InputError
 from experiments.live import server
 from experiments.live.server import Place, watch_app
@@ -207,3 +209,33 @@ def test_the_address_is_told_and_no_browser_opened_without_a_screen(
 
 def test_json_of_the_state_has_no_nan(client: TestClient) -> None:
     json.loads(client.get(f"/{TOKEN}/state.json").text, parse_constant=lambda name: pytest.fail(name))
+
+
+@pytest.mark.parametrize("command", ["calibrate", "discover", "heap"])
+def test_live_serves_the_page_beside_the_run(
+    command: str, small_study: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    places: list[Place] = []
+    seen: list[bytes] = []
+    urls: list[str] = []
+    opened = Place.open
+
+    def run(*_: object, **__: object) -> None:
+        urls.append(places[0].url)
+        with urllib.request.urlopen(urls[0] + "state.json") as answer:
+            seen.append(answer.read())
+        raise InputError("the run has looked", "enough", command)
+
+    monkeypatch.setattr(server.Place, "open", lambda port=0: places.append(opened(port)) or places[-1])
+    monkeypatch.setattr(server, "can_open_browser", lambda: False)
+    monkeypatch.setattr(api, "calibrate", run)
+    monkeypatch.setattr(api, "discover", run)
+    monkeypatch.setattr(cases, "simulate_heap", run)
+    words = [command, small_study.file, "--device", "cpu", "--live", "--out", tmp_path / "out"]
+    code, _, told = dem_warp(*words)
+    assert code == 2
+    assert "the run has looked" in told
+    assert f"Live: {urls[0]}" in told
+    assert json.loads(seen[0])["progress"]["state"] == ("running" if command == "heap" else "waiting")
+    with pytest.raises(OSError, match="refused"):
+        urllib.request.urlopen(urls[0])
