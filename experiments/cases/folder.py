@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -63,6 +64,7 @@ def _take_away(folder: Path) -> None:
     """Remove a folder that holds a lock alone, so that a run that was refused leaves nothing."""
     # another system may keep a file that is open, and another run may write into the folder just now
     with suppress(OSError):
+        shutil.rmtree(folder / JOURNAL, ignore_errors=True)
         (folder / LOCK).unlink()
         folder.rmdir()
 

@@ -6,9 +6,10 @@ import errno
 import logging
 import shlex
 import signal
+import subprocess
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import BrokenExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -29,6 +30,8 @@ if TYPE_CHECKING:
 BAD_INPUT, FAILED_RUN, INTERRUPTED, TERMINATED = 2, 1, 130, 143
 """Exit codes."""
 
+ENDED_OUTSIDE = "a process was ended from outside, perhaps for lack of memory: fewer --workers need less."
+
 QUIET_START = 2.0
 """Least duration that shows progress [s]."""
 MANIFEST = "study.json"
@@ -43,7 +46,7 @@ HIDDEN = ("Cc", "Cf", "Cs", "Zl", "Zp")
 WAYS_OUT = {
     errno.ENOSPC: "free some room on the disk",
     errno.EDQUOT: "free some room in your quota",
-    errno.EACCES: "see to the permissions, or name another place",
+    errno.EACCES: "see to the permissions, close the program that has it open, or name another place",
     errno.EPERM: "see to the permissions, or name another place",
     errno.EROFS: "name a place that can be written to",
     errno.ENOENT: "see to it that nothing is moved or removed while a command runs",
@@ -58,6 +61,11 @@ def plain(text: str) -> str:
         else character.encode("unicode_escape", "surrogatepass").decode()
         for character in text
     )  # fmt: skip
+
+
+def shell_line(words: Sequence[str]) -> str:
+    """Join the words of a command as the system's shell reads them."""
+    return subprocess.list2cmdline(words) if sys.platform == "win32" else shlex.join(words)
 
 
 class Messages(Console):
@@ -98,7 +106,7 @@ class Attempt:
         for name, value in {"out": out, **options}.items():
             if value is not None and value is not False:
                 words += [f"--{name.replace('_', '-')}", *([] if value is True else [str(value)])]
-        return cls(shlex.join(words), out)
+        return cls(shell_line(words), out)
 
     def __str__(self) -> str:
         """Say how to go on."""
@@ -125,9 +133,9 @@ def clear_errors(advice: object = "") -> Iterator[None]:
         except KeyboardInterrupt:
             messages.print(f"Interrupted. {advice}")
             raise typer.Exit(INTERRUPTED) from None
-        except BrokenExecutor:
-            rule = "a process was ended from outside, perhaps for lack of memory: fewer --workers need less."
-            fail(f"{rule} {advice}", FAILED_RUN)
+        except BrokenExecutor as error:
+            what = str(error) if _are_lost_workers(error) else ENDED_OUTSIDE
+            fail(f"{what} {advice}", FAILED_RUN)
         except MemoryError:
             fail(f"there is not enough memory: fewer --workers need less. {advice}", FAILED_RUN)
         except OSError as error:
@@ -162,6 +170,12 @@ def _is_input(error: ValueError) -> bool:
     kinds = [("experiments.errors", "InputError"), ("imaging", "PictureError"), ("doe", "DesignError")]
     loaded = (getattr(sys.modules.get(module), name, ()) for module, name in kinds)
     return isinstance(error, tuple(kind for kind in loaded if kind))
+
+
+def _are_lost_workers(error: BrokenExecutor) -> bool:
+    """Tell that an error says which workers were lost."""
+    module = sys.modules.get("experiments.cases.workers.workers")
+    return module is not None and isinstance(error, module.WorkersLostError)
 
 
 def fail(message: str, code: int = BAD_INPUT) -> NoReturn:

@@ -68,14 +68,6 @@ def watch_app(folder: Path, token: str) -> ASGIApp:
     return guarded(watch_routes(lambda request: folder), token)
 
 
-def ui_app(folder: Path, token: str) -> ASGIApp:
-    """Build the application of the page to start from."""
-    from experiments.live.start import start_routes
-    from experiments.live.workshop import Workshop
-
-    return guarded(start_routes(Workshop(folder)), token)
-
-
 @dataclass(frozen=True)
 class Place:
     """A socket that listens, and the token of its address."""

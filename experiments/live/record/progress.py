@@ -9,19 +9,32 @@ if TYPE_CHECKING:
 
 FIRST_GUESS = 0.01
 """Part of the work that is done before the time left is guessed."""
+WELL_BEGUN, LEAST_LEFT = 0.1, 0.1
+"""Part of the work from which on its speed alone counts, and of the time expected that is always left."""
 
 
 def time_left(progress: Progress, first: Progress | None = None) -> float | None:
     """Guess the time that is left [s]; None where it is too early to tell, or nothing is left.
 
-    The speed is that since the `first` progress: what an earlier run had done is not this one's speed.
+    The speed is that since the `first` progress: what an earlier run had done is not this one's speed. Before
+    that shows, it is what was expected of this machine.
     """
     done, seconds = progress.fraction, progress.seconds
     if first is not None:
         done, seconds = done - first.fraction, seconds - first.seconds
-    if done < FIRST_GUESS or progress.fraction >= 1.0:
-        return None
-    return seconds * (1.0 - progress.fraction) / done
+    left = _seconds_left(progress, done, seconds)
+    return left if progress.fraction < 1.0 else None
+
+
+def _seconds_left(progress: Progress, done: float, seconds: float) -> float | None:
+    """Time left by the speed so far, and before that shows by what was expected of this machine."""
+    expected, rest = getattr(progress, "expected", None), 1.0 - progress.fraction
+    if expected is None:
+        return seconds * rest / done if done >= FIRST_GUESS else None
+    trust = min(done / WELL_BEGUN, 1.0)
+    # what has shown nothing yet has still the time to come that has passed
+    begun = max(expected * rest - (seconds if done < FIRST_GUESS else 0.0), LEAST_LEFT * expected)
+    return begun if done <= 0.0 else trust * seconds * rest / done + (1.0 - trust) * begun
 
 
 def duration(seconds: float) -> str:

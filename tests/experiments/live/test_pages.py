@@ -17,7 +17,8 @@ from dem_warp import CaseResult, Progress
 from experiments import api
 from experiments.cases import Store
 from experiments.live import server
-from experiments.live.server import Place, serving, ui_app
+from experiments.live.server import Place, serving
+from experiments.live.ui.start import ui_app
 from experiments.studyfile import Study, load_study
 
 pytestmark = pytest.mark.program("chromium")

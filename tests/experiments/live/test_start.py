@@ -18,9 +18,9 @@ import trimesh
 from commandline import dem_warp
 from starlette.testclient import TestClient
 
-from experiments.live import started, workshop
-from experiments.live.server import ui_app
-from experiments.live.workshop import plain_value
+from experiments.live.ui import started, workshop
+from experiments.live.ui.start import ui_app
+from experiments.live.ui.workshop import plain_value
 from experiments.studyfile import load_study
 from experiments.toml_files import read_toml
 

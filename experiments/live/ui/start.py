@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from experiments.errors import InputError
-from experiments.live.started import Runs
+from experiments.live.server import guarded
+from experiments.live.ui.started import Runs
+from experiments.live.ui.workshop import LARGEST_UPLOAD, Workshop, command_line, problems_of
 from experiments.live.watched import page_file, page_routes, watch_routes
-from experiments.live.workshop import LARGEST_UPLOAD, Workshop, command_line, problems_of
 from experiments.runs.choices import default_folder
 from imaging import PictureError
 
@@ -17,12 +19,18 @@ if TYPE_CHECKING:
     from starlette.requests import Request
     from starlette.responses import Response
     from starlette.routing import Route
+    from starlette.types import ASGIApp
 
 COMMANDS = {"heap": "heap-1", "calibrate": "", "discover": "discover"}
 """Commands that can be started, and what their folder's name ends with."""
 
 Answer = Callable[[dict[str, Any]], Any]
 """Answers what the page asks, plain values by name, with JSON-able data."""
+
+
+def ui_app(folder: Path, token: str) -> ASGIApp:
+    """Build the application of the page to start from."""
+    return guarded(start_routes(Workshop(folder)), token)
 
 
 def start_routes(workshop: Workshop) -> list[Route]:

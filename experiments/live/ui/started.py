@@ -13,7 +13,7 @@ from typing import IO, Any
 
 from experiments.errors import InputError
 from experiments.live.state import RunState
-from experiments.live.workshop import command_line
+from experiments.live.ui.workshop import command_line
 
 PROGRAM = (sys.executable, "-c", "from experiments.cli import main; main()")
 """Words that run ``dem-warp``, also where it is not on the path."""
