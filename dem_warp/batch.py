@@ -4,13 +4,13 @@ import logging
 import time
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import warp as wp
 
 from dem_warp.case import Case
-from dem_warp.checkpoint import Checkpoints
+from dem_warp.checkpoint import Checkpoints, case_name
 from dem_warp.clumps import stack_spheres
 from dem_warp.provenance import engine_fingerprint, provenance
 from dem_warp.result import CaseResult
@@ -40,6 +40,17 @@ ADVICE = {
 }
 
 
+class Onlooker(Protocol):
+    """Sees a batch between two stretches of steps, and changes nothing of it.
+
+    On a CPU each process has a copy of its own, so that it can be pickled.
+    """
+
+    def __call__(self, batch: "Batch") -> None:
+        """Look at the batch, or do not: it is called often."""
+        ...
+
+
 class Batch:
     """Cases of one kind of scene, precision and largest number of spheres, as worlds of one launch.
 
@@ -49,9 +60,17 @@ class Batch:
     device : str
     checkpoints : Checkpoints, optional
         Where the cases are saved now and then, and go on from where an earlier run left them.
+    onlooker : Onlooker, optional
+        Called after every stretch of steps.
     """
 
-    def __init__(self, cases: Sequence[Case], device: str, checkpoints: Checkpoints | None = None) -> None:
+    def __init__(
+        self,
+        cases: Sequence[Case],
+        device: str,
+        checkpoints: Checkpoints | None = None,
+        onlooker: Onlooker | None = None,
+    ) -> None:
         self.cases = list(cases)
         self.setups = cases[0].scene.prepare(cases, device)
         self.solver = Solver(self.setups, device, cases[0].numerics.precision)
@@ -63,6 +82,7 @@ class Batch:
         self.steps = [0] * len(cases)
         self.provenance = provenance(self.solver.device, self.solver.precision.name)
         self._checkpoints, self._saved = checkpoints, time.monotonic()
+        self._onlooker = onlooker
         self._resume()
 
     def advance(self) -> list[tuple[int, CaseResult]]:
@@ -76,6 +96,8 @@ class Batch:
         ended = self._look(due)
         if self._checkpoints and time.monotonic() - self._saved >= self._checkpoints.every:
             self.save()
+        if self._onlooker:
+            self._onlooker(self)
         return ended
 
     def _take_back_late(self, ahead: int) -> list[int]:
@@ -106,6 +128,10 @@ class Batch:
     def phase(self, world: int) -> str:
         """Phase that a world is in."""
         return self.controllers[world].course.phase
+
+    def case_name(self, world: int) -> str:
+        """Name of the case of a world, by which its checkpoint is known too."""
+        return case_name(self.cases[world])
 
     @cached_property
     def maker(self) -> dict[str, Any]:
@@ -165,11 +191,12 @@ class Batch:
                     verdict = ("diverged", "a grain is nowhere: its position is no number")
             self.solver.stop(w)
             self.running.remove(w)
-            ended.append((w, self._result(w, *verdict)))
+            ended.append((w, self.result(w, *verdict)))
         self.solver.move_walls(moves)
         return ended
 
-    def _result(self, w: int, status: str, reason: str) -> CaseResult:
+    def result(self, w: int, status: str = "running", reason: str = "") -> CaseResult:
+        """Result of a world as it stands now, which may be before its end."""
         poses, course, setup = self.solver.poses(w), self.controllers[w].course, self.setups[w]
         counts = {"rebuilds": float(self.solver.rebuilds.numpy()[w])}
         return CaseResult(
@@ -187,7 +214,10 @@ class Batch:
 
 
 def begin(
-    cases: Sequence[Case], device: str, checkpoints: Checkpoints | None = None
+    cases: Sequence[Case],
+    device: str,
+    checkpoints: Checkpoints | None = None,
+    onlooker: Onlooker | None = None,
 ) -> tuple[Batch | None, list[int], dict[int, CaseResult]]:
     """Begin a batch of those cases that can be, and fail the others.
 
@@ -201,14 +231,14 @@ def begin(
         Results of the others by their indices, each with its reason.
     """
     try:
-        return Batch(cases, device, checkpoints), list(range(len(cases))), {}
+        return Batch(cases, device, checkpoints, onlooker), list(range(len(cases))), {}
     except (ValueError, MemoryError):
         faults = {i: _fault(case, device) for i, case in enumerate(cases)}
         refused = {i: _refusal(cases[i], reason, device) for i, reason in faults.items() if reason}
         if not refused:
             raise
         begun = [i for i in range(len(cases)) if i not in refused]
-        batch = Batch([cases[i] for i in begun], device, checkpoints) if begun else None
+        batch = Batch([cases[i] for i in begun], device, checkpoints, onlooker) if begun else None
         return batch, begun, refused
 
 

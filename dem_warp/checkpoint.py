@@ -53,15 +53,8 @@ class Checkpoints:
         self.folder, self.every = Path(folder), every
 
     def path(self, case: Case) -> Path:
-        """File of a case: the hash of all that the case says."""
-        content = {
-            "case": case.to_dict(),
-            "scene": type(case.scene).__name__,
-            # it does not change the result, but it is what the neighbour lists were made for
-            "skin": case.numerics.skin,
-        }
-        text = json.dumps(content, sort_keys=True, separators=(",", ":"))
-        return self.folder / f"{hashlib.sha256(text.encode()).hexdigest()}.npz"
+        """File of a case."""
+        return self.folder / f"{case_name(case)}.npz"
 
     def save(self, case: Case, maker: dict[str, Any], course: Course, snapshot: Snapshot) -> None:
         """Save where a case is, replacing its earlier checkpoint.
@@ -114,6 +107,18 @@ class Checkpoints:
     def drop(self, case: Case) -> None:
         """Remove the checkpoint of a case that has ended, if there is one."""
         self.path(case).unlink(missing_ok=True)
+
+
+def case_name(case: Case) -> str:
+    """Name of a case while it runs: the hash of all that it says."""
+    content = {
+        "case": case.to_dict(),
+        "scene": type(case.scene).__name__,
+        # it does not change the result, but it is what the neighbour lists were made for
+        "skin": case.numerics.skin,
+    }
+    text = json.dumps(content, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _require_same(found: dict[str, Any], expected: dict[str, Any]) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from typing import Any
 
-from dem_warp.batch import begin
+from dem_warp.batch import Onlooker, begin
 from dem_warp.case import Case
 from dem_warp.checkpoint import Checkpoints
 from dem_warp.device import resolve_device
@@ -41,9 +41,11 @@ def _wait_for_parent() -> None:
         os._exit(1)
 
 
-def _run_case(index: int, case: Case, checkpoints: Checkpoints | None) -> CaseResult:
+def _run_case(
+    index: int, case: Case, checkpoints: Checkpoints | None, onlooker: Onlooker | None
+) -> CaseResult:
     """Run one case in a worker, leaving its progress in the shared memory."""
-    batch, _, refused = begin([case], resolve_device("cpu"), checkpoints)
+    batch, _, refused = begin([case], resolve_device("cpu"), checkpoints, onlooker)
     if batch is None:
         return refused[0]
     while True:
@@ -61,6 +63,7 @@ def run_in_processes(
     on_result: OnResult,
     report: Report,
     checkpoints: Checkpoints | None = None,
+    onlooker: Onlooker | None = None,
 ) -> None:
     """Run cases, `workers` at a time.
 
@@ -74,13 +77,15 @@ def run_in_processes(
         Called now and then with the fraction done and the phase of every case.
     checkpoints : Checkpoints, optional
         Where the processes save their cases and take them up.
+    onlooker : Onlooker, optional
+        Sees the batch of each case, in its process.
     """
     context = multiprocessing.get_context("spawn")
     fractions = context.Array("d", len(cases))
     phases = context.Array("c", b"waiting".ljust(PHASE_LENGTH) * len(cases))
     with ProcessPoolExecutor(workers, context, _start_worker, (fractions, phases)) as pool:
         futures: dict[Future[CaseResult], int] = {
-            pool.submit(_run_case, i, case, checkpoints): i for i, case in enumerate(cases)
+            pool.submit(_run_case, i, case, checkpoints, onlooker): i for i, case in enumerate(cases)
         }
         pending = set(futures)
         try:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from dem_warp.batch import begin
+from dem_warp.batch import Onlooker, begin
 from dem_warp.case import Case
 from dem_warp.checkpoint import CHECKPOINT_EVERY, Checkpoints
 from dem_warp.device import resolve_device
@@ -23,6 +23,7 @@ def simulate(
     on_progress: OnProgress | None = None,
     checkpoint: str | Path | None = None,
     checkpoint_every: float = CHECKPOINT_EVERY,
+    onlooker: Onlooker | None = None,
 ) -> list[CaseResult]:
     """Simulate cases at once.
 
@@ -42,6 +43,9 @@ def simulate(
         were, to the same bits; the file of a case is removed when it has ended.
     checkpoint_every : float
         Wall time between two checkpoints [s].
+    onlooker : callable, optional
+        Called with each running `Batch` after every stretch of its steps, in the process that runs it; it may
+        copy from the batch and changes nothing of it.
 
     Returns
     -------
@@ -75,20 +79,25 @@ def simulate(
 
     count = min(workers or os.cpu_count() or 1, len(cases)) if name == "cpu" else 1
     if count > 1:
-        run_in_processes(cases, count, keep, report, checkpoints)
+        run_in_processes(cases, count, keep, report, checkpoints, onlooker)
     else:
-        _run_batches(cases, name, keep, report, checkpoints)
+        _run_batches(cases, name, keep, report, checkpoints, onlooker)
     return [results[i] for i in range(len(cases))]
 
 
 def _run_batches(
-    cases: Sequence[Case], device: str, keep: OnResult, report: Report, checkpoints: Checkpoints | None
+    cases: Sequence[Case],
+    device: str,
+    keep: OnResult,
+    report: Report,
+    checkpoints: Checkpoints | None,
+    onlooker: Onlooker | None,
 ) -> None:
     """Run batch after batch in this process."""
     fractions, phases = [0.0] * len(cases), ["waiting"] * len(cases)
     reported = time.perf_counter()
     for members in batches(cases, one_each=device == "cpu"):
-        batch, begun, refused = begin([cases[i] for i in members], device, checkpoints)
+        batch, begun, refused = begin([cases[i] for i in members], device, checkpoints, onlooker)
         for number, result in refused.items():
             fractions[members[number]] = 1.0
             keep(members[number], result)

@@ -16,6 +16,7 @@ from experiments.calibrate.campaign import StageHook
 from experiments.cases import open_workers, with_engine
 from experiments.cases.folder import locked
 from experiments.errors import InputError
+from experiments.live.record.journal import Journal
 from experiments.report.companion import Replay
 from experiments.report.material_card import CARD
 from experiments.runs.campaign import (
@@ -133,8 +134,12 @@ def calibrate(
     chosen = chosen_study(study, scale, resources)
     folder = Path(out) if out is not None else default_folder(chosen)
     chosen = check_runs(with_engine(chosen, engine), campaign=campaign, paper=published_replicates > 0)
-    with open_workers(resources_for(chosen, resources)) as crew, locked(folder, resume):
-        desk = Desk.open(chosen, folder, crew, resume, watch)
+    with (
+        open_workers(resources_for(chosen, resources)) as crew,
+        locked(folder, resume),
+        Journal(folder, "calibrate", chosen, resume, device=str(crew.described["device"])) as journal,
+    ):
+        desk = Desk.open(chosen, folder, crew, resume, watch, journal)
         replay = replay_published(desk, published_replicates) if published_replicates else None
         found = run_campaign(desk, on_stage, replay) if campaign else None
         record = record_published(desk, replay, found) if replay is not None else None

@@ -35,6 +35,7 @@ from experiments.commands.options import (
     Device,
     DryRun,
     EngineName,
+    Live,
     Out,
     Resume,
     Scale,
@@ -44,6 +45,9 @@ from experiments.commands.options import (
 )
 from experiments.commands.plans import show_plan
 from experiments.commands.results import print_study, show_stage
+from experiments.commands.watch import WATCH_EXAMPLE, watch
+from experiments.live.server import live_page
+from experiments.live.ui.command import UI_EXAMPLE, ui
 
 app = typer.Typer(
     name="dem-warp",
@@ -93,6 +97,7 @@ def calibrate(
         bool, typer.Option("--only-paper", help="Simulate the paper's own runs, and no campaign.")
     ] = False,
     paper_replicates: Annotated[int, typer.Option(min=1, help="Heaps of each of the paper's runs.")] = 3,
+    live: Live = False,
     as_json: AsJson = False,
 ) -> None:
     """Run a whole calibration: noise floor, screening, climb, surface, optimum, verification, report."""
@@ -117,10 +122,10 @@ def calibrate(
     go_on = Attempt.of(
         "calibrate", study, out=folder, scale=chosen.scale, device=device, workers=workers,
         scheduler=scheduler, cluster=cluster, engine=engine,
-        follow_paper=follow_paper, only_paper=only_paper,
+        follow_paper=follow_paper, only_paper=only_paper, live=live,
         paper_replicates=paper_replicates if follow_paper or only_paper else None, json=as_json,
     )  # fmt: skip
-    with clear_errors(go_on):
+    with clear_errors(go_on), live_page(folder, live, messages.print):
         print_study(chosen, resources_for(chosen, resources))
         ended = api.calibrate(
             chosen,
@@ -173,6 +178,7 @@ def discover(
     engine: EngineName = None,
     resume: Resume = False,
     dry_run: DryRun = False,
+    live: Live = False,
     as_json: AsJson = False,
 ) -> None:
     """Find the effect that a model lacks: calibrate, test the gap, name what explains it, show it closed."""
@@ -197,9 +203,9 @@ def discover(
     go_on = Attempt.of(
         "discover", study, measured, out=folder, bank=bank, photographs_only=photographs_only, scale=scale,
         device=device, workers=workers, scheduler=scheduler, cluster=cluster, seed=seed, engine=engine,
-        json=as_json,
+        live=live, json=as_json,
     )  # fmt: skip
-    with clear_errors(go_on):
+    with clear_errors(go_on), live_page(folder, live, messages.print):
         print_study(chosen, resources_for(chosen, resources))
         ended = api.discover(
             chosen,
@@ -232,6 +238,8 @@ app.command(epilog=NEW_EXAMPLE)(new)
 app.command(epilog=EXPORT_EXAMPLE)(export)
 app.command(epilog=BRIDGE_EXAMPLE)(bridge)
 app.command(epilog=DOCTOR_EXAMPLE)(doctor)
+app.command(epilog=WATCH_EXAMPLE)(watch)
+app.command(epilog=UI_EXAMPLE)(ui)
 
 
 def main() -> None:

@@ -16,7 +16,8 @@ ROOT = Path(__file__).resolve().parents[1]
 ROOMS = (
     "errors", "files", "texts", "toml_files", "studyfile.units", "sphere_files", "export",
     "measurement.observables", "studyfile", "measurement", "cases", "calibrate", "discover", "report",
-    "runs", "bridge", "api", "commands", "cli", "studies", "verification", "benchmarks", "trials",
+    "live.record", "runs", "bridge", "api", "live", "commands", "live.ui", "cli", "studies", "verification",
+    "benchmarks", "trials",
 )  # fmt: skip
 
 # Of `doe.discrepancy`, the folders in the order of use.

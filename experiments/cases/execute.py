@@ -5,14 +5,16 @@ from __future__ import annotations
 import logging
 import math
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import pandas as pd
 
 from dem_warp import Case, CaseResult, Progress
+from dem_warp.checkpoint import case_name
 from experiments.cases.engine import NO_ANSWER
 from experiments.cases.measuring import measuring_processes
 from experiments.cases.store import Store
@@ -34,12 +36,23 @@ MANY = 64
 _log = logging.getLogger(__name__)
 
 
+class CaseNotes(Protocol):
+    """Takes notes of cases while they run; `experiments.live.record.journal` has one."""
+
+    def planned(self, table: pd.DataFrame, names: Sequence[str]) -> None:
+        """Note the cases of a table, each with its ``case_key`` and its name while it runs."""
+
+    def ended(self, key: str, outcome: Mapping[str, Any]) -> None:
+        """Note what a case gave; called from any thread."""
+
+
 def run_cases(
     study: Study,
     table: pd.DataFrame,
     store: Store,
     workers: Workers = THIS_MACHINE,
     progress: Callable[[Progress], None] | None = None,
+    notes: CaseNotes | None = None,
 ) -> pd.DataFrame:
     """Simulate every case of a table that is not stored yet, all at once, and measure every heap.
 
@@ -60,6 +73,8 @@ def run_cases(
         Workers that simulate; left out: this machine's own.
     progress
         Called with the progress now and then.
+    notes
+        Takes notes of the cases while they run.
 
     Returns
     -------
@@ -82,10 +97,18 @@ def run_cases(
     def order(key: str) -> tuple[MeasurementSection, bool]:
         return study.measurement, study.scenes[scenes[key]].leaves_a_heap
 
+    def note(key: str, outcome: Future[dict[str, Any]]) -> None:
+        if notes and not outcome.cancelled() and outcome.exception() is None:
+            notes.ended(key, outcome.result())
+
+    if notes:
+        names = [case_name(case) if case else "" for case in cases]
+        notes.planned(table.assign(case_key=keys), names)
     with _measurers(workers, len(by_key)) as pool:
-        outcomes = _simulate_missing(by_key, store, pool, order, workers, progress)
+        outcomes = _simulate_missing(by_key, store, pool, order, workers, progress, note)
         for key in by_key.keys() - outcomes.keys():
             outcomes[key] = pool.submit(_stored_outcome, store.folder, key, *order(key))
+            outcomes[key].add_done_callback(partial(note, key))
         rows = [
             outcomes[key].result() if key else _outcome("refused", Observed(reason=reason))
             for key, reason in zip(keys, refused, strict=True)
@@ -132,6 +155,7 @@ def _simulate_missing(
     order: Callable[[str], tuple[MeasurementSection, bool]],
     workers: Workers,
     progress: Callable[[Progress], None] | None,
+    note: Callable[[str, Future[dict[str, Any]]], None],
 ) -> dict[str, Future[dict[str, Any]]]:
     """Simulate what the store lacks, in one call; save each result as it finishes, and measure it.
 
@@ -148,6 +172,7 @@ def _simulate_missing(
         if result.status != NO_ANSWER:
             store.save(key, result)
         outcomes[key] = pool.submit(_measured, result, *order(key))
+        outcomes[key].add_done_callback(partial(note, key))
 
     if missing:
         chosen = [cases[key] for key in missing]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -23,6 +24,9 @@ CASES = "cases"
 
 LOCK = ".lock"
 """File that a run holds while it works in a folder; it stays beside results, and is none."""
+
+JOURNAL = ".live"
+"""Folder of what a run tells while it works; it stays, and is no result."""
 
 _log = logging.getLogger(__name__)
 
@@ -63,6 +67,7 @@ def _take_away(folder: Path) -> None:
     """Remove a folder that holds a lock alone, so that a run that was refused leaves nothing."""
     # another system may keep a file that is open, and another run may write into the folder just now
     with suppress(OSError):
+        shutil.rmtree(folder / JOURNAL, ignore_errors=True)
         (folder / LOCK).unlink()
         folder.rmdir()
 
@@ -104,7 +109,7 @@ def is_used(folder: Path) -> bool:
     """Tell that a folder, or a file of that name, holds something."""
     if not folder.is_dir():
         return os.path.lexists(folder)
-    return any(path.name != LOCK for path in folder.iterdir())
+    return any(path.name not in (LOCK, JOURNAL) for path in folder.iterdir())
 
 
 def require_unused(folder: Path, advice: str = "") -> None:

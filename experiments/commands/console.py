@@ -22,6 +22,8 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn
 from rich.text import Text
 
+from experiments.live.record.progress import duration, time_left
+
 if TYPE_CHECKING:
     from dem_warp import Progress as BatchProgress
 
@@ -32,10 +34,6 @@ ENDED_OUTSIDE = "a process was ended from outside, perhaps for lack of memory: f
 
 QUIET_START = 2.0
 """Least duration that shows progress [s]."""
-FIRST_GUESS = 0.01
-"""Part of the work that is done before the time left is guessed."""
-WELL_BEGUN, LEAST_LEFT = 0.1, 0.1
-"""Part of the work from which on its speed alone counts, and of the time expected that is always left."""
 MANIFEST = "study.json"
 """File of a folder that a run can go on in; `experiments.cases.manifest` writes it."""
 
@@ -228,35 +226,10 @@ class CaseProgress:
 def describe_progress(progress: BatchProgress, first: BatchProgress | None = None) -> str:
     """Say how long it will take and what runs, as ``1 min 20 s left, 3 of 12 cases, 2 lift``.
 
-    The speed is that since the `first` progress: what an earlier run had done is not this one's speed.
+    The speed is that since the `first` progress, see `time_left`.
     """
     parts = [f"{progress.done} of {progress.total} cases"]
     parts += [f"{count} {phase}" for phase, count in progress.phase_counts.items() if phase != "waiting"]
-    done, seconds = progress.fraction, progress.seconds
-    if first is not None:
-        done, seconds = done - first.fraction, seconds - first.seconds
-    left = _seconds_left(progress, done, seconds)
-    if left is not None and progress.fraction < 1.0:
+    if (left := time_left(progress, first)) is not None:
         parts.insert(0, f"{duration(left)} left")
     return ", ".join(parts)
-
-
-def _seconds_left(progress: BatchProgress, done: float, seconds: float) -> float | None:
-    """Time left by the speed so far, and before that shows by what was expected of this machine."""
-    expected, rest = getattr(progress, "expected", None), 1.0 - progress.fraction
-    if expected is None:
-        return seconds * rest / done if done >= FIRST_GUESS else None
-    trust = min(done / WELL_BEGUN, 1.0)
-    # what has shown nothing yet has still the time to come that has passed
-    begun = max(expected * rest - (seconds if done < FIRST_GUESS else 0.0), LEAST_LEFT * expected)
-    return begun if done <= 0.0 else trust * seconds * rest / done + (1.0 - trust) * begun
-
-
-def duration(seconds: float) -> str:
-    """Write a time as a person would: ``12 s``, ``1 min 20 s``, ``2 h 5 min``."""
-    whole = round(seconds)
-    if whole < 60:
-        return f"{whole} s"
-    if whole < 3600:
-        return f"{whole // 60} min {whole % 60} s"
-    return f"{whole // 3600} h {whole % 3600 // 60} min"

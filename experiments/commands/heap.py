@@ -16,6 +16,7 @@ from experiments.commands.options import (
     Device,
     DryRun,
     EngineName,
+    Live,
     Out,
     Scale,
     Scheduler,
@@ -24,6 +25,7 @@ from experiments.commands.options import (
 )
 from experiments.commands.plans import show_plan
 from experiments.commands.results import print_measured, print_narrowness
+from experiments.live.server import live_page
 
 HEAP_EXAMPLE = "Example: [bold]dem-warp heap --scale bench --set E=0.48 --set F=0.45 --seed 7 --frames 40[/]"
 
@@ -60,6 +62,7 @@ def heap(
     cluster: Cluster = None,
     engine: EngineName = None,
     dry_run: DryRun = False,
+    live: Live = False,
     as_json: AsJson = False,
 ) -> None:
     """Simulate one heap: heap.vtp (ParaView, OVITO), angle.json, and snapshot.png with the fitted flanks.
@@ -72,6 +75,9 @@ def heap(
         check_study_file(study, scale, engine)
         from experiments.cases import open_workers, require_unused, simulate_heap, with_engine, write_heap
         from experiments.cases.movie import MOVIES, require_movie
+        from experiments.cases.workers.own import watched_by
+        from experiments.live.record.journal import Journal
+        from experiments.runs.campaign import watching
         from experiments.runs.choices import chosen_resources, chosen_study, default_folder, resources_for
         from experiments.studyfile.campaign import TARGET_SCENE
 
@@ -94,9 +100,16 @@ def heap(
             return
         require_unused(folder)
         print_narrowness(chosen)
-        with open_workers(resources) as crew, CaseProgress(scene or "heap") as progress:
+        chosen.case(values, seed, place)  # what it refuses is refused before anything is written
+        with (
+            live_page(folder, live, messages.print),
+            open_workers(resources) as crew,
+            Journal(folder, "heap", chosen, device=str(crew.described["device"])) as notes,
+            watching(scene or "heap", CaseProgress, notes) as progress,
+        ):
+            crew = watched_by(crew, notes.glimpses)
             simulated = simulate_heap(chosen, values, seed, crew, progress, place, frames)
-        write_heap(simulated, folder, movie or MOVIES[0])
+            write_heap(simulated, folder, movie or MOVIES[0])
     if as_json:
         typer.echo(json.dumps(simulated.to_dict(), allow_nan=False))
     messages.print(f"Files: {folder}")

@@ -50,6 +50,13 @@ EngineName = Annotated[
 ]
 Out = Annotated[Path | None, typer.Option(help="Folder of the results, new or empty.")]
 Resume = Annotated[bool, typer.Option("--resume", help="Go on in the folder of an earlier run.")]
+Live = Annotated[
+    bool, typer.Option("--live", help="Show the run in the browser while it lasts, as dem-warp watch does.")
+]
+Port = Annotated[
+    int, typer.Option(min=0, max=65535, help="Port of the address. 0: any that is free.", show_default=False)
+]
+NoBrowser = Annotated[bool, typer.Option("--no-browser", help="Only tell the address, open no browser.")]
 DryRun = Annotated[
     bool,
     typer.Option("--dry-run", help="Show cases, grains, steps, time, memory and disk, and run nothing."),

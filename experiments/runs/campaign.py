@@ -5,8 +5,8 @@ from __future__ import annotations
 import datetime
 import logging
 import time
-from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,12 +19,14 @@ from experiments.calibrate import Campaign, calibrate
 from experiments.calibrate.campaign import StageHook
 from experiments.calibrate.checks import check_calibration
 from experiments.calibrate.export import jsonable
+from experiments.calibrate.results import StageResult
 from experiments.cases import Store, Workers, open_folder, run_cases
 from experiments.cases.key import engine_identity
 from experiments.cases.outputs import publishing
-from experiments.cases.workers.own import THIS_MACHINE
+from experiments.cases.workers.own import THIS_MACHINE, watched_by
 from experiments.errors import StudyError
 from experiments.files import write_text
+from experiments.live.record.journal import Journal
 from experiments.measurement.target import with_measurements
 from experiments.report import heap_pictures, verified_heap, write_report
 from experiments.report.companion import Replay, companion_of
@@ -34,6 +36,22 @@ from experiments.studyfile import Study
 
 Watch = Callable[[str], AbstractContextManager[Callable[[Progress], None] | None]]
 """Opens the display of one batch, named by its stages, and hands out what its progress is reported to."""
+
+
+@contextmanager
+def watching(
+    title: str, watch: Watch, journal: Journal | None
+) -> Iterator[Callable[[Progress], None] | None]:
+    """Open the display of a batch, and its place in the journal; hand out what progress is reported to."""
+    with watch(title) as shown, journal.batch(title) if journal else nullcontext() as noted:
+        listeners = [each for each in (shown, noted) if each is not None]
+
+        def report(progress: Progress) -> None:
+            for listener in listeners:
+                listener(progress)
+
+        yield report if listeners else None
+
 
 WALL_TIMES_FILE = f"{WALL_TIMES}.csv"
 """File of the wall times of a folder's batches, over all runs that went on in it."""
@@ -53,6 +71,7 @@ class Desk:
     store: Store
     workers: Workers
     watch: Watch
+    journal: Journal | None = None
 
     @classmethod
     def open(
@@ -62,6 +81,7 @@ class Desk:
         workers: Workers = THIS_MACHINE,
         resume: bool = False,
         watch: Watch = lambda title: nullcontext(),
+        journal: Journal | None = None,
     ) -> Desk:
         """Make the folder of a study, or go on in it.
 
@@ -73,13 +93,14 @@ class Desk:
         store, changes = open_folder(folder, study, resume)
         for change in changes:
             _log.warning("The study has changed since the earlier run: %s", change)
-        return cls(study, folder, store, workers, watch)
+        workers = watched_by(workers, journal.glimpses) if journal else workers
+        return cls(study, folder, store, workers, watch, journal)
 
     def run(self, table: pd.DataFrame, title: str) -> pd.DataFrame:
         """Simulate a table of cases as one batch, and note the wall time of what was not stored yet."""
         before, started = len(self.store), time.perf_counter()
-        with self.watch(title) as progress:
-            cases = run_cases(self.study, table, self.store, self.workers, progress)
+        with watching(title, self.watch, self.journal) as progress:
+            cases = run_cases(self.study, table, self.store, self.workers, progress, self.journal)
         if simulated := len(self.store) - before:
             self._note_wall_time(title, simulated, time.perf_counter() - started)
         return cases
@@ -108,8 +129,13 @@ def run_campaign(desk: Desk, on_stage: StageHook | None = None, replay: Replay |
     def runner(table: pd.DataFrame) -> pd.DataFrame:
         return desk.run(table, ", ".join(str(stage).replace("_", " ") for stage in table["stage"].unique()))
 
+    def tell(name: str, result: StageResult) -> None:
+        for told in (desk.journal.stage if desk.journal else None, on_stage):
+            if told:
+                told(name, result)
+
     started = time.perf_counter()
-    campaign = calibrate(desk.study, runner, on_stage)
+    campaign = calibrate(desk.study, runner, tell)
     provenance = {
         **_source_and_day(),
         **desk.workers.described,

@@ -16,19 +16,20 @@ from doe.discrepancy import Bank, Discovery, Fit, Measured, Outcomes, Point, dri
 from experiments.cases import Workers, engine_of, open_folder, require_unused
 from experiments.cases.folder import locked
 from experiments.cases.outputs import publishing, sha256_of
-from experiments.cases.workers.own import THIS_MACHINE
+from experiments.cases.workers.own import THIS_MACHINE, watched_by
 from experiments.discover.engine import EngineSimulator
 from experiments.discover.maker import fingerprint_of, maker_of_today
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.search import Search
 from experiments.files import replacing
+from experiments.live.record.journal import Journal
 from experiments.measurement.measured_file import read_measured
 from experiments.measurement.observables import OBSERVABLES, PHOTOGRAPHED
 from experiments.report import HeapPicture, SolidHeap
 from experiments.report.companion import Companion, companion_of
 from experiments.report.discovery import Terms, write_discovery
 from experiments.report.discovery.pictures import photograph, simulated_heaps
-from experiments.runs.campaign import Watch
+from experiments.runs.campaign import Watch, watching
 from experiments.studyfile import Study
 
 OUTCOMES, BANK, SETTINGS = "outcomes.sqlite", "bank.npz", "settings.json"
@@ -64,19 +65,19 @@ class SearchResult:
 class _Watched:
     """The engine, with a display for every wave."""
 
-    def __init__(self, search: Search, job: Job, watch: Watch) -> None:
-        table = OutcomeTable(job.folder / OUTCOMES)
-        self.engine = EngineSimulator(search.study, search.library, table, job.workers, self._report)
+    def __init__(self, search: Search, job: Job, watch: Watch, journal: Journal) -> None:
+        table, workers = OutcomeTable(job.folder / OUTCOMES), watched_by(job.workers, journal.glimpses)
+        self.engine = EngineSimulator(search.study, search.library, table, workers, self._report)
         self.observables = self.engine.observables
         self.title = "library waves"
         self.waves: list[dict[str, Any]] = []
-        self._watch = watch
+        self._watch, self._journal = watch, journal
         self._listener: Callable[[Progress], None] | None = None
 
     def __call__(self, points: Sequence[Point]) -> Outcomes:
         """Observables of every point."""
         started, before = time.perf_counter(), len(self.engine.table)
-        with self._watch(self.title) as self._listener:
+        with watching(self.title, self._watch, self._journal) as self._listener:
             outcomes = self.engine(points)
         seconds, simulated = time.perf_counter() - started, len(self.engine.table) - before
         self.waves.append({"wave": self.title, "simulated": simulated, "seconds": round(seconds, 1)})
@@ -105,10 +106,14 @@ def run_search(job: Job, resume: bool = False, watch: Watch = lambda title: null
     measured = _measured(job)
     for note in measured.notes if measured else ():
         _log.warning("The data: %s", note)
-    with locked(job.folder, resume):
+    device = str(job.workers.described["device"])
+    with (
+        locked(job.folder, resume),
+        Journal(job.folder, "discover", job.study, resume, device=device) as journal,
+    ):
         for change in open_folder(job.folder, job.study, resume)[1]:
             _log.warning("The study has changed since the earlier run: %s", change)
-        return _search(job, search, companion, terms, bank, measured, watch)
+        return _search(job, search, companion, terms, bank, measured, watch, journal)
 
 
 def _search(
@@ -119,9 +124,10 @@ def _search(
     bank: Bank | None,
     measured: Measured | None,
     watch: Watch,
+    journal: Journal,
 ) -> SearchResult:
     """Simulate and analyse in an open folder, and make the outputs."""
-    simulator = _Watched(search, job, watch)
+    simulator = _Watched(search, job, watch, journal)
     with simulator.engine:
         if bank is None:
             maker = maker_of_today(source_commit(), simulator.engine.engine)

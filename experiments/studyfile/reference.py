@@ -49,6 +49,8 @@ class Row:
     """Rule of its numbers."""
     meaning: str = ""
     """One line in words."""
+    required: bool = False
+    """The key must be written."""
 
 
 def study_reference() -> tuple[Row, ...]:
@@ -85,7 +87,8 @@ def _rows(section: type[BaseModel], path: str, array: bool = False) -> Iterator[
         texts = meanings(section.__bases__[0]) | texts
     for key, name, field, inner in keys:
         if inner is None:
-            yield Row(head, key, _kind(field), _default(field), _rule(field), texts.get(name, ""))
+            told = (_kind(field), _default(field), _rule(field), texts.get(name, ""))
+            yield Row(head, key, *told, required=field.is_required())
         elif default := _name(field):
             yield Row(head, key, "text", json.dumps(default), "", texts.get(name, ""))
     for key, _, field, inner in keys:

@@ -18,6 +18,14 @@ def write_template(name: str, folder: Path | None = None) -> Path:
     InputError
         When the name is no plain name, or the file exists.
     """
+    path = new_study_path(name, folder)
+    text = TEMPLATE.read_text(encoding="utf-8").replace("{name}", path.stem).replace("{file}", path.name)
+    write_text(path, text)
+    return path
+
+
+def new_study_path(name: str, folder: Path | None = None) -> Path:
+    """Return the path of a new study file of a grain's name; errors as by `write_template`."""
     name = name.removesuffix(".toml")
     if not name or not all(character.isalnum() or character in " _-" for character in name):
         raise InputError("a name has letters, digits, spaces, - and _ only", name, "NAME")
@@ -27,6 +35,4 @@ def write_template(name: str, folder: Path | None = None) -> Path:
     path = (folder or Path()) / f"{name}.toml"
     if path.exists():
         raise InputError("a new study never overwrites a file", "one that exists", str(path))
-    text = TEMPLATE.read_text(encoding="utf-8").replace("{name}", name).replace("{file}", path.name)
-    write_text(path, text)
     return path

@@ -35,6 +35,7 @@ from experiments.cases import Store
 from experiments.commands.shapes import ClumpRequest, make_clump
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.errors import InputError
+from experiments.live.record.glimpses import Glimpses, read_glimpse
 from experiments.measurement.measured_file import read_measured
 from experiments.studyfile import load_study
 from imaging import PictureError, measure_photograph
@@ -193,6 +194,21 @@ def sqlite(folder: Path) -> Reader:
     )
 
 
+def glimpse(folder: Path) -> Reader:
+    """Glimpses of running cases."""
+    [result] = simulate([_case()], "cpu", 1)
+    Glimpses(folder / "glimpses").write("seed", result, {"phase": "lift", "fraction": 0.5})
+    content = (folder / "glimpses" / "seed.npz").read_bytes()
+    spheres, told = read_glimpse(folder / "glimpses" / "seed.npz")
+
+    def read(path: Path) -> dict[str, Any]:
+        found, words = read_glimpse(path)
+        return {"spheres": found, **words}
+
+    facts = {"spheres": spheres, **told}
+    return Reader({"seed.npz": content}, read, (ValueError,), checked=True, facts=facts)
+
+
 READERS: dict[str, Callable[[Path], Reader]] = {
     "study": study,
     "card": card,
@@ -204,6 +220,7 @@ READERS: dict[str, Callable[[Path], Reader]] = {
     "stored case": stored,
     "checkpoint": checkpoint,
     "sqlite": sqlite,
+    "glimpse": glimpse,
 }
 """Every reader by its name: made ready in a folder of its own."""
 

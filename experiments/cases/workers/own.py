@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ from typing import Any
 import warp as wp
 
 from dem_warp import Case, CaseResult, simulate
+from dem_warp.batch import Onlooker
 from dem_warp.device import resolve_device
 from dem_warp.result import OnProgress, OnResult
 from experiments.cases.engine import Engine
@@ -19,6 +20,7 @@ from experiments.cases.workers.batches import plan_batches
 from experiments.cases.workers.division import run_divided
 from experiments.cases.workers.speed import cpu_name, expected_seconds
 from experiments.cases.workers.wave import Wave
+from experiments.cases.workers.workers import Workers
 
 
 @dataclass(frozen=True)
@@ -29,6 +31,8 @@ class OwnWorkers:
     """``"cpu"``, ``"cuda"`` or ``"cuda:1"``; None: the GPU if there is one."""
     workers: int | None = None
     """Processes on the CPU; None: one a core."""
+    onlooker: Onlooker | None = None
+    """Onlooker of the batches of dem-warp's own engine."""
 
     @cached_property
     def name(self) -> str:
@@ -79,8 +83,10 @@ class OwnWorkers:
         """
         wave = Wave(cases, on_result, on_progress, expected_seconds(cases, self, engine))
 
+        simulator = engine or partial(simulate, onlooker=self.onlooker)
+
         def run(batch: int, members: list[int]) -> None:
-            (engine or simulate)(
+            simulator(
                 [cases[index] for index in members],
                 device=self.name,
                 workers=self.workers,
@@ -100,6 +106,11 @@ class OwnWorkers:
         if self.on_gpu and engine is None:
             return plan_batches(cases, wave.costs, memory=wp.get_device(self.name).free_memory)
         return [[index for batch in plan_batches(cases, wave.costs) for index in batch]]
+
+
+def watched_by(workers: Workers, onlooker: Onlooker) -> Workers:
+    """Return workers whose batches are looked at, where they are this machine's own."""
+    return replace(workers, onlooker=onlooker) if isinstance(workers, OwnWorkers) else workers
 
 
 THIS_MACHINE = OwnWorkers()

@@ -1,0 +1,68 @@
+"""Heaps as the page draws them: the spheres of a glimpse, of a stored case or of a heap's file."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from experiments.cases.folder import CASES, JOURNAL
+from experiments.errors import InputError
+from experiments.live.folder import inside
+from experiments.live.record.glimpses import read_glimpse, spheres_of
+from experiments.live.record.journal import GLIMPSES
+
+MOST_SPHERES = 60_000
+"""Spheres of a heap that are drawn; of more, whole grains are left out evenly."""
+
+_NAME = re.compile(r"[0-9a-f]{64}")
+
+
+def heap_spheres(folder: Path, name: str) -> tuple[np.ndarray, str, float]:
+    """Read the spheres of a heap, see `spheres_of`, its phase and how much of it is done.
+
+    Parameters
+    ----------
+    folder
+        Folder of the run.
+    name
+        Id of the heap, as `RunState.heaps` has it.
+
+    Raises
+    ------
+    InputError
+        When there is no such heap, or its file is damaged.
+    """
+    kind, _, key = name.partition("/")
+    if name == "heap":
+        return _few(_heap_file(inside(folder, "heap.vtp"))), "finished", 1.0
+    if kind not in ("glimpse", "case") or not _NAME.fullmatch(key):
+        raise InputError("must be the name of a heap", name, str(folder))
+    path = inside(folder, f"{JOURNAL}/{GLIMPSES}/{key}.npz" if kind == "glimpse" else f"{CASES}/{key}.npz")
+    if kind == "case":
+        # the simulator's classes take a second to import
+        from experiments.cases.store import Store
+
+        result = Store(path.parent).load(key)
+        return _few(spheres_of(result)), result.status, 1.0
+    try:
+        spheres, facts = read_glimpse(path)
+    except ValueError as error:
+        raise InputError(str(error), "another file", str(path)) from None
+    return _few(spheres), facts["phase"], facts["fraction"]
+
+
+def _heap_file(path: Path) -> np.ndarray:
+    """Read the spheres of a heap's file."""
+    from experiments.sphere_files import read_spheres
+
+    read = read_spheres(path)
+    bodies = np.zeros(len(read.spheres)) if read.bodies is None else read.bodies
+    return np.column_stack([read.spheres, bodies]).astype("<f4")
+
+
+def _few(spheres: np.ndarray) -> np.ndarray:
+    """Leave out whole grains, evenly, until no more spheres are left than are drawn."""
+    step = -(-len(spheres) // MOST_SPHERES)
+    return spheres[spheres[:, 4].astype(int) % step == 0] if step > 1 else spheres

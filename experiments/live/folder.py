@@ -1,0 +1,72 @@
+"""Files of a run's folder, which may come from anyone: read whole, of a known size, and never by a link."""
+
+from __future__ import annotations
+
+import json
+import stat
+from collections.abc import Iterator
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from experiments.errors import InputError
+
+LARGEST = 50_000_000
+"""Bytes of the largest file that is read whole."""
+
+LONGEST = 2_000
+"""Lines of a log that are read, its last ones."""
+
+
+def inside(folder: Path, name: str) -> Path:
+    """Return the path of a regular file below a folder.
+
+    Raises
+    ------
+    InputError
+        When the name leads out of the folder, a link stands on the way, or there is no such file.
+    """
+    parts = PurePosixPath(name).parts
+    if not parts or name.startswith("/") or "\\" in name or "\0" in name or ".." in parts:
+        raise InputError("must name a file below the folder", name, str(folder))
+    path = folder
+    for part in parts:
+        path = path / part
+        try:
+            facts = path.lstat()
+        except (OSError, ValueError):
+            raise InputError("must name a file below the folder", name, str(folder)) from None
+        if stat.S_ISLNK(facts.st_mode):
+            raise InputError("links are not followed", name, str(folder))
+    if not stat.S_ISREG(facts.st_mode):
+        raise InputError("must name a regular file", name, str(folder))
+    return path
+
+
+def read_json(folder: Path, name: str) -> dict[str, Any]:
+    """Read a JSON object; empty where there is none, or it is damaged."""
+    try:
+        found = json.loads(_read(folder, name))
+    except (OSError, ValueError, RecursionError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def read_lines(folder: Path, name: str, most: int = LONGEST) -> Iterator[dict[str, Any]]:
+    """Read the last JSON objects of a file with one a line; damaged lines, and the one half written, not."""
+    try:
+        lines = _read(folder, name).splitlines()[-most:]
+    except (OSError, ValueError):
+        return
+    for line in lines:
+        try:
+            found = json.loads(line)
+        except (ValueError, RecursionError):
+            continue
+        if isinstance(found, dict):
+            yield found
+
+
+def _read(folder: Path, name: str) -> str:
+    path = inside(folder, name)
+    with path.open("rb") as file:
+        return file.read(LARGEST).decode("utf-8", errors="replace")

@@ -1,0 +1,153 @@
+"""Runs that the page to start from began: commands of their own, which go on without it."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, Any
+
+from experiments.errors import InputError
+from experiments.live.state import RunState
+from experiments.live.ui.workshop import command_line
+
+PROGRAM = (sys.executable, "-c", "from experiments.cli import main; main()")
+"""Words that run ``dem-warp``, also where it is not on the path."""
+
+TOLD = 4_000
+"""Characters of a command's messages that are shown, its last ones."""
+
+
+@dataclass
+class Started:
+    """A command that was started, its folder, and what it says."""
+
+    words: tuple[str, ...]
+    folder: str
+    """Folder of its results, relative to that of the page."""
+    process: subprocess.Popen[bytes]
+    output: IO[bytes]
+
+    @property
+    def command(self) -> str:
+        """The command line."""
+        return command_line(*self.words)
+
+    @property
+    def messages(self) -> str:
+        """Last messages of the command."""
+        self.output.seek(0, os.SEEK_END)
+        self.output.seek(max(0, self.output.tell() - TOLD))
+        return self.output.read().decode("utf-8", errors="replace").replace("\r", "\n")
+
+
+class Runs:
+    """Runs of a folder: those that were started here, and those that lie in its ``out``."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._started: dict[str, Started] = {}
+
+    def start(self, words: Sequence[str], out: str) -> str:
+        """Start a command whose results go to a folder, and return that folder's name.
+
+        Raises
+        ------
+        InputError
+            When a run that was started here is at work there.
+        """
+        place = self._place(out)
+        if (before := self._started.get(place)) and before.process.poll() is None:
+            raise InputError("one run at a time works in a folder", "another at work", place)
+        output = tempfile.TemporaryFile()  # noqa: SIM115  (it lives as long as the run)
+        process = subprocess.Popen(
+            [*PROGRAM, *words],
+            cwd=self.folder,
+            stdin=subprocess.DEVNULL,
+            stdout=output,
+            stderr=subprocess.STDOUT,
+            # Ctrl-C on the page's server is not meant for its runs
+            start_new_session=os.name == "posix",
+        )
+        self._started[place] = Started(tuple(words), place, process, output)
+        return place
+
+    def stop(self, place: str) -> None:
+        """End a run that was started here; it can be resumed."""
+        if place in self._started:
+            self._started[place].process.terminate()
+
+    def resume(self, place: str) -> str:
+        """Go on with a run that was started here and has ended.
+
+        Raises
+        ------
+        InputError
+            When there is none.
+        """
+        if place not in self._started:
+            raise InputError("must be a run that was started from this page", place, "resume")
+        words = [word for word in self._started[place].words if word != "--resume"]
+        return self.start([*words, "--resume"], place)
+
+    def path(self, place: str) -> Path:
+        """Folder of a run.
+
+        Raises
+        ------
+        InputError
+            When there is none of this name.
+        """
+        if place not in self.names():
+            raise InputError("must be the folder of a run", place, "run")
+        return self.folder / place
+
+    def names(self) -> list[str]:
+        """Folders of all runs, those that were started here first."""
+        found = sorted(self.folder.glob("out/*/"), key=lambda path: path.stat().st_mtime, reverse=True)
+        lying = [
+            path.relative_to(self.folder).as_posix()
+            for path in found
+            if _is_run(path) and not path.is_symlink()
+        ]
+        return list(dict.fromkeys([*reversed(self._started), *lying]))
+
+    def listed(self) -> list[dict[str, Any]]:
+        """Tell of every run: its folder, command, state and messages."""
+        return [self._told(name) for name in self.names()]
+
+    def _told(self, name: str) -> dict[str, Any]:
+        state, started = RunState.read(self.folder / name), self._started.get(name)
+        told: dict[str, Any] = {
+            "folder": name,
+            "study": state.run.study,
+            "state": state.progress.state,
+            "message": state.progress.message,
+            "left": state.left,
+            "outputs": [each for each in state.outputs if each.endswith(".html") or each == "snapshot.png"],
+        }
+        if started is None:
+            return told | {"command": "", "messages": "", "running": False, "code": None}
+        code = started.process.poll()
+        if code is None and told["state"] != "running":
+            told |= {"state": "running", "message": "The command is starting."}
+        elif code not in (None, 0) and told["state"] in ("running", "waiting"):
+            told |= {"state": "failed", "message": f"The command ended with the exit code {code}."}
+        return told | {
+            "command": started.command, "messages": started.messages, "running": code is None, "code": code,
+        }  # fmt: skip
+
+    def _place(self, out: str) -> str:
+        """Folder of a new run, below that of the page."""
+        parts = Path(out).parts
+        if not parts or Path(out).is_absolute() or ".." in parts or any(p.startswith(".") for p in parts):
+            raise InputError("must be a folder below the one of this page", out, "--out")
+        return Path(out).as_posix()
+
+
+def _is_run(folder: Path) -> bool:
+    return any((folder / name).exists() for name in ("study.json", "angle.json", ".live"))

@@ -1,0 +1,289 @@
+"""What the page to start from can do in its folder, each by the function that a command calls."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from dem_warp import SCENES
+from experiments.commands.options import quantity, share
+from experiments.commands.photographs import mean_angle, measure_pictures
+from experiments.commands.shapes import ClumpRequest, make_clump, write_clump
+from experiments.errors import InputError, Problem
+from experiments.files import replacing, write_text
+from experiments.live.folder import inside
+from experiments.measurement.pictures import find_pictures
+from experiments.studyfile import Study, load_study, study_scales
+from experiments.studyfile.factor_section import merge
+from experiments.studyfile.places import nested
+from experiments.studyfile.reference import study_reference
+from experiments.studyfile.template import TEMPLATE, new_study_path
+from experiments.toml_files import read_toml, toml_text
+
+LARGEST_UPLOAD = 100_000_000
+"""Bytes of the largest file that is taken."""
+
+MOST_FACES = 20_000
+"""Triangles of a solid that the preview draws; of more, some are left out."""
+
+_FILE_NAME = re.compile(r"[^\W_][\w .()-]{0,120}", re.UNICODE)
+
+
+@dataclass(frozen=True)
+class Workshop:
+    """A folder in which a person works."""
+
+    folder: Path
+
+    # ---- what the page begins with -------------------------------------------------------------------------
+
+    def form(self) -> dict[str, Any]:
+        """Values of the template, keys and units of every test, and the files of the folder."""
+        document = read_toml(TEMPLATE)[1]
+        rows = [row for row in study_reference() if row.key]
+        tests = {
+            name: [
+                {"key": row.key, "kind": row.kind, "default": row.default, "bounds": row.bounds,
+                 "meaning": row.meaning, "required": row.required}
+                for row in rows
+                if row.section == f"[scene.{name}]"
+            ]
+            for name in SCENES
+        }  # fmt: skip
+        meanings = {f"{row.section[1:-1]}.{row.key}": row.meaning for row in rows}
+        return {
+            "folder": str(self.folder),
+            "template": document,
+            "tests": tests,
+            "meanings": meanings,
+            "studies": sorted(path.name for path in self.folder.glob("*.toml") if path.is_file()),
+            "measured": sorted(path.name for path in self.folder.glob("*.csv") if path.is_file()),
+        }
+
+    def new_file(self, name: str) -> Path:
+        """Return the path of a file that is taken from a person.
+
+        Raises
+        ------
+        InputError
+            When the name is no plain name, or the file exists.
+        """
+        parts = name.split("/")
+        if not 1 <= len(parts) <= 2 or not all(_FILE_NAME.fullmatch(part) for part in parts):
+            raise InputError("a file has a plain name, of letters, digits, spaces and .-_()", name, "upload")
+        path = self.folder.joinpath(*parts)
+        if any(each.is_symlink() for each in (path, path.parent)):
+            raise InputError("links are not followed", name, "upload")
+        if path.exists():
+            raise InputError("an upload never overwrites a file", "one that exists", str(path))
+        return path
+
+    def keep(self, name: str, data: bytes) -> Path:
+        """Write an uploaded file; the same one may come twice.
+
+        Raises
+        ------
+        InputError
+            When it is too large, its name is none, or another file has it.
+        """
+        if len(data) > LARGEST_UPLOAD:
+            raise InputError(f"a file has at most {LARGEST_UPLOAD:,} bytes", f"{len(data):,}", name)
+        try:
+            path = self.new_file(name)
+        except InputError:
+            if _same(self.folder, name, data):
+                return inside(self.folder, name)
+            raise
+        with replacing(path) as temporary:
+            temporary.write_bytes(data)
+        return path
+
+    # ---- grain and photographs -----------------------------------------------------------------------------
+
+    def clump(self, asked: Mapping[str, str]) -> dict[str, Any]:
+        """Make a clump, as ``dem-warp clump`` does; with ``out``, write it too.
+
+        Raises
+        ------
+        InputError
+            As by the command.
+        """
+        source = asked.get("source", "")
+        if ":" not in source:
+            source = str(inside(self.folder, source))
+        count, tolerance, reach = (asked.get(name) or None for name in ("spheres", "tolerance", "protrusion"))
+        request = ClumpRequest(
+            source,
+            _whole(count, "--spheres") if count else None,
+            share(tolerance, "--tolerance") if tolerance else None,
+            None if reach == "auto" else quantity(reach or "0 mm", "length", "--protrusion"),
+            asked.get("unit") or None,
+        )
+        density = quantity(asked["density"], "density", "--density") if asked.get("density") else None
+        made = make_clump(request)
+        if out := asked.get("out"):
+            with TemporaryDirectory() as draft:
+                write_clump(made.shape, Path(draft, "clump.txt"))
+                self.keep(out, Path(draft, "clump.txt").read_bytes())
+        own = np.column_stack([made.shape.centers, made.shape.radii])
+        spheres = made.fit.spheres if made.fit else own
+        return {
+            "facts": made.to_dict(density),
+            "advice": made.advice,
+            "told": made.told,
+            "spheres": np.column_stack([spheres, np.zeros(len(spheres))]).ravel().tolist(),
+            "faces": [] if made.solid is None else _faces(made.solid),
+            "command": self.clump_command(asked),
+        }
+
+    def clump_command(self, asked: Mapping[str, str]) -> str:
+        """Write the command line that makes a clump."""
+        names = ("spheres", "tolerance", "unit", "protrusion", "density", "out")
+        options = [word for name in names if asked.get(name) for word in (f"--{name}", str(asked[name]))]
+        return command_line("clump", asked.get("source", ""), *options)
+
+    def angles(self, folder: str, fit: str) -> dict[str, Any]:
+        """Measure the photographs of a folder, as ``dem-warp angle`` does.
+
+        Raises
+        ------
+        InputError
+            As by the command.
+        """
+        pictures = find_pictures(self._plain(folder), self.folder, "pictures")
+        rows = measure_pictures(pictures, fit)
+        mean = mean_angle(rows)
+        names = [f"{folder}/{path.name}" for path in pictures]
+        return {
+            "rows": [row | {"picture": Path(row["picture"]).name} for row in rows],
+            "mean": str(mean) if mean else "",
+            "command": command_line("angle", *names, "--fit", fit),
+        }
+
+    def _plain(self, name: str) -> str:
+        if not _FILE_NAME.fullmatch(name) or (self.folder / name).is_symlink():
+            raise InputError("must be a folder of photographs beside the study", name, "pictures")
+        return name
+
+    # ---- the study file ------------------------------------------------------------------------------------
+
+    def draft(
+        self, name: str, values: Mapping[str, str], factors: Sequence[Mapping[str, str]]
+    ) -> dict[str, Any]:
+        """Write a study of the form's values, and check it.
+
+        Parameters
+        ----------
+        name
+            Name of the grain, and of the file.
+        values
+            What was written for each place of a study file, as ``grain.density``; nothing where it is empty.
+        factors
+            Keys of each ``[[factor]]``.
+        """
+        path = new_study_path(name, self.folder)
+        document: dict[str, Any] = {"name": path.stem}
+        for place, text in values.items():
+            if text.strip():
+                document = merge(document, nested(place.split("."), plain_value(text)))
+        document["factor"] = [
+            {key: plain_value(text) for key, text in factor.items() if text.strip()} for factor in factors
+        ]
+        head = f"# One heap: dem-warp heap {shlex.quote(path.name)}\n"
+        head += f"# The whole campaign: dem-warp calibrate {shlex.quote(path.name)}\n\n"
+        text = head + toml_text(document)
+        return {"text": text, "file": path.name, **self.checked(path.name, text)}
+
+    def checked(self, file: str, text: str) -> dict[str, Any]:
+        """Check the text of a study file: what is wrong, or what is doubtful about it."""
+        try:
+            with self._draft_file(file, text) as path:
+                study = load_study(path)
+                told = {"note": study.note, "doubtful": study.narrowness(), "scales": study_scales(path)}
+        except InputError as error:
+            return problems_of(error)
+        return told
+
+    def write(self, file: str, text: str) -> Path:
+        """Write a study file that keeps every rule.
+
+        Raises
+        ------
+        InputError
+            When it breaks one, its name is none, or it exists.
+        """
+        path = new_study_path(file, self.folder)
+        with self._draft_file(path.name, text) as draft:
+            load_study(draft)
+        write_text(path, text)
+        return path
+
+    def study(self, file: str, scale: str | None = None) -> Study:
+        """Load a study file of the folder."""
+        return load_study(inside(self.folder, file), scale)
+
+    @contextmanager
+    def _draft_file(self, file: str, text: str) -> Iterator[Path]:
+        """Put a text where its files are found from, for as long as it is looked at; errors name the file."""
+        path = self.folder / f".draft-{Path(file).name}"
+        try:
+            write_text(path, text)
+            yield path
+        except InputError as error:
+            found = [
+                Problem(each.rule, each.value, each.place.replace(str(path), file)) for each in error.problems
+            ]
+            raise type(error).of(found) from None
+        finally:
+            path.unlink(missing_ok=True)
+
+
+def problems_of(error: InputError) -> dict[str, Any]:
+    """What an input breaks, in the command line's own words, and rule, value and place of each."""
+    rows = [{"rule": each.rule, "value": each.value, "place": each.place} for each in error.problems]
+    return {"error": str(error), "problems": rows}
+
+
+def command_line(*words: str) -> str:
+    """Write a command of dem-warp as a person would type it."""
+    return shlex.join(["dem-warp", *words])
+
+
+def plain_value(text: str) -> Any:
+    """Read a field of the form as a TOML file would: a number or a truth value where it is one, else text."""
+    try:
+        found = tomllib.loads(f"value = {text.strip()}")
+    except (tomllib.TOMLDecodeError, ValueError, RecursionError):
+        return text.strip()
+    value = found.get("value")
+    return value if found.keys() == {"value"} and isinstance(value, bool | int | float) else text.strip()
+
+
+def _whole(text: str, place: str) -> int:
+    try:
+        return int(text)
+    except ValueError:
+        raise InputError("must be a whole number", text, place) from None
+
+
+def _same(folder: Path, name: str, data: bytes) -> bool:
+    try:
+        return inside(folder, name).read_bytes() == data
+    except (InputError, OSError):
+        return False
+
+
+def _faces(solid: Any) -> list[float]:
+    """Corners of the triangles of a solid [m], nine numbers each."""
+    faces = np.asarray(solid.triangles)
+    step = -(-len(faces) // MOST_FACES)
+    return np.round(faces[::step].ravel(), 9).tolist()

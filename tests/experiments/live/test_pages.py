@@ -1,0 +1,287 @@
+"""The pages in headless Chromium: what they show of runs, without an error and without a look elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+import trimesh
+from browser import Browser, browsing
+from conftest import OTHER, begin
+
+from dem_warp import CaseResult, Progress
+from experiments import api
+from experiments.cases import Store
+from experiments.live import server
+from experiments.live.server import Place, serving
+from experiments.live.ui.start import ui_app
+from experiments.studyfile import Study, load_study
+
+pytestmark = pytest.mark.program("chromium")
+
+Cone = Callable[..., CaseResult]
+Serve = Callable[[Path], Place]
+
+PAINTED = """[...document.querySelectorAll('canvas')].filter((canvas) => canvas.width && canvas
+  .getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data.some((value) => value)).length"""
+"""Number of heaps that are drawn."""
+
+FAINT = """(() => {
+  const light = (color) => {
+    const [r, g, b] = color.match(/[\\d.]+/g).slice(0, 3).map((c) => c / 255).map(
+      (c) => (c <= 0.03928 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4));
+    return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+  };
+  const behind = (element) => {
+    for (let at = element; at; at = at.parentElement) {
+      const color = getComputedStyle(at).backgroundColor;
+      if (!color.endsWith(', 0)')) return color;
+    }
+    return 'rgb(255, 255, 255)';
+  };
+  const faint = [];
+  for (const element of document.querySelectorAll('body *')) {
+    const text = [...element.childNodes].some((node) => node.nodeType === 3 && node.textContent.trim());
+    if (!text || !element.checkVisibility() || element.closest('svg') || element.disabled) continue;
+    const [a, b] = [light(getComputedStyle(element).color), light(behind(element))].sort((x, y) => y - x);
+    if ((a + 0.05) / (b + 0.05) < 4.5) faint.push(element.textContent.trim().slice(0, 40));
+  }
+  return faint;
+})()"""
+"""Texts whose contrast is below the 4.5 of WCAG 2.1, AA."""
+
+UNNAMED = """[...document.querySelectorAll('input, select, textarea, button, canvas, progress, a')]
+  .filter((each) => each.checkVisibility() && !(each.labels?.length || each.getAttribute('aria-label')
+  || each.textContent.trim())).map((each) => each.outerHTML.slice(0, 80))"""
+"""Controls and pictures without a name for who cannot see them."""
+
+
+def check(browser: Browser, place: Place) -> None:
+    """See that a page has no error, nothing from elsewhere, a name for everything, and room for all."""
+    assert browser.errors == []
+    home = f"http://127.0.0.1:{place.port}/{place.token}/"
+    assert [each for each in browser.asked if not each.startswith((home, "data:", "blob:"))] == []
+    assert browser.run("document.documentElement.scrollWidth - innerWidth") <= 0
+    assert browser.run(UNNAMED) == []
+    assert browser.run(FAINT) == []
+    assert browser.run("document.querySelectorAll('h1').length") == 1
+    assert browser.run("document.documentElement.lang") == "en"
+
+
+LOOKS = [(1280, False), (1280, True), (390, False), (390, True)]
+
+
+@pytest.mark.parametrize(("width", "dark"), LOOKS)
+def test_a_run_is_shown_as_it_goes(
+    run_folder: Path,
+    small_study: Study,
+    cone: Cone,
+    served: Serve,
+    tmp_path: Path,
+    width: int,
+    dark: bool,
+) -> None:
+    journal = begin(run_folder, small_study, cone)
+    place = served(run_folder)
+    with ExitStack() as stack:
+        note = stack.enter_context(journal.batch("screening"))
+        note(Progress(0, 2, 0.0, {"lift": 1}, 0.0))
+        journal._noted = 0.0
+        note(Progress(1, 2, 0.5, {"lift": 1}, 30.0))
+        browser = stack.enter_context(browsing(tmp_path / "profile", place.url, width, dark))
+        browser.wait(f"{PAINTED} === 2")
+        shown = browser.run("document.body.innerText")
+        assert "30 s left, 50 %, 1 of 2 cases, 1 lift" in shown
+        assert "screening, run 2, replicate 1" in shown
+        assert "lift, 40 %" in shown
+        assert "at rest, 26.5°" in shown
+        assert "The run begins." in shown
+        assert browser.run("document.querySelector('#state').textContent") == "running"
+        browser.wait("document.querySelector('.chart .scatterlayer .point')")
+        dark_page = "getComputedStyle(document.body).backgroundColor === 'rgb(18, 22, 28)'"
+        assert browser.run(dark_page) is dark
+        check(browser, place)
+        # what happens is seen without loading the page anew
+        Store(run_folder / "cases").save(OTHER, cone(0.6))
+        journal.ended(OTHER, {"status": "finished", "reason": "", "angle": 31.25, "angle_se": 0.5})
+        browser.wait("document.body.innerText.includes('at rest, 31.3°')")
+        browser.wait(f"{PAINTED} === 2")
+        browser.wait("document.querySelectorAll('#cases tbody tr').length === 2")
+        journal.__exit__(None, None, None)
+        browser.wait("document.querySelector('#state').textContent === 'finished'")
+        check(browser, place)
+
+
+@pytest.mark.parametrize("ending", ["killed", "failed"])
+def test_a_run_that_was_broken_off_is_shown(
+    run_folder: Path, small_study: Study, cone: Cone, served: Serve, tmp_path: Path, ending: str,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    journal = begin(run_folder, small_study, cone)
+    if ending == "failed":
+        journal.__exit__(ValueError, ValueError("the disk is full"), None)
+    else:
+        journal._ended.set()
+        monkeypatch.setattr("experiments.live.state.STALE", -1.0)
+    place = served(run_folder)
+    with browsing(tmp_path / "profile", place.url) as browser:
+        browser.wait(f"{PAINTED} === 2")
+        shown = browser.run("document.body.innerText")
+        assert "last seen: lift, 40 %" in shown
+        assert ("The run failed: the disk is full" if ending == "failed" else "No sign of life") in shown
+        check(browser, place)
+
+
+def test_a_finished_calibration_is_shown_with_its_report(
+    small_text: str, tmp_path: Path, served: Serve
+) -> None:
+    """A real run, from the command's own function, with its stages, tables and report."""
+    study = tmp_path / "small.toml"
+    study.write_text(small_text, encoding="utf-8")
+    folder = tmp_path / "out"
+    found = api.calibrate(study, folder, device="cpu").campaign
+    assert found is not None
+    place = served(folder)
+    with browsing(tmp_path / "profile", place.url) as browser:
+        browser.wait(f"{PAINTED} === 12")
+        for decision in found.decisions:
+            assert decision.outcome in browser.run("document.querySelector('#stages').innerText")
+        assert browser.run("document.querySelectorAll('#cases tbody tr').length") == len(found.cases)
+        assert browser.run("document.querySelectorAll('.chart').length") == 3
+        # every chart has all of its room, and no more
+        browser.wait(
+            "[...document.querySelectorAll('.chart')].every((chart) => "
+            "Math.abs(chart.clientWidth - chart.querySelector('svg').clientWidth) < 2)"
+        )
+        check(browser, place)
+    with browsing(tmp_path / "again", f"{place.url}file/report.html") as browser:
+        browser.wait("document.querySelector('h1')")
+        assert browser.errors == []
+
+
+def test_the_page_beside_a_run_sees_its_end(
+    run_folder: Path, small_study: Study, cone: Cone, tmp_path: Path
+) -> None:
+    """`--live` serves a moment longer than the run lasts."""
+    told: list[str] = []
+    with ExitStack() as stack:
+        live = stack.enter_context(server.live_page(run_folder, True, told.append))
+        assert live is None
+        journal = begin(run_folder, small_study, cone)
+        [line] = told
+        browser = stack.enter_context(browsing(tmp_path / "profile", line.removeprefix("Live: ")))
+        browser.wait("document.querySelector('#state').textContent === 'running'")
+        journal.__exit__(None, None, None)
+        browser.wait("document.querySelector('#state').textContent === 'finished'")
+        assert browser.errors == []
+
+
+def test_a_heap_turns_by_the_arrow_keys(
+    run_folder: Path, small_study: Study, cone: Cone, served: Serve, tmp_path: Path
+) -> None:
+    begin(run_folder, small_study, cone)
+    with browsing(tmp_path / "profile", served(run_folder).url) as browser:
+        browser.wait(f"{PAINTED} === 2")
+        picture = "document.querySelector('canvas').toDataURL()"
+        before = browser.run(picture)
+        browser.run("document.querySelector('canvas').focus()")
+        assert browser.run("document.activeElement.tagName") == "CANVAS"
+        for name in ("keyDown", "keyUp"):
+            browser.call("Input.dispatchKeyEvent", type=name, key="ArrowLeft", code="ArrowLeft")
+        browser.wait(f"{picture} !== {before!r}")
+
+
+@pytest.fixture
+def workshop(tmp_path: Path):  # type: ignore[no-untyped-def]
+    """Serve the page to start from: its place, and its folder."""
+    folder = tmp_path / "work"
+    folder.mkdir()
+    place = Place.open()
+    with serving(place, ui_app(folder, place.token)):
+        yield place, folder
+
+
+READY = "document.documentElement.dataset.ready"
+
+
+@pytest.mark.parametrize(("width", "dark"), LOOKS)
+def test_the_page_to_start_from_stands(
+    workshop: tuple[Place, Path], tmp_path: Path, width: int, dark: bool
+) -> None:
+    place, _ = workshop
+    with browsing(tmp_path / "profile", place.url, width, dark) as browser:
+        browser.wait(READY)
+        check(browser, place)
+
+
+def test_from_an_stl_to_a_heap_in_the_browser(workshop: tuple[Place, Path], tmp_path: Path) -> None:
+    """Grain from an STL with its preview, test, ranges, study file, start, watch: by clicks alone."""
+    place, folder = workshop
+    stl = tmp_path / "grain.stl"
+    trimesh.creation.icosphere(subdivisions=2, radius=2.0).export(stl)
+    with browsing(tmp_path / "profile", place.url) as browser:
+        browser.wait(READY)
+        browser.fill("#name", "rye")
+        browser.click("input[value=file]")
+        browser.choose_files("#mesh", stl)
+        browser.fill("#spheres", "2")
+        browser.click("#preview")
+        browser.wait(f"{PAINTED} === 2")
+        assert "2 spheres, volume" in browser.run("document.querySelector('#clump-words').innerText")
+        command = browser.run("document.querySelector('#clump-command').innerText")
+        assert command.startswith("dem-warp clump grain.stl --spheres 2 --protrusion auto")
+        # a wrong value gets the message of the command line
+        browser.fill("[data-place='grain.density']", "heavy")
+        browser.click("#draft")
+        browser.wait("document.querySelector('#draft-error').innerText.includes('rye.toml')")
+        assert "(received 'heavy')" in browser.run("document.querySelector('#draft-error').innerText")
+        browser.fill("[data-place='grain.density']", "1200 kg/m^3")
+        settings = {"diameter": "28 mm", "height": "28 mm", "grain_count": "30"}
+        for key, value in settings.items():
+            browser.fill(f"[data-place='scene.lifted-cylinder.{key}']", value)
+        browser.fill("[data-place='numerics.modulus_scale']", "400")
+        browser.click("#draft")
+        browser.wait("document.querySelector('#text').value.includes('1200 kg/m^3')")
+        browser.click("#write")
+        browser.wait("document.querySelector('#written').innerText === 'Wrote rye.toml.'")
+        study = load_study(folder / "rye.toml")
+        assert study.case({}, seed=1).grains.shape.sphere_count == 2
+        browser.fill("#command", "heap")
+        browser.fill("#device", "cpu")
+        command = "dem-warp heap rye.toml --out out/rye-heap-1 --device cpu"
+        browser.wait(f"document.querySelector('#run-command').innerText === {command!r}")
+        browser.click("#start")
+        browser.wait("document.querySelector('#runs .badge.finished')")
+        check(browser, place)
+        link = browser.run("document.querySelector('#runs a').href")
+        browser.open(link)
+        browser.wait(f"{PAINTED} === 1")
+        assert browser.run("document.querySelector('h1').innerText") == "rye"
+        check(browser, place)
+    assert (folder / "out" / "rye-heap-1" / "heap.vtp").is_file()
+
+
+def test_photographs_become_the_target(workshop: tuple[Place, Path], tmp_path: Path) -> None:
+    place, folder = workshop
+    pictures = [tmp_path / f"{number}.png" for number in range(3)]
+    for path, slope in zip(pictures, (0.5, 0.55, 0.6), strict=True):
+        picture = np.full((300, 600), 230, np.uint8)
+        corners = np.array([[120, 250], [480, 250], [300, round(250 - 180 * slope)]], np.int32)
+        cv2.fillPoly(picture, [corners], 40)
+        picture[250:] = 120
+        cv2.imwrite(str(path), picture)
+    with browsing(tmp_path / "profile", place.url) as browser:
+        browser.wait(READY)
+        browser.click("input[value=pictures]")
+        browser.choose_files("#photos", *pictures)
+        browser.click("#measure")
+        browser.wait("document.querySelectorAll('#angles tbody tr').length === 3")
+        assert browser.run("document.querySelector('#angles-command').innerText").startswith("dem-warp angle")
+        browser.click("#draft")
+        browser.wait("document.querySelector('#text').value.includes('pictures = \"mygrain-photos\"')")
+        check(browser, place)
+    assert len(list((folder / "mygrain-photos").iterdir())) == 3

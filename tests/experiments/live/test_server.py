@@ -1,0 +1,241 @@
+"""The server on this machine: who is let in, and what a folder gives away."""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+import sys
+import urllib.request
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from commandline import dem_warp
+from conftest import KEY, NAME, OTHER, begin
+from starlette.testclient import TestClient
+
+from dem_warp import CaseResult
+from experiments import api, cases
+from experiments.errors import InputError
+from experiments.live import server
+from experiments.live.server import Place, watch_app
+from experiments.studyfile import Study
+
+TOKEN = "a-secret-token"
+HOST = "http://127.0.0.1:8765"
+
+
+@pytest.fixture
+def client(run_folder: Path, small_study: Study, cone: Callable[..., CaseResult]) -> TestClient:
+    """Ask the server of a run that is running."""
+    begin(run_folder, small_study, cone)
+    return TestClient(watch_app(run_folder, TOKEN), base_url=HOST)
+
+
+def test_the_page_and_all_that_it_loads_come_with_the_token(client: TestClient) -> None:
+    page = client.get(f"/{TOKEN}/")
+    assert page.status_code == 200
+    assert "dem-warp" in page.text
+    for name in ("pages/style.css", "pages/watch.js", "pages/page.js", "pages/spheres.js", "plotly.js"):
+        assert client.get(f"/{TOKEN}/{name}").status_code == 200, name
+
+
+@pytest.mark.parametrize(
+    "path", ["/", "/state.json", "/wrong/state.json", f"/{TOKEN}x/", f"/{TOKEN[:-1]}/", "//", f"//{TOKEN}/"]
+)
+def test_without_the_token_nothing_is_told(client: TestClient, path: str) -> None:
+    answer = client.get(HOST + path)
+    assert answer.status_code == 403
+    assert "Small" not in answer.text
+
+
+@pytest.mark.parametrize(
+    "host", ["evil.example", "127.0.0.1.evil.example:8765", "[::1]:8765", "0.0.0.0:8765", ""]
+)
+def test_a_page_of_another_name_is_refused(client: TestClient, host: str) -> None:
+    """DNS rebinding: a name of someone else's that leads to this address."""
+    assert client.get(f"/{TOKEN}/state.json", headers={"Host": host}).status_code == 403
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1:1", "localhost:8765", "localhost"])
+def test_a_tunnel_may_have_another_port(client: TestClient, host: str) -> None:
+    assert client.get(f"/{TOKEN}/state.json", headers={"Host": host}).status_code == 200
+
+
+def test_another_sites_request_is_refused(client: TestClient) -> None:
+    for origin in ("http://evil.example", "null", "https://127.0.0.1:8765"):
+        assert client.get(f"/{TOKEN}/state.json", headers={"Origin": origin}).status_code == 403
+    assert client.get(f"/{TOKEN}/state.json", headers={"Origin": HOST}).status_code == 200
+    assert client.post(f"/{TOKEN}/state.json").status_code == 403
+
+
+def test_a_page_loads_nothing_from_elsewhere(client: TestClient) -> None:
+    headers = client.get(f"/{TOKEN}/").headers
+    assert "default-src 'none'" in headers["content-security-policy"]
+    assert headers["referrer-policy"] == "no-referrer"
+    assert "sandbox" in client.get(f"/{TOKEN}/file/report.html").headers["content-security-policy"]
+
+
+def test_the_state_tells_what_the_run_does(client: TestClient) -> None:
+    state = client.get(f"/{TOKEN}/state.json").json()
+    assert state["run"] == {"command": "calibrate", "study": "Small", "scale": None, "device": "cpu"}
+    assert state["progress"]["state"] == "running"
+    assert [heap["id"] for heap in state["heaps"]] == [f"glimpse/{NAME}", f"case/{KEY}"]
+    assert state["heaps"][0]["title"] == "screening, run 2, replicate 1"
+    assert (state["cases"]["ended"], state["cases"]["planned"]) == (1, 2)
+    assert [line["text"] for line in state["log"]] == ["The run begins."]
+    assert state["outputs"] == ["report.html", "tables/cases.csv"]
+    assert [chart["name"] for chart in state["charts"]] == ["course"]
+
+
+def test_what_has_not_changed_is_not_sent_again(client: TestClient) -> None:
+    tag = client.get(f"/{TOKEN}/state.json").headers["etag"]
+    assert client.get(f"/{TOKEN}/state.json", headers={"If-None-Match": tag}).status_code == 304
+
+
+def test_heaps_come_as_their_spheres(client: TestClient, cone: Callable[..., CaseResult]) -> None:
+    for name, heap in ((f"case/{KEY}", cone()), (f"glimpse/{NAME}", cone(0.3))):
+        rows = np.frombuffer(client.get(f"/{TOKEN}/heap/{name}").content, "<f4").reshape(-1, 5)
+        np.testing.assert_allclose(rows[:, :3], heap.sphere_centers, atol=1e-9)
+        np.testing.assert_allclose(rows[:, 3], heap.sphere_radii, rtol=1e-6)
+    assert client.get(f"/{TOKEN}/heap/glimpse/{NAME}").headers["x-phase"] == "lift"
+
+
+@pytest.mark.parametrize(
+    "name", [f"case/{OTHER}", "case/../study", "glimpse/x", "other/" + KEY, "%2e%2e/secret", f"case/{KEY}%00"]
+)
+def test_a_heap_that_is_not_there_is_no_error(client: TestClient, name: str) -> None:
+    assert client.get(f"/{TOKEN}/heap/{name}").status_code == 204
+
+
+def test_files_of_the_run_can_be_opened(client: TestClient) -> None:
+    assert "The report" in client.get(f"/{TOKEN}/file/report.html").text
+    assert client.get(f"/{TOKEN}/file/tables/cases.csv").headers["content-type"].startswith("text/csv")
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "%2e%2e/secret.txt", "..%2f..%2fsecret.txt", "tables/%2e%2e/%2e%2e/%2e%2e/secret.txt",
+        "%2fetc/passwd",
+        "tables", "tables%5c..%5csecret.txt", "no.csv", "linked.txt", "away/secret.txt", ".live/log.jsonl",
+        "report.html%00.csv", "pipe.txt",
+    ],
+)  # fmt: skip
+def test_no_path_leads_out_of_the_folder(client: TestClient, run_folder: Path, path: str) -> None:
+    secret = run_folder.parents[1] / "secret.txt"
+    secret.write_text("secret", encoding="utf-8")
+    (run_folder / "linked.txt").symlink_to(secret)
+    (run_folder / "away").symlink_to(secret.parent)
+    os.mkfifo(run_folder / "pipe.txt")
+    answer = client.get(f"/{TOKEN}/file/{path}")
+    assert answer.status_code in (404, 422)
+    assert answer.text != "secret"
+
+
+def test_watching_changes_nothing(client: TestClient, run_folder: Path) -> None:
+    # the run's own sign of life, which the test does not stop
+    found = lambda: {  # noqa: E731
+        path: path.read_bytes() for path in run_folder.rglob("*") if path.is_file() and path.name != "beat"
+    }
+    before = found()
+    for name in ("", "state.json", f"heap/case/{KEY}", f"heap/glimpse/{NAME}", "file/report.html"):
+        client.get(f"/{TOKEN}/{name}")
+    assert found() == before
+
+
+def test_the_server_listens_on_this_machine_alone() -> None:
+    place = Place.open()
+    assert place.socket.getsockname()[0] == "127.0.0.1"
+    assert len(place.token) >= 32
+    assert place.token != Place.open().token
+    with pytest.raises(InputError, match=r"--port: must be a free port of this machine \(.+\) \(received"):
+        Place.open(_taken())
+
+
+def _taken() -> int:
+    listening = socket.create_server(("127.0.0.1", 0))
+    _open.append(listening)
+    return int(listening.getsockname()[1])
+
+
+_open: list[socket.socket] = []
+
+
+def test_a_missing_library_is_told_with_the_command_that_installs_it(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setitem(sys.modules, "uvicorn", None)
+    for words in (
+        ("watch", tmp_path),
+        ("ui", tmp_path),
+        ("heap", "--scale", "bench", "--live", "--out", tmp_path / "h"),
+    ):
+        code, _, told = dem_warp(*words)
+        assert code == 2
+        assert "pip install 'dem-warp[live]'" in told
+    assert not (tmp_path / "h").exists()
+
+
+def test_a_folder_that_is_not_there_is_refused(tmp_path: Path) -> None:
+    for command in ("watch", "ui"):
+        code, _, told = dem_warp(command, tmp_path / "none")
+        assert code == 2
+        assert "no folder of this name" in told
+
+
+def test_the_address_is_told_and_no_browser_opened_without_a_screen(
+    monkeypatch: pytest.MonkeyPatch, run_folder: Path
+) -> None:
+    run_folder.mkdir(parents=True)
+    opened: list[str] = []
+    monkeypatch.setattr(server, "serve", lambda place, app: place.socket.close())
+    monkeypatch.setattr(server.webbrowser, "open", opened.append)
+    monkeypatch.setattr(sys, "platform", "linux")
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    code, told, _ = dem_warp("watch", run_folder)
+    assert code == 0
+    assert told.startswith("http://127.0.0.1:")
+    assert opened == []
+    monkeypatch.setenv("DISPLAY", ":0")
+    dem_warp("watch", run_folder)
+    assert len(opened) == 1
+    dem_warp("watch", run_folder, "--no-browser")
+    assert len(opened) == 1
+
+
+def test_json_of_the_state_has_no_nan(client: TestClient) -> None:
+    json.loads(client.get(f"/{TOKEN}/state.json").text, parse_constant=lambda name: pytest.fail(name))
+
+
+@pytest.mark.parametrize("command", ["calibrate", "discover", "heap"])
+def test_live_serves_the_page_beside_the_run(
+    command: str, small_study: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    places: list[Place] = []
+    seen: list[bytes] = []
+    urls: list[str] = []
+    opened = Place.open
+
+    def run(*_: object, **__: object) -> None:
+        urls.append(places[0].url)
+        with urllib.request.urlopen(urls[0] + "state.json") as answer:
+            seen.append(answer.read())
+        raise InputError("the run has looked", "enough", command)
+
+    monkeypatch.setattr(server.Place, "open", lambda port=0: places.append(opened(port)) or places[-1])
+    monkeypatch.setattr(server, "can_open_browser", lambda: False)
+    monkeypatch.setattr(api, "calibrate", run)
+    monkeypatch.setattr(api, "discover", run)
+    monkeypatch.setattr(cases, "simulate_heap", run)
+    words = [command, small_study.file, "--device", "cpu", "--live", "--out", tmp_path / "out"]
+    code, _, told = dem_warp(*words)
+    assert code == 2
+    assert "the run has looked" in told
+    assert f"Live: {urls[0]}" in told
+    assert json.loads(seen[0])["progress"]["state"] == ("running" if command == "heap" else "waiting")
+    with pytest.raises(OSError, match="refused"):
+        urllib.request.urlopen(urls[0])
