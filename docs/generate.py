@@ -1,8 +1,11 @@
-"""Reference pages, made from the program itself: the study file, the command line, observables."""
+"""Reference pages, made from the program itself: study file, command line, Python, observables, effects."""
 
 from __future__ import annotations
 
+import inspect
+import tomllib
 from collections.abc import Iterable
+from importlib import import_module
 from itertools import groupby
 from pathlib import Path
 
@@ -10,6 +13,7 @@ import typer
 from typer.main import get_command
 
 from experiments.cli import app
+from experiments.discover.library import FILES
 from experiments.measurement.observables import OBSERVABLES
 from experiments.studyfile.reference import study_reference
 
@@ -92,12 +96,62 @@ def observables_page() -> str:
     )
 
 
+def python_page(package: str, about: str) -> str:
+    """Every public name of a package."""
+    module = import_module(package)
+    groups: dict[str, list[str]] = {"Functions": [], "Classes": [], "Constants": []}
+    for name in (each for each in module.__all__ if not each.startswith("__")):
+        thing = getattr(module, name)
+        if inspect.isclass(thing):
+            group, entry = "Classes", f".. autoclass:: {package}.{name}\n   :members:"
+        elif inspect.isroutine(thing):
+            group, entry = "Functions", f".. autofunction:: {package}.{name}"
+        else:
+            group, entry = "Constants", f".. autodata:: {package}.{name}\n   :no-value:"
+        groups[group].append(entry)
+    parts = [f"# `{package}`", about]
+    for group, entries in groups.items():
+        if entries:
+            parts.append(f"## {group}\n\n```{{eval-rst}}\n" + "\n\n".join(entries) + "\n```")
+    return "\n\n".join(parts)
+
+
+def effects_page() -> str:
+    """Every effect that a search knows."""
+    effects = {name: tomllib.loads(path.read_text(encoding="utf-8")) for name, path in sorted(FILES.items())}
+    rows = [
+        (f"`{name}`", effect["title"], effect["sentence"], effect["source"], effect["confirm"])
+        for name, effect in effects.items()
+    ]
+    return "\n\n".join(
+        [
+            "# Effects that a search knows",
+            "`dem-warp discover` tests each of these that the study can have. `[discover] mechanisms` names fewer.",
+            markdown_table(("name", "effect", "in words", "law and range", "what would confirm it"), rows),
+        ]
+    )
+
+
+PACKAGES = {
+    "experiments.api": "Whole runs: calibration, search and bridge. The command line calls these functions.",
+    "experiments.studyfile": "Study files and material cards, read and checked.",
+    "experiments.cases": "Cases: running, storing and measuring them; engines.",
+    "dem_warp": "The simulator: cases in, heaps out. SI units, z up, the plate at 0.",
+    "imaging": "Pictures and repose angles.",
+    "doe": "Designs of experiments and their analysis. They know nothing of grains.",
+}
+"""Packages with public names, in the order of the reference."""
+
+
 def write_pages(folder: Path) -> None:
     """Write the pages into a folder."""
     folder.mkdir(exist_ok=True)
-    for name, text in {
-        "study": study_page,
-        "commands": commands_page,
-        "observables": observables_page,
-    }.items():
-        (folder / f"{name}.md").write_text(text() + "\n", encoding="utf-8")
+    pages = {
+        "study": study_page(),
+        "commands": commands_page(),
+        "observables": observables_page(),
+        "effects": effects_page(),
+    }
+    pages |= {name.replace(".", "-"): python_page(name, about) for name, about in PACKAGES.items()}
+    for name, text in pages.items():
+        (folder / f"{name}.md").write_text(text + "\n", encoding="utf-8")
