@@ -2,6 +2,7 @@
 
 from dem_warp.case import Case, Numerics
 from dem_warp.clumps import ClumpShape
+from dem_warp.frames import Film, Frame, simulate_frames
 from dem_warp.laws.conventions import EDEM, PRESETS, RELATIVE, ContactLaws, laws_named
 from dem_warp.laws.library import MECHANISMS
 from dem_warp.laws.mechanism import Mechanism
@@ -29,6 +30,8 @@ __all__ = [
     "ContactLaws",
     "DrawDown",
     "Drum",
+    "Film",
+    "Frame",
     "GrainPopulation",
     "Hopper",
     "Interaction",
@@ -44,4 +47,5 @@ __all__ = [
     "laws_named",
     "rayleigh_time",
     "simulate",
+    "simulate_frames",
 ]

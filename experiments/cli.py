@@ -5,7 +5,9 @@ Imports of the simulator, the statistics and the pictures are inside the command
 
 from __future__ import annotations
 
+import io
 import json
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -19,11 +21,11 @@ from experiments.commands.console import (
     Attempt,
     CaseProgress,
     clear_errors,
-    fail,
     messages,
 )
 from experiments.commands.early import check_study_file
 from experiments.commands.export import EXPORT_EXAMPLE, export
+from experiments.commands.heap import HEAP_EXAMPLE, heap
 from experiments.commands.new import NEW_EXAMPLE, new
 from experiments.commands.options import (
     AsJson,
@@ -35,9 +37,8 @@ from experiments.commands.options import (
     Scale,
     StudyFile,
     Workers,
-    assignments,
 )
-from experiments.commands.results import print_measured, print_study, show_stage
+from experiments.commands.results import print_study, show_stage
 
 app = typer.Typer(
     name="dem-warp",
@@ -188,51 +189,7 @@ def discover(
     messages.print(f"Report: {ended.page}")
 
 
-@app.command(epilog="Example: [bold]dem-warp heap --scale bench --set E=0.48 --set F=0.45 --seed 7[/]")
-def heap(
-    study: StudyFile = None,
-    settings: Annotated[
-        list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="Value of a factor.")
-    ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of sizes, places and orientations.")] = 1,
-    scene: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", help="A further scene of the study, \\[response-scene.NAME]."),
-    ] = None,
-    out: Out = None,
-    scale: Scale = None,
-    device: Device = None,
-    engine: EngineName = None,
-    as_json: AsJson = False,
-) -> None:
-    """Simulate one heap: heap.vtp (ParaView), snapshot.png with the fitted flanks, angle.json.
-
-    A study of a hopper, a drum or a draw-down gives what that test measures instead of the angle; so does
-    --scene with a further scene of the study.
-    """
-    with clear_errors():
-        check_study_file(study, scale)
-        from experiments.cases import require_unused, simulate_heap, with_engine, write_heap
-        from experiments.runs.choices import chosen_device, chosen_study, default_folder
-        from experiments.studyfile.campaign import TARGET_SCENE
-
-        device = chosen_device(device)
-        chosen = with_engine(chosen_study(study, scale, device), engine)
-        values = chosen.natural_settings(assignments(settings or []), "--set")
-        folder = out or default_folder(chosen, f"{scene or 'heap'}-{seed}")
-        require_unused(folder)
-        with CaseProgress(scene or "heap") as progress:
-            simulated = simulate_heap(chosen, values, seed, device, progress, scene or TARGET_SCENE)
-        write_heap(simulated, folder)
-    if as_json:
-        typer.echo(json.dumps(simulated.to_dict(), allow_nan=False))
-    messages.print(f"Files: {folder}")
-    if simulated.reason:
-        fail(f"the case {simulated.result.status}: {simulated.reason}", FAILED_RUN)
-    elif not as_json:
-        print_measured(simulated)
-
-
+app.command(epilog=HEAP_EXAMPLE)(heap)
 app.command(epilog=ANGLE_EXAMPLE)(angle)
 app.command(epilog=CLUMP_EXAMPLE)(clump)
 app.command(epilog=NEW_EXAMPLE)(new)
@@ -242,4 +199,8 @@ app.command(epilog=BRIDGE_EXAMPLE)(bridge)
 
 def main() -> None:
     """Run the command line."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            # a console of another encoding than UTF-8 shows an escape for what it lacks
+            stream.reconfigure(errors="backslashreplace")
     app()

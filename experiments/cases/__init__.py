@@ -4,7 +4,7 @@ from experiments.cases.engine import Engine
 from experiments.cases.engines import ENGINES, engine_of, with_engine
 from experiments.cases.execute import run_cases
 from experiments.cases.folder import open_folder, require_unused
-from experiments.cases.heap import Heap, heap_picture, simulate_heap, write_heap
+from experiments.cases.heap import Heap, heap_snapshot, simulate_heap, write_heap
 from experiments.cases.store import Store
 
 __all__ = [
@@ -13,7 +13,7 @@ __all__ = [
     "Heap",
     "Store",
     "engine_of",
-    "heap_picture",
+    "heap_snapshot",
     "open_folder",
     "require_unused",
     "run_cases",

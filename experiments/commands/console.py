@@ -6,9 +6,10 @@ import errno
 import logging
 import shlex
 import signal
+import subprocess
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import BrokenExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -43,7 +44,7 @@ HIDDEN = ("Cc", "Cf", "Cs", "Zl", "Zp")
 WAYS_OUT = {
     errno.ENOSPC: "free some room on the disk",
     errno.EDQUOT: "free some room in your quota",
-    errno.EACCES: "see to the permissions, or name another place",
+    errno.EACCES: "see to the permissions, close the program that has it open, or name another place",
     errno.EPERM: "see to the permissions, or name another place",
     errno.EROFS: "name a place that can be written to",
     errno.ENOENT: "see to it that nothing is moved or removed while a command runs",
@@ -58,6 +59,11 @@ def plain(text: str) -> str:
         else character.encode("unicode_escape", "surrogatepass").decode()
         for character in text
     )  # fmt: skip
+
+
+def shell_line(words: Sequence[str]) -> str:
+    """Join the words of a command as the system's shell reads them."""
+    return subprocess.list2cmdline(words) if sys.platform == "win32" else shlex.join(words)
 
 
 class Messages(Console):
@@ -98,7 +104,7 @@ class Attempt:
         for name, value in {"out": out, **options}.items():
             if value is not None and value is not False:
                 words += [f"--{name.replace('_', '-')}", *([] if value is True else [str(value)])]
-        return cls(shlex.join(words), out)
+        return cls(shell_line(words), out)
 
     def __str__(self) -> str:
         """Say how to go on."""

@@ -28,6 +28,11 @@ def show_stage(name: str, result: StageResult) -> None:
 def print_study(study: Study, device: str) -> None:
     """Say which study runs where, and what is doubtful about it."""
     messages.print(f"{study.name}, on {device}", study.note, sep="\n")
+    print_narrowness(study)
+
+
+def print_narrowness(study: Study) -> None:
+    """Say that the container is narrow for its grains, where it is."""
     if narrow := study.narrowness():
         messages.print(f"Doubtful: {narrow}")
 
