@@ -55,7 +55,10 @@ nb_execution_raise_on_error = True
 nb_execution_show_tb = True
 nb_execution_timeout = 900
 nb_merge_streams = True
-suppress_warnings = ["myst-nb.lexer"]  # of cells that are shell, see `show_as_typed`
+suppress_warnings = [
+    "myst-nb.lexer",  # of cells that are shell, see `show_as_typed`
+    "ref.python",  # words of a docstring's types, as "mean", that are names of several attributes too
+]
 
 autodoc_member_order = "bysource"
 autodoc_typehints = "description"

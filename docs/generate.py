@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import ast
 import inspect
 import tomllib
 from collections.abc import Iterable
 from importlib import import_module
-from itertools import groupby
+from itertools import groupby, pairwise
 from pathlib import Path
+from types import ModuleType
 
 import typer
 from typer.main import get_command
@@ -96,6 +98,23 @@ def observables_page() -> str:
     )
 
 
+def meaning_of(module: ModuleType, name: str) -> str:
+    """Return what the line below a constant says, in the module that assigns it."""
+    taken = (node for node in ast.walk(source_of(module)) if isinstance(node, ast.ImportFrom) and node.module)
+    homes = [node.module for node in taken if name in {alias.name for alias in node.names}]
+    body = source_of(import_module(homes[0]) if homes else module).body
+    for node, after in pairwise(body):
+        targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
+        if name in {getattr(target, "id", "") for target in targets} and isinstance(after, ast.Expr):
+            return " ".join(ast.literal_eval(after.value).split())
+    return ""
+
+
+def source_of(module: ModuleType) -> ast.Module:
+    """Parse a module's source."""
+    return ast.parse(inspect.getsource(module))
+
+
 def python_page(package: str, about: str) -> str:
     """Every public name of a package."""
     module = import_module(package)
@@ -107,7 +126,7 @@ def python_page(package: str, about: str) -> str:
         elif inspect.isroutine(thing):
             group, entry = "Functions", f".. autofunction:: {package}.{name}"
         else:
-            group, entry = "Constants", f".. autodata:: {package}.{name}\n   :no-value:"
+            group, entry = "Constants", f".. py:data:: {package}.{name}\n\n   {meaning_of(module, name)}"
         groups[group].append(entry)
     parts = [f"# `{package}`", about]
     for group, entries in groups.items():

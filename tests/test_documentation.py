@@ -14,7 +14,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-import click
 import pytest
 import typer
 from typer.main import get_command
@@ -127,9 +126,9 @@ def test_commands_are_as_the_command_line_takes_them(block: Block) -> None:
 
 
 def test_a_command_that_is_wrong_is_seen() -> None:
-    with pytest.raises(click.UsageError):
+    with pytest.raises(Exception, match="No such option"):
         parsed(["heap", "--no-such-option"])
-    with pytest.raises(click.UsageError):
+    with pytest.raises(Exception, match="valid integer"):
         parsed(["heap", "--seed", "many"])
 
 
@@ -159,11 +158,12 @@ def test_studies_load(block: Block, tmp_path: Path) -> None:
     for clump in re.findall(r'clump = "(\S+)"', block.code):
         (tmp_path / clump).write_text("0 0 0 2\n", encoding="utf-8")
     text = BASE.read_text(encoding="utf-8")
+    if "grain-grain" in changes.get("contact", {}):
+        text = text.replace("[contact.grain-grain]\nrestitution = 0.2\nrolling_friction = 0.05\n", "")
+        if "factor" not in changes:
+            text = re.sub(r"\[\[factor\]\].*?\n\n", "", text, flags=re.DOTALL)
     if any(key in changes.get("grain", {}) for key in ("clump", "shapes")):
         text = text.replace('sphere = "2 mm"\n', "")
-    if "factor" in changes:
-        for factor in changes["factor"]:
-            text = re.sub(rf"^{factor['parameter'].split('.')[-1]} = .*\n", "", text, count=1, flags=re.MULTILINE)
     if "scene" in changes:
         text = re.sub(r"\[scene\.lifted-cylinder\].*?\n\n", "", text, flags=re.DOTALL)
     (tmp_path / "base.toml").write_text(text, encoding="utf-8")

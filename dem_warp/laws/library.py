@@ -39,6 +39,7 @@ def _check(name: str, kind: type[Mechanism], known: Mapping[str, type[Mechanism]
 
 
 MECHANISMS = Registry("dem_warp.laws", {mechanism.name: mechanism for mechanism in _ALL}, _check)
+"""Laws beside the base law, by name; those of plug-ins included."""
 
 
 def parameters() -> tuple[str, ...]:
