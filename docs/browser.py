@@ -29,7 +29,7 @@ def browser() -> Iterator[Browser]:
     """Start the browser of this machine."""
     program = next((found for name in PROGRAMS if (found := shutil.which(name))), None)
     if program is None:
-        raise SystemExit(f"Error: none of {', '.join(PROGRAMS)} is installed; pages are opened in one of them")
+        raise SystemExit(f"Error: none of {', '.join(PROGRAMS)} is installed; pages need one of them")
     with sync_playwright() as play:
         running = play.chromium.launch(executable_path=program, args=["--no-sandbox", "--use-gl=swiftshader"])
         yield running

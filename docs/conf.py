@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import os
 import re
-import shutil
 import sys
 from pathlib import Path
 from typing import Any
@@ -70,13 +69,6 @@ PROGRESS = re.compile(r".*: +\d+ %, .*\d+ of \d+ cases.*\n?")
 """A line of progress, as it is written every ten seconds where there is no terminal."""
 
 
-def prepare() -> None:
-    """Write the reference pages, and empty the folder for what pages leave to be shown."""
-    write_pages(GENERATED)
-    shutil.rmtree(SHOWN, ignore_errors=True)
-    SHOWN.mkdir()
-
-
 def show_as_typed(app: Any, doctree: nodes.document) -> None:
     """Show a cell that IPython runs by its first line as what it holds: commands, or a file with its name.
 
@@ -99,7 +91,8 @@ def show_as_typed(app: Any, doctree: nodes.document) -> None:
             block.parent.remove(block)
 
 
-prepare()
+write_pages(GENERATED)
+SHOWN.mkdir(exist_ok=True)
 
 
 def setup(app: Any) -> None:

@@ -145,7 +145,7 @@ def effects_page() -> str:
     return "\n\n".join(
         [
             "# Effects that a search knows",
-            "`dem-warp discover` tests each of these that the study can have. `[discover] mechanisms` names fewer.",
+            "`dem-warp discover` tests each that the study can have. `[discover] mechanisms` names fewer.",
             markdown_table(("name", "effect", "in words", "law and range", "what would confirm it"), rows),
         ]
     )

@@ -1,4 +1,4 @@
-"""Draw the compatible region of a calibrated material: ``python docs/region_picture.py material.toml region.png``.
+"""Draw the compatible region of a material: ``python docs/region_picture.py material.toml region.png``.
 
 Nothing is simulated: a material card holds the runs of its response surface.
 """

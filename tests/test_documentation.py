@@ -1,6 +1,6 @@
-"""The documentation without its execution: each command, study, script and link on its pages is one that exists.
+"""The documentation without its execution: each command, study, script and link on its pages exists.
 
-``sphinx-build -W -b html docs out/site`` runs them; `tests/test_site.py` builds the pages without running them.
+``sphinx-build -W -b html docs out/site`` runs them.
 """
 
 from __future__ import annotations
@@ -27,12 +27,13 @@ PAGES = sorted(path for path in DOCS.rglob("*.md") if "generated" not in path.pa
 TEXTS = [*PAGES, ROOT / "README.md", ROOT / "CONTRIBUTING.md"]
 NOT_RUN = re.compile(r'^:caption: "Not run (here|by this page): .+"$', re.MULTILINE)
 MOST_NOT_RUN = 5
-"""Blocks of the site that its build does not run: what needs other hardware, other programs or own measurements."""
+"""Blocks that the build does not run: they need other hardware, other programs or own measurements."""
 
 BASE = Path(__file__).parent / "experiments" / "small.toml"
 """Study that a piece of one is merged over."""
 
 COMMANDS = get_command(app)
+FENCED = re.compile(r"^[ ]*```.*?^[ ]*```$", re.MULTILINE | re.DOTALL)
 
 
 @dataclass(frozen=True)
@@ -134,7 +135,7 @@ def test_a_command_that_is_wrong_is_seen() -> None:
 
 @pytest.mark.parametrize("page", TEXTS, ids=lambda page: page.name)
 def test_commands_and_options_in_a_sentence_exist(page: Path) -> None:
-    text = re.sub(r"^[ ]*```.*?^[ ]*```$", "", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+    text = FENCED.sub("", page.read_text(encoding="utf-8"))
     group = typer.Context(COMMANDS, info_name="dem-warp")
     names = COMMANDS.list_commands(group)
     known = {"--help", "--version"} | {
@@ -177,8 +178,8 @@ def test_python_compiles(block: Block) -> None:
 
 @pytest.mark.parametrize("page", TEXTS, ids=lambda page: page.name)
 def test_links_lead_somewhere(page: Path) -> None:
-    """Pages that the build makes are those that it is known to make; `sphinx-build -W` checks the headings."""
-    text = re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
+    """Pages that the build makes and headings are left to `sphinx-build -W`."""
+    text = FENCED.sub("", page.read_text(encoding="utf-8"))
     for target in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", text):
         if "://" in target or "generated/" in target:
             continue
