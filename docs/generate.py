@@ -14,6 +14,7 @@ from types import ModuleType
 import typer
 from typer.main import get_command
 
+from dem_warp import SCENES
 from experiments.cli import app
 from experiments.discover.library import FILES
 from experiments.measurement.observables import OBSERVABLES
@@ -88,14 +89,16 @@ def observables_page() -> str:
         )
         for each in OBSERVABLES
     ]
-    return "\n\n".join(
-        [
-            "# Observables",
-            "An observable is a number that a test yields. A study's target and responses name them, and so "
-            "does a file of measured heaps. One definition holds for a picture, a balance and a simulation.",
-            markdown_table(("name", "meaning", "unit", "instrument", "definition"), rows),
-        ]
-    )
+    parts = [
+        "# List of observables",
+        "A study's target and responses name them, and so does a file of measured heaps.",
+        "## Measured on a heap",
+        markdown_table(("name", "meaning", "unit", "instrument", "definition"), rows),
+    ]
+    for name, scene in SCENES.items():
+        told = [(f"`{each}`", unit, meaning) for each, (unit, meaning) in scene.observables.items()]
+        parts += [f"## Told by `[scene.{name}]`", markdown_table(("name", "unit", "definition"), told)]
+    return "\n\n".join(parts)
 
 
 def meaning_of(module: ModuleType, name: str) -> str:
