@@ -90,6 +90,9 @@ def copy_file(source: Path, target: Path) -> None:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file in UTF-8, whole or not at all; its bytes are the same on every system."""
+    """Write a text file in UTF-8, whole or not at all; its bytes are the same on every system.
+
+    A name of a file that the system's encoding could not read, as under ``LC_ALL=C``, goes out as it came in.
+    """
     with replacing(path) as temporary:
-        temporary.write_text(text, encoding="utf-8", newline="\n")
+        temporary.write_text(text, encoding="utf-8", errors="surrogateescape", newline="\n")

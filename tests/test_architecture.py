@@ -56,6 +56,7 @@ COMES_WITH = {
     "markupsafe": "jinja2",
     "pydantic_core": "pydantic",
     "threadpoolctl": "scikit-learn",
+    "vtkmodules": "pyvista",
 }
 
 MAX_FILE_LINES = 400

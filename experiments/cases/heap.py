@@ -110,7 +110,8 @@ def simulate_heap(
     elif engine_of(study) is None:
         result, film = simulate_frames(case, frames, device, progress)
     else:
-        raise InputError("must run on dem-warp's own engine", study.engine and study.engine.name, "--frames")
+        other = study.engine and (study.engine.name or study.engine.command)
+        raise InputError("must run on dem-warp's own engine", other, "--frames")
     values = {factor.name: settings.get(factor.name, factor.center) for factor in study.factors}
     observed = observe(study.measurement, result, study.scenes[scene].leaves_a_heap)
     return Heap(study, values, seed, result, observed, scene, film)

@@ -45,8 +45,10 @@ def save(data: pyvista.PolyData, path: Path) -> None:
     from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
 
     writer = vtkXMLPolyDataWriter()
-    writer.SetFileName(str(path))
+    # Python writes the file: it knows every name that the system has
+    writer.WriteToOutputStringOn()
     writer.SetInputData(data)
     writer.SetCompressorTypeToNone()
     writer.SetDataModeToBinary()
     writer.Write()
+    path.write_text(writer.GetOutputString(), encoding="utf-8", newline="\n")

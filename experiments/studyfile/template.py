@@ -22,9 +22,7 @@ def write_template(name: str, folder: Path | None = None) -> Path:
     if not name or not all(character.isalnum() or character in " _-" for character in name):
         raise InputError("a name has letters, digits, spaces, - and _ only", name, "NAME")
     if is_device_name(name) or name != name.strip():
-        rule = (
-            "a name is none of a device (con, nul, com1, ...) and has no blank at its ends, for Windows' sake"
-        )
+        rule = "a name has no blank at its ends, and is none of a device of Windows (con, nul, com1, ...)"
         raise InputError(rule, repr(name), "NAME")
     path = (folder or Path()) / f"{name}.toml"
     if path.exists():

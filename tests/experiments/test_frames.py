@@ -177,24 +177,25 @@ def test_the_clean_picture_measures_to_the_same_angle(
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "engine", "said"),
     [
-        (("--movie", "avi", "--frames", "4"), "--movie: must be one of gif, mp4; received avi"),
-        (("--movie", "gif"), "--movie: a film is made of frames: --frames N says of how many; received gif"),
-        (("--frames", "1"), "1 is not in the range 2<=x<=1000"),
+        (("--movie", "avi", "--frames", "4"), "", "--movie: must be one of gif, mp4 (received avi)"),
+        (("--movie", "gif"), "", "a film is made of frames: --frames N says of how many (received gif)"),
+        (("--frames", "1"), "", "should be greater than or equal to 2"),
         (
-            ("--frames", "4", "--engine", "liggghts"),
-            "--frames: must run on dem-warp's own engine; received liggghts",
+            ("--frames", "4"),
+            '[engine]\ncommand = "mine"\n',
+            "must run on dem-warp's own engine (received mine)",
         ),
     ],
 )
 def test_what_cannot_be_filmed_is_refused(
-    write_study: Callable[..., Path], tmp_path: Path, options: tuple[str, ...], said: str
+    write_study: Callable[..., Path], tmp_path: Path, options: tuple[str, ...], engine: str, said: str
 ) -> None:
     out = tmp_path / "out"
-    code, _, err = dem_warp("heap", write_study(), "--device", "cpu", *options, "--out", out)
+    code, _, err = dem_warp("heap", write_study(add=engine), "--device", "cpu", *options, "--out", out)
     assert (code, out.exists()) == (2, False)
-    assert said in " ".join(err.split())
+    assert said in " ".join(err.replace("\u2502", " ").split())
 
 
 def test_a_film_of_another_test(write_study: Callable[..., Path], tmp_path: Path) -> None:
