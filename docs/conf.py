@@ -1,8 +1,12 @@
-"""The documentation: ``sphinx-build -W -b html docs out/site`` runs every command on its pages."""
+"""The documentation: ``sphinx-build -W -b html docs out/site`` runs every command on its pages.
+
+With ``-D nb_execution_mode=off`` nothing is run: the pages are checked, their outputs are missing.
+"""
 
 from __future__ import annotations
 
 import os
+import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -10,13 +14,18 @@ from typing import Any
 from docutils import nodes
 
 ROOT = Path(__file__).parents[1]
+GENERATED = Path(__file__).parent / "generated"
+SHOWN = GENERATED / "shown"
 sys.path[:0] = [str(ROOT), str(Path(__file__).parent)]
 # Pages run in folders of their own: their commands are those of this environment and of this tree.
 os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
 os.environ["PYTHONPATH"] = str(ROOT)
 os.environ["DEM_WARP"] = str(ROOT)
+os.environ["SHOWN"] = str(SHOWN)
+os.environ["BASH_ENV"] = str(ROOT / "docs" / "strict.sh")
 os.environ["COLUMNS"] = "100"
 os.environ["TERM"] = "dumb"
+os.environ["TIMEFORMAT"] = "wall time %0lR"
 
 from generate import write_pages  # noqa: E402
 
@@ -27,25 +36,29 @@ author = "the dem-warp developers"
 project_copyright = author
 version = release = __version__
 
-extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_copybutton"]
-exclude_patterns = ["notebooks/*.py"]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_copybutton", "formulas"]
+exclude_patterns = ["notebooks/*.py", "generated/shown"]
 html_theme = "furo"
 html_title = "dem-warp"
 html_static_path = ["static"]
+html_extra_path = ["generated/shown"]  # reports that pages made, to be opened from them
 html_css_files = ["style.css"]
 html_show_sphinx = False
+html_math_renderer = "mathml"
 copybutton_exclude = ".linenos, .gp, .go"
 
 myst_enable_extensions = ["dollarmath", "attrs_inline", "colon_fence"]
 myst_heading_anchors = 3
 nb_execution_mode = "force"
-nb_execution_excludepatterns = ["notebooks/*"]  # executed where they are made, docs/notebooks/build.py
 nb_execution_in_temp = True
-nb_execution_raise_on_error = True
+nb_execution_raise_on_error = False  # an error is a warning, and -W fails once every page was tried
 nb_execution_show_tb = True
 nb_execution_timeout = 900
 nb_merge_streams = True
-suppress_warnings = ["myst-nb.lexer"]  # of cells that are shell, see `show_as_typed`
+suppress_warnings = [
+    "myst-nb.lexer",  # of cells that are shell, see `show_as_typed`
+    "ref.python",  # words of a docstring's types, as "mean", that are names of several attributes too
+]
 
 autodoc_member_order = "bysource"
 autodoc_typehints = "description"
@@ -53,11 +66,15 @@ autodoc_preserve_defaults = True
 napoleon_google_docstring = False
 napoleon_use_rtype = False
 
-write_pages(Path(__file__).parent / "generated")
+PROGRESS = re.compile(r".*: +\d+ %, .*\d+ of \d+ cases.*\n?")
+"""A line of progress, as it is written every ten seconds where there is no terminal."""
 
 
 def show_as_typed(app: Any, doctree: nodes.document) -> None:
-    """Show a cell that IPython runs by its first line as what it holds: commands, or a file with its name."""
+    """Show a cell that IPython runs by its first line as what it holds: commands, or a file with its name.
+
+    Lines of progress are left out of what the commands print.
+    """
     for block in list(doctree.findall(nodes.literal_block)):
         first, _, rest = block.rawsource.partition("\n")
         if first == "%%bash":
@@ -65,9 +82,18 @@ def show_as_typed(app: Any, doctree: nodes.document) -> None:
         elif first.startswith("%%writefile "):
             name = first.split()[1]
             shown, language = f"# {name}\n{rest}", Path(name).suffix.removeprefix(".") or "text"
+        elif PROGRESS.search(block.rawsource):
+            shown, language = PROGRESS.sub("", block.rawsource), block.get("language", "text")
         else:
             continue
-        block.replace_self(nodes.literal_block(shown, shown, language=language))
+        if shown.strip():
+            block.replace_self(nodes.literal_block(shown, shown, language=language, classes=block["classes"]))
+        else:
+            block.parent.remove(block)
+
+
+write_pages(GENERATED)
+SHOWN.mkdir(exist_ok=True)
 
 
 def setup(app: Any) -> None:

@@ -1,15 +1,22 @@
-"""Reference pages, made from the program itself: the study file, the command line, observables."""
+"""Reference pages, made from the program itself: study file, command line, Python, observables, effects."""
 
 from __future__ import annotations
 
+import ast
+import inspect
+import tomllib
 from collections.abc import Iterable
-from itertools import groupby
+from importlib import import_module
+from itertools import groupby, pairwise
 from pathlib import Path
+from types import ModuleType
 
 import typer
 from typer.main import get_command
 
+from dem_warp import SCENES
 from experiments.cli import app
+from experiments.discover.library import FILES
 from experiments.measurement.observables import OBSERVABLES
 from experiments.studyfile.reference import study_reference
 
@@ -82,22 +89,91 @@ def observables_page() -> str:
         )
         for each in OBSERVABLES
     ]
+    parts = [
+        "# List of observables",
+        "A study's target and responses name them, and so does a file of measured heaps.",
+        "## Measured on a heap",
+        markdown_table(("name", "meaning", "unit", "instrument", "definition"), rows),
+    ]
+    for name, scene in SCENES.items():
+        told = [(f"`{each}`", unit, meaning) for each, (unit, meaning) in scene.observables.items()]
+        parts += [f"## Told by `[scene.{name}]`", markdown_table(("name", "unit", "definition"), told)]
+    return "\n\n".join(parts)
+
+
+def meaning_of(module: ModuleType, name: str) -> str:
+    """Return what the line below a constant says, in the module that assigns it."""
+    taken = (node for node in ast.walk(source_of(module)) if isinstance(node, ast.ImportFrom) and node.module)
+    homes = [node.module for node in taken if name in {alias.name for alias in node.names}]
+    body = source_of(import_module(homes[0]) if homes else module).body
+    for node, after in pairwise(body):
+        targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
+        if name in {getattr(target, "id", "") for target in targets} and isinstance(after, ast.Expr):
+            return " ".join(ast.literal_eval(after.value).split())
+    return ""
+
+
+def source_of(module: ModuleType) -> ast.Module:
+    """Parse a module's source."""
+    return ast.parse(inspect.getsource(module))
+
+
+def python_page(package: str, about: str) -> str:
+    """Every public name of a package."""
+    module = import_module(package)
+    groups: dict[str, list[str]] = {"Functions": [], "Classes": [], "Constants": []}
+    for name in (each for each in module.__all__ if not each.startswith("__")):
+        thing = getattr(module, name)
+        if inspect.isclass(thing):
+            group, entry = "Classes", f".. autoclass:: {package}.{name}\n   :members:"
+        elif inspect.isroutine(thing):
+            group, entry = "Functions", f".. autofunction:: {package}.{name}"
+        else:
+            group, entry = "Constants", f".. py:data:: {package}.{name}\n\n   {meaning_of(module, name)}"
+        groups[group].append(entry)
+    parts = [f"# `{package}`", about]
+    for group, entries in groups.items():
+        if entries:
+            parts.append(f"## {group}\n\n```{{eval-rst}}\n" + "\n\n".join(entries) + "\n```")
+    return "\n\n".join(parts)
+
+
+def effects_page() -> str:
+    """Every effect that a search knows."""
+    effects = {name: tomllib.loads(path.read_text(encoding="utf-8")) for name, path in sorted(FILES.items())}
+    rows = [
+        (f"`{name}`", effect["title"], effect["sentence"], effect["source"], effect["confirm"])
+        for name, effect in effects.items()
+    ]
     return "\n\n".join(
         [
-            "# Observables",
-            "An observable is a number that a test yields. A study's target and responses name them, and so "
-            "does a file of measured heaps. One definition holds for a picture, a balance and a simulation.",
-            markdown_table(("name", "meaning", "unit", "instrument", "definition"), rows),
+            "# Effects that a search knows",
+            "`dem-warp discover` tests each that the study can have. `[discover] mechanisms` names fewer.",
+            markdown_table(("name", "effect", "in words", "law and range", "what would confirm it"), rows),
         ]
     )
+
+
+PACKAGES = {
+    "experiments.api": "Whole runs: calibration, search and bridge. The command line calls these functions.",
+    "experiments.studyfile": "Study files and material cards, read and checked.",
+    "experiments.cases": "Cases: running, storing and measuring them; engines.",
+    "dem_warp": "The simulator: cases in, heaps out. SI units, z up, the plate at 0.",
+    "imaging": "Pictures and repose angles.",
+    "doe": "Designs of experiments and their analysis. They know nothing of grains.",
+}
+"""Packages with public names, in the order of the reference."""
 
 
 def write_pages(folder: Path) -> None:
     """Write the pages into a folder."""
     folder.mkdir(exist_ok=True)
-    for name, text in {
-        "study": study_page,
-        "commands": commands_page,
-        "observables": observables_page,
-    }.items():
-        (folder / f"{name}.md").write_text(text() + "\n", encoding="utf-8")
+    pages = {
+        "study": study_page(),
+        "commands": commands_page(),
+        "observables": observables_page(),
+        "effects": effects_page(),
+    }
+    pages |= {name.replace(".", "-"): python_page(name, about) for name, about in PACKAGES.items()}
+    for name, text in pages.items():
+        (folder / f"{name}.md").write_text(text + "\n", encoding="utf-8")

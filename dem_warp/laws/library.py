@@ -29,6 +29,7 @@ def _check(name: str, kind: type[Mechanism], known: Mapping[str, type[Mechanism]
 
 
 MECHANISMS = Registry("dem_warp.laws", _ALL, _check)
+"""Laws beside the base law, by name; those of plug-ins included."""
 
 
 def parameters() -> tuple[str, ...]:

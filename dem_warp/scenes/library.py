@@ -14,3 +14,4 @@ SCENES = Registry(
     {scene.name: scene for scene in _ALL},
     lambda name, kind, known: require_kind(PouredScene, name, kind),
 )
+"""Tests by the name of their section; those of plug-ins included."""

@@ -1,9 +1,10 @@
-"""Make and execute the notebooks: ``python docs/notebooks/build.py``.
+"""Make and execute the notebooks: ``python docs/notebooks/build.py [NAME ...]``.
 
 ``NAME_source.py`` in percent format is the source of ``NAME.ipynb``. Needs nbformat, nbclient and ipykernel
 (``pip install -e ".[docs]"``).
 """
 
+import sys
 from pathlib import Path
 
 import nbformat
@@ -42,15 +43,16 @@ def notebook_of(script: str) -> nbformat.NotebookNode:
     return nbformat.v4.new_notebook(cells=cells, metadata=kernel)
 
 
-def main() -> None:
-    """Execute every notebook and write it beside its script."""
-    for script in sorted(FOLDER.glob("*_source.py")):
+def main(names: list[str]) -> None:
+    """Execute notebooks, all where none is named, and write each beside its script."""
+    chosen = [f"{name}_source.py" for name in names] or ["*_source.py"]
+    for script in sorted(path for pattern in chosen for path in FOLDER.glob(pattern)):
         notebook = notebook_of(script.read_text(encoding="utf-8"))
-        NotebookClient(notebook, timeout=300).execute()
+        NotebookClient(notebook, timeout=900).execute()
         for cell in notebook.cells:
             cell.metadata.pop("execution", None)  # times of a run would change the file each time
         nbformat.write(notebook, FOLDER / f"{script.stem.removesuffix('_source')}.ipynb")
 
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:])

@@ -22,7 +22,7 @@ class DesignQuality:
     """Numbers about a design and a model, for an error variance of 1; made by ``design_quality``."""
 
     d_efficiency: float
-    """|X'X|^(1/p) / N in percent: 100 is an orthogonal two-level design of as many runs."""
+    """``|X'X|^(1/p) / N`` in percent: 100 is an orthogonal two-level design of as many runs."""
     a_efficiency: float
     """p / (N trace (X'X)^-1) in percent, the same scale."""
     g_efficiency: float
