@@ -152,7 +152,7 @@ class Design:
         """Run labels in the order of execution: ``design.natural.loc[design.run_order]``."""
         if self.seed is None:
             return self.coded.index
-        order = np.random.default_rng(self.seed).permutation(len(self.coded))
+        order = np.random.default_rng(int(self.seed)).permutation(len(self.coded))
         return self.coded.index[order]
 
     def factor(self, name: str) -> Factor:

@@ -216,7 +216,8 @@ class JointFit:
             region explored; 0 where nothing is compatible).
 
             The true setting lies within half_width of the point along the direction with probability
-            1 - alpha, where the surfaces are straight that far (``doe.simultaneous``).
+            1 - alpha (with 2 measurements of a target at least so), where the surfaces are straight that far
+            (``doe.simultaneous``).
         """
         names, every = tuple(self.goals), self._misfits_at(self.coded_point)
         gradients = [goal.fit.quadratic_form.gradient(self.coded_point) for goal in self.goals.values()]

@@ -72,7 +72,7 @@ class Mixture:
         """Labels in the order of execution."""
         if self.seed is None:
             return self.shares.index
-        return self.shares.index[np.random.default_rng(self.seed).permutation(len(self.shares))]
+        return self.shares.index[np.random.default_rng(int(self.seed)).permutation(len(self.shares))]
 
     def __repr__(self) -> str:
         return f"Mixture of {len(self.shares)} blends of {', '.join(self.names)}"

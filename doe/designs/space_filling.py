@@ -61,7 +61,7 @@ def sobol(factors: Iterable[Factor], runs: int, *, seed: int | None = None) -> D
         raise DesignError(
             f"a Sobol design has a power of two of runs, such as {below} or {2 * below}; received {runs}"
         )
-    checked_seed(seed)
+    seed = checked_seed(seed)
     sampler = qmc.Sobol(len(factors), scramble=seed is not None, rng=np.random.default_rng(seed or 0))
     return _design(factors, sampler.random_base2(runs.bit_length() - 1))
 
