@@ -137,7 +137,7 @@ def calibrate(
     with (
         open_workers(resources_for(chosen, resources)) as crew,
         locked(folder, resume),
-        Journal(folder, "calibrate", chosen, resume, device=str(crew.described["device"])) as journal,
+        Journal(folder, "calibrate", chosen, resume, device=str(crew.described.get("device", ""))) as journal,
     ):
         desk = Desk.open(chosen, folder, crew, resume, watch, journal)
         replay = replay_published(desk, published_replicates) if published_replicates else None

@@ -104,7 +104,7 @@ def heap(
         with (
             live_page(folder, live, messages.print),
             open_workers(resources) as crew,
-            Journal(folder, "heap", chosen, device=str(crew.described["device"])) as notes,
+            Journal(folder, "heap", chosen, device=str(crew.described.get("device", ""))) as notes,
             watching(scene or "heap", CaseProgress, notes) as progress,
         ):
             crew = watched_by(crew, notes.glimpses)

@@ -106,7 +106,7 @@ def run_search(job: Job, resume: bool = False, watch: Watch = lambda title: null
     measured = _measured(job)
     for note in measured.notes if measured else ():
         _log.warning("The data: %s", note)
-    device = str(job.workers.described["device"])
+    device = str(job.workers.described.get("device", ""))
     with (
         locked(job.folder, resume),
         Journal(job.folder, "discover", job.study, resume, device=device) as journal,
