@@ -2,6 +2,7 @@
 
 from .case import Case, Numerics
 from .clumps import ClumpShape
+from .frames import Film, Frame, simulate_frames
 from .laws.conventions import EDEM, PRESETS, RELATIVE, ContactLaws, laws_named
 from .laws.library import MECHANISMS
 from .laws.mechanism import Mechanism
@@ -29,6 +30,8 @@ __all__ = [
     "ContactLaws",
     "DrawDown",
     "Drum",
+    "Film",
+    "Frame",
     "GrainPopulation",
     "Hopper",
     "Interaction",
@@ -44,4 +47,5 @@ __all__ = [
     "laws_named",
     "rayleigh_time",
     "simulate",
+    "simulate_frames",
 ]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
-from doe.checks import checked_level, checked_number
+from doe.checks import checked_choice, checked_level, checked_number
 from doe.errors import DesignError
 from doe.sample import Sample, Values
 from doe.two_errors import TwoErrors
@@ -121,8 +121,7 @@ def compare_means(
         Fewer than two values, values that are not finite, no spread at all, a margin that is not positive, a
         sample where a number is due or the other way round.
     """
-    if method not in METHODS:
-        raise DesignError(f"method is one of {', '.join(METHODS)}, received {method!r}")
+    checked_choice("method", method, METHODS)
     if margin is not None:
         margin = checked_number("an equivalence margin", margin)
         if not margin > 0.0:

@@ -44,6 +44,7 @@ LAYERS = {
 }  # fmt: skip
 
 DISTRIBUTIONS = {
+    "dask_jobqueue": "dask-jobqueue",
     "PIL": "pillow",
     "cv2": "opencv-python-headless",
     "lazy_loader": "lazy-loader",
@@ -54,9 +55,11 @@ DISTRIBUTIONS = {
 COMES_WITH = {
     "annotated_types": "pydantic",
     "contourpy": "matplotlib",
+    "dask": "distributed",
     "markupsafe": "jinja2",
     "pydantic_core": "pydantic",
     "threadpoolctl": "scikit-learn",
+    "vtkmodules": "pyvista",
 }
 
 MAX_FILE_LINES = 400

@@ -47,6 +47,7 @@ class Drum(PouredScene):
     """Revolutions while measuring."""
 
     name = "drum"
+    wall_names = ("shell", "end-1", "end-2")
     observables: ClassVar[Mapping[str, Observable]] = FILL_OBSERVABLES | {
         "dynamic_angle": Observable(
             "deg",

@@ -65,6 +65,9 @@ class TwoScenes:
     target: Target
     campaign: CampaignSettings = field(default_factory=CampaignSettings)
     factors: tuple[Factor, ...] = FACTORS
+    labels: Mapping[str, str] = field(
+        default_factory=lambda: {factor.name: f"parameter {factor.name}" for factor in FACTORS}
+    )
     limits: Mapping[str, tuple[float, float]] = field(
         default_factory=lambda: {name: (0.0, float("inf")) for name in "AEFG"}
     )

@@ -115,7 +115,7 @@ def _children(process: int) -> list[int]:
     """Processes that a process has begun."""
     listed = Path(f"/proc/{process}/task/{process}/children")
     try:
-        return [int(child) for child in listed.read_text().split()]
+        return [int(child) for child in listed.read_text(encoding="ascii").split()]
     except OSError:
         return []
 

@@ -6,6 +6,7 @@ It needs Linux, and the right to mount a file system of its own:
 
 from __future__ import annotations
 
+import importlib
 import os
 import random
 import shutil
@@ -35,9 +36,8 @@ CASES = 250
 
 def load_libraries() -> None:
     """Import what a campaign does, so that its forks need not; the simulator itself is not begun."""
-    import experiments.api
-    import experiments.cli
-    import experiments.report.writer  # noqa: F401
+    for name in ("experiments.api", "experiments.cli", "experiments.report.writer"):
+        importlib.import_module(name)
 
 
 def undisturbed(work: Path) -> tuple[dict[str, str], float, int]:
