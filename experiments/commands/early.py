@@ -56,8 +56,8 @@ def _readable(path: Path | None, scale: str | None, engine: str | None) -> Study
 
     scales = read_toml(path)[1].get("scale", {}) if path is not None else {}
     if path is not None and scale is not None and isinstance(scales, dict) and scale not in scales:
-        known = ", ".join(scales) or "none"
-        raise StudyError(f"the scale must be one that the study has, known: {known}", scale, str(path))
+        named = ", ".join(scales) or "none"
+        raise StudyError(f"the scale must be one that the study has, known: {named}", scale, str(path))
     # now the sections of a study, which need pydantic and numpy
     from experiments.studyfile import load_study, study_scales
 
