@@ -36,13 +36,12 @@ def listed(values: Mapping[str, float]) -> str:
 
 def named(study: Study, names: Iterable[str]) -> str:
     """Name factors in words: ``grain-grain static friction (E), grain-steel static friction (F)``."""
-    labels = {section.name: section.label for section in study.factor_sections}
-    return ", ".join(f"{labels[name]} ({name})" for name in names)
+    return ", ".join(f"{study.labels[name]} ({name})" for name in names)
 
 
 def worded(study: Study, values: Mapping[str, float]) -> str:
     """Write values with their factors in words: ``grain-grain static friction (E) 0.48, ...``."""
-    units = {section.name: section.unit for section in study.factor_sections}
+    units = {factor.name: factor.unit for factor in study.factors}
     parts = (f"{named(study, [name])} {value:.4g} {units[name]}".rstrip() for name, value in values.items())
     return ", ".join(parts)
 

@@ -12,7 +12,7 @@ from typing import Any
 from dem_warp import CaseResult, Film, Progress, simulate_frames
 from experiments.cases.engines import engine_of
 from experiments.cases.frames import write_frames
-from experiments.cases.movie import write_movie
+from experiments.cases.movie import NO_MOVIE, write_movie
 from experiments.cases.polydata import poly, save
 from experiments.cases.workers.own import THIS_MACHINE, OwnWorkers
 from experiments.cases.workers.workers import Workers
@@ -151,7 +151,8 @@ def write_heap(heap: Heap, folder: Path, movie: str = "gif") -> None:
                 save_picture(temporary, picture)
     if heap.film:
         write_frames(heap.film, folder / "frames")
-        write_movie(heap.film, folder / f"heap.{movie}")
+        if movie != NO_MOVIE:
+            write_movie(heap.film, folder / f"heap.{movie}")
     write_text(folder / "angle.json", json.dumps(heap.to_dict(), indent=1, allow_nan=False) + "\n")
 
 

@@ -51,11 +51,14 @@ def _readable(path: Path | None, scale: str | None, engine: str | None) -> Study
     """Read a study file; None where none is named and the study that ships is meant."""
     if path is None and engine is None:
         return None
-    from experiments.errors import InputError
+    from experiments.errors import InputError, StudyError
     from experiments.toml_files import read_toml
 
-    if path is not None:
-        read_toml(path)
+    scales = read_toml(path)[1].get("scale", {}) if path is not None else {}
+    if path is not None and scale is not None and isinstance(scales, dict) and scale not in scales:
+        known = ", ".join(scales) or "none"
+        raise StudyError(f"the scale must be one that the study has, known: {known}", scale, str(path))
+    # now the sections of a study, which need pydantic and numpy
     from experiments.studyfile import load_study, study_scales
 
     known = study_scales(path)

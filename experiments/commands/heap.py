@@ -51,7 +51,7 @@ def heap(
         ),
     ] = None,
     movie: Annotated[
-        str | None, typer.Option(metavar="KIND", help="Film of the frames: gif or mp4. Left out: gif.")
+        str | None, typer.Option(metavar="KIND", help="Film of the frames: gif, mp4 or none. Left out: gif.")
     ] = None,
     out: Out = None,
     scale: Scale = None,

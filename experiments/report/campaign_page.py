@@ -44,7 +44,7 @@ def render_page(
         A heap to be turned.
     """
     companion = companion_of(study)
-    labels = {section.name: section.label for section in study.factor_sections}
+    labels = study.labels
     context = Context(campaign, labels, companion.published())
     chapters = [chapter("heaps")] if pictures or solid else []
     chapters += stage_chapters(context)

@@ -97,8 +97,7 @@ def _open_region(campaign: Campaign, study: Study) -> Iterator[Caution]:
     if not optimum.region.mask.any():
         yield Caution("No setting that was explored agrees with every response.", "optimum")
     elif optimum.unidentified:
-        labels = {section.name: section.label for section in study.factor_sections}
-        names = enumeration(f"{labels[name]} ({name})" for name in optimum.unidentified)
+        names = enumeration(f"{study.labels[name]} ({name})" for name in optimum.unidentified)
         what = "These responses leave" if optimum.joint else "The target alone leaves"
         yield Caution(
             f"The compatible region is wide: {fixed(100.0 * optimum.region.fraction, 0)} % of the settings "
@@ -131,11 +130,12 @@ def _poor_surface(campaign: Campaign, study: Study) -> Iterator[Caution]:
 def _beyond_ranges(campaign: Campaign, study: Study) -> Iterator[Caution]:
     if campaign.optimum is None:
         return
-    for section, factor in zip(study.factor_sections, study.factors, strict=True):
+    for factor in study.factors:
         value = campaign.optimum.point.get(factor.name, factor.center)
         if not factor.low <= value <= factor.high:
             yield Caution(
-                f"The value of {section.label} ({factor.name}) lies outside the range that the study states.",
+                f"The value of {study.labels[factor.name]} ({factor.name}) lies outside the range that the "
+                "study states.",
                 "factors",
             )
 

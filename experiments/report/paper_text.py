@@ -72,12 +72,12 @@ def paper_table(campaign: Campaign, study: Study) -> Table:
     if optimum is None:
         raise ValueError("a campaign that chose no point has no values")
     rows = []
-    for section, factor in zip(study.factor_sections, study.factors, strict=True):
+    for factor in study.factors:
         calibrated, ranges = factor.name in optimum.point, optimum.region.ranges
         ends = [significant(float(ranges[end].get(factor.name, float("nan"))), 3) for end in ("low", "high")]
         rows.append(
             {
-                "parameter": section.label,
+                "parameter": study.labels[factor.name],
                 "symbol": factor.name,
                 "unit": factor.unit or "1",
                 "explored": f"{factor.low:g} to {factor.high:g}",
@@ -123,8 +123,7 @@ def _designs(campaign: Campaign, study: Study) -> Iterator[str]:
         f"A {kind} design of {len(screening.design.coded)} runs, {len(screening.cases)} cases, screened "
         f"{len(campaign.factors)} parameters."
     )
-    labels = {section.name: section.label for section in study.factor_sections}
-    kept = enumeration(labels[name] for name in selection.kept)
+    kept = enumeration(study.labels[name] for name in selection.kept)
     yield f"A path of steepest ascent of {len(climb.path)} steps along {kept} led towards the target."
     fit = campaign.surface.leading
     yield (
@@ -140,9 +139,8 @@ def _choice(campaign: Campaign, study: Study) -> Iterator[str]:
     if optimum is None or target is None:
         return
     units = {factor.name: factor.unit for factor in campaign.factors}
-    labels = {section.name: section.label for section in study.factor_sections}
     values = enumeration(
-        f"{labels[name]} {significant(value, 3)} {units[name]}".rstrip()
+        f"{study.labels[name]} {significant(value, 3)} {units[name]}".rstrip()
         for name, value in optimum.point.items()
     )
     source = "simulated with hidden values" if target.truth else "measured"

@@ -154,6 +154,11 @@ class Study(Physics):
         return tuple(section.factor() for section in self.factor_sections)
 
     @cached_property
+    def labels(self) -> dict[str, str]:
+        """Meaning of every factor, in words."""
+        return {section.name: section.label for section in self.factor_sections}
+
+    @cached_property
     def limits(self) -> dict[str, tuple[float, float]]:
         """Hard physical limits of every factor in its natural unit, infinite where there is none."""
         return {section.name: section.limits for section in self.factor_sections}

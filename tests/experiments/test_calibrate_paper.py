@@ -45,6 +45,7 @@ MEASURED = Target((Response("angle", "angle", "deg", measured=Sample(30.148, 0.5
 class PaperStudy:
     campaign: CampaignSettings = PAPER_DECISIONS
     factors: tuple[Factor, ...] = field(default_factory=lambda: tuple(factors()))
+    labels: dict[str, str] = field(default_factory=lambda: {factor.name: factor.name for factor in factors()})
     target: Target = MEASURED
     limits: dict[str, tuple[float, float]] = field(
         default_factory=lambda: dict.fromkeys("ABCDEFGH", (0.0, math.inf))

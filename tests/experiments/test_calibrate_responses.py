@@ -6,7 +6,6 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -66,8 +65,8 @@ class TwoScenes:
     target: Target
     campaign: CampaignSettings = field(default_factory=CampaignSettings)
     factors: tuple[Factor, ...] = FACTORS
-    factor_sections: tuple[SimpleNamespace, ...] = tuple(
-        SimpleNamespace(name=factor.name, label=factor.name, unit="") for factor in FACTORS
+    labels: Mapping[str, str] = field(
+        default_factory=lambda: {factor.name: f"parameter {factor.name}" for factor in FACTORS}
     )
     limits: Mapping[str, tuple[float, float]] = field(
         default_factory=lambda: {name: (0.0, float("inf")) for name in "AEFG"}

@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass, field
-from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -29,9 +28,7 @@ MEASURED = Target((Response("angle", "angle", "deg", measured=Sample(20.0, NOISE
 class PlaneStudy:
     campaign: CampaignSettings = field(default_factory=CampaignSettings)
     factors: tuple[Factor, ...] = (Factor("E", 0.0, 2.0), Factor("F", 0.0, 2.0))
-    factor_sections: tuple[SimpleNamespace, ...] = tuple(
-        SimpleNamespace(name=name, label=f"friction {name}", unit="") for name in "EF"
-    )
+    labels: dict[str, str] = field(default_factory=lambda: {name: f"friction {name}" for name in "EF"})
     target: Target = MEASURED
     limits: dict[str, tuple[float, float]] = field(
         default_factory=lambda: dict.fromkeys("EF", (-math.inf, math.inf))

@@ -19,7 +19,7 @@ MAP_REACH = 6.0
 SIGNIFICANT = 0.05
 """Adjusted p value below which a residual is marked."""
 
-MANY_BARS = 12
+MANY_BARS = 5
 """Bars beyond which a chart is taller."""
 
 DODGE = 0.16

@@ -31,7 +31,7 @@ const charts = [...document.querySelectorAll("script[data-plot]")].map((source) 
 const sizes = new ResizeObserver((changes) => changes.forEach(({ target }) => Plotly.Plots.resize(target)));
 
 const NARROW = 480; // pixels of a chart below which its long names are broken into lines
-const BROKEN = 16; // letters of a line then
+const BROKEN = 24; // letters of a line then
 
 /** Break a text between its words. */
 function broken(text) {
