@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
+from dem_warp.entries import SPHERE_MASK
 from dem_warp.kernels.probe import probe_kernels
 from dem_warp.rollback import Rollback
 from dem_warp.solver import Solver
-from dem_warp.types import SPHERE_MASK
 
 NO_GRAIN = NO_WALL = -1
 """Partner of a contact that is none of the kind."""

@@ -1,5 +1,7 @@
 """The grains of a case: their shapes, their material and their sizes, and how they are drawn from a seed."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

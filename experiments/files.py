@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import stat
 from collections.abc import Iterator
@@ -13,6 +14,9 @@ from experiments.errors import InputError
 
 DEVICES = {"con", "prn", "aux", "nul", *(f"{kind}{n}" for kind in ("com", "lpt") for n in range(1, 10))}
 """Names that Windows keeps for devices, whatever their ending: a file of such a name cannot go there."""
+
+_TEMPORARY = re.compile(r"\..+\.\d+(\.\w+)?")
+"""Names that `replacing` gives."""
 
 
 def is_device_name(name: str) -> bool:
@@ -36,6 +40,13 @@ def replacing(path: Path) -> Iterator[Path]:
         temporary.replace(path)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def remove_leftovers(folder: Path) -> None:
+    """Remove what a killed run had half written by `replacing` in a folder, which no other run may use."""
+    for path in folder.rglob(".*"):
+        if _TEMPORARY.fullmatch(path.name) and path.is_file() and not path.is_symlink():
+            path.unlink()
 
 
 def check_file(path: Path, largest: int) -> None:

@@ -51,8 +51,8 @@ def test_the_container_has_the_stages_that_are_named() -> None:
     assert stages[2][0] == "cpu"
     assert set(re.findall(r"--target (\w+)", DOCKERFILE)) == {"cpu", "cuda"}
     assert set(re.findall(r"from=(\w+)", DOCKERFILE)) == {"build"}
-    # Nobody is root in it, and the last user before the command is none either.
-    assert re.findall(r"^USER (\w+)$", DOCKERFILE, re.MULTILINE) == ["nobody"]
+    # Nobody is root in it.
+    assert re.findall(r"^USER (\w+)$", DOCKERFILE, re.MULTILINE) == ["65534"]
 
 
 def test_the_gate_runs_on_three_systems() -> None:

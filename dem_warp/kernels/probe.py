@@ -5,10 +5,11 @@ from types import SimpleNamespace
 
 import warp as wp
 
+from dem_warp.entries import SPHERE_BITS, SPHERE_MASK
 from dem_warp.kernels.contacts import contact_functions
 from dem_warp.kernels.packing import packing
 from dem_warp.kernels.walls import wall_functions
-from dem_warp.types import SPHERE_BITS, SPHERE_MASK, Build, device_structs
+from dem_warp.types import Build, device_structs
 
 
 @functools.cache

@@ -15,6 +15,7 @@ from experiments.cases.manifest import MANIFEST, describe, differences, read_man
 from experiments.cases.outputs import changed_outputs
 from experiments.cases.store import Store
 from experiments.errors import StoreError
+from experiments.files import remove_leftovers
 from experiments.studyfile import Study
 
 CASES = "cases"
@@ -49,6 +50,8 @@ def locked(folder: Path, resume: bool = False) -> Iterator[None]:
     try:
         # another run may have come and gone since
         _require_usable(folder, resume)
+        if resume:
+            remove_leftovers(folder)
         yield
     finally:
         if made and not is_used(folder):

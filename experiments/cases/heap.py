@@ -10,10 +10,12 @@ from pathlib import Path
 from typing import Any
 
 from dem_warp import CaseResult, Film, Progress, simulate_frames
-from experiments.cases.engines import engine_of, simulator_of
+from experiments.cases.engines import engine_of
 from experiments.cases.frames import write_frames
-from experiments.cases.movie import write_movie
+from experiments.cases.movie import NO_MOVIE, write_movie
 from experiments.cases.polydata import poly, save
+from experiments.cases.workers.own import THIS_MACHINE, OwnWorkers
+from experiments.cases.workers.workers import Workers
 from experiments.errors import InputError
 from experiments.files import replacing, write_text
 from experiments.measurement.observables import observables_of
@@ -87,7 +89,7 @@ def simulate_heap(
     study: Study,
     settings: Mapping[str, float],
     seed: int,
-    device: str | None = None,
+    workers: Workers = THIS_MACHINE,
     progress: Callable[[Progress], None] | None = None,
     scene: str = TARGET_SCENE,
     frames: int | None = None,
@@ -105,13 +107,16 @@ def simulate_heap(
         When frames are asked of another engine than dem-warp's own.
     """
     case, film = study.case(settings, seed, scene), None
+    engine = engine_of(study)
     if frames is None:
-        [result] = simulator_of(study)([case], device=device, workers=1, on_progress=progress)
-    elif engine_of(study) is None:
-        result, film = simulate_frames(case, frames, device, progress)
-    else:
+        [result] = workers.simulate([case], engine, on_progress=progress)
+    elif engine is not None:
         other = study.engine and (study.engine.name or study.engine.command)
         raise InputError("must run on dem-warp's own engine", other, "--frames")
+    elif not isinstance(workers, OwnWorkers):
+        raise InputError("must run on this machine", workers.machine, "--frames")
+    else:
+        result, film = simulate_frames(case, frames, workers.name, progress)
     values = {factor.name: settings.get(factor.name, factor.center) for factor in study.factors}
     observed = observe(study.measurement, result, study.scenes[scene].leaves_a_heap)
     return Heap(study, values, seed, result, observed, scene, film)
@@ -146,7 +151,8 @@ def write_heap(heap: Heap, folder: Path, movie: str = "gif") -> None:
                 save_picture(temporary, picture)
     if heap.film:
         write_frames(heap.film, folder / "frames")
-        write_movie(heap.film, folder / f"heap.{movie}")
+        if movie != NO_MOVIE:
+            write_movie(heap.film, folder / f"heap.{movie}")
     write_text(folder / "angle.json", json.dumps(heap.to_dict(), indent=1, allow_nan=False) + "\n")
 
 

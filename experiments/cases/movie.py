@@ -12,8 +12,9 @@ from experiments.errors import InputError
 from experiments.files import replacing
 from imaging.film import Scenery, save_film
 
-MOVIES = ("gif", "mp4")
-"""Kinds of films."""
+NO_MOVIE = "none"
+MOVIES = ("gif", "mp4", NO_MOVIE)
+"""Kinds of films, the first of which is made where none is named."""
 
 MARGIN = 1.1
 """Room around what is shown."""

@@ -3,13 +3,26 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from typing import Annotated
 
 import typer
 
 from experiments.commands.console import FAILED_RUN, CaseProgress, clear_errors, fail, messages
 from experiments.commands.early import check_study_file
-from experiments.commands.options import AsJson, Device, EngineName, Out, Scale, StudyFile, assignments
+from experiments.commands.options import (
+    AsJson,
+    Cluster,
+    Device,
+    DryRun,
+    EngineName,
+    Out,
+    Scale,
+    Scheduler,
+    StudyFile,
+    assignments,
+)
+from experiments.commands.plans import show_plan
 from experiments.commands.results import print_measured, print_narrowness
 
 HEAP_EXAMPLE = "Example: [bold]dem-warp heap --scale bench --set E=0.48 --set F=0.45 --seed 7 --frames 40[/]"
@@ -38,12 +51,15 @@ def heap(
         ),
     ] = None,
     movie: Annotated[
-        str | None, typer.Option(metavar="KIND", help="Film of the frames: gif or mp4. Left out: gif.")
+        str | None, typer.Option(metavar="KIND", help="Film of the frames: gif, mp4 or none. Left out: gif.")
     ] = None,
     out: Out = None,
     scale: Scale = None,
     device: Device = None,
+    scheduler: Scheduler = None,
+    cluster: Cluster = None,
     engine: EngineName = None,
+    dry_run: DryRun = False,
     as_json: AsJson = False,
 ) -> None:
     """Simulate one heap: heap.vtp (ParaView, OVITO), angle.json, and snapshot.png with the fitted flanks.
@@ -53,21 +69,33 @@ def heap(
     scene of the study.
     """
     with clear_errors():
-        check_study_file(study, scale)
-        from experiments.cases import require_unused, simulate_heap, with_engine, write_heap
+        check_study_file(study, scale, engine)
+        from experiments.cases import open_workers, require_unused, simulate_heap, with_engine, write_heap
         from experiments.cases.movie import MOVIES, require_movie
-        from experiments.runs.choices import chosen_device, chosen_study, default_folder
+        from experiments.runs.choices import chosen_resources, chosen_study, default_folder, resources_for
         from experiments.studyfile.campaign import TARGET_SCENE
 
         require_movie(movie, frames)
-        device = chosen_device(device)
-        chosen = with_engine(chosen_study(study, scale, device), engine)
+        resources, place = chosen_resources(device, 1, scheduler, cluster), scene or TARGET_SCENE
+        chosen = with_engine(chosen_study(study, scale, resources), engine)
         values = chosen.natural_settings(assignments(settings or []), "--set")
-        folder = out or default_folder(chosen, f"{scene or 'heap'}-{seed}")
+        folder, resources = (
+            out or default_folder(chosen, f"{scene or 'heap'}-{seed}"),
+            resources_for(chosen, resources),
+        )
+        if dry_run:
+            from experiments.runs.plan import plan_heap
+
+            show_plan(
+                resources,
+                partial(plan_heap, chosen, resources, case=chosen.case(values, seed, place)),
+                as_json,
+            )
+            return
         require_unused(folder)
         print_narrowness(chosen)
-        with CaseProgress(scene or "heap") as progress:
-            simulated = simulate_heap(chosen, values, seed, device, progress, scene or TARGET_SCENE, frames)
+        with open_workers(resources) as crew, CaseProgress(scene or "heap") as progress:
+            simulated = simulate_heap(chosen, values, seed, crew, progress, place, frames)
         write_heap(simulated, folder, movie or MOVIES[0])
     if as_json:
         typer.echo(json.dumps(simulated.to_dict(), allow_nan=False))

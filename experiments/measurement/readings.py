@@ -15,7 +15,6 @@ from experiments.measurement.plausible import SizeOfTest
 from experiments.measurement.table import Row
 from experiments.studyfile.schema import nearest_name
 from experiments.studyfile.units import Quantity
-from imaging import find_outline, measure, read_picture
 
 CLOGGED = "the tube clogged"
 """Reason of a replicate that left no heap because the grains stayed in the tube."""
@@ -100,6 +99,9 @@ def _seen(row: Row, size: SizeOfTest, fit: str) -> Iterator[Reading]:
     pixel = _pixel(row)
     if name and pixel is None and BY_NAME[name].unit == "m":
         raise row.error("a length in a picture needs the size of its pixels, as 0.1 mm", "pixel")
+    # a file of numbers needs no pictures
+    from imaging import find_outline, measure, read_picture
+
     outline = find_outline(read_picture(path), meters_per_pixel=pixel, place=str(path))
     views = [View.of(measure(outline, fit, str(path)))]
     for observable in OBSERVABLES:

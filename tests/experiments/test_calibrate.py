@@ -9,8 +9,9 @@ import pandas as pd
 import pytest
 
 from doe import Factor, Sample
-from experiments.calibrate import CampaignSettings, ClimbEnd, Outcome, Response, Target, Twin, calibrate
+from experiments.calibrate import ClimbEnd, Outcome, calibrate
 from experiments.calibrate.results import STAGES
+from experiments.studyfile.campaign import CampaignSettings, Response, Target, Twin
 
 NOISE = 0.3
 """Standard deviation of one analytic heap [deg]."""
@@ -23,7 +24,6 @@ FACTORS = (
     Factor("G", 0.03, 0.08),
 )
 Angle = Callable[[Mapping[str, float]], float]
-
 ANGLE = Response("angle", "angle", "deg")
 
 
@@ -42,6 +42,9 @@ class AnalyticStudy:
     target: Target = field(default_factory=lambda: measured(26.0, 0.4))
     campaign: CampaignSettings = field(default_factory=CampaignSettings)
     factors: tuple[Factor, ...] = FACTORS
+    labels: Mapping[str, str] = field(
+        default_factory=lambda: {factor.name: f"parameter {factor.name}" for factor in FACTORS}
+    )
     limits: Mapping[str, tuple[float, float]] = field(
         default_factory=lambda: {name: (0.0, float("inf")) for name in "EFG"}
     )
@@ -244,7 +247,7 @@ def test_a_climb_that_meets_a_hard_limit_stays_inside_it() -> None:
     campaign = calibrate(study, heaps)
     assert campaign.climb.path["F"].min() == 0.0
     assert campaign.outcome is Outcome.TARGET_NOT_REACHED
-    assert "at the bound: F" in campaign.reason
+    assert "at the bound: parameter F (F)" in campaign.reason
 
 
 def test_a_climb_whose_start_is_its_bound_says_so() -> None:
@@ -252,7 +255,7 @@ def test_a_climb_whose_start_is_its_bound_says_so() -> None:
     study = AnalyticStudy(campaign=settings(selection={"keep": ["F"]}, climb=fixed))
     campaign = calibrate(study, AnalyticHeaps(two_frictions))
     assert campaign.outcome is Outcome.TARGET_NOT_REACHED
-    assert "cannot leave its start (F = 0.78)" in campaign.reason
+    assert "cannot leave its start (parameter F (F) 0.78)" in campaign.reason
 
 
 def test_a_climb_that_turns_is_a_plateau() -> None:

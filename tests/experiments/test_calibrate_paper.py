@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from doe import Design, Factor, Sample, compare_means, noise_floor
-from experiments.calibrate import CampaignSettings, ClimbEnd, Response, Target
+from experiments.calibrate import ClimbEnd
 from experiments.calibrate.climb import climb, require_crossing
 from experiments.calibrate.optimum import find_optimum
 from experiments.calibrate.results import (
@@ -25,6 +25,7 @@ from experiments.calibrate.surface import explore_surface
 from experiments.calibrate.target import settle_target
 from experiments.calibrate.verification import verify
 from experiments.studies.buckwheat.paper import factors, published
+from experiments.studyfile.campaign import CampaignSettings, Response, Target
 
 ANGLE = "repose_angle_deg"
 
@@ -44,6 +45,7 @@ MEASURED = Target((Response("angle", "angle", "deg", measured=Sample(30.148, 0.5
 class PaperStudy:
     campaign: CampaignSettings = PAPER_DECISIONS
     factors: tuple[Factor, ...] = field(default_factory=lambda: tuple(factors()))
+    labels: dict[str, str] = field(default_factory=lambda: {factor.name: factor.name for factor in factors()})
     target: Target = MEASURED
     limits: dict[str, tuple[float, float]] = field(
         default_factory=lambda: dict.fromkeys("ABCDEFGH", (0.0, math.inf))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 import xml.etree.ElementTree as ET
 from collections.abc import Callable
 from pathlib import Path
@@ -165,27 +166,28 @@ def test_the_clean_picture_measures_to_the_same_angle(
     heap = Heap(small_study, {}, 1, result, observe(small_study.measurement, result, True))
     write_heap(heap, tmp_path)
     assert heap.angle is not None
-    truth, measured = heap.angle.views[0], {}
-    for name in ("snapshot.png", "snapshot-clean.png"):
-        code, out, err = dem_warp("angle", tmp_path / name, "--json")
-        measured[name] = json.loads(out)["pictures"][0] if code == 0 else err
-    clean = measured["snapshot-clean.png"]
-    # The tolerance of a smooth heap in `imaging`; the lines of the other picture are dark too.
-    assert [clean["left"], clean["right"]] == pytest.approx([truth.left, truth.right], abs=0.3)
-    drawn, bare = (cv2.imread(str(tmp_path / name)) for name in measured)
-    assert (drawn != bare).any(axis=2).mean() > 0.001
+    truth = heap.angle.views[0]
+    assert dem_warp("angle", tmp_path / "heap.vtp", "--overlay", tmp_path)[0] == 0
+    for clean, annotated in (("snapshot-clean", "snapshot"), ("heap-angle-clean", "heap-angle")):
+        code, out, err = dem_warp("angle", tmp_path / f"{clean}.png", "--json")
+        assert code == 0, err
+        [seen] = json.loads(out)["pictures"]
+        # The tolerance of a smooth heap in `imaging`.
+        assert [seen["left"], seen["right"]] == pytest.approx([truth.left, truth.right], abs=0.3)
+        drawn, bare = (cv2.imread(str(tmp_path / f"{name}.png")) for name in (annotated, clean))
+        assert (drawn != bare).any(axis=2).mean() > 0.001
 
 
 @pytest.mark.parametrize(
     ("options", "engine", "said"),
     [
-        (("--movie", "avi", "--frames", "4"), "", "--movie: must be one of gif, mp4 (received avi)"),
+        (("--movie", "avi", "--frames", "4"), "", "--movie: must be one of gif, mp4, none (received avi)"),
         (("--movie", "gif"), "", "a film is made of frames: --frames N says of how many (received gif)"),
         (("--frames", "1"), "", "should be greater than or equal to 2"),
         (
             ("--frames", "4"),
-            '[engine]\ncommand = "mine"\n',
-            "must run on dem-warp's own engine (received mine)",
+            f"[engine]\ncommand = '{sys.executable}'\n",
+            "--frames: must run on dem-warp's own engine",
         ),
     ],
 )

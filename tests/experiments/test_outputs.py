@@ -187,3 +187,15 @@ def test_one_run_at_a_time_works_in_a_folder(folder: Path, small_study: Study) -
     assert "one run at a time" in refused[0]
     with locked(folder, resume=True):
         open_folder(folder, small_study, resume=True)
+
+
+def test_a_resumed_folder_loses_what_a_killed_run_had_half_written(folder: Path, small_study: Study) -> None:
+    with locked(folder):
+        open_folder(folder, small_study)
+    (folder / "cases").mkdir()
+    halves = [folder / ".wall_times.30816.csv", folder / "cases" / ".0a1b.77.npz"]
+    others = [folder / ".notes.csv", folder / "wall_times.2.csv"]
+    for path in (*halves, *others):
+        path.write_text("half", encoding="utf-8")
+    with locked(folder, resume=True):
+        assert [path.exists() for path in (*halves, *others)] == [False, False, True, True]

@@ -42,7 +42,8 @@ def found_on(trial: Study, discovered: Discovered, verdict: Verdict) -> Discover
     """A discovery with the factors of the trial study."""
     found = discovered(verdict)
     names = tuple(factor.name for factor in trial.factors)[:2]
-    return replace(found, factors=names)
+    drifts = tuple(replace(drift, factor=name) for drift, name in zip(found.drifts, names, strict=False))
+    return replace(found, factors=names, drifts=drifts)
 
 
 def test_the_files_hold_the_same_numbers(
