@@ -16,7 +16,7 @@ from experiments.calibrate.campaign import StageHook
 from experiments.cases import open_workers, with_engine
 from experiments.cases.folder import locked
 from experiments.errors import InputError
-from experiments.live.record.journal import Journal
+from experiments.live.trail.journal import Journal
 from experiments.report.companion import Replay
 from experiments.report.material_card import CARD
 from experiments.runs.campaign import (

@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parents[1]
 ROOMS = (
     "errors", "files", "texts", "toml_files", "studyfile.units", "sphere_files", "export",
     "measurement.observables", "studyfile", "measurement", "cases", "calibrate", "discover", "report",
-    "live.record", "runs", "bridge", "api", "live", "commands", "live.ui", "cli", "studies", "verification",
+    "live.trail", "runs", "bridge", "api", "live", "commands", "live.ui", "cli", "studies", "verification",
     "benchmarks", "trials",
 )  # fmt: skip
 

@@ -37,7 +37,7 @@ _log = logging.getLogger(__name__)
 
 
 class CaseNotes(Protocol):
-    """Takes notes of cases while they run; `experiments.live.record.journal` has one."""
+    """Takes notes of cases while they run; `experiments.live.trail.journal` has one."""
 
     def planned(self, table: pd.DataFrame, names: Sequence[str]) -> None:
         """Note the cases of a table, each with its ``case_key`` and its name while it runs."""

@@ -22,7 +22,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn
 from rich.text import Text
 
-from experiments.live.record.progress import duration, time_left
+from experiments.live.trail.progress import duration, time_left
 
 if TYPE_CHECKING:
     from dem_warp import Progress as BatchProgress

@@ -76,7 +76,7 @@ def heap(
         from experiments.cases import open_workers, require_unused, simulate_heap, with_engine, write_heap
         from experiments.cases.movie import MOVIES, require_movie
         from experiments.cases.workers.own import watched_by
-        from experiments.live.record.journal import Journal
+        from experiments.live.trail.journal import Journal
         from experiments.runs.campaign import watching
         from experiments.runs.choices import chosen_resources, chosen_study, default_folder, resources_for
         from experiments.studyfile.campaign import TARGET_SCENE

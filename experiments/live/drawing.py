@@ -10,8 +10,8 @@ import numpy as np
 from experiments.cases.folder import CASES, JOURNAL
 from experiments.errors import InputError
 from experiments.live.folder import inside
-from experiments.live.record.glimpses import read_glimpse, spheres_of
-from experiments.live.record.journal import GLIMPSES
+from experiments.live.trail.glimpses import read_glimpse, spheres_of
+from experiments.live.trail.journal import GLIMPSES
 
 MOST_SPHERES = 60_000
 """Spheres of a heap that are drawn; of more, whole grains are left out evenly."""

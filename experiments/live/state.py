@@ -21,8 +21,8 @@ from experiments.live.notes import (
     noted,
     values_of,
 )
-from experiments.live.record.journal import BEAT, CASES, GLIMPSES, LOG, PROGRESS, RUN, STAGES
-from experiments.live.record.progress import duration
+from experiments.live.trail.journal import BEAT, CASES, GLIMPSES, LOG, PROGRESS, RUN, STAGES
+from experiments.live.trail.progress import duration
 
 STALE = 15.0
 """Time without a sign of life after which a run counts as killed [s]."""

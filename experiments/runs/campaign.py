@@ -26,7 +26,7 @@ from experiments.cases.outputs import publishing
 from experiments.cases.workers.own import THIS_MACHINE, watched_by
 from experiments.errors import StudyError
 from experiments.files import write_text
-from experiments.live.record.journal import Journal
+from experiments.live.trail.journal import Journal
 from experiments.measurement.target import with_measurements
 from experiments.report import heap_pictures, verified_heap, write_report
 from experiments.report.companion import Replay, companion_of

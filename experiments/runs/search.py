@@ -22,7 +22,7 @@ from experiments.discover.maker import fingerprint_of, maker_of_today
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.search import Search
 from experiments.files import replacing
-from experiments.live.record.journal import Journal
+from experiments.live.trail.journal import Journal
 from experiments.measurement.measured_file import read_measured
 from experiments.measurement.observables import OBSERVABLES, PHOTOGRAPHED
 from experiments.report import HeapPicture, SolidHeap

@@ -35,7 +35,7 @@ from experiments.cases import Store
 from experiments.commands.shapes import ClumpRequest, make_clump
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.errors import InputError
-from experiments.live.record.glimpses import Glimpses, read_glimpse
+from experiments.live.trail.glimpses import Glimpses, read_glimpse
 from experiments.measurement.measured_file import read_measured
 from experiments.studyfile import load_study
 from imaging import PictureError, measure_photograph

@@ -12,7 +12,7 @@ from dem_warp import CaseResult
 from experiments.calibrate.cases import plan_cases
 from experiments.cases import Store
 from experiments.files import write_text
-from experiments.live.record.journal import Journal
+from experiments.live.trail.journal import Journal
 from experiments.live.server import Place, serving, watch_app
 from experiments.studyfile import Study
 

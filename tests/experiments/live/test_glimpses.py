@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from dem_warp import CaseResult, simulate
-from experiments.live.record import glimpses as module
-from experiments.live.record.glimpses import KEPT, SHARE, Glimpses, prune, read_glimpse, spheres_of
+from experiments.live.trail import glimpses as module
+from experiments.live.trail.glimpses import KEPT, SHARE, Glimpses, prune, read_glimpse, spheres_of
 from experiments.studyfile import Study
 
 

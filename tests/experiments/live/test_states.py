@@ -18,7 +18,7 @@ from experiments.benchmarks.fuzz.mutations import mutated
 from experiments.cases import Store, open_folder
 from experiments.cases.folder import JOURNAL, is_used
 from experiments.live.charts import charts_of
-from experiments.live.record.journal import BEAT, CASES, PROGRESS, Journal
+from experiments.live.trail.journal import BEAT, CASES, PROGRESS, Journal
 from experiments.live.state import RunState
 from experiments.live.watched import state_text
 from experiments.studyfile import Study
@@ -74,7 +74,7 @@ def test_a_killed_run_is_interrupted(run_folder: Path, small_study: Study, cone:
 def test_a_run_gives_signs_of_life(
     run_folder: Path, small_study: Study, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("experiments.live.record.journal.BEAT_EVERY", 0.01)
+    monkeypatch.setattr("experiments.live.trail.journal.BEAT_EVERY", 0.01)
     with Journal(run_folder, "calibrate", small_study):
         ended = time.monotonic() + 20.0
         while not (run_folder / JOURNAL / BEAT).exists():

@@ -22,8 +22,8 @@ from experiments.calibrate.export import indexed, jsonable
 from experiments.calibrate.results import TargetResult
 from experiments.cases.folder import JOURNAL
 from experiments.errors import StudyError
-from experiments.live.record.glimpses import Glimpses, prune
-from experiments.live.record.progress import time_left
+from experiments.live.trail.glimpses import Glimpses, prune
+from experiments.live.trail.progress import time_left
 
 if TYPE_CHECKING:
     import pandas as pd
