@@ -5,7 +5,7 @@ from dem_warp.clumps import ClumpShape
 from dem_warp.laws.conventions import EDEM, PRESETS, RELATIVE, ContactLaws, laws_named
 from dem_warp.laws.library import MECHANISMS
 from dem_warp.laws.mechanism import Mechanism
-from dem_warp.materials import Interaction, Material, effective_moduli, rayleigh_time
+from dem_warp.materials import Interaction, Material, WallPart, effective_moduli, rayleigh_time
 from dem_warp.parameters import Parameter
 from dem_warp.population import GrainPopulation, ShapeMixture
 from dem_warp.result import CaseResult, Progress
@@ -39,6 +39,7 @@ __all__ = [
     "Parameter",
     "Progress",
     "ShapeMixture",
+    "WallPart",
     "__version__",
     "effective_moduli",
     "laws_named",

@@ -5,15 +5,24 @@ The object checks itself by them, and whatever reads the parameter from a file t
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
-from typing import get_type_hints
+from typing import Any, get_type_hints
 
 UNITS = (
     "1", "m", "m^3", "s", "1/s", "Hz", "m/s", "kg", "kg/s", "kg/m^3", "N", "N/m", "Pa", "J/m^2", "J/m^3",
     "rad",
 )  # fmt: skip
 """Units that a parameter may have; a study file knows a dimension for each."""
+
+
+LATER = "later"
+"""Mark of a field that came after cases had keys."""
+
+
+def later(default: Any) -> Any:
+    """Default of a field that came after cases had keys: a case does not tell of it, so its key stays."""
+    return field(default=default, metadata={LATER: True})
 
 
 @dataclass(frozen=True)

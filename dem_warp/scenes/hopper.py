@@ -40,6 +40,7 @@ class Hopper(PouredScene):
 
     name = "hopper"
     observables: ClassVar[Mapping[str, Observable]] = FILL_OBSERVABLES | DISCHARGE_OBSERVABLES
+    part_names = (("bin",), ("floor",), ("floor",))
     floor = 0.0
 
     def __post_init__(self) -> None:

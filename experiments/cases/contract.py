@@ -191,11 +191,12 @@ def _walls(case: Case[Any], folder: Path) -> list[dict[str, Any]]:
     largest = grains.size_mean + SIZE_LIMIT * grains.size_sd
     reach = largest * max(shape.bounding_radius for shape in grains.mixture.shapes)
     half_width = max(scene.room(reach)[:2])
-    contacts, told = scene.contacts(case), []
-    for number, wall in enumerate(scene.walls(reach)):
+    walls, told = scene.walls(reach), []
+    contacts, holds = scene.surfaces(case, len(walls))
+    for number, wall in enumerate(walls):
         name = f"wall-{number + 1}.stl"
         write_text(folder / name, stl_text(triangles_of(wall, half_width), f"wall-{number + 1}"))
-        contact = contacts[scene.contact_of(number)]
+        contact = contacts[holds[number]]
         told.append(
             {
                 "kind": type(wall).__name__.lower(),
@@ -209,6 +210,8 @@ def _walls(case: Case[Any], folder: Path) -> list[dict[str, Any]]:
                 "rolling_friction": contact.rolling_friction,
             }
         )
+        if part := scene.part_of(case, number):
+            told[-1] |= {"restitution": part.surface.restitution, "material": _material(part.material)}
     return told
 
 
