@@ -7,7 +7,7 @@ from dem_warp.laws.library import MECHANISMS
 from dem_warp.laws.mechanism import Mechanism
 from dem_warp.materials import Interaction, Material, WallPart, effective_moduli, rayleigh_time
 from dem_warp.parameters import Parameter
-from dem_warp.population import GrainPopulation, ShapeMixture
+from dem_warp.population import GrainPopulation, ShapeMixture, SizeClasses
 from dem_warp.result import CaseResult, Progress
 from dem_warp.scenes.draw_down import DrawDown
 from dem_warp.scenes.drum import Drum
@@ -39,6 +39,7 @@ __all__ = [
     "Parameter",
     "Progress",
     "ShapeMixture",
+    "SizeClasses",
     "WallPart",
     "__version__",
     "effective_moduli",

@@ -8,7 +8,7 @@ from dem_warp.laws.conventions import EDEM, ContactLaws
 from dem_warp.laws.mechanism import Mechanism
 from dem_warp.materials import Interaction, Material, WallPart, rayleigh_time
 from dem_warp.model import ContactCoefficients
-from dem_warp.parameters import LATER, Parameter, check_parameters, later
+from dem_warp.parameters import LATER, Parameter, check_parameters
 from dem_warp.population import GrainPopulation
 from dem_warp.scenes.scene import Scene
 from dem_warp.types import PRECISIONS
@@ -52,7 +52,7 @@ class Case(Generic[SceneT]):
     change the last bits: its code is compiled in."""
     laws: ContactLaws = EDEM
     """Conventions of the contact law."""
-    wall_parts: tuple[WallPart, ...] = later(())
+    wall_parts: tuple[WallPart, ...] = field(default=(), metadata=LATER)
     """Walls of another material than the rest, by the names that the scene has for them."""
 
     def __post_init__(self) -> None:
@@ -137,7 +137,7 @@ def _plain(value: Any) -> Any:
         return value.to_dict()
     if is_dataclass(value) and not isinstance(value, type):
         told = ((f, getattr(value, f.name)) for f in fields(value))
-        return {f.name: _plain(own) for f, own in told if not (f.metadata.get(LATER) and own == f.default)}
+        return {f.name: _plain(own) for f, own in told if not (f.metadata == LATER and own == f.default)}
     return value
 
 

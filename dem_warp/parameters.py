@@ -5,9 +5,9 @@ The object checks itself by them, and whatever reads the parameter from a file t
 """
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache
-from typing import Any, get_type_hints
+from typing import get_type_hints
 
 UNITS = (
     "1", "m", "m^3", "s", "1/s", "Hz", "m/s", "kg", "kg/s", "kg/m^3", "N", "N/m", "Pa", "J/m^2", "J/m^3",
@@ -16,13 +16,9 @@ UNITS = (
 """Units that a parameter may have; a study file knows a dimension for each."""
 
 
-LATER = "later"
-"""Mark of a field that came after cases had keys."""
-
-
-def later(default: Any) -> Any:
-    """Default of a field that came after cases had keys: a case does not tell of it, so its key stays."""
-    return field(default=default, metadata={LATER: True})
+LATER = {"later": True}
+"""Metadata of a field that came after cases had keys: at its default a case does not tell of it, so that its
+key stays."""
 
 
 @dataclass(frozen=True)

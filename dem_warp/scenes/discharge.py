@@ -9,8 +9,8 @@ import numpy as np
 
 from dem_warp.case import Case
 from dem_warp.model import WorldSetup
-from dem_warp.scenes.poured_controller import UNREST, Phase, PouredController
 from dem_warp.scenes.averages import mean_over_time
+from dem_warp.scenes.poured_controller import UNREST, Phase, PouredController
 from dem_warp.scenes.scene import Course, Decision, Observable
 from dem_warp.scenes.surfaces import LEAST_POINTS, slope
 from dem_warp.view import WorldView
@@ -62,7 +62,7 @@ class Discharge(Course):
 
     @property
     def flow_rate_se(self) -> float | None:
-        """Standard error of the mean flow from look to look of the steady part [kg/s]; None of a few looks."""
+        """Standard error of the mean flow of the steady part [kg/s]; None where too few looks show it."""
         time, mass = self._steady
         mean = mean_over_time(np.diff(mass) / np.diff(time))
         return mean.standard_error if mean else None

@@ -10,7 +10,7 @@ import numpy as np
 from dem_warp.case import Case
 from dem_warp.materials import Material
 from dem_warp.model import GRAVITY, WorldSetup
-from dem_warp.parameters import Parameter, later
+from dem_warp.parameters import LATER, Parameter
 from dem_warp.scenes.averages import mean_over_time
 from dem_warp.scenes.drum_surface import (
     DrumView,
@@ -36,7 +36,7 @@ OPEN_FILLED = 0.5
 """Part that a rain fills across the whole width of the drum."""
 
 HATCH = 0.8
-"""Height above the axis, over the radius, from which the grains of any other bed fall: under a hatch there."""
+"""Height above the axis, over the radius, of the hatch that the grains of any other bed fall from."""
 
 FLYING = 0.5
 """A raining grain that is faster than this part of its first speed has not landed."""
@@ -46,8 +46,8 @@ FLYING = 0.5
 class Drum(PouredScene):
     """A drum, part filled by a rain of grains, turns about its axis, which is along y.
 
-    z is up in the cross-section. Where the axis is inclined, gravity is turned instead of the drum: the end at
-    -y, its front, is the lower one.
+    z is up in the cross-section. Where the axis is inclined, gravity is turned instead of the drum: its
+    front, the end at -y, is the lower one.
     """
 
     diameter: Annotated[float, Parameter("m", above=0.0)]
@@ -64,13 +64,15 @@ class Drum(PouredScene):
     """Revolutions before measuring."""
     revolutions: Annotated[float, Parameter("1", above=0.0)] = 2.0
     """Revolutions while measuring."""
-    inclination: Annotated[float, Parameter("rad", at_least=0.0, below=math.pi / 2)] = later(0.0)
+    inclination: Annotated[float, Parameter("rad", at_least=0.0, below=math.pi / 2)] = field(
+        default=0.0, metadata=LATER
+    )
     """Inclination of the axis from the horizontal: the front end is the lower."""
-    picture: Picture = later("depth")
+    picture: Picture = field(default="depth", metadata=LATER)
     """Picture that the slopes are read from: depth, the mean surface over the length of the drum; silhouette,
     the outline that a camera sees through the front end against a light behind the drum; end, the grains that
     lie against the front end."""
-    camera_distance: Annotated[float | None, Parameter("m", above=0.0)] = later(None)
+    camera_distance: Annotated[float | None, Parameter("m", above=0.0)] = field(default=None, metadata=LATER)
     """Distance of the camera from the front end, on the axis, of a silhouette; left out: from far away."""
 
     name = "drum"
@@ -82,8 +84,8 @@ class Drum(PouredScene):
         "dynamic_angle_sd": Observable("deg", "standard deviation of that slope from look to look"),
         "dynamic_angle_se": Observable(
             "deg",
-            "standard error of the mean over time, which knows how long the slope remembers; absent of a test "
-            "of fewer than four looks",
+            "standard error of the mean over time, which knows how long the slope remembers; absent of fewer "
+            "than four looks",
         ),
         "dynamic_angle_freedom": Observable(
             "1", "degrees of freedom of that standard error: an interval takes Student's t of as many"
@@ -110,9 +112,9 @@ class Drum(PouredScene):
             raise ValueError(f"Drum.camera_distance: {rule}, got {self.camera_distance!r}")
         if self.is_hatched and self.highest > self.hatch:
             raise ValueError(
-                f"Drum.filling: must leave the bed at the lower end below {self.hatch:.4g} m, where grains fall "
-                f"in: lower the filling, the inclination or the length, got {self.filling!r} and a bed of "
-                f"{self.highest:.4g} m"
+                f"Drum.filling: must leave the bed at the lower end below {self.hatch:.4g} m, where grains "
+                f"fall in: lower the filling, the inclination or the length, got {self.filling!r} and a bed "
+                f"of {self.highest:.4g} m"
             )
         if self.froude_number >= 1:
             fastest = self.rotation_rate / math.sqrt(self.froude_number)
@@ -148,7 +150,7 @@ class Drum(PouredScene):
 
     @property
     def is_hatched(self) -> bool:
-        """The bed is not level, or reaches above the axis: grains fall from a hatch until it has its volume."""
+        """The bed is not level, or above the axis: grains fall from a hatch until it has its volume."""
         return self.inclination > 0.0 or self.filling > OPEN_FILLED
 
     @property
@@ -218,7 +220,7 @@ class DrumController(PouredController[Turning]):
         self.phases["turn"] = Phase(self._turn, scene.revolutions / scene.rotation_rate)
 
     def is_full(self, view: WorldView) -> bool:
-        """Tell that the grains that have landed fill the drum as they should; a counted fill is never full."""
+        """Tell that the grains that have landed take their part of the drum; a counted fill is never full."""
         if not self.scene.is_hatched:
             return super().is_full(view)
         if self.poured.grain_count is not None:

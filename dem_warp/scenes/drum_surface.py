@@ -35,7 +35,7 @@ class DrumView(NamedTuple):
     """Inner ones [m]."""
     picture: Picture = "depth"
     camera_distance: float | None = None
-    """From the outer face of the bed to the camera, on the axis; None: from so far that nothing narrows [m]."""
+    """From the front end to the camera, on the axis; None: from so far that nothing narrows [m]."""
 
     def seen(self, positions: np.ndarray, reach: float) -> np.ndarray:
         """Grains that the picture shows, where it shows them.

@@ -117,9 +117,8 @@ class PouredScene(ABC):
         known = list(dict.fromkeys(name for wall in self.part_names for name in wall))
         for name in names:
             if name not in known:
-                raise ValueError(
-                    f"{type(self).__name__}: the walls have the parts {', '.join(known) or 'none'}, got {name!r}"
-                )
+                rule = f"the walls have the parts {', '.join(known) or 'none'}"
+                raise ValueError(f"{type(self).__name__}: {rule}, got {name!r}")
 
     def surfaces(self, case: Case[Any], wall_count: int) -> tuple[tuple[ContactCoefficients, ...], list[int]]:
         """Contacts of a case, and which of them holds for each wall, those of another material included."""
@@ -130,7 +129,7 @@ class PouredScene(ABC):
         return (*contacts, *map(case.contact_with, case.wall_parts)), holds
 
     def part_of(self, case: Case[Any], wall: int) -> WallPart | None:
-        """Part of another material that a wall belongs to, the most special of its names; None of the rest."""
+        """Part of another material that a wall belongs to, by its most special name; None of the rest."""
         parts = {part.name: part for part in case.wall_parts}
         names = self.part_names[wall] if parts and self.part_names else ()
         return next((parts[name] for name in reversed(names) if name in parts), None)

@@ -23,7 +23,7 @@ LARGEST = 10_000_000
 
 def describe(study: Study) -> dict[str, Any]:
     """Everything that a study says, its clumps included, as JSON-able data."""
-    digests = [hashlib.sha256(clump.read_bytes()).hexdigest() for clump in study.grain.clump_files]
+    digests = [hashlib.sha256(clump.read_bytes()).hexdigest() for clump in study.grain.files]
     return {"study": study.document, "scale": study.scale, "clump_sha256": digests}
 
 

@@ -31,7 +31,7 @@ from experiments.discover.library import FORMER_NAMES, Mechanism, library_for
 from experiments.discover.maker import notes_on
 from experiments.errors import InputError, StudyError
 from experiments.studyfile import Study
-from experiments.studyfile.schema import nearest_name
+from experiments.texts import nearest_name
 
 WITHOUT_EFFECT = (
     "name", "note", "companion", "target", "response", "campaign", "discover", "factor", "engine",

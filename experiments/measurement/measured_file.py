@@ -27,9 +27,9 @@ from experiments.measurement.notes import data_notes
 from experiments.measurement.observables import NAMES
 from experiments.measurement.plausible import SizeOfTest, inversions, size_of_test
 from experiments.measurement.readings import CLOGGED, CLOGGED_ROW, Reading, readings_of
-from experiments.measurement.table import Row, read_rows
+from experiments.rows import Row, read_rows
 from experiments.studyfile import Condition, Study
-from experiments.studyfile.schema import nearest_name
+from experiments.texts import nearest_name
 from imaging import PictureError
 
 COLUMNS = ("condition", "replicate", "observable", "value", "unit", "picture", "pixel", "fit")

@@ -12,9 +12,9 @@ from experiments.errors import Problem
 from experiments.measurement.observables import BY_NAME, DIMENSIONS, OBSERVABLES, Observable, View
 from experiments.measurement.pictures import require_same_fit
 from experiments.measurement.plausible import SizeOfTest
-from experiments.measurement.table import Row
-from experiments.studyfile.schema import nearest_name
+from experiments.rows import Row
 from experiments.studyfile.units import Quantity
+from experiments.texts import nearest_name
 from imaging import find_outline, measure, read_picture
 
 CLOGGED = "the tube clogged"

@@ -33,10 +33,11 @@ from experiments.studyfile.factor_section import (
 from experiments.studyfile.places import Places
 from experiments.studyfile.reserved_names import check_factor_names
 from experiments.studyfile.scene_sections import SceneSection
-from experiments.studyfile.schema import Section, nearest_name, validated
+from experiments.studyfile.schema import Section, validated
 from experiments.studyfile.sections import Physics, Scene
 from experiments.studyfile.setters import changed
 from experiments.studyfile.target_section import ResponseSection, TargetSection, build_target
+from experiments.texts import nearest_name
 from experiments.toml_files import read_toml
 from imaging import FITS
 

@@ -13,7 +13,8 @@ from experiments.measurement.observables import ANGLE, DIMENSIONS, Observable, o
 from experiments.studyfile.campaign import TARGET_SCENE, FactorValues, Response, Target, Twin
 from experiments.studyfile.places import KeyPath, Places
 from experiments.studyfile.scene_sections import SceneSection
-from experiments.studyfile.schema import RawQuantity, Section, nearest_name
+from experiments.studyfile.schema import RawQuantity, Section
+from experiments.texts import nearest_name
 
 MEASUREMENTS = ("mean", "sd", "n")
 """Keys that tell of the physical test."""
