@@ -54,12 +54,10 @@ class Search:
         Raises
         ------
         StudyError
-            When the study cannot be searched: its test leaves no heap, nothing varies, every condition is
-            held out, or ``[discover]`` names what it cannot have.
+            When the study cannot be searched: nothing varies, every condition is held out, or
+            ``[discover]`` names what it cannot have.
         """
         file = str(study.file)
-        if not study.scene.leaves_a_heap:
-            raise StudyError("the search measures heaps: [scene.lifted-cylinder]", "another test", file)
         if not study.factors:
             raise StudyError("a search calibrates first, so it needs at least one [[factor]]", "none", file)
         if all(condition.held_out for condition in study.conditions):

@@ -99,7 +99,8 @@ def _given(study: Study, measured: list[Replicated], note: str) -> Study:
 
 def _table(study: Study, one: Replicated) -> dict[str, Any]:
     """Write one as the table of a response: numbers that read back as the same floats."""
-    unit, column = BY_NAME[one.observable].unit, _column(one)
+    units = {each.name: each.unit for each in study.scene.measurable}
+    unit, column = units[one.observable], _column(one)
     numbers: dict[str, Any] = {
         key: value if unit == "1" else f"{value!r} {unit}"
         for key, value in (("mean", float(one.sample.mean)), ("sd", float(one.sample.sd)))
@@ -112,4 +113,4 @@ def _table(study: Study, one: Replicated) -> dict[str, Any]:
 
 
 def _column(one: Replicated) -> str:
-    return BY_NAME[one.observable].column
+    return BY_NAME[one.observable].column if one.observable in BY_NAME else one.observable

@@ -22,7 +22,7 @@ from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.search import Search
 from experiments.files import replacing
 from experiments.measurement.measured_file import read_measured
-from experiments.measurement.observables import OBSERVABLES, PHOTOGRAPHED
+from experiments.measurement.observables import Instrument
 from experiments.report import HeapPicture
 from experiments.report.companion import Companion, companion_of
 from experiments.report.discovery import Terms, write_discovery
@@ -102,7 +102,7 @@ def run_search(job: Job, resume: bool = False, watch: Watch = lambda title: null
     if not resume:
         require_unused(job.folder, "; --resume goes on in it")
     companion, search = companion_of(job.study), Search.of(job.study)
-    terms = Terms.of(search.library, OBSERVABLES, job.study.factor_sections)
+    terms = Terms.of(search.library, job.study.scene.measurable, job.study.factor_sections)
     bank = _known_bank(job, search)
     measured = _measured(job)
     for note in measured.notes if measured else ():
@@ -155,7 +155,7 @@ def heaps_side_by_side(
     engine: EngineSimulator, found: Discovery, terms: Terms, measured: Measured, job: Job
 ) -> list[HeapPicture]:
     """Draw a measured heap, where there is a photograph, that of the base, and that with the mechanism."""
-    if found.base is None:
+    if found.base is None or not job.study.scene.leaves_a_heap:
         return []
     fitted = [condition.name for condition in job.study.conditions if not condition.held_out]
     training = [name for name in measured.conditions if name in fitted]
@@ -182,7 +182,8 @@ def _measured(job: Job) -> Measured | None:
     if job.measured is None:
         return None
     measured = read_measured(job.measured, job.study)
-    return measured.only(PHOTOGRAPHED) if job.photographs_only else measured
+    shown = [each.name for each in job.study.scene.measurable if each.instrument is Instrument.PHOTOGRAPH]
+    return measured.only(shown) if job.photographs_only else measured
 
 
 def _point(fit: Fit, condition: str, seed: int) -> Point:
