@@ -12,7 +12,7 @@ before it runs  alias_structure, design_quality, power_table, detectable_effect,
 screened        screen, two_level_effects, steepest_path, climb_table
 fitted          fit_surface, fit_formula, fit_mixture; influence, box_cox, robust_coefficients
 best settings   canonical, ridge_path, stationary_region, maximize, minimize, most_desirable
-compared        compare_means, agreement, noise_floor, curvature_test, joint_fit
+compared        compare_means, agreement, noise_floor, curvature_test, joint_fit, ProfileSample
 carried over    transfer, transfer_points
 
 ``doe.plots`` draws them.
@@ -52,6 +52,7 @@ from doe.noise import (
     variance_ratio,
 )
 from doe.optimum import StationaryPoint
+from doe.profiles import Mode, ProfileSample
 from doe.region import Region
 from doe.screening import ScreenResult, aliases, screen
 from doe.steepest import ClimbPath, climb_table, steepest_path
@@ -77,7 +78,9 @@ __all__ = [
     "JointFit",
     "LinearFit",
     "Mixture",
+    "Mode",
     "NoiseFloor",
+    "ProfileSample",
     "Region",
     "RobustTable",
     "Sample",

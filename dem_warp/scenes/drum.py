@@ -13,6 +13,7 @@ from dem_warp.model import GRAVITY, WorldSetup
 from dem_warp.parameters import LATER, Parameter
 from dem_warp.scenes.averages import mean_over_time
 from dem_warp.scenes.drum_surface import (
+    STATIONS,
     DrumView,
     Picture,
     SurfaceAngles,
@@ -20,6 +21,7 @@ from dem_warp.scenes.drum_surface import (
     half_chord,
     level_of,
     surface_angles,
+    surface_heights,
 )
 from dem_warp.scenes.poured_controller import Phase, PouredController
 from dem_warp.scenes.poured_scene import FILL_OBSERVABLES, PouredScene
@@ -76,29 +78,39 @@ class Drum(PouredScene):
     """Distance of the camera from the front end, on the axis, of a silhouette; left out: from far away."""
 
     name = "drum"
-    observables: ClassVar[Mapping[str, Observable]] = FILL_OBSERVABLES | {
-        "dynamic_angle": Observable(
-            "deg",
-            "slope of the least-squares line through the middle 80 % of the surface, mean over time",
-        ),
-        "dynamic_angle_sd": Observable("deg", "standard deviation of that slope from look to look"),
-        "dynamic_angle_se": Observable(
-            "deg",
-            "standard error of the mean over time, which knows how long the slope remembers; absent of fewer "
-            "than four looks",
-        ),
-        "dynamic_angle_freedom": Observable(
-            "1", "degrees of freedom of that standard error: an interval takes Student's t of as many"
-        ),
-        "upper_angle": Observable("deg", "the same slope, of the upper half of that part"),
-        "lower_angle": Observable("deg", "the same slope, of the lower half of that part"),
-        "mass_angle": Observable(
-            "deg",
-            "turn of the line from the axis to the bed's centre of mass from the vertical, mean over time",
-        ),
-        "mass_angle_se": Observable("deg", "its standard error, as of the other"),
-        "grains_lost": Observable("1", "grains that left the drum"),
-    }
+    observables: ClassVar[Mapping[str, Observable]] = (
+        FILL_OBSERVABLES
+        | {
+            "dynamic_angle": Observable(
+                "deg",
+                "slope of the least-squares line through the middle 80 % of the surface, mean over time",
+            ),
+            "dynamic_angle_sd": Observable("deg", "standard deviation of that slope from look to look"),
+            "dynamic_angle_se": Observable(
+                "deg",
+                "standard error of the mean over time, which knows how long the slope remembers; absent of "
+                "fewer than four looks",
+            ),
+            "dynamic_angle_freedom": Observable(
+                "1", "degrees of freedom of that standard error: an interval takes Student's t of as many"
+            ),
+            "upper_angle": Observable("deg", "the same slope, of the upper half of that part"),
+            "lower_angle": Observable("deg", "the same slope, of the lower half of that part"),
+            "mass_angle": Observable(
+                "deg",
+                "turn of the line from the axis to the bed's centre of mass from the vertical, mean over "
+                "time",
+            ),
+            "mass_angle_se": Observable("deg", "its standard error, as of the other"),
+            "grains_lost": Observable("1", "grains that left the drum"),
+        }
+        | {
+            f"surface_{number}": Observable(
+                "m", f"height of the surface above the axis at x = {place:+g} of the radius, mean over time"
+            )
+            for number, place in enumerate(STATIONS, 1)
+        }
+    )
     part_names = (("shell",), ("ends", "front"), ("ends", "back"))
     floor = 0.0
 
@@ -208,6 +220,8 @@ class Turning(Course):
 
     angles: list[list[float]] = field(default_factory=list)
     """`SurfaceAngles` of every look at which all of them could be seen."""
+    heights: list[list[float]] = field(default_factory=list)
+    """Heights of the surface at `STATIONS` of every look at which it could be seen [m]."""
 
 
 class DrumController(PouredController[Turning]):
@@ -269,6 +283,9 @@ class DrumController(PouredController[Turning]):
         angles = surface_angles(from_axis, chord, self.grain_reach, self.scene.view)
         if angles is not None:
             self.course.angles.append(list(angles))
+        heights = surface_heights(from_axis, chord, self.grain_reach, self.scene.view)
+        if heights is not None:
+            self.course.heights.append(heights.tolist())
         if view.time - self.course.phase_start < self.phases["turn"].expected:
             return Decision()
         return Decision(done=True, failure=self._finish(view))
@@ -287,4 +304,6 @@ class DrumController(PouredController[Turning]):
             mean = mean_over_time([angles[place] for angles in self.course.angles])
             known = {f"{name}_se": mean.standard_error, f"{name}_freedom": mean.freedom} if mean else {}
             seen |= {key: value for key, value in known.items() if key in self.scene.observables}
+        surface = np.mean(self.course.heights, axis=0)
+        seen |= {f"surface_{number}": float(height) for number, height in enumerate(surface, 1)}
         return ""

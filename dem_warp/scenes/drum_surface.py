@@ -13,6 +13,9 @@ SURFACE = 0.8
 FINER = 4
 """Strips that a column of the bed is cut into where the shell bounds it."""
 
+STATIONS = (-0.8, -0.6, -0.4, -0.2, 0.0, 0.2, 0.4, 0.6, 0.8)
+"""Places across a drum, over its radius, at which the height of the surface is told."""
+
 Picture = Literal["depth", "silhouette", "end"]
 """Pictures that a surface is read from: the mean over the drum's depth, the outline against a light behind
 it, and the grains that lie against the transparent end."""
@@ -127,6 +130,36 @@ def surface_angles(
     if whole is None or upper is None or lower is None:
         return None
     return SurfaceAngles(whole, upper, lower, math.degrees(turn))
+
+
+def surface_heights(positions: np.ndarray, chord: float, reach: float, view: DrumView) -> np.ndarray | None:
+    """Heights of the surface of a bed above the axis at `STATIONS` [m]; None where it cannot be seen.
+
+    The surface is found as by `surface_angles`, and turned back into the picture. Beside it is the shell.
+
+    Parameters
+    ----------
+    positions, chord, reach, view
+        As of `surface_angles`.
+    """
+    if not len(positions):
+        return None
+    center = positions.mean(axis=0)
+    turn = math.atan2(-center[0], -center[2])
+    level = _turned_back(view.seen(positions, reach), turn)
+    if not len(level):
+        return None
+    along, height = profile(level, reach)
+    inside = np.abs(along) < chord
+    if not inside.any():
+        return None
+    x, _, z = _turned_back(
+        np.column_stack([along, np.zeros(len(along)), height + TOP_OF_GRAIN * reach])[inside], -turn
+    ).T
+    order = np.argsort(x)
+    places = np.array(STATIONS) * view.radius
+    wall = np.sqrt(view.radius**2 - places**2)
+    return np.asarray(np.clip(np.interp(places, x[order], z[order]), -wall, wall))
 
 
 def level_of(filling: float, radius: float) -> float:

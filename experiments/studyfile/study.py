@@ -134,7 +134,7 @@ class Study(Physics):
             rule = "is the angle of a heap, which this test does not leave: name an observable of the test"
             raise StudyError(rule, "no observable", f"{self.file}: target")
         if self._target is None and self.target_section is not None:
-            rule = "names pictures or a file: measurement.target.with_measurements takes numbers from them"
+            rule = "names pictures, profiles or a file: with_measurements takes numbers from them"
             raise StudyError(rule, "no numbers", f"{self.file}: target")
         if self._target is None:
             raise StudyError("a calibration needs a [target] or a [[response]]", "none", str(self.file))

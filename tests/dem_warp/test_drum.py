@@ -9,7 +9,7 @@ from worlds import STEEL, assert_measured_as_told, ball_case, run_batch
 
 from dem_warp import Case, CaseResult, Drum, Interaction, Material, WallPart
 from dem_warp.model import GRAVITY
-from dem_warp.scenes.drum_surface import DrumView, bed_volume, surface_angles
+from dem_warp.scenes.drum_surface import STATIONS, DrumView, bed_volume, surface_angles, surface_heights
 
 DRUM = Drum(
     diameter=0.05,
@@ -219,3 +219,22 @@ def test_the_volume_below_a_bed_is_that_of_the_drum_below_its_plane():
     for tilt in (0.0, 30.0):
         assert bed_volume(slab(tilt), 0.025, 0.018, 5e-4) == pytest.approx(half, rel=0.05)
     assert bed_volume(np.empty((0, 3)), 0.025, 0.018, 5e-4) == 0.0
+
+
+@pytest.mark.parametrize("picture", ["depth", "silhouette", "end"])
+@pytest.mark.parametrize("tilt", [0.0, 30.0, 50.0])
+def test_the_heights_of_a_plane_bed_are_those_of_its_plane(picture, tilt):
+    view = DrumView(0.025, 0.018, picture)
+    heights = surface_heights(slab(tilt), 0.025, 5e-4, view)
+    x = 0.025 * np.array(STATIONS)
+    wall = np.sqrt(0.025**2 - x**2)
+    plane = np.clip(-math.tan(math.radians(tilt)) * x, -wall, wall)
+    # A lattice of 1 mm, whose balls reach 0.3 mm less to the shell than the plane does.
+    assert heights == pytest.approx(plane, abs=0.9e-3 / math.cos(math.radians(tilt)))
+
+
+def test_a_drum_tells_of_its_surface_from_end_to_end(runs):
+    level, steep = ([runs[f].observables[f"surface_{i}"] for i in range(1, 10)] for f in (0.0, 0.6))
+    # Without friction the bed is level from -0.6 to 0.6 of the radius, to half a ball; with it, it falls.
+    assert np.ptp(level[2:7]) < 2e-3
+    assert all(np.diff(steep[2:7]) < 0.0)
