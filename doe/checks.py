@@ -2,6 +2,7 @@
 
 import math
 import numbers
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -42,6 +43,19 @@ def _range(above: float, least: float) -> str:
     if math.isfinite(least):
         return "finite and not negative" if least == 0.0 else f"finite and at least {least:g}"
     return "finite"
+
+
+def checked_kind(name: str, value: Any, kind: type) -> None:
+    """Raise DesignError unless a value is of a kind, such as a Design or a Surface."""
+    if not isinstance(value, kind):
+        raise DesignError(f"{name} must be a {kind.__name__}, received {value!r}")
+
+
+def checked_list(name: str, values: Any) -> list:
+    """Return values as a list; raise DesignError when they are none, or a text."""
+    if not isinstance(values, Iterable) or isinstance(values, str | bytes):
+        raise DesignError(f"{name} must be a list, received {values!r}")
+    return list(values)
 
 
 def checked_level(value: Any, name: str = "alpha") -> float:

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from doe.checks import real_array
+from doe.checks import checked_count, real_array
 from doe.errors import DesignError
 from doe.factors import Category, Factor, checked_factors, coded_points, natural_points
 from doe.labels import aligned
@@ -43,6 +43,8 @@ class Design:
 
     def __post_init__(self) -> None:
         factors = checked_factors(self.factors)
+        if self.seed is not None:
+            checked_count("seed", self.seed, least=0)
         names, dummies = [factor.name for factor in factors], tuple(self.dummies)
         coded = _checked_table(self.coded, names, dummies)
         for name in dummies:

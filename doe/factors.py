@@ -1,6 +1,7 @@
 """Factors: parameters that a design varies, with the coding between natural units and -1..+1."""
 
 import math
+import numbers
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
@@ -38,6 +39,8 @@ class Factor:
     unit: str = ""
 
     def __post_init__(self) -> None:
+        if not isinstance(self.name, str):
+            raise DesignError(f"a factor's name is text, received {self.name!r}")
         if not self.name or self.name != self.name.strip() or set(self.name) & set(":^"):
             raise DesignError(f"a factor's name is not empty, has no outer blanks, ':' or '^': {self.name!r}")
         if self.name in RESERVED_NAMES:
@@ -45,7 +48,8 @@ class Factor:
                 f"{self.name!r} names a row of the analysis tables: give the factor another name"
             )
         for place in ("low", "high"):
-            if not math.isfinite(getattr(self, place)):
+            value = getattr(self, place)
+            if not isinstance(value, numbers.Real) or not math.isfinite(value):
                 raise DesignError(
                     f"factor {self.name!r}: {place} must be finite, received {getattr(self, place)}"
                 )
@@ -109,7 +113,7 @@ class Category(Factor):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        levels = tuple(self.levels)
+        levels = tuple(self.levels) if isinstance(self.levels, Iterable) else ()
         if isinstance(self.levels, str) or len(levels) < 2 or len(set(levels)) < len(levels):
             raise DesignError(
                 f"category {self.name!r}: two or more different levels, received {self.levels!r}"
@@ -168,8 +172,13 @@ def two_level_factors(factors: Iterable[Factor], what: str) -> tuple[Factor, ...
 
 
 def checked_factors(factors: Iterable[Factor]) -> tuple[Factor, ...]:
-    """Return the factors as a tuple; raise DesignError when empty or when a name comes twice."""
+    """Return the factors as a tuple; raise DesignError when empty, no factors, or when a name comes twice."""
+    if not isinstance(factors, Iterable) or isinstance(factors, str | bytes):
+        raise DesignError(f"factors is a list of Factor or Category, received {factors!r}")
     factors = tuple(factors)
+    for factor in factors:
+        if not isinstance(factor, Factor | Category):
+            raise DesignError(f"factors is a list of Factor or Category, received {factor!r} in it")
     if not factors:
         raise DesignError("a design needs at least one factor, received none")
     names = [factor.name for factor in factors]

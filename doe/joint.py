@@ -68,7 +68,8 @@ class JointFit:
     That level lies above alpha over their number where the errors of the fits hang together, as those of
     responses of the same runs do, whose residuals tell it. The targets are measured one independently of the
     other. So the true setting is compatible with probability 1 - alpha, where the models hold: .94 to .96 for
-    .95 with 3 measurements of each target or more; with 2 at least .94, up to .99. Surfaces whose terms the
+    .95 with 3 measurements of each target or more (.943 to .964 with 6 responses and 3 measurements); with 2
+    at least .94, up to .995. Surfaces whose terms the
     data chose count as they were before the choice.
     """
 

@@ -295,6 +295,8 @@ class Surface:
             A factor without value, a value that is no finite number, a level outside 0 to 1.
         """
         level = checked_level(alpha)
+        if not isinstance(points, pd.DataFrame | Mapping | pd.Series):
+            raise DesignError(f"points is a DataFrame, or one point as a mapping; received {points!r}")
         table = points if isinstance(points, pd.DataFrame) else pd.DataFrame([dict(points)])
         inside = self._coded_table(table, coded)
         honest = self.unselected

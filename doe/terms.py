@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 import pandas as pd
 
+from doe.checks import checked_list
 from doe.errors import DesignError
 from doe.factors import Factor
 
@@ -45,7 +46,9 @@ def parsed_terms(written: Iterable[str], names: Sequence[str]) -> tuple[Term, ..
         model is hierarchical.
     """
     terms: list[Term] = []
-    for text in written:
+    for text in checked_list("model, unless it is a name,", written):
+        if not isinstance(text, str):
+            raise DesignError(f"a term is text such as 'A:B' or 'A^2', received {text!r}")
         base, power, degree = text.partition("^")
         parts = [part.strip() for part in base.split(":")]
         if power:

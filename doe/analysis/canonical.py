@@ -8,6 +8,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy import optimize, stats
 
+from doe.checks import checked_kind, checked_level, real_array
 from doe.errors import DesignError
 from doe.factors import natural_points
 from doe.optimum import StationaryPoint
@@ -64,6 +65,8 @@ def canonical(surface: Surface, alpha: float = 0.05) -> CanonicalAnalysis:
     DesignError
         The fitted surface is exactly straight along some direction, or of a higher degree.
     """
+    checked_level(alpha)
+    checked_kind("surface", surface, Surface)
     form, names = surface.quadratic_form, surface.design.names
     stationary = surface.stationary_point()
     values, vectors = np.linalg.eigh(form.matrix)
@@ -117,7 +120,8 @@ def ridge_path(
     DesignError
         A radius that is negative or not finite; a surface without slope and curvature.
     """
-    radii = np.asarray(radii, dtype=np.float64)
+    checked_kind("surface", surface, Surface)
+    radii = real_array("radii", radii)
     if radii.ndim != 1 or not np.isfinite(radii).all() or (radii < 0.0).any() or radii.size == 0:
         raise DesignError(f"radii are finite and not negative, received {radii.tolist()}")
     form = surface.quadratic_form

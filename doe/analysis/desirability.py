@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy import optimize
 from scipy.stats import qmc
 
+from doe.checks import checked_kind, checked_number
 from doe.designs.optimal import Constraint, allowed
 from doe.errors import DesignError
 from doe.factors import natural_points
@@ -53,6 +54,10 @@ class Wish:
     importance: float = 1.0
 
     def __post_init__(self) -> None:
+        for place in ("low", "high"):
+            checked_number(f"{place} of a wish", getattr(self, place))
+        if self.target is not None:
+            checked_number("target of a wish", self.target)
         if not (np.isfinite(self.low) and np.isfinite(self.high) and self.low < self.high):
             raise DesignError(f"a wish has low < high, both finite; received {self.low} and {self.high}")
         if self.target is not None and not self.low < self.target < self.high:
@@ -131,6 +136,7 @@ def maximize(
     seed : int
         Of the points that the search starts from.
     """
+    checked_kind("surface", surface, Surface)
     return _best({"response": surface}, {}, 1.0, extent, radius, constraints, seed)
 
 
@@ -143,6 +149,7 @@ def minimize(
     seed: int = 0,
 ) -> BestSetting:
     """Return the setting with the smallest fitted response (see ``maximize``)."""
+    checked_kind("surface", surface, Surface)
     return _best({"response": surface}, {}, -1.0, extent, radius, constraints, seed)
 
 
@@ -171,6 +178,9 @@ def most_desirable(
     DesignError
         Other factors, a response without wish or surface, or no setting that is not useless for some wish.
     """
+    for name, given in (("surfaces", surfaces), ("wishes", wishes)):
+        if not isinstance(given, Mapping):
+            raise DesignError(f"{name} is a mapping by response, received {given!r}")
     if not surfaces or set(surfaces) != set(wishes):
         raise DesignError(f"a wish for every surface: {sorted(surfaces)} and {sorted(wishes)}")
     first = next(iter(surfaces.values())).design.factors
@@ -212,7 +222,8 @@ def _best(
 ) -> BestSetting:
     surface = next(iter(surfaces.values()))
     count = len(surface.design.factors)
-    if not (np.isfinite(extent) and extent > 0.0) or not (radius is None or radius > 0.0):
+    checked_number("extent", extent, above=0.0)
+    if not (radius is None or radius > 0.0):
         raise DesignError(f"extent and radius are positive, received {extent} and {radius}")
 
     def score(coded: NDArray[np.float64]) -> NDArray[np.float64]:

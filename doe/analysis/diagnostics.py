@@ -8,6 +8,7 @@ from scipy import optimize, stats
 
 from doe.analysis.coefficients import coefficient_table
 from doe.anova import settings_of
+from doe.checks import checked_kind
 from doe.errors import DesignError
 from doe.surface import Surface
 
@@ -52,6 +53,7 @@ def influence(surface: Surface) -> pd.DataFrame:
         response, fitted, residual, leverage, studentized (by all runs), deleted (by the other runs: t on one
         degree of freedom less), cook (Technometrics 19, 1977, p. 15), dffits, remark.
     """
+    checked_kind("surface", surface, Surface)
     leverage, studentized = surface.leverage, surface.studentized_residuals
     df, count = surface.residual_df, len(surface.fit.params)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -103,6 +105,7 @@ def box_cox(surface: Surface, confidence: float = 0.95) -> BoxCox:
     DesignError
         Responses that are not all positive.
     """
+    checked_kind("surface", surface, Surface)
     response = surface.response.to_numpy()
     if not (response > 0.0).all():
         raise DesignError(
@@ -156,6 +159,7 @@ def robust_coefficients(surface: Surface) -> RobustTable:
     HC3 (MacKinnon and White, J. Econometrics 29, 1985, p. 305) from statsmodels; the replicates' spreads are
     compared by Levene's test about the medians (Brown and Forsythe 1974), in settings of three or more.
     """
+    checked_kind("surface", surface, Surface)
     table = coefficient_table(surface.fit, robust=True)
     table["usual se"] = coefficient_table(surface.fit)["se"]
     p, note = _spread(surface)

@@ -9,7 +9,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from doe.anova import block_columns
-from doe.checks import checked_level
+from doe.checks import checked_count, checked_kind, checked_level
 from doe.design import Design, observations
 from doe.designs.aliases import two_level_runs
 from doe.errors import DesignError
@@ -84,11 +84,14 @@ def two_level_effects(design: Design, response: ArrayLike, order: int | None = N
     DesignError
         Effects that fall partly onto one another (a Plackett-Burman design: ``screen`` it), or fewer than 5.
     """
+    checked_kind("design", design, Design)
     _, values = observations(design, response)
     means = values.groupby(level=0, sort=False).mean()
     coded = two_level_runs(design)
     y = means.loc[coded.index].to_numpy()
-    rows, mixed = _distinct(coded, design.names, order or len(design.names))
+    rows, mixed = _distinct(
+        coded, design.names, len(design.names) if order is None else checked_count("order", order)
+    )
     columns = np.column_stack([coded[list(term)].prod(axis=1) for term in rows])
     blocks = None if design.blocks is None else design.blocks.loc[coded.index]
     lost = np.column_stack([np.ones(len(coded)), block_columns(blocks, coded.index).to_numpy()])

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from statsmodels.regression.linear_model import RegressionResults
 
 from doe.analysis.coefficients import coefficient_table, significant_words, summary_text
+from doe.checks import checked_kind, real_array
 from doe.design import Design, observations
 from doe.designs.mixture import Mixture
 from doe.errors import DesignError
@@ -100,6 +101,9 @@ def fit_formula(design: Design, response: ArrayLike, formula: str, *, coded: boo
     DesignError
         A formula that is not understood, a name that is no variable, terms that the runs cannot tell apart.
     """
+    checked_kind("design", design, Design)
+    if not isinstance(formula, str):
+        raise DesignError(f"formula is text such as 'A * B', received {formula!r}")
     if "~" in formula:
         raise DesignError(f"formula is the right-hand side alone, such as 'A * B'; received {formula!r}")
     observed, values = observations(design, response)
@@ -129,9 +133,10 @@ def fit_mixture(mixture: Mixture, response: ArrayLike, model: str = "quadratic")
     model : {"linear", "quadratic", "special cubic"}
         Components; with their products of two; and of three (Scheffe 1958).
     """
+    checked_kind("mixture", mixture, Mixture)
     if model not in MIXTURE_MODELS:
         raise DesignError(f"model is one of {', '.join(MIXTURE_MODELS)}, received {model!r}")
-    values = np.asarray(response, dtype=np.float64)
+    values = real_array("response", response)
     if values.ndim not in (1, 2) or len(values) != len(mixture.shares) or not np.isfinite(values).all():
         raise DesignError(
             f"a response has a finite value for each of {len(mixture.shares)} blends, received "

@@ -3,6 +3,7 @@
 import numpy as np
 from scipy import stats
 
+from doe.checks import checked_kind, checked_level
 from doe.region import Region, box_cells
 from doe.surface import Surface
 from doe.terms import Term
@@ -28,6 +29,8 @@ def stationary_region(
     resolution : int, optional
         Cells along each factor.
     """
+    checked_level(alpha)
+    checked_kind("surface", surface, Surface)
     honest = surface.unselected
     names = honest.design.names
     points, count = box_cells(len(names), extent, resolution)

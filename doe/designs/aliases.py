@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from doe.checks import checked_count, checked_kind
 from doe.design import Design
 from doe.errors import DesignError
 from doe.terms import Term, term_name
@@ -105,6 +106,8 @@ def alias_structure(design: Design, order: int = 2) -> AliasStructure:
     DesignError
         A factor with other levels than -1 and +1.
     """
+    order = checked_count("order", order)
+    checked_kind("design", design, Design)
     coded = two_level_runs(design)
     names = design.names
     terms: list[Term] = [term for size in range(1, order + 1) for term in itertools.combinations(names, size)]

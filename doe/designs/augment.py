@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
+from doe.checks import checked_count, checked_kind, checked_list, checked_number
 from doe.design import Design, numbered
 from doe.errors import DesignError
 from doe.factors import Category, numeric_factors
@@ -22,6 +23,8 @@ def join(*designs: Design, blocks: Sequence | None = None) -> Design:
         A label for each design, whose runs become a block; default 1, 2, ... Designs with blocks of their own
         keep those as ``label.block``.
     """
+    for design in designs:
+        checked_kind("design", design, Design)
     if len(designs) < 2:
         raise DesignError(f"join takes two or more designs, received {len(designs)}")
     first = designs[0]
@@ -57,7 +60,12 @@ def foldover(design: Design, factors: Sequence[str] | None = None) -> Design:
     factors : names, optional
         Factors whose signs turn round; default all, and the dummies.
     """
-    turned = list(design.coded.columns) if factors is None else [design.factor(name).name for name in factors]
+    checked_kind("design", design, Design)
+    turned = (
+        list(design.coded.columns)
+        if factors is None
+        else [design.factor(name).name for name in checked_list("factors", factors)]
+    )
     many = [f.name for f in design.factors if isinstance(f, Category) and len(f.levels) > 2]
     if many:
         raise DesignError(f"a category of more than two levels has no mirror image: {many[0]!r}")
@@ -72,9 +80,9 @@ def add_center(design: Design, count: int) -> Design:
     They cost little, show curvature (``screen`` and ``curvature_test``) and give an error without replicating
     the rest.
     """
+    checked_kind("design", design, Design)
     numeric_factors(design.factors, "a center")
-    if count < 1:
-        raise DesignError(f"count is the number of center runs and at least 1, received {count}")
+    count = checked_count("count, the number of center runs,", count)
     labels = (
         []
         if design.blocks is None
@@ -99,9 +107,10 @@ def add_axial(design: Design, alpha: float, center: int = 0) -> Design:
     center : int
         Center runs in the new block.
     """
+    checked_kind("design", design, Design)
     numeric_factors(design.factors, "an axial point")
-    if not (np.isfinite(alpha) and alpha > 0.0) or center < 0:
-        raise DesignError(f"alpha is positive and center not negative, received {alpha} and {center}")
+    alpha = checked_number("alpha", alpha, above=0.0)
+    center = checked_count("center", center, least=0)
     count = len(design.factors)
     coded = np.vstack([np.kron(np.eye(count), [[-alpha], [alpha]]), np.zeros((center, count))])
     axial = Design(design.factors, numbered(pd.DataFrame(coded, columns=design.names)))

@@ -5,6 +5,7 @@ from collections.abc import Iterable
 import numpy as np
 import pandas as pd
 
+from doe.checks import checked_count
 from doe.design import Design, numbered
 from doe.designs.factorial import basic_factorial
 from doe.errors import DesignError
@@ -58,8 +59,8 @@ def box_behnken(
         raise DesignError("the Box-Behnken design of 3 factors has no orthogonal blocks")
     if not blocks:
         pieces = [np.vstack(pieces)]
-    center = CENTERS[count] if center is None else center
-    if center < 0 or center % len(pieces):
+    center = CENTERS[count] if center is None else checked_count("center", center, least=0)
+    if center % len(pieces):
         raise DesignError(
             f"center is the number of center runs, shared by {len(pieces)} blocks; received {center}"
         )

@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from doe.checks import checked_count, checked_number
 from doe.design import Design, numbered
 from doe.designs.blocking import block_labels
 from doe.designs.factorial import basic_factorial
@@ -108,9 +109,12 @@ def _corner_blocks(corners: NDArray[np.float64], blocks: int) -> list[NDArray[np
 
 def _centers(center: int | tuple[int, int], blocks: int) -> tuple[int, int]:
     """Return the center runs of each block of corners and of the axial points."""
-    cube, star = (center if blocks > 1 else 0, center) if isinstance(center, int) else center
-    if cube < 0 or star < 0:
-        raise DesignError(f"center is the number of center runs and not negative, received {center}")
+    if not isinstance(center, tuple):
+        count = checked_count("center", center, least=0)
+        return (count if blocks > 1 else 0), count
+    if len(center) != 2:
+        raise DesignError(f"center is one or two numbers of center runs, received {center}")
+    cube, star = (checked_count("center", count, least=0) for count in center)
     return cube, star
 
 
@@ -132,6 +136,4 @@ def _axial_distance(
         if alpha not in named:
             raise DesignError(f"alpha is one of {', '.join(ALPHAS)} or a number, received {alpha!r}")
         return named[alpha]
-    if not (math.isfinite(alpha) and alpha > 0.0):
-        raise DesignError(f"alpha must be positive and finite, received {alpha}")
-    return float(alpha)
+    return checked_number("alpha", alpha, above=0.0)

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from doe.checks import checked_count, checked_list
 from doe.design import Design, numbered
 from doe.designs.aliases import alias_structure
 from doe.designs.blocking import block_labels
@@ -69,8 +70,9 @@ def full_factorial(
         Seed of the run order; None keeps the standard order.
     """
     factors = checked_factors(factors)
-    counts = [levels] * len(factors) if isinstance(levels, int) else list(levels)
-    if len(counts) != len(factors) or any(count < 2 for count in counts):
+    given = [levels] * len(factors) if isinstance(levels, int) else checked_list("levels", levels)
+    counts = [checked_count("levels", count, least=2) for count in given]
+    if len(counts) != len(factors):
         raise DesignError(f"levels: two or more for each of {len(factors)} factors, received {levels}")
     grids = [
         np.array(factor.codes) if isinstance(factor, Category) else np.linspace(-1.0, 1.0, count)
@@ -122,6 +124,8 @@ def fractional_factorial(
     if generators is not None:
         coded, written = _generated(names, generators)
     else:
+        if runs is not None:
+            runs = checked_count("runs", runs, least=2)
         coded, written = _from_catalogue(names, runs, resolution)
     design = _with_blocks(factors, coded, blocks, center, seed)
     structure = alias_structure(design, order=1)

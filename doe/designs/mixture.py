@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from doe.checks import checked_count, checked_kind, checked_list
 from doe.design import numbered
 from doe.errors import DesignError
 
@@ -32,6 +33,7 @@ class Mixture:
     seed: int | None = None
 
     def __post_init__(self) -> None:
+        checked_kind("shares", self.shares, pd.DataFrame)
         totals = self.shares.sum(axis=1)
         off = totals.index[(totals - 1.0).abs() > TOLERANCE]
         if len(off) or not (self.shares >= -TOLERANCE).all(axis=None):
@@ -80,8 +82,7 @@ def simplex_lattice(
         Seed of the run order.
     """
     names = _checked(components)
-    if degree < 1:
-        raise DesignError(f"degree: 1 or more, received {degree}")
+    degree = checked_count("degree", degree)
     count = len(names)
     rows = [row for row in itertools.product(range(degree, -1, -1), repeat=count) if sum(row) == degree]
     shares = np.array(rows) / degree
@@ -107,8 +108,8 @@ def simplex_centroid(
 
 
 def _checked(components: Sequence[str]) -> list[str]:
-    names = [str(name) for name in components]
-    if isinstance(components, str) or len(names) < 2 or len(set(names)) < len(names):
+    names = [str(name) for name in checked_list("components", components)]
+    if len(names) < 2 or len(set(names)) < len(names):
         raise DesignError(f"a mixture has two or more different components, received {components!r}")
     return names
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.stats import qmc
 
 from doe.anova import block_columns
+from doe.checks import checked_count
 from doe.design import Design, numbered
 from doe.designs.augment import join
 from doe.designs.model_columns import model_columns
@@ -70,6 +71,7 @@ def optimal_design(
     factors = checked_factors(factors)
     if criterion not in ("D", "I"):
         raise DesignError(f"criterion is D or I, received {criterion!r}")
+    runs = checked_count("runs", runs)
     rng = np.random.default_rng(seed)
     candidates = allowed(factors, _candidates(factors, levels, seed), constraints)
     expanded = model_columns(candidates, factors, model).to_numpy()
@@ -79,7 +81,7 @@ def optimal_design(
         kept, blocks = _kept(existing, factors, model)
         expanded = np.column_stack([expanded, np.broadcast_to(blocks, (len(expanded), len(blocks)))])
     count = expanded.shape[1]
-    if len(kept) + runs < count or runs < 1:
+    if len(kept) + runs < count:
         raise DesignError(f"{count} coefficients need as many runs, received {len(kept) + runs}")
     if np.linalg.matrix_rank(np.vstack([expanded, kept])) < count:
         raise DesignError(

@@ -5,6 +5,7 @@ from collections.abc import Iterable
 
 import pandas as pd
 
+from doe.checks import checked_count
 from doe.design import Design, numbered
 from doe.designs.hadamard import constructible, screening_matrix, worst_alias
 from doe.errors import DesignError
@@ -49,6 +50,7 @@ def plackett_burman(factors: Iterable[Factor], runs: int | None = None, seed: in
         runs = max(DEFAULT_RUNS, 4 * math.ceil((len(factors) + 1) / 4))
         while not constructible(runs):
             runs += 4
+    runs = checked_count("runs", runs)
     if runs < len(factors) + 1:
         raise DesignError(f"{len(factors)} factors need at least {len(factors) + 1} runs, received {runs}")
     matrix = screening_matrix(runs, len(factors))

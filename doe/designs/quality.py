@@ -9,6 +9,7 @@ from scipy import stats
 from scipy.stats import qmc
 
 from doe.anova import block_columns
+from doe.checks import checked_kind
 from doe.design import Design
 from doe.designs.model_columns import model_columns
 from doe.designs.optimal import Constraint, allowed
@@ -58,6 +59,7 @@ def design_quality(
     DesignError
         The design cannot tell the model's terms apart.
     """
+    checked_kind("design", design, Design)
     matrix = _full_matrix(design, model)
     columns = model_columns(design.points, design.factors, model)
     count, runs = columns.shape[1], len(columns)
@@ -115,6 +117,7 @@ def power_table(
     DesignError
         No degrees of freedom for the error, or terms that the runs cannot tell apart.
     """
+    checked_kind("design", design, Design)
     if not (np.isfinite(sd) and sd > 0.0) or replicates < 1 or not 0.0 < alpha < 1.0:
         raise DesignError(
             "sd is positive, replicates at least 1 and alpha between 0 and 1; received "

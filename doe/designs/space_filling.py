@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 from scipy.stats import qmc
 
+from doe.checks import checked_count
 from doe.design import Design, numbered
 from doe.errors import DesignError
 from doe.factors import Factor, numeric_factors
@@ -32,8 +33,7 @@ def latin_hypercube(
         moving them apart, which does not (see ``scipy.stats.qmc.LatinHypercube``).
     """
     factors = numeric_factors(factors, "a Latin hypercube")
-    if runs < 2:
-        raise DesignError(f"a Latin hypercube has two or more runs, received {runs}")
+    runs = checked_count("runs of a Latin hypercube", runs, least=2)
     sampler = qmc.LatinHypercube(len(factors), optimization=optimize, rng=np.random.default_rng(seed))
     return _design(factors, sampler.random(runs))
 
@@ -50,7 +50,8 @@ def sobol(factors: Iterable[Factor], runs: int, *, seed: int | None = None) -> D
         Seed of Owen's scrambling; None takes the plain sequence, whose first run has every factor low.
     """
     factors = numeric_factors(factors, "a Sobol design")
-    if runs < 2 or runs & (runs - 1):
+    runs = checked_count("runs of a Sobol design", runs, least=2)
+    if runs & (runs - 1):
         below = 1 << max(runs.bit_length() - 1, 1)
         raise DesignError(
             f"a Sobol design has a power of two of runs, such as {below} or {2 * below}; received {runs}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from filelock import FileLock, Timeout
@@ -21,7 +21,7 @@ CASES = "cases"
 """Folder of the stored cases."""
 
 LOCK = ".lock"
-"""File that a run holds while it works in a folder; it stays, and is no result."""
+"""File that a run holds while it works in a folder; it stays beside results, and is none."""
 
 _log = logging.getLogger(__name__)
 
@@ -37,7 +37,7 @@ def locked(folder: Path, resume: bool = False) -> Iterator[None]:
         resume. Nothing is written then.
     """
     _require_usable(folder, resume)
-    lock = FileLock(folder / LOCK, timeout=0)
+    lock, made = FileLock(folder / LOCK, timeout=0), not folder.exists()
     try:
         folder.mkdir(parents=True, exist_ok=True)
         lock.acquire()
@@ -51,7 +51,17 @@ def locked(folder: Path, resume: bool = False) -> Iterator[None]:
         _require_usable(folder, resume)
         yield
     finally:
+        if made and not is_used(folder):
+            _take_away(folder)
         lock.release()
+
+
+def _take_away(folder: Path) -> None:
+    """Remove a folder that holds a lock alone, so that a run that was refused leaves nothing."""
+    # another system may keep a file that is open, and another run may write into the folder just now
+    with suppress(OSError):
+        (folder / LOCK).unlink()
+        folder.rmdir()
 
 
 def open_folder(folder: Path, study: Study, resume: bool = False) -> tuple[Store, list[str]]:

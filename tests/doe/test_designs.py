@@ -164,7 +164,7 @@ def test_rotatable_prediction_variance_depends_on_the_radius_alone(count):
             "alpha is one of rotatable, face, spherical, orthogonal, blocks or a number, received 'corner'",
         ),
         ({"alpha": 0.0}, "alpha must be positive and finite, received 0"),
-        ({"center": -1}, "not negative, received -1"),
+        ({"center": -1}, "at least 0, received -1"),
     ],
 )
 def test_composite_refuses(options, message):

@@ -34,10 +34,15 @@ def in_laws(file: Path, scale: str | None, laws: str) -> Study:
 
 def prove(study: Study, folder: Path, laws: str, seeds: int, workers: int | None) -> dict[str, object]:
     """Calibrate a study, and run its card's test in LIGGGHTS; what is finished in the folder is kept."""
+    named = f"{study.name}, laws {laws}"
     card = folder / "campaign" / "material.toml"
     if not card.is_file():
         resume = card.parent.is_dir()
-        api.calibrate(study, card.parent, device="cpu", workers=workers, resume=resume, watch=CaseProgress)
+        made = api.calibrate(
+            study, card.parent, device="cpu", workers=workers, resume=resume, watch=CaseProgress
+        ).campaign
+        if made is None or made.optimum is None:
+            return {"study": named, "met": False, "why": made and made.reason}
     source = read_source(card)
     there = with_engine(source.study, "liggghts")
     store, _ = open_folder(folder / "liggghts", there, resume=True)
@@ -48,7 +53,6 @@ def prove(study: Study, folder: Path, laws: str, seeds: int, workers: int | None
     test = compare_means(good[source.observable].to_numpy(), source.target, margin=MARGIN)
     low, high = test.interval
     met = low <= MARGIN and high >= -MARGIN
-    named = f"{study.name}, laws {laws}"
     numbers = (source.target.mean, test.a.mean, test.a.sd, test.a.n, test.difference, low, high)
     return dict(zip(COLUMNS, (named, *numbers, met, test.equivalent), strict=True))
 
