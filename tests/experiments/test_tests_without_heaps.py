@@ -35,7 +35,10 @@ revolutions = 0.1
 rest_speed = "0.05 m/s"
 """
 FAST = '[condition.base]\n[condition.fast]\nscene.drum.rotation_rate = "2 1/s"\n'
-MEASURABLE = ["fill_height", "solid_fraction", "dynamic_angle", "upper_angle", "lower_angle", "mass_angle"]
+MEASURABLE = [
+    "fill_height", "solid_fraction", "dynamic_angle", "upper_angle", "lower_angle", "mass_angle",
+    *(f"surface_{number}" for number in range(1, 10)),
+]  # fmt: skip
 
 
 @pytest.fixture
