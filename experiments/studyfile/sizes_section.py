@@ -12,15 +12,9 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from dem_warp import ClumpShape, GrainPopulation, Material, SizeClasses
-from experiments.grain_sizes import (
-    DIAMETERS,
-    Classes,
-    Continuous,
-    Distribution,
-    cut_classes,
-    read_counts,
-    read_sieves,
-)
+from experiments.grain_sizes.classes import Classes, cut_classes
+from experiments.grain_sizes.diameters import DIAMETERS
+from experiments.grain_sizes.distribution import Continuous, Distribution
 from experiments.studyfile.schema import Length, Number, Section
 from experiments.studyfile.units import unit_size
 
@@ -153,8 +147,11 @@ def _classes(section: SizesSection, modified: tuple[int, ...]) -> Classes:
 
 def _distribution(section: SizesSection) -> tuple[Distribution, float]:
     """Distribution of the diameter, and the part of the mass that a table gives none for."""
-    # The formulas of scipy.stats take a second to load, and few studies need them.
+    # The formulas of scipy.stats take a second to load, and few studies need them; the readers of tables know
+    # the units of this package.
     from scipy import stats
+
+    from experiments.grain_sizes.tables import read_counts, read_sieves
 
     if section.sieves is not None:
         return read_sieves(section.sieves, section.unit)

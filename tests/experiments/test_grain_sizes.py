@@ -11,8 +11,10 @@ from scipy import stats
 
 from dem_warp import ClumpShape
 from experiments.errors import InputError, StudyError
-from experiments.grain_sizes import Continuous, Tabulated, cut_classes, read_counts, read_sieves
+from experiments.grain_sizes.classes import cut_classes
 from experiments.grain_sizes.diameters import feret_diameter, sieve_diameter, volume_diameter
+from experiments.grain_sizes.distribution import Continuous, Tabulated
+from experiments.grain_sizes.tables import read_counts, read_sieves
 from experiments.report.study_facts import study_facts
 from experiments.studyfile import load_study
 
