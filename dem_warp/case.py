@@ -1,19 +1,20 @@
 """One simulation: what is simulated (scene, grains, contacts, seed) and how (numerics)."""
 
 from dataclasses import dataclass, field, fields, is_dataclass
-from typing import Annotated, Any, Generic, Literal, TypeVar
+from typing import Annotated, Any, Generic, Literal, TypeVar, get_args
 
-from dem_warp.laws.contact_law import check_forms
 from dem_warp.laws.conventions import EDEM, ContactLaws
-from dem_warp.laws.mechanism import Mechanism
+from dem_warp.laws.mechanism import Mechanism, check_forms
 from dem_warp.materials import Interaction, Material, WallPart, rayleigh_time
 from dem_warp.model import ContactCoefficients
 from dem_warp.parameters import LATER, Parameter, check_parameters
 from dem_warp.population import GrainPopulation
 from dem_warp.scenes.scene import Scene
-from dem_warp.types import PRECISIONS
 
 SceneT = TypeVar("SceneT", bound=Scene)
+
+PrecisionName = Literal["mixed", "double"]
+"""Names of `dem_warp.types.PRECISIONS`."""
 
 
 @dataclass(frozen=True)
@@ -24,14 +25,14 @@ class Numerics:
     """Time step, as a fraction of the Rayleigh time of the smallest sphere; the paper uses 0.25."""
     skin: Annotated[float | None, Parameter("m", above=0.0)] = None
     """Reach of the neighbour lists beyond contact, which affects the speed only; left out: from the step."""
-    precision: Literal["mixed", "double"] = "mixed"
+    precision: PrecisionName = "mixed"
     """Floating point precision of the forces."""
     modulus_scale: Annotated[float, Parameter("1", at_least=1.0)] = 1.0
     """The grains' shear modulus is divided by this (softer grains take larger steps)."""
 
     def __post_init__(self) -> None:
         check_parameters(self)
-        known = sorted(PRECISIONS)
+        known = sorted(get_args(PrecisionName))
         _require(self.precision in known, "Numerics.precision", f"must be one of {known}", self.precision)
 
 

@@ -8,12 +8,11 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from dem_warp.clumps import ClumpShape
-from dem_warp.laws.contact_law import Mechanisms, check_forms
+from dem_warp.entries import MAX_PARTNERS, MAX_SPHERES_PER_GRAIN
 from dem_warp.laws.conventions import BASE_FORMS, EDEM, ContactLaws, LawForms
 from dem_warp.laws.library import MECHANISMS
-from dem_warp.laws.mechanism import Mechanism, clashes
+from dem_warp.laws.mechanism import Mechanism, Mechanisms, check_forms, clashes
 from dem_warp.materials import DAMPINGS, Interaction, Material, effective_moduli
-from dem_warp.types import MAX_PARTNERS, MAX_SPHERES_PER_GRAIN
 from dem_warp.walls import Wall
 
 GRAVITY = 9.81

@@ -1,5 +1,7 @@
 """The grains of a case: their shapes, their material and their sizes, and how they are drawn from a seed."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -227,7 +229,7 @@ class GrainPopulation:
     @classmethod
     def of_classes(
         cls, shape: ClumpShape | ShapeMixture, material: Material, classes: SizeClasses
-    ) -> "GrainPopulation":
+    ) -> GrainPopulation:
         """Build a population of classes of size."""
         mean = classes.moment(1)
         spread = math.sqrt(max(classes.moment(2) - mean**2, 0.0))

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import warp as wp
 
 from dem_warp.version import __version__, source_commit
 
@@ -85,6 +84,8 @@ def _is_docstring(part: Any) -> bool:
 
 def provenance(device: Any, precision: str) -> dict[str, Any]:
     """Versions, device and precision that make a result, by name."""
+    import warp as wp
+
     return {
         "dem-warp": __version__,
         "commit": source_commit(),

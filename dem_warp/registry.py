@@ -1,14 +1,43 @@
 """Registries: laws, scenes and the like by name, those of this tree and those of packages from outside."""
 
 import logging
+from collections import ChainMap
 from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property
+from importlib import import_module
 from importlib.metadata import entry_points
 from typing import Generic, TypeVar
 
 T = TypeVar("T")
 
 _log = logging.getLogger(__name__)
+
+
+class Modules(Mapping[str, T], Generic[T]):
+    """Things of this tree by name, each imported when it is first wanted: names alone load nothing.
+
+    Parameters
+    ----------
+    places : mapping
+        Module and name of each, as ``"dem_warp.laws.jkr:JKR"``.
+    """
+
+    def __init__(self, places: Mapping[str, str]) -> None:
+        self._places = places
+
+    def __getitem__(self, name: str) -> T:
+        module, _, thing = self._places[name].partition(":")
+        found: T = getattr(import_module(module), thing)
+        return found
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._places
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._places)
+
+    def __len__(self) -> int:
+        return len(self._places)
 
 
 class Registry(Mapping[str, T], Generic[T]):
@@ -42,8 +71,10 @@ class Registry(Mapping[str, T], Generic[T]):
         self._group, self._built_in, self._check = group, built_in, check
 
     @cached_property
-    def _known(self) -> dict[str, T]:
-        known = dict(self._built_in)
+    def _outside(self) -> dict[str, T]:
+        """What packages from outside announce."""
+        outside: dict[str, T] = {}
+        known = ChainMap(outside, self._built_in)  # type: ignore[arg-type]
         for entry in sorted(entry_points(group=self._group), key=lambda entry: entry.name):
             try:
                 if entry.name in known:
@@ -55,17 +86,21 @@ class Registry(Mapping[str, T], Generic[T]):
                 place = f"package {package}, entry {entry.name} = {entry.value} of {self._group}"
                 _log.warning("%s: left out, %s: %s", place, type(error).__name__, error)
             else:
-                known[entry.name] = thing
-        return known
+                outside[entry.name] = thing
+        return outside
 
     def __getitem__(self, name: str) -> T:
-        return self._known[name]
+        return self._built_in[name] if name in self._built_in else self._outside[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._built_in or name in self._outside
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._known)
+        yield from self._built_in
+        yield from self._outside
 
     def __len__(self) -> int:
-        return len(self._known)
+        return len(self._built_in) + len(self._outside)
 
 
 def require_kind(base: type, name: str, thing: object) -> None:

@@ -48,29 +48,44 @@ class CaseResult:
     provenance: dict[str, Any] = field(default_factory=dict)
     """Versions, device and precision."""
 
-    @cached_property
+    @property
     def sphere_centers(self) -> np.ndarray:
         """Sphere centres in place [m], (spheres, 3), grain by grain."""
-        vector, scalar = self.orientations[:, None, :3], self.orientations[:, None, 3:]
-        local = self.clumps[self.shapes, :, :3] * self.sizes[:, None, None]
-        turned = 2.0 * np.cross(vector, local)
-        placed = self.positions[:, None] + local + scalar * turned + np.cross(vector, turned)
-        return placed[self._exist]
+        return self._spheres[0]
 
     @property
     def sphere_radii(self) -> np.ndarray:
         """Sphere radii [m], (spheres,)."""
-        return (self.clumps[self.shapes, :, 3] * self.sizes[:, None])[self._exist]
+        return self._spheres[1]
 
     @property
     def sphere_grain(self) -> np.ndarray:
         """Grain of each sphere, (spheres,)."""
-        return np.nonzero(self._exist)[0]
+        return self._spheres[2]
 
-    @property
-    def _exist(self) -> np.ndarray:
-        """True where a grain has the sphere of a number, (n, S)."""
-        return self.clumps[self.shapes, :, 3] > 0.0
+    @cached_property
+    def _spheres(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        return place_spheres(self.positions, self.orientations, self.sizes, self.clumps[self.shapes])
+
+
+def place_spheres(
+    positions: np.ndarray, orientations: np.ndarray, sizes: np.ndarray, clumps: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Centres [m], (spheres, 3), radii [m] and grains, (spheres,), of the spheres of grains, grain by grain.
+
+    Parameters
+    ----------
+    positions, orientations, sizes
+        As in `CaseResult`.
+    clumps : (n, S, 4) array
+        Spheres of each grain's shape, as in `CaseResult`.
+    """
+    vector, scalar = orientations[:, None, :3], orientations[:, None, 3:]
+    local = clumps[:, :, :3] * sizes[:, None, None]
+    turned = 2.0 * np.cross(vector, local)
+    placed = positions[:, None] + local + scalar * turned + np.cross(vector, turned)
+    exist = clumps[:, :, 3] > 0.0
+    return placed[exist], (clumps[:, :, 3] * sizes[:, None])[exist], np.nonzero(exist)[0]
 
 
 OnResult = Callable[[int, CaseResult], None]

@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from dem_warp.entries import SPHERE_BITS, SPHERE_MASK
 from dem_warp.solver import CHUNK, Solver
 from dem_warp.state import arrays_of
-from dem_warp.types import SPHERE_BITS, SPHERE_MASK
 
 Snapshot = dict[str, np.ndarray]
 """Part of a world in each array of the state, by the array's name."""

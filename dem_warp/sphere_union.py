@@ -106,7 +106,7 @@ def _latitudes(offsets: Array, cap_cosines: Array, resolution: int) -> tuple[Arr
     tilt = np.arctan2(np.hypot(offsets[:, 0], offsets[:, 1]), offsets[:, 2])
     reach = np.arccos(np.clip(cap_cosines, -1.0, 1.0))
     breaks = np.abs(np.concatenate([[0.0, np.pi], tilt - reach, tilt + reach]))
-    breaks = np.unique(np.minimum(breaks, 2.0 * np.pi - breaks))
+    breaks = np.array(sorted(set(np.minimum(breaks, 2.0 * np.pi - breaks).tolist())))
     nodes, weights = _unit_gauss(resolution)
     # An arc opens like a square root at a breakpoint; the map's flat ends make that smooth.
     spans = np.diff(breaks)[:, None]

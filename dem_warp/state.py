@@ -8,8 +8,8 @@ import numpy as np
 import warp as wp
 
 from dem_warp.clumps import stack_spheres
-from dem_warp.laws.contact_law import Mechanisms
 from dem_warp.laws.conventions import LawForms
+from dem_warp.laws.mechanism import Mechanisms
 from dem_warp.model import WorldSetup, shape_table
 from dem_warp.types import FRAMES, Precision, device_structs
 

@@ -13,16 +13,9 @@ from typing import Any
 
 import warp as wp
 
-from dem_warp.laws.contact_law import Mechanisms
 from dem_warp.laws.conventions import BASE_FORMS, LawForms
 from dem_warp.laws.library import parameters
-
-SPHERE_BITS = 23
-"""Bits of a neighbour entry that hold the partner (a sphere or a wall); above is the own sphere's number."""
-
-SPHERE_MASK = (1 << SPHERE_BITS) - 1
-MAX_PARTNERS = 1 << SPHERE_BITS
-MAX_SPHERES_PER_GRAIN = 1 << (31 - SPHERE_BITS)
+from dem_warp.laws.mechanism import Mechanisms
 
 FRAMES = 128
 """Steps for which the places of the walls are kept: a power of two above the longest cycle."""

@@ -21,9 +21,8 @@ def source_commit() -> str:
     if (here.parent / ".git").exists():
         command = ["git", "describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"]
         try:
-            return subprocess.run(
-                command, cwd=here, capture_output=True, text=True, check=True
-            ).stdout.strip()
+            told = subprocess.run(command, cwd=here, capture_output=True, encoding="utf-8", check=True)
+            return told.stdout.strip()
         except (OSError, subprocess.CalledProcessError):
             return ""
     built = here / COMMIT_FILE

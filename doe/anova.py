@@ -6,12 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 import statsmodels.api as sm
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 from statsmodels.regression.linear_model import RegressionResults
 
+from doe.checks import checked_kind
 from doe.errors import DesignError
-from doe.labels import in_rows
+from doe.labels import check_labels, in_rows
 
 ALIAS_TOLERANCE = 1e-8
 """Length of what a column adds to those before it, relative to its own, below which it adds nothing."""
@@ -33,6 +34,19 @@ class ErrorTerm:
     def mean_sq(self) -> float:
         """Mean square; NaN without degrees of freedom."""
         return self.sum_sq / self.df if self.df > 0 else np.nan
+
+
+def block_numbers(blocks: pd.Series, rows: pd.Index) -> NDArray[np.intp]:
+    """Return the number of each row's block; raise DesignError unless every row has one."""
+    checked_kind("blocks", blocks, pd.Series)
+    if not blocks.index.equals(rows):
+        if rows.has_duplicates:
+            raise DesignError("blocks have the labels of the rows, in their order where a label comes again")
+        check_labels("blocks", blocks.index, rows)
+        blocks = blocks.loc[rows]
+    if blocks.isna().any():
+        raise DesignError(f"blocks: row {blocks.index[blocks.isna()][0]} has none")
+    return pd.factorize(blocks)[0]
 
 
 def least_squares(matrix: pd.DataFrame, response: pd.Series) -> RegressionResults:
@@ -63,19 +77,15 @@ def pure_error(coded: pd.DataFrame, response: ArrayLike, blocks: pd.Series | Non
 
     Rows of ``coded`` that agree (in one block, where there are blocks) are replicates of one setting; the
     degrees of freedom are the observations less the distinct settings. A labelled response is read by the
-    labels of ``coded``, an array by its position.
+    labels of ``coded``, an array by its position; so are labelled blocks.
     """
     if not isinstance(coded, pd.DataFrame) or not len(coded.columns):
         raise DesignError(f"pure error needs a table of settings, one row an observation, received {coded!r}")
     values = in_rows("a response", response, coded.index)
     setting = settings_of(coded)
     if blocks is not None:
-        setting = (
-            pd.DataFrame({"setting": setting, "block": blocks.to_numpy()})
-            .groupby(["setting", "block"])
-            .ngroup()
-        )
-        setting = setting.to_numpy()
+        label = block_numbers(blocks, coded.index)
+        setting = np.unique(np.column_stack([setting, label]), axis=0, return_inverse=True)[1].ravel()
     within = values.to_numpy() - values.groupby(setting).transform("mean").to_numpy()
     return ErrorTerm(float(len(values) - len(np.unique(setting))), float(within @ within))
 

@@ -2,11 +2,10 @@
 
 import math
 import numbers
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Collection, Iterable, Mapping
+from typing import Any, TypeVar
 
 import numpy as np
-import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from doe.errors import DesignError
@@ -45,17 +44,54 @@ def _range(above: float, least: float) -> str:
     return "finite"
 
 
-def checked_kind(name: str, value: Any, kind: type) -> None:
-    """Raise DesignError unless a value is of a kind, such as a Design or a Surface."""
+Kind = TypeVar("Kind")
+
+
+def checked_kind(name: str, value: Any, kind: type[Kind]) -> Kind:
+    """Return a value; raise DesignError unless it is of a kind, such as a Design or a Surface."""
     if not isinstance(value, kind):
         raise DesignError(f"{name} must be a {kind.__name__}, received {value!r}")
+    return value
 
 
 def checked_list(name: str, values: Any) -> list:
-    """Return values as a list; raise DesignError when they are none, or a text."""
-    if not isinstance(values, Iterable) or isinstance(values, str | bytes):
+    """Return values as a list; raise DesignError when they are none: a text, a mapping, a table."""
+    # a table is told by its columns: pandas need not be loaded to read factors
+    if (
+        not isinstance(values, Iterable)
+        or isinstance(values, str | bytes | Mapping)
+        or hasattr(values, "columns")
+    ):
         raise DesignError(f"{name} must be a list, received {values!r}")
     return list(values)
+
+
+def checked_flag(name: str, value: Any) -> bool:
+    """Return a truth value; raise DesignError for anything else."""
+    if not isinstance(value, bool | np.bool_):
+        raise DesignError(f"{name} must be True or False, received {value!r}")
+    return bool(value)
+
+
+def checked_choice(name: str, value: Any, choices: Collection[str]) -> str:
+    """Return a name; raise DesignError unless it is one of some."""
+    if not isinstance(value, str) or value not in choices:
+        raise DesignError(f"{name} is one of {', '.join(choices)}, received {value!r}")
+    return value
+
+
+def checked_map(name: str, value: Any) -> dict:
+    """Return a mapping, or a Series, as a dict; raise DesignError for anything else."""
+    import pandas as pd
+
+    if not isinstance(value, Mapping | pd.Series):
+        raise DesignError(f"{name} must be a mapping by name, received {value!r}")
+    return dict(value)
+
+
+def checked_seed(value: Any) -> int | None:
+    """Return a seed of random numbers: a whole number that is not negative, or None."""
+    return None if value is None else checked_count("seed", value, least=0)
 
 
 def checked_level(value: Any, name: str = "alpha") -> float:
@@ -65,11 +101,17 @@ def checked_level(value: Any, name: str = "alpha") -> float:
     return float(value)
 
 
-def checked_count(name: str, value: Any, least: int = 1) -> int:
-    """Return a whole number that is at least ``least``."""
+MOST = 100_000
+"""Of runs, levels, center runs, steps: more are a slip of the pen, and would fill the memory."""
+
+
+def checked_count(name: str, value: Any, least: int = 1, most: float = math.inf) -> int:
+    """Return a whole number that is at least ``least`` and at most ``most``."""
     whole = isinstance(value, numbers.Real) and not isinstance(value, bool | np.bool_)
     if not whole or not math.isfinite(value) or int(value) != value or int(value) < least:
         raise DesignError(f"{name} must be a whole number of at least {least}, received {value!r}")
+    if value > most:
+        raise DesignError(f"{name} must be at most {most}, received {value}")
     return int(value)
 
 
@@ -94,11 +136,13 @@ def real_array(name: str, values: ArrayLike) -> NDArray[np.float64]:
         raise DesignError(f"{name}: a masked value is no measurement, received one at position {place}")
     if isinstance(values, str | bytes | dict | set) or values is None:
         raise DesignError(f"{name} must be numbers, received {values!r}")
-    if isinstance(getattr(values, "dtype", None), pd.CategoricalDtype):
+    if getattr(getattr(values, "dtype", None), "name", "") == "category":
         raise DesignError(f"{name} must be real numbers, received categories")
     try:
         array = np.asarray(values)
         if array.dtype == object:  # pandas' missing values, Python's fractions and decimals, or no numbers
+            import pandas as pd
+
             if any(isinstance(value, str | bytes | bool | complex) for value in array.ravel()):
                 raise TypeError("text, truth values or complex numbers")
             array = np.asarray(pd.DataFrame(array.reshape(array.shape[0], -1)), dtype=np.float64).reshape(
@@ -109,3 +153,13 @@ def real_array(name: str, values: ArrayLike) -> NDArray[np.float64]:
         return np.array(array, dtype=np.float64)
     except (TypeError, ValueError, IndexError) as error:
         raise DesignError(f"{name} must be real numbers in equal rows: {error}") from None
+
+
+def checked_points(coded: ArrayLike, factor_count: int) -> NDArray[np.float64]:
+    """Return coded points, shape (points, factors); one point may be given as a row of its own."""
+    points = np.atleast_2d(real_array("coded points", coded))
+    if points.ndim != 2 or points.shape[1] != factor_count:
+        raise DesignError(f"coded points have shape (points, {factor_count}), received {points.shape}")
+    if not np.isfinite(points).all():
+        raise DesignError(f"coded points are finite, received {points[~np.isfinite(points)][0]}")
+    return points

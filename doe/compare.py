@@ -1,61 +1,20 @@
 """Two means: t-tests, the interval of their difference, and equivalence within a margin (TOST)."""
 
+from __future__ import annotations
+
 import math
 import numbers
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
-import pandas as pd
-from numpy.typing import NDArray
 from scipy import stats
 
-from doe.checks import checked_count, checked_level, checked_number, real_array
+from doe.checks import checked_choice, checked_level, checked_number
 from doe.errors import DesignError
+from doe.sample import Sample, Values
 from doe.two_errors import TwoErrors
 
 METHODS = ("welch", "pooled", "guarded", "one-sample")
-
-Values: TypeAlias = Sequence[float] | NDArray | pd.Series
-
-
-@dataclass(frozen=True)
-class Sample:
-    """A sample by its summary: mean, standard deviation (n - 1 in its denominator), size."""
-
-    mean: float
-    sd: float
-    n: int
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "mean", checked_number("a sample's mean", self.mean))
-        object.__setattr__(self, "sd", checked_number("a sample's sd", self.sd, least=0.0))
-        count = checked_count("n, the size of a sample, which needs 2 values to have a spread,", self.n, 2)
-        object.__setattr__(self, "n", count)
-
-    @classmethod
-    def of(cls, values: "Sample | Values") -> "Sample":
-        """Return the summary of values (a Sample is returned as it is)."""
-        if isinstance(values, Sample):
-            return values
-        numbers = real_array("a sample", values)
-        if numbers.ndim != 1 or numbers.size < 2:
-            raise DesignError(f"a sample is at least 2 values in one row, received shape {numbers.shape}")
-        bad = np.flatnonzero(~np.isfinite(numbers))
-        if bad.size:
-            raise DesignError(f"a sample's values must be finite: {numbers[bad[0]]} at position {bad[0] + 1}")
-        return cls(float(numbers.mean()), float(numbers.std(ddof=1)), int(numbers.size))
-
-    @property
-    def df(self) -> int:
-        """Degrees of freedom of the standard deviation."""
-        return self.n - 1
-
-    @property
-    def se(self) -> float:
-        """Standard error of the mean."""
-        return self.sd / math.sqrt(self.n)
 
 
 @dataclass(frozen=True)
@@ -162,8 +121,7 @@ def compare_means(
         Fewer than two values, values that are not finite, no spread at all, a margin that is not positive, a
         sample where a number is due or the other way round.
     """
-    if method not in METHODS:
-        raise DesignError(f"method is one of {', '.join(METHODS)}, received {method!r}")
+    checked_choice("method", method, METHODS)
     if margin is not None:
         margin = checked_number("an equivalence margin", margin)
         if not margin > 0.0:

@@ -6,12 +6,15 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from doe.checks import checked_count, checked_number
-from doe.factors import natural_points
 from doe.fitted import FittedSurface
+from doe.points import natural_points
 from doe.quadratic import QuadraticForm
 
 CURVE_RESOLUTION = 201
 """Grid lines along each factor that a curve of two factors is traced through."""
+
+MOST_LINES = 10_000
+"""Grid lines along a factor that may be asked for."""
 
 LINE_BUDGET = 4_000
 """Lines parallel to the axes that a contour in three or more factors is sampled on."""
@@ -48,7 +51,7 @@ def contour(
     checked_number("target", target)
     checked_number("extent, the coded half width of the box,", extent, above=0.0)
     if resolution is not None:
-        checked_count("resolution", resolution, least=2)
+        checked_count("resolution", resolution, least=2, most=MOST_LINES)
     return natural_points(surface.design.factors, contour_points(surface, target, extent, resolution))
 
 

@@ -1,17 +1,27 @@
 """Design: the settings of every run, coded and natural, with the order in which to run them."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from doe.checks import checked_count, real_array
+from doe.checks import (
+    checked_flag,
+    checked_kind,
+    checked_list,
+    checked_map,
+    checked_number,
+    checked_seed,
+    real_array,
+)
 from doe.errors import DesignError
-from doe.factors import Category, Factor, checked_factors, coded_points, natural_points
+from doe.factors import Category, Factor, checked_factors
 from doe.labels import aligned
+from doe.points import coded_points, natural_points
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,9 +53,9 @@ class Design:
 
     def __post_init__(self) -> None:
         factors = checked_factors(self.factors)
-        if self.seed is not None:
-            checked_count("seed", self.seed, least=0)
-        names, dummies = [factor.name for factor in factors], tuple(self.dummies)
+        checked_seed(self.seed)
+        checked_kind("coded, the table of a design,", self.coded, pd.DataFrame)
+        names, dummies = [factor.name for factor in factors], tuple(checked_list("dummies", self.dummies))
         coded = _checked_table(self.coded, names, dummies)
         for name in dummies:
             center = (coded[names] == 0.0).all(axis=1) & (coded[name] == 0.0)
@@ -105,12 +115,14 @@ class Design:
             label that comes twice, a dummy with other values than -1 and +1, or a table of which it is not
             plain whether it is coded.
         """
-        factors, dummies = checked_factors(factors), tuple(dummies)
+        factors, dummies = checked_factors(factors), tuple(checked_list("dummies", dummies))
+        if coded is not None:
+            checked_flag("coded, unless it is None,", coded)
         if not isinstance(table, pd.DataFrame):
             raise DesignError(f"a design is made from a DataFrame, received {type(table).__name__}")
         blocks = None
         if block is not None:
-            if block not in table.columns:
+            if not isinstance(block, str) or block not in table.columns:
                 raise DesignError(f"no column for the block {block!r}; the table has {list(table.columns)}")
             blocks, table = table[block], table.drop(columns=block)
         if coded is not None and not coded:
@@ -145,6 +157,8 @@ class Design:
 
     def factor(self, name: str) -> Factor:
         """Return the factor of this name."""
+        if not isinstance(name, str):
+            raise DesignError(f"a factor is named by text, received {name!r}")
         for factor in self.factors:
             if factor.name == name:
                 return factor
@@ -156,18 +170,20 @@ class Design:
         So a table of finished cases, some replicated and some missing, becomes a design again:
         ``design.select(table["run"])``.
         """
-        unknown = [run for run in runs if run not in self.coded.index]
+        runs = checked_list("runs", runs)
+        unknown = [run for run in runs if not isinstance(run, Hashable) or run not in self.coded.index]
         if unknown:
             raise DesignError(f"the design has no run {unknown[0]!r}; its runs are {list(self.coded.index)}")
-        table = numbered(self.coded.loc[list(runs)])
-        blocks = None if self.blocks is None else self.blocks.loc[list(runs)].set_axis(table.index)
+        table = numbered(self.coded.loc[runs])
+        blocks = None if self.blocks is None else self.blocks.loc[runs].set_axis(table.index)
         return Design(self.factors, table, dummies=self.dummies, blocks=blocks)
 
     def with_blocks(self, labels: Sequence) -> "Design":
         """Return the design with these blocks: a label for each run, in the order of the runs."""
+        labels = checked_list("blocks", labels)
         if len(labels) != len(self.coded):
             raise DesignError(f"blocks: one label for each of {len(self.coded)} runs, received {len(labels)}")
-        blocks = pd.Series(list(labels), index=self.coded.index)
+        blocks = pd.Series(labels, index=self.coded.index)
         return replace(self, blocks=blocks)
 
 
@@ -191,6 +207,7 @@ def observations(design: Design, response: ArrayLike) -> tuple[pd.DataFrame, pd.
     DesignError
         Other labels, another shape, or a value that is not finite (with its run and replicate).
     """
+    checked_kind("design", design, Design)
     values = aligned("a response", response, design.coded.index)
     runs = len(design.coded)
     if values.ndim not in (1, 2) or values.shape[0] != runs or values.size == 0:
@@ -206,6 +223,20 @@ def observations(design: Design, response: ArrayLike) -> tuple[pd.DataFrame, pd.
     rows = np.repeat(np.arange(runs), values.shape[1])
     coded = design.coded.iloc[rows]
     return coded, pd.Series(values.ravel(), index=coded.index, name="response")
+
+
+def checked_setting(name: str, point: Any, design: Design) -> dict[str, Any]:
+    """Return the natural settings of a design's factors; raise DesignError when one is missing or wrong."""
+    given = checked_map(name, point)
+    missing = [factor.name for factor in design.factors if factor.name not in given]
+    if missing:
+        raise DesignError(f"no value for factor {missing[0]!r} in {name}: {given}")
+    for factor in design.factors:
+        if isinstance(factor, Category):
+            factor.to_coded(given[factor.name])
+        else:
+            checked_number(f"the value of {factor.name!r} in {name}", given[factor.name])
+    return {factor.name: given[factor.name] for factor in design.factors}
 
 
 def checked_blocks(blocks: pd.Series, coded: pd.DataFrame) -> pd.Series:

@@ -4,14 +4,16 @@ import math
 import numbers
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
-import pandas as pd
 
 from doe.errors import DesignError
 
-Values = TypeVar("Values", float, np.ndarray, pd.Series)
+if TYPE_CHECKING:
+    import pandas as pd
+
+Values = TypeVar("Values", float, np.ndarray, "pd.Series")
 
 RESERVED_NAMES = frozenset(
     {"intercept", "blocks", "curvature", "model", "residual", "lack of fit", "pure error", "total"}
@@ -144,7 +146,7 @@ class Category(Factor):
             raise DesignError(
                 f"category {self.name!r} has the levels {list(table)}, received {strangers[0]!r}"
             )
-        if isinstance(values, pd.Series):
+        if hasattr(values, "map"):  # a column of a table
             return values.map(table)
         found = np.array([table[value] for value in np.ravel(values)])
         return found.reshape(np.shape(values)) if np.ndim(values) else found[0]
@@ -186,13 +188,3 @@ def checked_factors(factors: Iterable[Factor]) -> tuple[Factor, ...]:
     if twice:
         raise DesignError(f"factor names must differ, received twice: {', '.join(twice)}")
     return factors
-
-
-def natural_points(factors: Iterable[Factor], coded: pd.DataFrame) -> pd.DataFrame:
-    """Return the natural values of coded points: columns are the factors' names, same index."""
-    return pd.DataFrame({f.name: f.to_natural(coded[f.name]) for f in factors}, index=coded.index)
-
-
-def coded_points(factors: Iterable[Factor], natural: pd.DataFrame) -> pd.DataFrame:
-    """Return the coded values of natural points: columns are the factors' names, same index."""
-    return pd.DataFrame({f.name: f.to_coded(natural[f.name]) for f in factors}, index=natural.index)

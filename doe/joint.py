@@ -10,12 +10,12 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy import optimize
 
-from doe.checks import checked_count, checked_level, checked_number
-from doe.compare import Sample
+from doe.checks import checked_count, checked_level, checked_map, checked_number
 from doe.errors import DesignError
 from doe.factors import Factor
 from doe.fitted import FittedSurface, unselected
 from doe.region import Region, box_cells, misfit
+from doe.sample import Sample
 from doe.simultaneous import Simultaneous
 from doe.surface import Surface
 from doe.two_errors import TwoErrors
@@ -233,9 +233,9 @@ class JointFit:
             together.half_width(np.array(gradients), vector, first) if value > 0.0 else np.inf
             for vector, value in zip(vectors.T, values, strict=True)
         ]
-        index = pd.RangeIndex(1, len(values) + 1, name="direction")
+        index, mask = pd.RangeIndex(1, len(values) + 1, name="direction"), self._mask(names)
         table = pd.DataFrame(vectors.T, columns=[factor.name for factor in self.factors], index=index)
-        return table.assign(half_width=half_width, span=[self._span(vector) for vector in vectors.T])
+        return table.assign(half_width=half_width, span=[self._span(vector, mask) for vector in vectors.T])
 
     def _mask(self, names: tuple[str, ...]) -> NDArray[np.bool_]:
         """Return the cells where some responses agree, by the level of these."""
@@ -292,10 +292,10 @@ class JointFit:
         table = pd.DataFrame(self.cells, columns=[factor.name for factor in self.factors])
         return Region(self.factors, table, mask, self.resolution, self.extent, self.explored)
 
-    def _span(self, direction: NDArray[np.float64]) -> float:
-        """Return the compatible region's shadow on a direction, over that of the region explored."""
+    def _span(self, direction: NDArray[np.float64], mask: NDArray[np.bool_]) -> float:
+        """Return the shadow of a region's cells on a direction, over that of the region explored."""
         shadow = self.cells @ direction
-        belonging = shadow[self._mask(tuple(self.goals))]
+        belonging = shadow[mask]
         return float(np.ptp(belonging) / np.ptp(shadow[self.explored])) if belonging.size else 0.0
 
     def _order(self) -> Iterator[tuple[str, ...]]:
@@ -313,9 +313,10 @@ class JointFit:
         """Return a point in coded units: that of the smallest chi2 unless one is given."""
         if point is None:
             return self.coded_point
+        point = checked_map("point", point)
         missing = [factor.name for factor in self.factors if factor.name not in point]
         if missing:
-            raise DesignError(f"no value for factor {missing[0]!r} in the point {dict(point)}")
+            raise DesignError(f"no value for factor {missing[0]!r} in the point {point}")
         values = {f: checked_number(f"the point's value of {f.name!r}", point[f.name]) for f in self.factors}
         return np.array([float(factor.to_coded(value)) for factor, value in values.items()])
 

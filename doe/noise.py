@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from numpy.typing import NDArray
 from scipy import optimize, stats
 
-from doe.checks import checked_level, checked_number
-from doe.compare import Sample
+from doe.checks import checked_count, checked_level, checked_number
 from doe.errors import DesignError
+from doe.sample import Sample
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,8 @@ def effect_power(effect: float, sd: float, observations: int, error_df: float, a
     error_df : float
         Degrees of freedom of the error that the test uses.
     """
-    for name, value in (("sd", sd), ("observations", observations), ("error_df", error_df)):
+    checked_count("observations", observations)
+    for name, value in (("sd", sd), ("error_df", error_df)):
         checked_number(name, value, above=0.0)
     checked_level(alpha)
     shift = abs(checked_number("effect", effect)) * math.sqrt(observations) / (2.0 * sd)
@@ -115,7 +116,8 @@ def detectable_effect(
     """Return the smallest effect that is found with a given power (see ``effect_power``)."""
     if not checked_level(alpha) < checked_number("power", power) < 1.0:
         raise DesignError(f"power lies between alpha ({alpha}) and 1, received {power}")
-    for name, value in (("sd", sd), ("observations", observations), ("error_df", error_df)):
+    checked_count("observations", observations)
+    for name, value in (("sd", sd), ("error_df", error_df)):
         checked_number(name, value, above=0.0)
     standard_error = 2.0 * sd / math.sqrt(observations)
     top = standard_error

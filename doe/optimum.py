@@ -9,11 +9,11 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy import optimize
 
-from doe.checks import checked_number
+from doe.checks import checked_map, checked_number
 from doe.contour import contour_points
 from doe.errors import DesignError, TargetError
-from doe.factors import natural_points
 from doe.fitted import FittedSurface
+from doe.points import natural_points
 from doe.quadratic import QuadraticForm
 from doe.region import box_cells
 
@@ -74,6 +74,7 @@ def nearest(
     factors = surface.design.factors
     origin = np.zeros(len(factors))
     if to is not None:
+        to = checked_map("the point to be near to", to)
         missing = [name for name in surface.design.names if name not in to]
         if missing:
             raise DesignError(f"no value for factor {missing[0]!r} in the point to be near to: {dict(to)}")

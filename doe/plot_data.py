@@ -8,10 +8,16 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy import stats
 
+from doe.checks import checked_count, checked_kind, checked_map, checked_number
+from doe.design import checked_setting
 from doe.errors import DesignError
-from doe.factors import Factor, coded_points
+from doe.factors import Factor
+from doe.points import coded_points
 from doe.screening import ScreenResult
 from doe.surface import Surface
+
+MOST_POINTS = 2_000
+"""Points along an axis of a figure."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,13 +83,19 @@ def surface_grid(
     resolution : int
         Points along each axis.
     """
-    design = surface.design
+    design = checked_kind("surface", surface, Surface).design
+    checked_number("extent", extent, above=0.0)
+    resolution = checked_count("resolution", resolution, least=2, most=MOST_POINTS)
     if len(design.factors) < 2:
         raise DesignError(f"a surface is drawn over two factors, the design has only {design.names[0]!r}")
-    x_factor, y_factor = design.factor(x or design.names[0]), design.factor(y or design.names[1])
+    x_factor, y_factor = (
+        design.factor(fallback if name is None else name)
+        for name, fallback in zip((x, y), design.names, strict=False)
+    )
     if x_factor == y_factor:
         raise DesignError(f"a surface is drawn over two different factors, received {x_factor.name!r} twice")
-    held = {factor.name: (at or {}).get(factor.name, factor.center) for factor in design.factors}
+    centers = {factor.name: factor.center for factor in design.factors}
+    held = checked_setting("at", centers | ({} if at is None else checked_map("at", at)), design)
     line = np.linspace(-extent, extent, resolution)
     x_values, y_values = x_factor.to_natural(line), y_factor.to_natural(line)
     points = pd.DataFrame(held, index=range(resolution**2))

@@ -9,10 +9,11 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from doe.checks import checked_count, checked_df, checked_number
-from doe.compare import Sample
 from doe.errors import DesignError
-from doe.factors import Factor, natural_points
+from doe.factors import Factor
 from doe.fitted import FittedSurface, unselected
+from doe.points import natural_points
+from doe.sample import Sample
 from doe.two_errors import TwoErrors
 
 CELL_BUDGET = 160_000

@@ -19,7 +19,7 @@ from doe.anova import (
     partial_sums,
     pure_error,
 )
-from doe.checks import checked_level
+from doe.checks import checked_choice, checked_flag, checked_kind, checked_level
 from doe.design import Design, observations
 from doe.errors import DesignError
 from doe.lenth import LENTH_DRAWS, SEED, orthogonal_null, pseudo_error
@@ -130,7 +130,8 @@ class ScreenResult:
 
         With ``bonferroni`` the level is shared among all columns of the design, dummies included.
         """
-        shared = checked_level(alpha) / (self.design.coded.shape[1] if bonferroni else 1)
+        whole = self.design.coded.shape[1] if checked_flag("bonferroni", bonferroni) else 1
+        shared = checked_level(alpha) / whole
         if self.error_rule == "lenth":
             return float(np.quantile(self._lenth_null, 1.0 - shared))
         return float(stats.t.isf(0.5 * shared, self.error_df))
@@ -190,8 +191,9 @@ def screen(design: Design, response: ArrayLike, error: str | None = None) -> Scr
         A response that is not finite or does not vary, terms that the runs cannot tell apart, or no degrees
         of freedom for the error that was asked for.
     """
-    if error is not None and error not in ERRORS:
-        raise DesignError(f"error is one of {', '.join(ERRORS)}, received {error!r}")
+    if error is not None:
+        checked_choice("error", error, ERRORS)
+    checked_kind("design", design, Design)
     coded, values = observations(design, response)
     blocks = None if design.blocks is None else design.blocks.loc[values.index]
     columns = model_matrix(coded, model_terms(design.names, "first-order"))
@@ -211,6 +213,7 @@ def aliases(design: Design, interaction: str) -> pd.Series:
     The alias matrix (X'X)^-1 X'z of the product column z, for the intercept, every factor and every dummy:
     +1/3 means that a third of the interaction is added to that coefficient.
     """
+    checked_kind("design", design, Design)
     product_of = find_term(interaction, _interactions(design))
     columns = model_matrix(design.coded, [(name,) for name in design.coded.columns])
     product = design.coded[list(product_of)].prod(axis=1)

@@ -30,7 +30,7 @@ LEVELS = 7
 
 LOWEST, HIGHEST = 0.6, 1.2
 
-LEVEL_TAILS, INTERVAL_TAILS = (0.5, 0.3), (0.35, 0.12)
+LEVEL_TAILS, INTERVAL_TAILS = (0.5, 0.4), (0.35, 0.12)
 """Probabilities of a smaller estimate for the true variances behind an interval: estimates that weigh as well
 as measure must be doubted more than those that only measure."""
 
@@ -77,18 +77,28 @@ class Simultaneous:
         ----------
         difference, first : array, shape (points, differences)
         """
+        return np.asarray(np.abs(difference) <= self.reach(first))
+
+    def reach(self, first: FloatArray) -> FloatArray:
+        """Return the size from which on each difference is significant, shape (points, differences).
+
+        Parameters
+        ----------
+        first : array, shape (points, differences)
+            Estimated variances of the first errors.
+        """
         total = first + self.second
         grid, level = self._grid, self.levels(first)
         place = np.clip(np.searchsorted(grid, level) - 1, 0, len(grid) - 2)
         weight = np.log(level / grid[place]) / np.log(grid[place + 1] / grid[place])
         rows = np.arange(len(level))
-        accepted = np.empty(difference.shape, dtype=bool)
+        reach = np.empty(first.shape)
         for column, rule in enumerate(self.errors):
             share = self.second[column] / total[:, column]
             table = np.array([rule.critical(share, one) for one in grid])
             critical = table[place, rows] ** (1.0 - weight) * table[place + 1, rows] ** weight
-            accepted[:, column] = np.abs(difference[:, column]) <= critical * np.sqrt(total[:, column])
-        return accepted
+            reach[:, column] = critical * np.sqrt(total[:, column])
+        return reach
 
     def half_width(self, slopes: FloatArray, direction: FloatArray, first: FloatArray) -> float:
         """Return the half width of the interval of a linear combination of unknowns.

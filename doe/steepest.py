@@ -8,10 +8,20 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from doe.checks import checked_number, real_array
+from doe.checks import (
+    MOST,
+    checked_count,
+    checked_flag,
+    checked_kind,
+    checked_list,
+    checked_map,
+    checked_number,
+    real_array,
+)
 from doe.design import Design, numbered, observations
 from doe.errors import DesignError
-from doe.factors import Factor, coded_points
+from doe.factors import Factor
+from doe.points import coded_points
 from doe.screening import ScreenResult
 from doe.surface import Surface
 
@@ -71,22 +81,22 @@ def steepest_path(
     """
     if not isinstance(fit, ScreenResult | Surface):
         raise DesignError(f"a path starts from a ScreenResult or a Surface, received {fit!r}")
-    if isinstance(steps, bool) or not isinstance(steps, numbers.Integral) or steps < 1:
-        raise DesignError(f"a path has at least one step, received {steps!r}")
-    moving = [fit.design.factor(name) for name in (factors if factors is not None else fit.design.names)]
+    steps = checked_count("steps of a path", steps, most=MOST)
+    chosen = fit.design.names if factors is None else checked_list("factors", factors)
+    moving = [fit.design.factor(name) for name in chosen]
     if not moving:
         raise DesignError("a path moves at least one factor, received none")
     names = [factor.name for factor in moving]
-    _check_names(
-        names, step=step if isinstance(step, Mapping) else {}, start=start or {}, limits=limits or {}
-    )
-    begin = np.array([_start(factor, start or {}) for factor in moving])
-    sign = -1.0 if descend else 1.0
+    start = {} if start is None else checked_map("start", start)
+    limits = {} if limits is None else checked_map("limits", limits)
+    _check_names(names, step=step if isinstance(step, Mapping) else {}, start=start, limits=limits)
+    begin = np.array([_start(factor, start) for factor in moving])
+    sign = -1.0 if checked_flag("descend", descend) else 1.0
     slopes = sign * _gradient(fit, moving, begin)
     if not np.abs(slopes).max() > ROUNDING * fit.coded_coefficients.abs().max():
         raise DesignError(f"no direction to climb: the response has no slope in {', '.join(names)}")
     stride = _natural_stride(moving, slopes, step)
-    table = numbered(pd.DataFrame(_walk(names, begin, stride, int(steps), limits or {}), columns=names))
+    table = numbered(pd.DataFrame(_walk(names, begin, stride, steps, limits), columns=names))
     coded = coded_points(moving, table)
     predicted = _predicted(fit, coded)
     falls = np.flatnonzero(~(sign * np.diff(predicted) > 0.0))
@@ -106,6 +116,7 @@ def climb_table(path: Design, response: ArrayLike, target: float) -> pd.DataFram
     A labelled response is read by the path's run labels; the percent of a target of 0 is NaN.
     """
     target = checked_number("target", target)
+    checked_kind("path", path, Design)
     _, values = observations(path, response)
     taken = sorted(set(path.names) & CLIMB_COLUMNS)
     if taken:

@@ -13,12 +13,21 @@ from statsmodels.regression.linear_model import RegressionResults
 from doe import contour, optimum, region
 from doe.analysis.coefficients import anova_by_order, coefficient_table, significant_words, summary_text
 from doe.anova import ErrorTerm, anova_table, block_columns, block_sum, least_squares, pure_error
-from doe.checks import checked_level, real_array
-from doe.compare import Sample
+from doe.checks import (
+    checked_choice,
+    checked_flag,
+    checked_kind,
+    checked_level,
+    checked_map,
+    checked_points,
+    real_array,
+)
 from doe.design import Design, observations
 from doe.errors import DesignError
-from doe.factors import Category, coded_points, two_level_factors
+from doe.factors import Category, two_level_factors
+from doe.points import coded_points
 from doe.quadratic import QuadraticForm
+from doe.sample import Sample
 from doe.terms import (
     INTERCEPT,
     Term,
@@ -134,8 +143,7 @@ class Surface:
 
     def equation(self, units: str = "natural", digits: int = 6) -> str:
         """Return the fitted polynomial as text, in natural or coded units."""
-        if units not in ("natural", "coded"):
-            raise DesignError(f"units is natural or coded, received {units!r}")
+        checked_choice("units", units, ("natural", "coded"))
         coefficients = self.coefficients if units == "natural" else self.coded_coefficients
         return equation_text({str(name): value for name, value in coefficients.items()}, digits)
 
@@ -253,11 +261,7 @@ class Surface:
 
         After ``reduce`` the standard error is that of the model before (see ``unselected``).
         """
-        points = np.atleast_2d(real_array("coded points", coded))
-        if points.ndim != 2 or points.shape[1] != len(self.design.names):
-            raise DesignError(
-                f"coded points have shape (points, {len(self.design.names)}), received {points.shape}"
-            )
+        points = checked_points(coded, len(self.design.names))
         table = pd.DataFrame(points, columns=self.design.names)
         return self._mean(table), self.unselected._standard_error(table)
 
@@ -295,10 +299,8 @@ class Surface:
             A factor without value, a value that is no finite number, a level outside 0 to 1.
         """
         level = checked_level(alpha)
-        if not isinstance(points, pd.DataFrame | Mapping | pd.Series):
-            raise DesignError(f"points is a DataFrame, or one point as a mapping; received {points!r}")
-        table = points if isinstance(points, pd.DataFrame) else pd.DataFrame([dict(points)])
-        inside = self._coded_table(table, coded)
+        table = points if isinstance(points, pd.DataFrame) else pd.DataFrame([checked_map("points", points)])
+        inside = self._coded_table(table, checked_flag("coded", coded))
         honest = self.unselected
         center, se = honest.evaluate(inside)
         t = stats.t.isf(0.5 * level, honest.residual_df)
@@ -361,7 +363,8 @@ class Surface:
         self, point: Mapping[str, float], target: Sample, alpha: float = 0.05, coded: bool = False
     ) -> bool:
         """Tell if a target does not contradict one setting: the rule of ``compatible_region`` there."""
-        inside = self._coded_table(pd.DataFrame([dict(point)]), coded)
+        one = pd.DataFrame([checked_map("point", point)])
+        inside = self._coded_table(one, checked_flag("coded", coded))
         return region.agrees(self, inside.to_numpy(), target, alpha)
 
     def band(
@@ -389,6 +392,7 @@ def fit_surface(design: Design, response: ArrayLike, model: str | Iterable[str] 
         A response that is not finite or does not vary, too few runs for the terms, or terms that the runs
         cannot tell apart.
     """
+    checked_kind("design", design, Design)
     coded, values = observations(design, response)
     two_level_factors(design.factors, "a polynomial")
     terms = model_terms(design.names, model) if isinstance(model, str) else parsed_terms(model, design.names)

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 import pandas as pd
 
-from doe.checks import checked_list
+from doe.checks import checked_choice, checked_count, checked_list
 from doe.errors import DesignError
 from doe.factors import Factor
 
@@ -16,6 +16,9 @@ Term = tuple[str, ...]
 
 INTERCEPT: Term = ()
 HIGHEST_POWER = 4
+MOST_DIGITS = 17
+"""Digits behind the point of a written coefficient."""
+
 MODELS = ("first-order", "interaction", "quadratic", "three-factor")
 
 
@@ -24,8 +27,7 @@ def model_terms(names: Sequence[str], model: str) -> tuple[Term, ...]:
 
     ``three-factor`` has the interactions of two and of three factors, and no squares.
     """
-    if model not in MODELS:
-        raise DesignError(f"model is one of {', '.join(MODELS)}, received {model!r}")
+    checked_choice("model", model, MODELS)
     terms: list[Term] = [(name,) for name in names]
     if model != "first-order":
         terms += itertools.combinations(names, 2)
@@ -122,6 +124,7 @@ def natural_coefficients(coded: Mapping[Term, float], factors: Iterable[Factor])
 
 def equation_text(coefficients: Mapping[str, float], digits: int) -> str:
     """Return the polynomial as text: ``60.8 - 108.9 E + 121.2 E F + 72.1 E^2``."""
+    digits = checked_count("digits", digits, least=0, most=MOST_DIGITS)
     parts = []
     for name, value in coefficients.items():
         sign = "-" if value < 0.0 else "+"

@@ -23,17 +23,30 @@ from scipy.linalg import block_diag
 from statsmodels.regression.linear_model import GLS
 
 from doe import optimum, region
-from doe.checks import checked_level, checked_number, real_array
-from doe.compare import Sample
+from doe.checks import (
+    MOST,
+    checked_count,
+    checked_df,
+    checked_kind,
+    checked_level,
+    checked_map,
+    checked_number,
+    checked_points,
+    real_array,
+)
 from doe.design import Design
 from doe.errors import DesignError
-from doe.factors import coded_points, natural_points
+from doe.points import coded_points, natural_points
 from doe.quadratic import QuadraticForm
+from doe.sample import Sample
 from doe.surface import Surface
 from doe.terms import INTERCEPT, model_matrix
 
 SCALE_SD = 0.25
 """Standard deviation of the scale about 1 before any run: solvers of one test are alike so far."""
+
+FARTHEST = 1e4
+"""Distance of the level from the responses over their range from which on shift and scale are one."""
 
 LEAST_RUNS = 4
 """Fewest runs that leave a spread beside shift and scale."""
@@ -100,7 +113,7 @@ class Transfer:
 
     def evaluate(self, coded: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return mean in the other process and its standard error at coded points, (points, factors)."""
-        points = np.atleast_2d(real_array("coded points", coded))
+        points = checked_points(coded, len(self.design.names))
         own, common = self._columns(points), self._common(points)
         weighed = np.linalg.solve(self._covariance, np.column_stack([self._leftover, common.T]))
         mean = self.level + own @ self._fit.params + common @ weighed[:, 0]
@@ -207,20 +220,24 @@ def transfer(
         Fewer than four runs, a value that is not finite, or runs that cannot tell shift from scale: on all of
         them the surface is the same.
     """
+    checked_kind("source", source, Surface)
+    checked_kind("runs", runs, pd.DataFrame)
     values = real_array("a response", response)
     missing = [name for name in source.design.names if name not in runs.columns]
     if missing:
         raise DesignError(f"no column for factor {missing[0]!r}; the runs have {list(runs.columns)}")
-    table = coded_points(source.design.factors, runs[source.design.names])
+    natural = {name: real_array(f"the runs' {name!r}", runs[name]) for name in source.design.names}
+    table = coded_points(source.design.factors, pd.DataFrame(natural))
     points = pd.DataFrame(table)[source.design.names].to_numpy(dtype=np.float64)
     if values.shape != (len(points),) or len(points) < LEAST_RUNS:
         rule = f"a surface is carried over by {LEAST_RUNS} runs or more, each with one response"
         raise DesignError(f"{rule}: received {len(points)} runs and responses of shape {values.shape}")
     if not (np.isfinite(values).all() and np.isfinite(points).all()):
         raise DesignError("runs and responses must be finite, received others")
-    checked_number("the level", level)
-    if not scale_sd > 0.0:
-        raise DesignError(f"the standard deviation of the scale must be positive, received {scale_sd!r}")
+    distance = np.abs(checked_number("the level", level) - values).max()
+    if distance > FARTHEST * max(float(np.ptp(values)), float(np.ptp(source.fitted))):
+        raise DesignError(f"the level lies among the responses or near them, received {level:g}")
+    checked_df("scale_sd, the standard deviation of the scale,", scale_sd)
     found = Transfer(source, float(level), points, values, 1.0, 1.0, scale_sd)
     if np.ptp(found._columns(points)[:, 1]) <= 1e-9 * max(1.0, float(np.ptp(source.fitted))):
         raise DesignError(
@@ -282,8 +299,15 @@ def transfer_points(
     DataFrame
         Natural units, a column a factor, one row a run.
     """
-    names = source.design.names
-    origin = np.array([float(f.to_coded(at[f.name])) for f in source.design.factors])
+    checked_kind("source", source, Surface)
+    names, at = source.design.names, checked_map("at", at)
+    missing = [name for name in names if name not in at]
+    if missing:
+        raise DesignError(f"no value for factor {missing[0]!r} in the point {at}")
+    count, turn = checked_count("count", count, most=MOST), checked_count("turn", turn, least=0)
+    step, extent = checked_number("step", step, above=0.0), checked_number("extent", extent, above=0.0)
+    values = [checked_number(f"the point's value of {name!r}", at[name]) for name in names]
+    origin = np.array([float(f.to_coded(x)) for f, x in zip(source.design.factors, values, strict=True)])
     slope = source.quadratic_form.gradient(origin)
     if not np.linalg.norm(slope) > 0.0:
         raise DesignError(f"a surface is carried over at a point where it rises or falls, not at {at}")

@@ -13,7 +13,7 @@ from experiments.bridge.result import Crossing
 from experiments.bridge.source import read_source
 from experiments.calibrate import Campaign
 from experiments.calibrate.campaign import StageHook
-from experiments.cases import with_engine
+from experiments.cases import open_workers, with_engine
 from experiments.cases.folder import locked
 from experiments.errors import InputError
 from experiments.report.companion import Replay
@@ -27,7 +27,7 @@ from experiments.runs.campaign import (
     replay_published,
     run_campaign,
 )
-from experiments.runs.choices import chosen_device, chosen_study, default_folder
+from experiments.runs.choices import chosen_resources, chosen_study, default_folder, resources_for
 from experiments.runs.search import Job, SearchResult, run_search
 from experiments.studyfile import Study
 
@@ -83,6 +83,8 @@ def calibrate(
     scale: str | None = None,
     device: str | None = None,
     workers: int | None = None,
+    scheduler: str | None = None,
+    cluster: str | Path | None = None,
     engine: str | None = None,
     resume: bool = False,
     published_replicates: int = 0,
@@ -101,9 +103,14 @@ def calibrate(
     scale
         A scale of the study's file; None: the one for the device, ``paper`` on a GPU and ``bench`` without.
     device
-        ``"cpu"``, ``"cuda"`` or ``"cuda:1"``; None: the GPU if there is one.
+        ``"cpu"``, ``"cuda"``, ``"cuda:1"``, or several GPUs between commas; None: the GPU if there is one.
     workers
-        Processes on the CPU; None: one a core.
+        Processes on the CPU, GPUs of this machine, or workers of a cluster; None: one a core, one GPU, those
+        of the cluster.
+    scheduler
+        Address of a Dask scheduler whose workers simulate.
+    cluster
+        File with a ``[cluster]``, whose workers are started; None: that of the study, or none.
     engine
         Name of an engine (`experiments.cases.ENGINES`); None: that of the study.
     resume
@@ -122,11 +129,12 @@ def calibrate(
     InputError
         When study, device, engine or folder break a rule; nothing is written then.
     """
-    chosen = chosen_study(study, scale, device := chosen_device(device))
+    resources = chosen_resources(device, workers, scheduler, cluster)
+    chosen = chosen_study(study, scale, resources)
     folder = Path(out) if out is not None else default_folder(chosen)
     chosen = check_runs(with_engine(chosen, engine), campaign=campaign, paper=published_replicates > 0)
-    with locked(folder, resume):
-        desk = Desk.open(chosen, folder, device, workers, resume, watch)
+    with open_workers(resources_for(chosen, resources)) as crew, locked(folder, resume):
+        desk = Desk.open(chosen, folder, crew, resume, watch)
         replay = replay_published(desk, published_replicates) if published_replicates else None
         found = run_campaign(desk, on_stage, replay) if campaign else None
         record = record_published(desk, replay, found) if replay is not None else None
@@ -144,6 +152,8 @@ def discover(
     scale: str | None = None,
     device: str | None = None,
     workers: int | None = None,
+    scheduler: str | None = None,
+    cluster: str | Path | None = None,
     engine: str | None = None,
     resume: bool = False,
     watch: Watch = lambda title: nullcontext(),
@@ -152,7 +162,7 @@ def discover(
 
     Parameters
     ----------
-    study, out, scale, workers, engine, resume, watch
+    study, out, scale, device, workers, scheduler, cluster, engine, resume, watch
         As of `calibrate`.
     data
         File of measured heaps; None: only the bank of library waves is made.
@@ -162,18 +172,19 @@ def discover(
         Look only at what photographs show.
     seed
         Seed of the bootstraps and of the fresh runs.
-    device
-        As of `calibrate`; several GPUs stand between commas.
 
     Raises
     ------
     InputError
         When study, data, bank, device or folder break a rule; nothing is written then.
     """
-    chosen = with_engine(chosen_study(study, scale, device := chosen_device(device, several=True)), engine)
+    resources = chosen_resources(device, workers, scheduler, cluster)
+    chosen = with_engine(chosen_study(study, scale, resources), engine)
     folder = Path(out) if out is not None else default_folder(chosen, "discover")
     data, bank = (Path(file) if file is not None else None for file in (data, bank))
-    return run_search(Job(chosen, data, folder, bank, photographs_only, device, workers, seed), resume, watch)
+    with open_workers(resources_for(chosen, resources)) as crew:
+        job = Job(chosen, data, folder, bank, photographs_only, crew, seed)
+        return run_search(job, resume, watch)
 
 
 def bridge(
@@ -187,6 +198,8 @@ def bridge(
     margin: float | None = None,
     seed: int = 1,
     workers: int | None = None,
+    scheduler: str | None = None,
+    cluster: str | Path | None = None,
     time_limit: str | None = None,
     approximate: bool = False,
     resume: bool = False,
@@ -210,6 +223,8 @@ def bridge(
         Root of the seeds of all runs.
     workers
         Runs at once; None: one a core.
+    scheduler, cluster
+        As of `calibrate`; the other solver must be there.
     time_limit
         Wall time of a run with its unit, as ``"10 min"``; None: none.
     approximate
@@ -231,8 +246,10 @@ def bridge(
     limits = {"time_limit": time_limit, "approximate": approximate or None}
     study = with_engine(source.study, engine, command, **limits)
     folder = Path(out) if out is not None else default_folder(study, "bridge")
-    desk = Desk.open(study, folder, None, workers, resume, watch)
-    name = engine or str(getattr(getattr(desk.store.engine, "program", None), "name", command))
-    crossing = cross(source, desk.run, name, runs, fresh, within, seed)
+    resources = resources_for(study, chosen_resources(None, workers, scheduler, cluster))
+    with open_workers(resources) as crew:
+        desk = Desk.open(study, folder, crew, resume, watch)
+        name = engine or str(getattr(getattr(desk.store.engine, "program", None), "name", command))
+        crossing = cross(source, desk.run, name, runs, fresh, within, seed)
     write_crossing(crossing, folder)
     return Bridge(folder, crossing)

@@ -5,7 +5,10 @@ Imports of the simulator, the statistics and the pictures are inside the command
 
 from __future__ import annotations
 
+import io
 import json
+import sys
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -19,25 +22,28 @@ from experiments.commands.console import (
     Attempt,
     CaseProgress,
     clear_errors,
-    fail,
     messages,
 )
-from experiments.commands.early import check_study_file
+from experiments.commands.doctor import DOCTOR_EXAMPLE, doctor
+from experiments.commands.early import check_calibration_file, check_study_file
 from experiments.commands.export import EXPORT_EXAMPLE, export
+from experiments.commands.heap import HEAP_EXAMPLE, heap
 from experiments.commands.new import NEW_EXAMPLE, new
 from experiments.commands.options import (
     AsJson,
+    Cluster,
     Device,
-    Devices,
+    DryRun,
     EngineName,
     Out,
     Resume,
     Scale,
+    Scheduler,
     StudyFile,
     Workers,
-    assignments,
 )
-from experiments.commands.results import print_measured, print_study, show_stage
+from experiments.commands.plans import show_plan
+from experiments.commands.results import print_study, show_stage
 
 app = typer.Typer(
     name="dem-warp",
@@ -75,8 +81,11 @@ def calibrate(
     scale: Scale = None,
     device: Device = None,
     workers: Workers = None,
+    scheduler: Scheduler = None,
+    cluster: Cluster = None,
     engine: EngineName = None,
     resume: Resume = False,
+    dry_run: DryRun = False,
     follow_paper: Annotated[
         bool, typer.Option("--follow-paper", help="Simulate the paper's own runs too, and set them beside.")
     ] = False,
@@ -88,25 +97,38 @@ def calibrate(
 ) -> None:
     """Run a whole calibration: noise floor, screening, climb, surface, optimum, verification, report."""
     with clear_errors():
-        check_study_file(study, scale)
+        if only_paper:
+            check_study_file(study, scale, engine)
+        else:
+            check_calibration_file(study, scale, engine)
         from experiments import api
-        from experiments.runs.choices import chosen_device, chosen_study, default_folder
+        from experiments.runs.choices import chosen_resources, chosen_study, default_folder, resources_for
 
-        device = chosen_device(device)
-        chosen = chosen_study(study, scale, device)
+        resources = chosen_resources(device, workers, scheduler, cluster)
+        chosen = chosen_study(study, scale, resources)
         folder = out or default_folder(chosen)
+        if dry_run:
+            from experiments.runs.campaign import check_runs
+            from experiments.runs.plan import plan_calibration
+
+            checked, used = check_runs(chosen), resources_for(chosen, resources)
+            show_plan(used, partial(plan_calibration, checked, used), as_json)
+            return
     go_on = Attempt.of(
-        "calibrate", study, out=folder, scale=chosen.scale, device=device, workers=workers, engine=engine,
+        "calibrate", study, out=folder, scale=chosen.scale, device=device, workers=workers,
+        scheduler=scheduler, cluster=cluster, engine=engine,
         follow_paper=follow_paper, only_paper=only_paper,
         paper_replicates=paper_replicates if follow_paper or only_paper else None, json=as_json,
     )  # fmt: skip
     with clear_errors(go_on):
-        print_study(chosen, device)
+        print_study(chosen, resources_for(chosen, resources))
         ended = api.calibrate(
             chosen,
             folder,
             device=device,
             workers=workers,
+            scheduler=scheduler,
+            cluster=cluster,
             engine=engine,
             resume=resume,
             published_replicates=paper_replicates if follow_paper or only_paper else 0,
@@ -144,28 +166,41 @@ def discover(
     ] = False,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the bootstraps and of the fresh runs.")] = 1,
     scale: Scale = None,
-    device: Devices = None,
+    device: Device = None,
     workers: Workers = None,
+    scheduler: Scheduler = None,
+    cluster: Cluster = None,
     engine: EngineName = None,
     resume: Resume = False,
+    dry_run: DryRun = False,
     as_json: AsJson = False,
 ) -> None:
     """Find the effect that a model lacks: calibrate, test the gap, name what explains it, show it closed."""
     with clear_errors():
-        check_study_file(study, scale)
+        check_study_file(study, scale, engine)
         from experiments import api
         from experiments.report.discovery import results_of, verdict_line
-        from experiments.runs.choices import chosen_device, chosen_study, default_folder
+        from experiments.runs.choices import chosen_resources, chosen_study, default_folder, resources_for
 
-        device = chosen_device(device, several=True)
-        chosen = chosen_study(study, scale, device)
+        resources = chosen_resources(device, workers, scheduler, cluster)
+        chosen = chosen_study(study, scale, resources)
         folder = out or default_folder(chosen, "discover")
+        if dry_run:
+            from experiments.runs.plan import plan_search
+            from experiments.runs.search import Job, known_bank
+
+            used = resources_for(chosen, resources)
+            has_bank = known_bank(Job(chosen, measured, folder, bank)) is not None
+            plan = partial(plan_search, chosen, used, has_bank=has_bank, analysed=measured is not None)
+            show_plan(used, plan, as_json)
+            return
     go_on = Attempt.of(
         "discover", study, measured, out=folder, bank=bank, photographs_only=photographs_only, scale=scale,
-        device=device, workers=workers, seed=seed, engine=engine, json=as_json,
+        device=device, workers=workers, scheduler=scheduler, cluster=cluster, seed=seed, engine=engine,
+        json=as_json,
     )  # fmt: skip
     with clear_errors(go_on):
-        print_study(chosen, device)
+        print_study(chosen, resources_for(chosen, resources))
         ended = api.discover(
             chosen,
             measured,
@@ -175,6 +210,8 @@ def discover(
             seed=seed,
             device=device,
             workers=workers,
+            scheduler=scheduler,
+            cluster=cluster,
             engine=engine,
             resume=resume,
             watch=CaseProgress,
@@ -188,58 +225,19 @@ def discover(
     messages.print(f"Report: {ended.page}")
 
 
-@app.command(epilog="Example: [bold]dem-warp heap --scale bench --set E=0.48 --set F=0.45 --seed 7[/]")
-def heap(
-    study: StudyFile = None,
-    settings: Annotated[
-        list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="Value of a factor.")
-    ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of sizes, places and orientations.")] = 1,
-    scene: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", help="A further scene of the study, \\[response-scene.NAME]."),
-    ] = None,
-    out: Out = None,
-    scale: Scale = None,
-    device: Device = None,
-    engine: EngineName = None,
-    as_json: AsJson = False,
-) -> None:
-    """Simulate one heap: heap.vtp (ParaView), snapshot.png with the fitted flanks, angle.json.
-
-    A study of a hopper, a drum or a draw-down gives what that test measures instead of the angle; so does
-    --scene with a further scene of the study.
-    """
-    with clear_errors():
-        check_study_file(study, scale)
-        from experiments.cases import require_unused, simulate_heap, with_engine, write_heap
-        from experiments.runs.choices import chosen_device, chosen_study, default_folder
-        from experiments.studyfile.campaign import TARGET_SCENE
-
-        device = chosen_device(device)
-        chosen = with_engine(chosen_study(study, scale, device), engine)
-        values = chosen.natural_settings(assignments(settings or []), "--set")
-        folder = out or default_folder(chosen, f"{scene or 'heap'}-{seed}")
-        require_unused(folder)
-        with CaseProgress(scene or "heap") as progress:
-            simulated = simulate_heap(chosen, values, seed, device, progress, scene or TARGET_SCENE)
-        write_heap(simulated, folder)
-    if as_json:
-        typer.echo(json.dumps(simulated.to_dict(), allow_nan=False))
-    messages.print(f"Files: {folder}")
-    if simulated.reason:
-        fail(f"the case {simulated.result.status}: {simulated.reason}", FAILED_RUN)
-    elif not as_json:
-        print_measured(simulated)
-
-
+app.command(epilog=HEAP_EXAMPLE)(heap)
 app.command(epilog=ANGLE_EXAMPLE)(angle)
 app.command(epilog=CLUMP_EXAMPLE)(clump)
 app.command(epilog=NEW_EXAMPLE)(new)
 app.command(epilog=EXPORT_EXAMPLE)(export)
 app.command(epilog=BRIDGE_EXAMPLE)(bridge)
+app.command(epilog=DOCTOR_EXAMPLE)(doctor)
 
 
 def main() -> None:
     """Run the command line."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            # a console of another encoding than UTF-8 shows an escape for what it lacks
+            stream.reconfigure(errors="backslashreplace")
     app()

@@ -11,6 +11,14 @@ from pathlib import Path
 
 from experiments.errors import InputError
 
+DEVICES = {"con", "prn", "aux", "nul", *(f"{kind}{n}" for kind in ("com", "lpt") for n in range(1, 10))}
+"""Names that Windows keeps for devices, whatever their ending: a file of such a name cannot go there."""
+
+
+def is_device_name(name: str) -> bool:
+    """Tell that a file of this name is a device on Windows."""
+    return name.partition(".")[0].rstrip(" ").casefold() in DEVICES
+
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
@@ -82,6 +90,9 @@ def copy_file(source: Path, target: Path) -> None:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file in UTF-8, whole or not at all."""
+    """Write a text file in UTF-8, whole or not at all; its bytes are the same on every system.
+
+    A name of a file that the system's encoding could not read, as under ``LC_ALL=C``, goes out as it came in.
+    """
     with replacing(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+        temporary.write_text(text, encoding="utf-8", errors="surrogateescape", newline="\n")

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from imaging.drawn import drawn_outline
 from imaging.geometry import Picture
 from imaging.outline import Outline
 from imaging.photograph import photographed_outline
-from imaging.silhouette import drawn_outline
 from imaging.view import View
 
 

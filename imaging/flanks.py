@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy import optimize
 
 from imaging.errors import PictureError
+from imaging.fits import FitSettings
 from imaging.geometry import FloatArray
 from imaging.outline import Outline
 from imaging.roughness import slope_error
@@ -19,48 +20,6 @@ APEX_ZONE = 0.6
 """The apex is sought where the outline is at least this share of its greatest height."""
 TOE_ROUNDS = 10
 """Rounds in which the line, its roughness and the flank's base are brought to agree."""
-
-
-@dataclass(frozen=True)
-class FitSettings:
-    """Which part of a flank the line is fitted to: angles with different settings are not comparable."""
-
-    name: str
-    """Name in reports."""
-    lower: float
-    upper: float
-    """Part of the heap's height that the fit covers, 0 to 1."""
-    toe: float = 1.0
-    """A flank begins where its line is this many times higher than the outline is rough (root mean square
-    about the line). Lower down lie single grains that rolled away, and gaps between them that the plate
-    cuts off. On a smooth flank this leaves nothing out."""
-
-    def __post_init__(self) -> None:
-        if not 0.0 <= self.lower < self.upper <= 1.0:
-            raise PictureError("0 <= lower < upper <= 1", (self.lower, self.upper), f"fit {self.name!r}")
-        if not 0.0 <= self.toe <= 5.0:
-            raise PictureError("0 <= toe <= 5", self.toe, f"fit {self.name!r}")
-
-    @classmethod
-    def of(cls, fit: str | FitSettings) -> FitSettings:
-        """Look a named fit up (see `FITS`); settings pass through."""
-        if isinstance(fit, FitSettings):
-            return fit
-        if fit not in FITS:
-            raise PictureError(f"the fit is one of {', '.join(FITS)}, or FitSettings", repr(fit), "fit")
-        return FITS[fit]
-
-
-FITS = {
-    settings.name: settings
-    for settings in (
-        FitSettings("flank", 0.0, 1.0),
-        FitSettings("middle", 0.2, 0.8),
-        FitSettings("lower", 0.0, 0.5),
-        FitSettings("upper", 0.5, 1.0),
-    )
-}
-"""Named fits: `flank` is the whole flank from base to apex, `middle` its 20 to 80 % of height."""
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from imaging.errors import PictureError
 from imaging.finding import find_outline
-from imaging.flanks import FitSettings
+from imaging.fits import FitSettings
 from imaging.geometry import FloatArray, Frame, Spheres
 from imaging.outline import Outline
 from imaging.render import silhouette

@@ -20,7 +20,8 @@ from imaging.doubts import (
     relative_misfit,
 )
 from imaging.errors import PictureError
-from imaging.flanks import FitSettings, fit_flanks
+from imaging.fits import FitSettings
+from imaging.flanks import fit_flanks
 from imaging.geometry import FloatArray, Picture
 from imaging.looks import other_looks, with_faint
 from imaging.outline import Outline, levelled

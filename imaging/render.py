@@ -87,7 +87,7 @@ def snapshot(
     colors = _sphere_colors(grains, len(spheres.radii))[indices]
     layer = _renderer(backend).shaded(shown, colors, frame, azimuth)
     opacity = layer[:, :, 3:].astype(np.float64) / 255.0
-    image = np.rint(opacity * layer[:, :, :3] + (1.0 - opacity) * _empty_plate(frame)).astype(np.uint8)
+    image = np.rint(opacity * layer[:, :, :3] + (1.0 - opacity) * empty_plate(frame)).astype(np.uint8)
     return Snapshot(image, frame.meters_per_pixel, frame.ground_row, azimuth)
 
 
@@ -124,7 +124,8 @@ def _sphere_colors(grains: ArrayLike | None, sphere_count: int) -> FloatArray:
     return np.clip(np.outer(lightness[rank], GRAIN_COLOR), 0.0, 255.0)
 
 
-def _empty_plate(frame: Frame) -> Picture:
+def empty_plate(frame: Frame) -> Picture:
+    """Draw the plate of a frame alone, blue-green-red."""
     image = np.full((*frame.shape, 3), 255, dtype=np.uint8)
     image[frame.ground_rows :] = PLATE_COLOR
     image[frame.ground_rows : frame.ground_rows + 1] = PLATE_EDGE_COLOR

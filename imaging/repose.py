@@ -13,7 +13,8 @@ from scipy import special
 from imaging.doubts import doubts_of
 from imaging.errors import PictureError
 from imaging.finding import find_outline
-from imaging.flanks import FitSettings, FlankLine, fit_flanks
+from imaging.fits import FitSettings
+from imaging.flanks import FlankLine, fit_flanks
 from imaging.geometry import Picture
 from imaging.outline import Outline
 from imaging.pictures import focal_length, read_picture

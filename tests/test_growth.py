@@ -50,8 +50,8 @@ class Addition:
 
 ADDITIONS = {
     "contact law": Addition(
-        "magnetism", (PLUGIN / "magnetism.py").read_text("utf-8"), "Magnetism",
-        "_ALL: tuple[type[Mechanism], ...] = (", "Magnetism, ",
+        "magnetism", (PLUGIN / "magnetism.py").read_text("utf-8"), "",
+        "_ALL: Modules[type[Mechanism]] = Modules({", '"magnetism": "dem_warp.laws.magnetism:Magnetism", ',
     ),
     "scene": Addition("jar", (PLUGIN / "jar.py").read_text("utf-8"), "Jar",
         "_ALL: tuple[type[PouredScene], ...] = (", "Jar, ",

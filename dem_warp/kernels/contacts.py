@@ -8,11 +8,12 @@ from types import SimpleNamespace
 
 import warp as wp
 
+from dem_warp.entries import SPHERE_BITS, SPHERE_MASK
 from dem_warp.kernels.lanes import load_pair
 from dem_warp.kernels.packing import packing
 from dem_warp.kernels.walls import wall_functions
-from dem_warp.laws.contact_law import acts_apart, contact_law, memory_size, turning_of_partner
-from dem_warp.types import SPHERE_BITS, SPHERE_MASK, Build, device_structs
+from dem_warp.laws.contact_law import acts_apart, contact_law, memory_size
+from dem_warp.types import Build, device_structs
 
 
 @functools.cache
@@ -27,7 +28,7 @@ def contact_functions(build: Build) -> SimpleNamespace:
     pack = packing(precision)
     law = contact_law(build.mechanisms, build.forms)
     is_apart = acts_apart(build.mechanisms)
-    turning = turning_of_partner(build.forms)
+    turning = build.forms.partner_turning
     memory_each = wp.constant(memory_size(build.mechanisms, build.forms))
     # the lanes of a warp that meet nothing wait for the others: let them load and work as if, so that nobody
     # waits for the distance before the rest is loaded

@@ -14,9 +14,10 @@ from types import SimpleNamespace
 
 import warp as wp
 
+from dem_warp.entries import SPHERE_BITS
 from dem_warp.kernels.packing import packing
 from dem_warp.laws.contact_law import memory_size
-from dem_warp.types import SPHERE_BITS, Build, WorldFlag, device_structs
+from dem_warp.types import Build, WorldFlag, device_structs
 
 NEIGHBOUR_OVERFLOW = wp.constant(int(WorldFlag.NEIGHBOUR_OVERFLOW))
 

@@ -11,11 +11,12 @@ from types import SimpleNamespace
 
 import warp as wp
 
+from dem_warp.entries import SPHERE_MASK
 from dem_warp.kernels.contacts import contact_functions
 from dem_warp.kernels.lanes import WARP, bit_count, lanes_with, largest_of_warp
 from dem_warp.kernels.packing import packing
 from dem_warp.kernels.walls import wall_functions
-from dem_warp.types import SPHERE_MASK, Build, WorldFlag, device_structs
+from dem_warp.types import Build, WorldFlag, device_structs
 
 HEADROOM = 4.0
 """Speed that a grain is allowed to reach, over what it has: an impact makes a falling grain spin."""

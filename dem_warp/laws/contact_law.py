@@ -6,7 +6,7 @@ from typing import Any
 import warp as wp
 
 from dem_warp.laws.conventions import BASE_FORMS, LawForms
-from dem_warp.laws.mechanism import Mechanism
+from dem_warp.laws.mechanism import Mechanisms, check_forms
 from dem_warp.laws.normal import (
     damped,
     hertz_force,
@@ -27,12 +27,7 @@ from dem_warp.laws.tangential import (
     unloaded,
 )
 
-Mechanisms = tuple[type[Mechanism], ...]
-
 _DAMPINGS = {"tsuji": tsuji_rate, "mass_velocity": mass_rate, "viscoelastic": viscoelastic_rate}
-_REPLACED = {"rolling": ("rolling",), "slider": ("sliding", "tangential_history")}
-"""Laws whose base choice alone leaves room for a mechanism, by the hook that it has."""
-
 _SPRINGS = {"spring": coulomb_spring, "spring_free": free_spring, "sum": sum_spring}
 
 
@@ -46,37 +41,6 @@ def memory_size(mechanisms: Mechanisms, forms: LawForms = BASE_FORMS) -> int:
 def acts_apart(mechanisms: Mechanisms) -> bool:
     """Tell whether some mechanism acts on surfaces that do not touch."""
     return any(mechanism.acts_apart for mechanism in mechanisms)
-
-
-def turning_of_partner(forms: LawForms) -> str:
-    """Turning of the partner by a law's torque, `RollingChoice.on_partner`."""
-    return ROLLING[forms.rolling].on_partner if forms.rolling in ROLLING else "opposite"
-
-
-def check_forms(mechanisms: Mechanisms, forms: LawForms) -> None:
-    """Check that no mechanism stands where the law is another than the base's.
-
-    Raises
-    ------
-    ValueError
-        With the mechanism and the law that it does not go with.
-    """
-    base = BASE_FORMS
-    for hook, laws in _REPLACED.items():
-        for law in laws:
-            chosen = getattr(forms, law)
-            clash = [
-                m.name for m in mechanisms if getattr(m, hook) is not None and chosen != getattr(base, law)
-            ]
-            if clash:
-                rule = f"must be {getattr(base, law)!r} beside the mechanism {clash[0]}"
-                raise ValueError(f"ContactLaws.{law}: {rule}, got {chosen!r}")
-    if turning_of_partner(forms) != "opposite" and (
-        clash := [m.name for m in mechanisms if m.torque is not None]
-    ):
-        raise ValueError(
-            f"ContactLaws.rolling: must not be {forms.rolling!r} beside the mechanism {clash[0]}"
-        )
 
 
 @functools.cache

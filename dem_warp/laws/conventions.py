@@ -25,6 +25,14 @@ Rolling = Literal[
 ]  # fmt: skip
 
 
+PartnerTurning = Literal["opposite", "alike", "own lever"]
+"""Turning of the partner: by the opposite torque, by the same one, or by the opposite force at its own lever.
+Then `Contact.rolled` is the grain's own spin [rad/s], and what both spins slide [m/s]."""
+
+_PARTNER_TURNINGS: Mapping[str, PartnerTurning] = {"edem_rvd": "alike", "deme": "own lever"}
+"""Turnings by the choice of rolling, where they are not opposite."""
+
+
 class LawForms(NamedTuple):
     """Choices that kernels are compiled for; the others are numbers in the contact's parameters."""
 
@@ -38,6 +46,11 @@ class LawForms(NamedTuple):
     def changed(self) -> tuple[str, ...]:
         """Choices that are not the base law's."""
         return tuple(own for own, base in zip(self, BASE_FORMS, strict=True) if own != base)
+
+    @property
+    def partner_turning(self) -> PartnerTurning:
+        """Turning of the partner by a rolling resistance that is a torque of the contact."""
+        return _PARTNER_TURNINGS.get(self.rolling, "opposite")
 
 
 BASE_FORMS = LawForms("tsuji", "displacement", "spring", "push", "own_spin")

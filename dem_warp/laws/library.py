@@ -2,32 +2,22 @@
 
 from collections.abc import Mapping
 
-from dem_warp.laws.capillary import CapillaryBridge
-from dem_warp.laws.elastic_plastic_rolling import ElasticPlasticRolling
-from dem_warp.laws.hysteretic_spring import HystereticSpring
-from dem_warp.laws.jkr import JKR
-from dem_warp.laws.kinetic_friction import KineticFriction
-from dem_warp.laws.linear_cohesion import LinearCohesion
 from dem_warp.laws.mechanism import Mechanism
-from dem_warp.laws.micro_slip import MicroSlip
-from dem_warp.laws.rate_weakening import RateWeakening
-from dem_warp.laws.twisting import Twisting
-from dem_warp.laws.wall_adhesion import WallAdhesion
-from dem_warp.registry import Registry, require_kind
+from dem_warp.registry import Modules, Registry, require_kind
 
-_ALL: tuple[type[Mechanism], ...] = (
-    LinearCohesion,
-    WallAdhesion,
-    JKR,
-    CapillaryBridge,
-    ElasticPlasticRolling,
-    Twisting,
+_ALL: Modules[type[Mechanism]] = Modules({
+    "linear_cohesion": "dem_warp.laws.linear_cohesion:LinearCohesion",
+    "wall_adhesion": "dem_warp.laws.wall_adhesion:WallAdhesion",
+    "jkr": "dem_warp.laws.jkr:JKR",
+    "capillary_bridge": "dem_warp.laws.capillary:CapillaryBridge",
+    "elastic_plastic_rolling": "dem_warp.laws.elastic_plastic_rolling:ElasticPlasticRolling",
+    "twisting": "dem_warp.laws.twisting:Twisting",
     # before kinetic friction, which compares the spring with the coefficient that holds at the present speed
-    RateWeakening,
-    KineticFriction,
-    HystereticSpring,
-    MicroSlip,
-)
+    "rate_weakening": "dem_warp.laws.rate_weakening:RateWeakening",
+    "kinetic_friction": "dem_warp.laws.kinetic_friction:KineticFriction",
+    "hysteretic_spring": "dem_warp.laws.hysteretic_spring:HystereticSpring",
+    "micro_slip": "dem_warp.laws.micro_slip:MicroSlip",
+})  # fmt: skip
 
 
 def _check(name: str, kind: type[Mechanism], known: Mapping[str, type[Mechanism]]) -> None:
@@ -38,7 +28,7 @@ def _check(name: str, kind: type[Mechanism], known: Mapping[str, type[Mechanism]
         raise ValueError(f"must have parameters of its own, got {', '.join(shared)}")
 
 
-MECHANISMS = Registry("dem_warp.laws", {mechanism.name: mechanism for mechanism in _ALL}, _check)
+MECHANISMS = Registry("dem_warp.laws", _ALL, _check)
 
 
 def parameters() -> tuple[str, ...]:

@@ -9,6 +9,7 @@ base law as it is.
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, get_args
 
+from dem_warp.laws.conventions import BASE_FORMS, LawForms
 from dem_warp.parameters import check_parameters, parameters_of
 
 Between = Literal["all", "grains", "walls"]
@@ -93,7 +94,40 @@ class Mechanism:
         return 0.0
 
 
+Mechanisms = tuple[type[Mechanism], ...]
+"""Mechanisms of a build, in the order of the library."""
+
+REPLACED = {"rolling": ("rolling",), "slider": ("sliding", "tangential_history")}
+"""Laws whose base choice alone leaves room for a mechanism, by the hook that it has."""
+
+
 def clashes(mechanisms: tuple[Mechanism, ...]) -> list[tuple[str, str]]:
     """Names of those that must not stand in one contact: each with the one that it excludes."""
     pairs = [(one, other) for one in mechanisms for other in mechanisms]
     return [(one.name, other.name) for one, other in pairs if other.name in one.excludes]
+
+
+def check_forms(mechanisms: Mechanisms, forms: LawForms) -> None:
+    """Check that no mechanism stands where the law is another than the base's.
+
+    Raises
+    ------
+    ValueError
+        With the mechanism and the law that it does not go with.
+    """
+    base = BASE_FORMS
+    for hook, laws in REPLACED.items():
+        for law in laws:
+            chosen = getattr(forms, law)
+            clash = [
+                m.name for m in mechanisms if getattr(m, hook) is not None and chosen != getattr(base, law)
+            ]
+            if clash:
+                rule = f"must be {getattr(base, law)!r} beside the mechanism {clash[0]}"
+                raise ValueError(f"ContactLaws.{law}: {rule}, got {chosen!r}")
+    if forms.partner_turning != "opposite" and (
+        clash := [m.name for m in mechanisms if m.torque is not None]
+    ):
+        raise ValueError(
+            f"ContactLaws.rolling: must not be {forms.rolling!r} beside the mechanism {clash[0]}"
+        )

@@ -7,7 +7,7 @@ the integration (`rolling.resist_spin`).
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import warp as wp
 
@@ -225,13 +225,10 @@ class RollingChoice:
     """Load: the normal force where it pushes, its `size`, or its `elastic` part."""
     memory_size: int = 0
     """Values that it remembers of a contact."""
-    on_partner: Literal["opposite", "alike", "own lever"] = "opposite"
-    """Turning of the partner: by the opposite torque, by the same one, or by the opposite force at its own
-    lever. Then `Contact.rolled` is the grain's own spin [rad/s], and what both spins slide [m/s]."""
 
 
 ROLLING: Mapping[str, RollingChoice] = {
-    "edem_rvd": RollingChoice(rvd_torque, on_partner="alike"),
+    "edem_rvd": RollingChoice(rvd_torque),
     "relative_constant": RollingChoice(constant_torque, memory_size=3),
     "cdt": RollingChoice(cdt_torque, "elastic"),
     "elastic_plastic": RollingChoice(spring_torque, memory_size=3),
@@ -239,6 +236,6 @@ ROLLING: Mapping[str, RollingChoice] = {
     "sds": RollingChoice(sds_torque, "size", 3),
     "rocky_3": RollingChoice(rocky_torque, memory_size=3),
     "yade": RollingChoice(yade_torque, "size", 3),
-    "deme": RollingChoice(deme_couple, "size", 1, "own lever"),
+    "deme": RollingChoice(deme_couple, "size", 1),
 }
 """Choices that are torques of a contact, by name; the others are limits of a grain's own spin."""

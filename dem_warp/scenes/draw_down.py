@@ -48,6 +48,7 @@ class DrawDown(PouredScene):
     """Material of both boxes."""
 
     name = "draw-down"
+    wall_names = ("plate", "box", "gate")
     observables: ClassVar[Mapping[str, Observable]] = (
         FILL_OBSERVABLES
         | DISCHARGE_OBSERVABLES

@@ -78,6 +78,7 @@ class Drum(PouredScene):
     """Distance of the camera from the front end, on the axis, of a silhouette; left out: from far away."""
 
     name = "drum"
+    wall_names = ("shell", "end-1", "end-2")
     observables: ClassVar[Mapping[str, Observable]] = (
         FILL_OBSERVABLES
         | {

@@ -39,6 +39,7 @@ class Hopper(PouredScene):
     """Material of the bin, its floor and its plug."""
 
     name = "hopper"
+    wall_names = ("bin", "floor", "plug")
     observables: ClassVar[Mapping[str, Observable]] = FILL_OBSERVABLES | DISCHARGE_OBSERVABLES
     part_names = (("bin",), ("floor",), ("floor",))
     floor = 0.0

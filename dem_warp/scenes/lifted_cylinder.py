@@ -97,6 +97,7 @@ class LiftedCylinder(PouredScene):
     on to the end of a vibration."""
 
     name = "lifted-cylinder"
+    wall_names = ("plate", "tube")
     leaves_a_heap = True
     observables: ClassVar[Mapping[str, Observable]] = FILL_OBSERVABLES | LIFT_OBSERVABLES
     part_names = (("plate",), ("tube",))

@@ -8,12 +8,12 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from dem_warp.case import Case
+from dem_warp.entries import MAX_PARTNERS
 from dem_warp.materials import WallPart
 from dem_warp.model import GRAVITY, ContactCoefficients, Grains, WorldSetup
 from dem_warp.parameters import Parameter, check_parameters
 from dem_warp.scenes.rain import CrossSection, Rain, place_rain
 from dem_warp.scenes.scene import Controller, Observable
-from dem_warp.types import MAX_PARTNERS
 from dem_warp.walls import Wall
 
 FREEBOARD = 1.2

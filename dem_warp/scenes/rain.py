@@ -11,11 +11,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import warp as wp
 
 from dem_warp.clumps import stack_spheres
-from dem_warp.kernels.lanes import WARP
-from dem_warp.kernels.rain import MAX_DELAYS, place_grains
 from dem_warp.population import DrawnGrains
 
 
@@ -70,6 +67,12 @@ def place_rain(
     ValueError
         If a container is too narrow, or its rain too dense, for the grains.
     """
+    # a scene's parameters are read without a device
+    import warp as wp
+
+    from dem_warp.kernels.lanes import WARP
+    from dem_warp.kernels.rain import MAX_DELAYS, place_grains
+
     orientations = [
         _random_orientations(drawn.count, seed) for drawn, seed in zip(grains, seeds, strict=True)
     ]

@@ -8,10 +8,10 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy import optimize, stats
 
-from doe.checks import checked_kind, checked_level, real_array
+from doe.checks import checked_flag, checked_kind, checked_level, real_array
 from doe.errors import DesignError
-from doe.factors import natural_points
 from doe.optimum import StationaryPoint
+from doe.points import natural_points
 from doe.quadratic import QuadraticForm
 from doe.surface import Surface
 from doe.terms import term_name
@@ -125,7 +125,7 @@ def ridge_path(
     if radii.ndim != 1 or not np.isfinite(radii).all() or (radii < 0.0).any() or radii.size == 0:
         raise DesignError(f"radii are finite and not negative, received {radii.tolist()}")
     form = surface.quadratic_form
-    sign = -1.0 if descend else 1.0
+    sign = -1.0 if checked_flag("descend", descend) else 1.0
     rising = QuadraticForm(sign * form.constant, sign * form.slopes, sign * form.matrix)
     found = [_on_sphere(rising, float(radius)) for radius in radii]
     coded = pd.DataFrame([point for point, _ in found], columns=surface.design.names)

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 from scipy import optimize
 from scipy.stats import qmc
 
-from doe.checks import checked_kind, checked_number
+from doe.checks import checked_flag, checked_kind, checked_list, checked_map, checked_number, checked_seed
+from doe.design import Design
 from doe.designs.optimal import Constraint, allowed
 from doe.errors import DesignError
-from doe.factors import natural_points
+from doe.points import natural_points
 from doe.surface import Surface
 
 STARTS = 6
@@ -62,13 +63,14 @@ class Wish:
             raise DesignError(f"a wish has low < high, both finite; received {self.low} and {self.high}")
         if self.target is not None and not self.low < self.target < self.high:
             raise DesignError(f"a target lies between {self.low} and {self.high}, received {self.target}")
-        numbers = (*np.atleast_1d(self.weight), self.importance)
-        if not all(np.isfinite(number) and number > 0.0 for number in numbers) or len(numbers) > 3:
-            raise DesignError(
-                f"weight (two with a target) and importance are positive, received "
-                f"{self.weight} and {self.importance}"
-            )
-        if self.target is None and len(numbers) > 2:
+        checked_flag("larger", self.larger)
+        checked_number("importance of a wish", self.importance, above=0.0)
+        weights = self.weight if isinstance(self.weight, tuple) else (self.weight,)
+        for weight in weights:
+            checked_number("weight of a wish", weight, above=0.0)
+        if not 1 <= len(weights) <= 2:
+            raise DesignError(f"a wish has one weight, or two with a target: received {self.weight}")
+        if self.target is None and len(weights) > 1:
             raise DesignError(f"a wish without target has one weight, received {self.weight}")
 
     def of(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -178,15 +180,25 @@ def most_desirable(
     DesignError
         Other factors, a response without wish or surface, or no setting that is not useless for some wish.
     """
-    for name, given in (("surfaces", surfaces), ("wishes", wishes)):
-        if not isinstance(given, Mapping):
-            raise DesignError(f"{name} is a mapping by response, received {given!r}")
-    if not surfaces or set(surfaces) != set(wishes):
+    checked_surfaces(surfaces)
+    for name, wish in checked_map("wishes", wishes).items():
+        checked_kind(f"wish of {name!r}", wish, Wish)
+    if set(surfaces) != set(wishes):
         raise DesignError(f"a wish for every surface: {sorted(surfaces)} and {sorted(wishes)}")
-    first = next(iter(surfaces.values())).design.factors
-    if any(surface.design.factors != first for surface in surfaces.values()):
-        raise DesignError("the surfaces have the same factors, with the same ranges")
     return _best(surfaces, wishes, 1.0, extent, radius, constraints, seed)
+
+
+def checked_surfaces(surfaces: Mapping[str, Surface]) -> Design:
+    """Return the design of surfaces by response; raise DesignError unless they have the same factors."""
+    given = checked_map("surfaces", surfaces)
+    if not given:
+        raise DesignError("surfaces holds one fitted surface or more by response, received none")
+    for name, surface in given.items():
+        checked_kind(f"surface of {name!r}", surface, Surface)
+    first = next(iter(given.values())).design
+    if any(surface.design.factors != first.factors for surface in given.values()):
+        raise DesignError("the surfaces have the same factors, with the same ranges")
+    return first
 
 
 def overall(
@@ -223,13 +235,14 @@ def _best(
     surface = next(iter(surfaces.values()))
     count = len(surface.design.factors)
     checked_number("extent", extent, above=0.0)
-    if not (radius is None or radius > 0.0):
-        raise DesignError(f"extent and radius are positive, received {extent} and {radius}")
+    if radius is not None:
+        checked_number("radius", radius, above=0.0)
+    constraints = checked_list("constraints", constraints)
 
     def score(coded: NDArray[np.float64]) -> NDArray[np.float64]:
         return overall(surfaces, wishes, coded) if wishes else sign * fitted_means(surface, coded)
 
-    unit = qmc.Sobol(count, rng=np.random.default_rng(seed)).random_base2(DRAWS_LOG2)
+    unit = qmc.Sobol(count, rng=np.random.default_rng(checked_seed(seed))).random_base2(DRAWS_LOG2)
     corners = 2.0 * np.round(unit[:256]) - 1.0
     points = extent * np.vstack([np.zeros((1, count)), 2.0 * unit - 1.0, corners])
     if radius is not None:

@@ -8,7 +8,7 @@ from scipy import optimize, stats
 
 from doe.analysis.coefficients import coefficient_table
 from doe.anova import settings_of
-from doe.checks import checked_kind
+from doe.checks import checked_kind, checked_level
 from doe.errors import DesignError
 from doe.surface import Surface
 
@@ -106,6 +106,7 @@ def box_cox(surface: Surface, confidence: float = 0.95) -> BoxCox:
         Responses that are not all positive.
     """
     checked_kind("surface", surface, Surface)
+    confidence = checked_level(confidence, "confidence")
     response = surface.response.to_numpy()
     if not (response > 0.0).all():
         raise DesignError(

@@ -9,7 +9,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from doe.anova import block_columns
-from doe.checks import checked_count, checked_kind, checked_level
+from doe.checks import checked_count, checked_flag, checked_kind, checked_level
 from doe.design import Design, observations
 from doe.designs.aliases import two_level_runs
 from doe.errors import DesignError
@@ -41,7 +41,7 @@ class TwoLevelEffects:
         together : bool
         """
         level = checked_level(alpha)
-        if together:
+        if checked_flag("together", together):
             level = 1.0 - (1.0 - level) ** (1.0 / self.count)
         return self.pseudo_error * float(np.quantile(orthogonal_null(self.count), 1.0 - level))
 
@@ -89,9 +89,8 @@ def two_level_effects(design: Design, response: ArrayLike, order: int | None = N
     means = values.groupby(level=0, sort=False).mean()
     coded = two_level_runs(design)
     y = means.loc[coded.index].to_numpy()
-    rows, mixed = _distinct(
-        coded, design.names, len(design.names) if order is None else checked_count("order", order)
-    )
+    highest = len(design.names) if order is None else min(checked_count("order", order), len(design.names))
+    rows, mixed = _distinct(coded, design.names, highest)
     columns = np.column_stack([coded[list(term)].prod(axis=1) for term in rows])
     blocks = None if design.blocks is None else design.blocks.loc[coded.index]
     lost = np.column_stack([np.ones(len(coded)), block_columns(blocks, coded.index).to_numpy()])

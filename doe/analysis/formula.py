@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from statsmodels.regression.linear_model import RegressionResults
 
 from doe.analysis.coefficients import coefficient_table, significant_words, summary_text
-from doe.checks import checked_kind, real_array
+from doe.checks import checked_choice, checked_flag, checked_kind, checked_level, checked_map, real_array
 from doe.design import Design, observations
 from doe.designs.mixture import Mixture
 from doe.errors import DesignError
@@ -53,7 +53,8 @@ class LinearFit:
 
     def predict(self, points: pd.DataFrame | Mapping[str, Any], alpha: float = 0.05) -> pd.DataFrame:
         """Return mean, se, confidence and prediction limits at natural settings (columns as ``Surface``)."""
-        table = points if isinstance(points, pd.DataFrame) else pd.DataFrame([dict(points)])
+        alpha = checked_level(alpha)
+        table = points if isinstance(points, pd.DataFrame) else pd.DataFrame([checked_map("points", points)])
         try:
             frame = self.fit.get_prediction(table).summary_frame(alpha=alpha)
         except Exception as error:
@@ -107,7 +108,7 @@ def fit_formula(design: Design, response: ArrayLike, formula: str, *, coded: boo
     if "~" in formula:
         raise DesignError(f"formula is the right-hand side alone, such as 'A * B'; received {formula!r}")
     observed, values = observations(design, response)
-    table = (design.points if coded else design.natural).loc[observed.index].copy()
+    table = (design.points if checked_flag("coded", coded) else design.natural).loc[observed.index].copy()
     for factor in design.factors:
         if hasattr(factor, "levels"):
             table[factor.name] = pd.Categorical(
@@ -134,8 +135,7 @@ def fit_mixture(mixture: Mixture, response: ArrayLike, model: str = "quadratic")
         Components; with their products of two; and of three (Scheffe 1958).
     """
     checked_kind("mixture", mixture, Mixture)
-    if model not in MIXTURE_MODELS:
-        raise DesignError(f"model is one of {', '.join(MIXTURE_MODELS)}, received {model!r}")
+    checked_choice("model", model, MIXTURE_MODELS)
     values = real_array("response", response)
     if values.ndim not in (1, 2) or len(values) != len(mixture.shares) or not np.isfinite(values).all():
         raise DesignError(

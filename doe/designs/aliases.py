@@ -106,8 +106,8 @@ def alias_structure(design: Design, order: int = 2) -> AliasStructure:
     DesignError
         A factor with other levels than -1 and +1.
     """
-    order = checked_count("order", order)
     checked_kind("design", design, Design)
+    order = min(checked_count("order", order), len(design.names))
     coded = two_level_runs(design)
     names = design.names
     terms: list[Term] = [term for size in range(1, order + 1) for term in itertools.combinations(names, size)]

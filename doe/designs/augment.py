@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
-from doe.checks import checked_count, checked_kind, checked_list, checked_number
+from doe.checks import MOST, checked_count, checked_kind, checked_list, checked_number
 from doe.design import Design, numbered
 from doe.errors import DesignError
 from doe.factors import Category, numeric_factors
@@ -28,7 +28,7 @@ def join(*designs: Design, blocks: Sequence | None = None) -> Design:
     if len(designs) < 2:
         raise DesignError(f"join takes two or more designs, received {len(designs)}")
     first = designs[0]
-    labels = list(range(1, len(designs) + 1)) if blocks is None else list(blocks)
+    labels = list(range(1, len(designs) + 1)) if blocks is None else checked_list("blocks", blocks)
     if len(labels) != len(designs) or len(set(labels)) < len(labels):
         raise DesignError(f"blocks: a different label for each of {len(designs)} designs, received {labels}")
     for design in designs[1:]:
@@ -66,6 +66,8 @@ def foldover(design: Design, factors: Sequence[str] | None = None) -> Design:
         if factors is None
         else [design.factor(name).name for name in checked_list("factors", factors)]
     )
+    if not turned:
+        raise DesignError("a foldover turns the signs of at least one factor, received none")
     many = [f.name for f in design.factors if isinstance(f, Category) and len(f.levels) > 2]
     if many:
         raise DesignError(f"a category of more than two levels has no mirror image: {many[0]!r}")
@@ -82,7 +84,7 @@ def add_center(design: Design, count: int) -> Design:
     """
     checked_kind("design", design, Design)
     numeric_factors(design.factors, "a center")
-    count = checked_count("count, the number of center runs,", count)
+    count = checked_count("count, the number of center runs,", count, most=MOST)
     labels = (
         []
         if design.blocks is None
@@ -110,7 +112,7 @@ def add_axial(design: Design, alpha: float, center: int = 0) -> Design:
     checked_kind("design", design, Design)
     numeric_factors(design.factors, "an axial point")
     alpha = checked_number("alpha", alpha, above=0.0)
-    center = checked_count("center", center, least=0)
+    center = checked_count("center", center, least=0, most=MOST)
     count = len(design.factors)
     coded = np.vstack([np.kron(np.eye(count), [[-alpha], [alpha]]), np.zeros((center, count))])
     axial = Design(design.factors, numbered(pd.DataFrame(coded, columns=design.names)))

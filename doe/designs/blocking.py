@@ -6,6 +6,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from doe.checks import checked_count
 from doe.errors import DesignError
 
 SMALL = 1e-9
@@ -24,10 +25,11 @@ def block_labels(coded: NDArray[np.float64], blocks: int) -> NDArray[np.int64]:
     DesignError
         A number of blocks that is no power of two, or one for which a main effect would be lost.
     """
+    blocks = checked_count("blocks", blocks)
     if blocks == 1:
         return np.ones(len(coded), dtype=np.int64)
-    count = int(math.log2(blocks)) if blocks > 0 else 0
-    if blocks < 1 or 2**count != blocks or blocks >= len(coded) or not (np.abs(coded) == 1.0).all():
+    count = int(math.log2(blocks))
+    if 2**count != blocks or blocks >= len(coded) or not (np.abs(coded) == 1.0).all():
         raise DesignError(
             f"blocks of a two-level design: 2, 4, ... and fewer than its {len(coded)} runs, received {blocks}"
         )

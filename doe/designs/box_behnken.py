@@ -5,7 +5,7 @@ from collections.abc import Iterable
 import numpy as np
 import pandas as pd
 
-from doe.checks import checked_count
+from doe.checks import MOST, checked_count, checked_flag
 from doe.design import Design, numbered
 from doe.designs.factorial import basic_factorial
 from doe.errors import DesignError
@@ -55,11 +55,11 @@ def box_behnken(
     if count not in TOGETHER:
         raise DesignError(f"a Box-Behnken design takes 3 to 7 factors, received {count}")
     pieces = _pieces(count)
-    if blocks and len(pieces) == 1:
+    if checked_flag("blocks", blocks) and len(pieces) == 1:
         raise DesignError("the Box-Behnken design of 3 factors has no orthogonal blocks")
     if not blocks:
         pieces = [np.vstack(pieces)]
-    center = CENTERS[count] if center is None else checked_count("center", center, least=0)
+    center = CENTERS[count] if center is None else checked_count("center", center, least=0, most=MOST)
     if center % len(pieces):
         raise DesignError(
             f"center is the number of center runs, shared by {len(pieces)} blocks; received {center}"

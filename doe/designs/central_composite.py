@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from doe.checks import checked_count, checked_number
+from doe.checks import MOST, checked_count, checked_flag, checked_number
 from doe.design import Design, numbered
 from doe.designs.blocking import block_labels
 from doe.designs.factorial import basic_factorial
@@ -75,7 +75,8 @@ def central_composite(
         center runs, blocks that would cost a main effect.
     """
     factors = numeric_factors(factors, "a central composite design")
-    corners = two_level_part(len(factors), full)
+    blocks = checked_count("blocks", blocks)
+    corners = two_level_part(len(factors), checked_flag("full", full))
     parts = _corner_blocks(corners, blocks)
     cube, star = _centers(center, blocks)
     distance = _axial_distance(alpha, len(factors), len(corners), cube * len(parts), star)
@@ -110,11 +111,11 @@ def _corner_blocks(corners: NDArray[np.float64], blocks: int) -> list[NDArray[np
 def _centers(center: int | tuple[int, int], blocks: int) -> tuple[int, int]:
     """Return the center runs of each block of corners and of the axial points."""
     if not isinstance(center, tuple):
-        count = checked_count("center", center, least=0)
+        count = checked_count("center", center, least=0, most=MOST)
         return (count if blocks > 1 else 0), count
     if len(center) != 2:
         raise DesignError(f"center is one or two numbers of center runs, received {center}")
-    cube, star = (checked_count("center", count, least=0) for count in center)
+    cube, star = (checked_count("center", count, least=0, most=MOST) for count in center)
     return cube, star
 
 

@@ -5,6 +5,7 @@ from collections.abc import Iterable
 import numpy as np
 import pandas as pd
 
+from doe.checks import MOST, checked_count
 from doe.design import Design, numbered
 from doe.designs.hadamard import conference_matrix, has_conference
 from doe.errors import DesignError
@@ -39,9 +40,10 @@ def definitive_screening(
         raise DesignError(
             f"a definitive screening design takes 3 to {MOST_FACTORS} factors, received {len(factors)}"
         )
-    if spare < 0 or center < 1:
-        raise DesignError(f"spare is not negative and center at least 1, received {spare} and {center}")
-    order = len(factors) + spare
+    center = checked_count("center", center, most=MOST)
+    order = len(factors) + checked_count("spare", spare, least=0)
+    if order > 2 * MOST_FACTORS:
+        raise DesignError(f"factors and spare columns are at most {2 * MOST_FACTORS}, received {order}")
     while not has_conference(order):
         order += 1
     half = conference_matrix(order)[:, : len(factors)]

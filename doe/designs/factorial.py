@@ -8,15 +8,13 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from doe.checks import checked_count, checked_list
+from doe.checks import MOST, checked_count, checked_list
 from doe.design import Design, numbered
 from doe.designs.aliases import alias_structure
 from doe.designs.blocking import block_labels
 from doe.errors import DesignError
 from doe.factors import Category, Factor, checked_factors, two_level_factors
 from doe.terms import term_name
-
-MOST_RUNS = 100_000
 
 CATALOGUE: dict[int, dict[int, tuple[int, ...]]] = {
     4: {3: (3,)},
@@ -71,7 +69,7 @@ def full_factorial(
     """
     factors = checked_factors(factors)
     given = [levels] * len(factors) if isinstance(levels, int) else checked_list("levels", levels)
-    counts = [checked_count("levels", count, least=2) for count in given]
+    counts = [checked_count("levels", count, least=2, most=MOST) for count in given]
     if len(counts) != len(factors):
         raise DesignError(f"levels: two or more for each of {len(factors)} factors, received {levels}")
     grids = [
@@ -79,7 +77,7 @@ def full_factorial(
         for factor, count in zip(factors, counts, strict=True)
     ]
     size = math.prod(len(grid) for grid in grids)
-    if size > MOST_RUNS:
+    if size > MOST:
         raise DesignError(f"a full factorial of {size} runs: take a fraction of it")
     coded = np.array(list(itertools.product(*grids[::-1])))[:, ::-1]
     return _with_blocks(factors, coded, blocks, center, seed)
@@ -121,8 +119,10 @@ def fractional_factorial(
     """
     factors = two_level_factors(factors, "a two-level fraction")
     names = [factor.name for factor in factors]
+    if resolution is not None:
+        resolution = checked_count("resolution", resolution, least=2)
     if generators is not None:
-        coded, written = _generated(names, generators)
+        coded, written = _generated(names, checked_list("generators", generators))
     else:
         if runs is not None:
             runs = checked_count("runs", runs, least=2)
@@ -197,6 +197,8 @@ def _generated(names: list[str], generators: Sequence[str]) -> tuple[NDArray[np.
     basic = basic_factorial(len(basic_names))
     further: dict[str, NDArray[np.float64]] = {}
     for text in generators:
+        if not isinstance(text, str):
+            raise DesignError(f"a generator is text such as 'D = A:B:C', received {text!r}")
         name, equal, word = (part.strip() for part in text.partition("="))
         parts = [part.strip() for part in word.lstrip("+-").split(":")]
         strangers = [part for part in parts if part not in basic_names]
@@ -216,8 +218,7 @@ def _with_blocks(
     factors: tuple[Factor, ...], coded: NDArray[np.float64], blocks: int, center: int, seed: int | None
 ) -> Design:
     """Return the design of these runs, in blocks each of which has its center runs behind it."""
-    if center < 0:
-        raise DesignError(f"center is the number of center runs and not negative, received {center}")
+    center, blocks = checked_count("center", center, least=0, most=MOST), checked_count("blocks", blocks)
     if center and any(isinstance(factor, Category) for factor in factors):
         raise DesignError("a category has no center: choose center=0")
     labels = block_labels(coded, blocks)

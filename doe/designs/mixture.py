@@ -1,17 +1,31 @@
 """Mixture designs: shares of components that add up to one."""
 
 import itertools
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
 
-from doe.checks import checked_count, checked_kind, checked_list
+from doe.checks import (
+    MOST,
+    checked_count,
+    checked_flag,
+    checked_kind,
+    checked_list,
+    checked_map,
+    checked_number,
+    checked_seed,
+    real_array,
+)
 from doe.design import numbered
 from doe.errors import DesignError
 
 TOLERANCE = 1e-9
+
+MOST_TRIED = 10_000_000
+"""Combinations of shares that are looked through."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,8 +48,14 @@ class Mixture:
 
     def __post_init__(self) -> None:
         checked_kind("shares", self.shares, pd.DataFrame)
+        checked_seed(self.seed)
+        checked_map("lower", self.lower)
+        for name in self.shares.columns:
+            real_array(f"the shares of {name!r}", self.shares[name])
+        if self.shares.empty:
+            raise DesignError("a mixture has at least one blend, received an empty table")
         totals = self.shares.sum(axis=1)
-        off = totals.index[(totals - 1.0).abs() > TOLERANCE]
+        off = totals.index[~((totals - 1.0).abs() <= TOLERANCE)]
         if len(off) or not (self.shares >= -TOLERANCE).all(axis=None):
             place = off[0] if len(off) else self.shares.index[(self.shares < -TOLERANCE).any(axis=1)][0]
             raise DesignError(
@@ -84,9 +104,11 @@ def simplex_lattice(
     names = _checked(components)
     degree = checked_count("degree", degree)
     count = len(names)
+    if math.comb(count + degree - 1, degree) > MOST or (degree + 1) ** count > MOST_TRIED:
+        raise DesignError(f"a lattice of {count} components and degree {degree} has too many blends")
     rows = [row for row in itertools.product(range(degree, -1, -1), repeat=count) if sum(row) == degree]
     shares = np.array(rows) / degree
-    if interior:
+    if checked_flag("interior", interior):
         equal = np.full((1, count), 1.0 / count)
         shares = np.vstack([shares, equal, 0.5 * (np.eye(count) + equal)])
     return _scaled(names, shares, lower, seed)
@@ -108,7 +130,10 @@ def simplex_centroid(
 
 
 def _checked(components: Sequence[str]) -> list[str]:
-    names = [str(name) for name in checked_list("components", components)]
+    names = checked_list("components", components)
+    for name in names:
+        if not isinstance(name, str):
+            raise DesignError(f"a component's name is text, received {name!r}")
     if len(names) < 2 or len(set(names)) < len(names):
         raise DesignError(f"a mixture has two or more different components, received {components!r}")
     return names
@@ -117,12 +142,14 @@ def _checked(components: Sequence[str]) -> list[str]:
 def _scaled(
     names: list[str], shares: np.ndarray, lower: Mapping[str, float] | None, seed: int | None
 ) -> Mixture:
-    lower = dict(lower or {})
+    lower = {} if lower is None else checked_map("lower", lower)
     strangers = [name for name in lower if name not in names]
     if strangers:
         raise DesignError(f"lower names {strangers[0]!r}, which is no component of {', '.join(names)}")
-    least = np.array([lower.get(name, 0.0) for name in names])
-    if not (np.isfinite(least).all() and (least >= 0.0).all() and least.sum() < 1.0):
+    least = np.array(
+        [checked_number(f"the least share of {name!r}", lower.get(name, 0.0), least=0.0) for name in names]
+    )
+    if not least.sum() < 1.0:
         raise DesignError(f"least shares are not negative and add up to less than 1, received {lower}")
     table = pd.DataFrame(least + (1.0 - least.sum()) * shares, columns=names)
     return Mixture(numbered(table), lower, seed)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from doe.errors import DesignError
+from doe.checks import checked_choice
 from doe.factors import Category, Factor
 from doe.terms import MODELS
 
@@ -18,8 +18,7 @@ def model_columns(coded: pd.DataFrame, factors: Sequence[Factor], model: str) ->
 
     A category of k levels has k - 1 columns, each of which adds up to zero over the levels.
     """
-    if model not in MODELS:
-        raise DesignError(f"model is one of {', '.join(MODELS)}, received {model!r}")
+    checked_choice("model", model, MODELS)
     linear = [_base(coded[factor.name].to_numpy(), factor) for factor in factors]
     columns: Columns = {"intercept": np.ones(len(coded))}
     for base in linear:

@@ -9,12 +9,13 @@ from numpy.typing import NDArray
 from scipy.stats import qmc
 
 from doe.anova import block_columns
-from doe.checks import checked_count
+from doe.checks import MOST, checked_choice, checked_count, checked_kind, checked_list, checked_seed
 from doe.design import Design, numbered
 from doe.designs.augment import join
 from doe.designs.model_columns import model_columns
 from doe.errors import DesignError
-from doe.factors import Category, Factor, checked_factors, natural_points
+from doe.factors import Category, Factor, checked_factors
+from doe.points import natural_points
 
 CANDIDATE_BUDGET = 4_096
 """Most candidate runs; a grid that has more is replaced by Sobol points and the corners."""
@@ -69,10 +70,13 @@ def optimal_design(
         An unknown criterion, constraints that allow no run or too few for the model.
     """
     factors = checked_factors(factors)
-    if criterion not in ("D", "I"):
-        raise DesignError(f"criterion is D or I, received {criterion!r}")
-    runs = checked_count("runs", runs)
-    rng = np.random.default_rng(seed)
+    checked_choice("criterion", criterion, ("D", "I"))
+    runs = checked_count("runs", runs, most=MOST)
+    starts = checked_count("starts", starts, most=MOST)
+    rng = np.random.default_rng(checked_seed(seed))
+    constraints = checked_list("constraints", constraints)
+    if existing is not None:
+        checked_kind("existing", existing, Design)
     candidates = allowed(factors, _candidates(factors, levels, seed), constraints)
     expanded = model_columns(candidates, factors, model).to_numpy()
     polynomial = expanded.shape[1]
@@ -104,7 +108,9 @@ def allowed(
     """Return the coded points whose natural values keep all constraints; raise DesignError when none does."""
     natural = natural_points(factors, coded)
     mask = np.ones(len(coded), dtype=bool)
-    for rule in constraints:
+    for rule in checked_list("constraints", constraints):
+        if not isinstance(rule, str) and not callable(rule):
+            raise DesignError(f"a constraint is text such as 'v0 < v1' or a function, received {rule!r}")
         try:
             held = natural.eval(rule, engine="python") if isinstance(rule, str) else rule(natural)
         except Exception as error:
@@ -122,8 +128,7 @@ def _candidates(factors: Sequence[Factor], levels: int | None, seed: int) -> pd.
     """Return the runs to choose from: a grid, or Sobol points and the corners where the grid is too large."""
     if levels is None:
         levels = 5 if 5.0 ** len(factors) <= CANDIDATE_BUDGET else 3
-    if levels < 2:
-        raise DesignError(f"levels: two or more, received {levels}")
+    levels = checked_count("levels", levels, least=2, most=MOST)
     grids = [
         np.array(f.codes) if isinstance(f, Category) else np.linspace(-1.0, 1.0, levels) for f in factors
     ]

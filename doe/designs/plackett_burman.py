@@ -17,6 +17,9 @@ DEFAULT_RUNS = 12
 RESOLUTION_V = {16: 5, 32: 6, 64: 8, 128: 11}
 """Most factors of a regular fraction of resolution V, by its runs."""
 
+MOST_RUNS = 1_000
+"""Larger matrices take minutes."""
+
 
 def plackett_burman(factors: Iterable[Factor], runs: int | None = None, seed: int | None = None) -> Design:
     """Return the Plackett-Burman design of the factors.
@@ -50,7 +53,7 @@ def plackett_burman(factors: Iterable[Factor], runs: int | None = None, seed: in
         runs = max(DEFAULT_RUNS, 4 * math.ceil((len(factors) + 1) / 4))
         while not constructible(runs):
             runs += 4
-    runs = checked_count("runs", runs)
+    runs = checked_count("runs", runs, most=MOST_RUNS)
     if runs < len(factors) + 1:
         raise DesignError(f"{len(factors)} factors need at least {len(factors) + 1} runs, received {runs}")
     matrix = screening_matrix(runs, len(factors))

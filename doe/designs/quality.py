@@ -9,7 +9,7 @@ from scipy import stats
 from scipy.stats import qmc
 
 from doe.anova import block_columns
-from doe.checks import checked_kind
+from doe.checks import checked_count, checked_kind, checked_level, checked_list, checked_number, checked_seed
 from doe.design import Design
 from doe.designs.model_columns import model_columns
 from doe.designs.optimal import Constraint, allowed
@@ -64,7 +64,7 @@ def design_quality(
     columns = model_columns(design.points, design.factors, model)
     count, runs = columns.shape[1], len(columns)
     inverse = np.linalg.inv(matrix.T @ matrix)[:count, :count]
-    unit = qmc.Sobol(len(design.factors), rng=np.random.default_rng(seed)).random_base2(11)
+    unit = qmc.Sobol(len(design.factors), rng=np.random.default_rng(checked_seed(seed))).random_base2(11)
     box = pd.concat([_points(design, unit), _points(design, np.round(unit))], ignore_index=True)
     inside = allowed(design.factors, box, constraints)
     columns_inside = model_columns(inside, design.factors, model).to_numpy()
@@ -118,11 +118,11 @@ def power_table(
         No degrees of freedom for the error, or terms that the runs cannot tell apart.
     """
     checked_kind("design", design, Design)
-    if not (np.isfinite(sd) and sd > 0.0) or replicates < 1 or not 0.0 < alpha < 1.0:
-        raise DesignError(
-            "sd is positive, replicates at least 1 and alpha between 0 and 1; received "
-            f"{sd}, {replicates}, {alpha}"
-        )
+    sd, replicates = checked_number("sd", sd, above=0.0), checked_count("replicates", replicates)
+    alpha = checked_level(alpha)
+    sizes = [checked_number("an effect", effect) for effect in checked_list("effects", effects)]
+    if not sizes:
+        raise DesignError("a power table takes one effect or more, received none")
     matrix = _full_matrix(design, model)
     columns = model_columns(design.points, design.factors, model)
     count = columns.shape[1]
@@ -137,7 +137,7 @@ def power_table(
     se = pd.Series(scale * sd * np.sqrt(np.diag(inverse)), index=columns.columns).iloc[1:]
     table = pd.DataFrame({"se": se, "vif": _inflation(columns, inverse * replicates), "df": float(df)})
     critical = stats.t.isf(0.5 * alpha, df)
-    for effect in effects:
+    for effect in sizes:
         shift = np.abs(effect) / se
         table[f"power at {effect:g}"] = stats.nct.sf(critical, df, shift) + stats.nct.sf(critical, df, -shift)
     return table.rename_axis("term")

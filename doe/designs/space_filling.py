@@ -7,10 +7,12 @@ import numpy as np
 import pandas as pd
 from scipy.stats import qmc
 
-from doe.checks import checked_count
+from doe.checks import MOST, checked_choice, checked_count, checked_seed
 from doe.design import Design, numbered
 from doe.errors import DesignError
 from doe.factors import Factor, numeric_factors
+
+OPTIMIZE = ("random-cd", "lloyd")
 
 
 def latin_hypercube(
@@ -33,8 +35,11 @@ def latin_hypercube(
         moving them apart, which does not (see ``scipy.stats.qmc.LatinHypercube``).
     """
     factors = numeric_factors(factors, "a Latin hypercube")
-    runs = checked_count("runs of a Latin hypercube", runs, least=2)
-    sampler = qmc.LatinHypercube(len(factors), optimization=optimize, rng=np.random.default_rng(seed))
+    runs = checked_count("runs of a Latin hypercube", runs, least=2, most=MOST)
+    if optimize is not None:
+        checked_choice("optimize, unless it is None,", optimize, OPTIMIZE)
+    rng = np.random.default_rng(checked_count("seed", seed, least=0))
+    sampler = qmc.LatinHypercube(len(factors), optimization=optimize, rng=rng)
     return _design(factors, sampler.random(runs))
 
 
@@ -50,12 +55,13 @@ def sobol(factors: Iterable[Factor], runs: int, *, seed: int | None = None) -> D
         Seed of Owen's scrambling; None takes the plain sequence, whose first run has every factor low.
     """
     factors = numeric_factors(factors, "a Sobol design")
-    runs = checked_count("runs of a Sobol design", runs, least=2)
+    runs = checked_count("runs of a Sobol design", runs, least=2, most=MOST)
     if runs & (runs - 1):
         below = 1 << max(runs.bit_length() - 1, 1)
         raise DesignError(
             f"a Sobol design has a power of two of runs, such as {below} or {2 * below}; received {runs}"
         )
+    checked_seed(seed)
     sampler = qmc.Sobol(len(factors), scramble=seed is not None, rng=np.random.default_rng(seed or 0))
     return _design(factors, sampler.random_base2(runs.bit_length() - 1))
 

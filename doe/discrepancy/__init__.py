@@ -30,33 +30,6 @@ generator of the runs that it wants; `drive` answers it.
 ('named', ('leak',))
 """
 
-from doe.discrepancy.analysis import Analysis, analyse, drive
-from doe.discrepancy.contest.gap import Answer, Question
-from doe.discrepancy.contest.power import Power
-from doe.discrepancy.emulation.bank import Bank, bank_points, load_bank, make_bank
-from doe.discrepancy.emulation.emulator import Emulator, fit_emulator
-from doe.discrepancy.fitting.fit import Interval
-from doe.discrepancy.problem.measured import Measured
-from doe.discrepancy.problem.settings import Settings, settings_of
-from doe.discrepancy.problem.simulator import Outcomes, Point, Simulator
-from doe.discrepancy.problem.space import MechanismRange, SearchSpace
-from doe.discrepancy.verdict.before_after import BeforeAfter
-from doe.discrepancy.verdict.discovery import (
-    Candidate,
-    Confounding,
-    Data,
-    Discovery,
-    Drift,
-    Effort,
-    Fit,
-    Gap,
-    Verdict,
-)
-from doe.discrepancy.verdict.next_experiment import NextExperiment
+import lazy_loader
 
-__all__ = [
-    "Analysis", "Answer", "Bank", "BeforeAfter", "Candidate", "Confounding", "Data", "Discovery", "Drift",
-    "Effort", "Emulator", "Fit", "Gap", "Interval", "Measured", "MechanismRange", "NextExperiment",
-    "Outcomes", "Point", "Power", "Question", "SearchSpace", "Settings", "Simulator", "Verdict", "analyse",
-    "bank_points", "drive", "fit_emulator", "load_bank", "make_bank", "settings_of",
-]  # fmt: skip
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -9,6 +9,8 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
 from doe.agreement import Agreement
+from doe.checks import checked_kind, checked_list, checked_number
+from doe.errors import DesignError
 from doe.palette import BLUE, GREEN, MUTED, ORANGE, VERMILION
 from doe.plots.style import canvas, plain
 from doe.steepest import ClimbPath, climb_table
@@ -27,6 +29,7 @@ def climb_plot(
     figure, axes = canvas(axes, 3.8)
     axes.axhline(target, color=VERMILION, linewidth=1.2, label=f"target {target:g}")
     if target_sd is not None:
+        checked_number("target_sd", target_sd, least=0.0)
         axes.axhspan(target - target_sd, target + target_sd, color=VERMILION, alpha=0.15, linewidth=0.0)
     steps = np.arange(len(table))
     axes.plot(steps, path.predicted, color=MUTED, linestyle="--", label="predicted")
@@ -56,6 +59,10 @@ def agreement_plot(
     axes : Axes, optional
         Where to draw; default a figure of its own.
     """
+    checked_kind("result", result, Agreement)
+    groups = checked_list("groups", groups)
+    if len(groups) != result.runs:
+        raise DesignError(f"groups: a name for each of {result.runs} runs, received {len(groups)}")
     figure, axes = canvas(axes, 4.6)
     ends = [
         min(result.response.min(), result.reference.min()),

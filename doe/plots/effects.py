@@ -7,8 +7,9 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from doe.analysis.desirability import Wish
-from doe.design import Design, observations
+from doe.analysis.desirability import Wish, checked_surfaces
+from doe.checks import checked_kind, checked_list, checked_map
+from doe.design import Design, checked_setting, observations
 from doe.errors import DesignError
 from doe.factors import Category, Factor
 from doe.palette import BLUE, MUTED, ORANGE, VERMILION
@@ -79,7 +80,7 @@ def interaction_plot(
 
     Parallel lines: the two do not interact.
     """
-    if x == trace:
+    if checked_kind("x", x, str) == checked_kind("trace", trace, str):
         raise DesignError(f"an interaction is that of two different factors, received {x!r} twice")
     figure, axes = canvas(axes, 3.6)
     table = level_means(design, response, x, trace).reset_index().pivot_table("mean", x, trace)
@@ -118,16 +119,16 @@ def cube_plot(
     at : mapping of natural values by factor, optional
         Where the other factors are held; default their centers.
     """
-    names = list(factors) if factors is not None else surface.design.names[:3]
-    if len(set(names)) != 3:
-        raise DesignError(f"a cube has three different factors, received {names}")
+    checked_kind("surface", surface, Surface)
+    names = surface.design.names[:3] if factors is None else checked_list("factors", factors)
     chosen = [surface.design.factor(name) for name in names]
-    held = {
-        factor.name: (at or {}).get(
-            factor.name, factor.to_natural(factor.codes[0] if isinstance(factor, Category) else 0.0)
-        )
+    if len(set(names)) != 3 or len(names) != 3:
+        raise DesignError(f"a cube has three different factors, received {names}")
+    centers = {
+        factor.name: factor.to_natural(factor.codes[0] if isinstance(factor, Category) else 0.0)
         for factor in surface.design.factors
     }
+    held = checked_setting("at", centers | ({} if at is None else checked_map("at", at)), surface.design)
     figure, axes = canvas(axes, 4.2)
     corners = np.array([[a, b, c] for c in (0, 1) for b in (0, 1) for a in (0, 1)], dtype=float)
     points = pd.DataFrame([held] * 8)
@@ -183,10 +184,12 @@ def profile_plot(
     axes : array of Axes, shape (responses, factors), optional
         One row more with wishes.
     """
-    design = next(iter(surfaces.values())).design
-    missing = [name for name in design.names if name not in at]
-    if missing:
-        raise DesignError(f"no value for factor {missing[0]!r} in the setting of the profiler")
+    design = checked_surfaces(surfaces)
+    at = checked_setting("the setting of the profiler", at, design)
+    if wishes is not None and set(checked_map("wishes", wishes)) != set(surfaces):
+        raise DesignError(f"a wish for every surface: {sorted(surfaces)} and {sorted(wishes)}")
+    for name, wish in ({} if wishes is None else wishes).items():
+        checked_kind(f"wish of {name!r}", wish, Wish)
     rows = len(surfaces) + (wishes is not None)
     if axes is None:
         figure = Figure(figsize=(WIDTH, 0.6 + 1.7 * rows), layout="constrained")

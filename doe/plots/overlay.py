@@ -8,6 +8,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from doe.analysis.desirability import checked_surfaces
+from doe.checks import checked_map, checked_number
+from doe.design import checked_setting
 from doe.errors import DesignError
 from doe.palette import BLUE, GREEN, MUTED, ORANGE, VERMILION
 from doe.plot_data import surface_grid
@@ -40,13 +43,22 @@ def overlay_plot(
     point : mapping of natural values by factor, optional
         A setting to mark; factors off the axes are held there unless ``at`` says otherwise.
     """
-    if set(limits) != set(surfaces) or not 0 < len(surfaces) <= len(COLORS):
+    design = checked_surfaces(surfaces)
+    if set(checked_map("limits", limits)) != set(surfaces) or len(surfaces) > len(COLORS):
         raise DesignError(
             f"limits for each of one to {len(COLORS)} surfaces: {sorted(surfaces)} and {sorted(limits)}"
         )
+    for name, pair in limits.items():
+        if not isinstance(pair, tuple | list) or len(pair) != 2:
+            raise DesignError(f"the limits of {name!r} are (low, high), None where free: received {pair!r}")
+        for limit in pair:
+            if limit is not None:
+                checked_number(f"a limit of {name!r}", limit)
+    if point is not None:
+        point = checked_setting("point", point, design)
     given = axes is not None
     figure, axes = canvas(axes, 4.8)
-    held = at if at is not None or point is None else dict(point)
+    held = at if at is not None or point is None else point
     handles: list[Line2D | Patch] = []
     inside = None
     for (name, surface), color in zip(surfaces.items(), COLORS, strict=False):

@@ -8,6 +8,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from doe.analysis.effects import TwoLevelEffects
+from doe.checks import checked_kind, checked_list
+from doe.errors import DesignError
 from doe.palette import BLUE, MUTED, ORANGE
 from doe.plot_data import half_normal_points, pareto_points
 from doe.plots.style import canvas, key, plain
@@ -21,6 +23,8 @@ def pareto_chart(
     axes: Axes | None = None,
 ) -> Figure:
     """Draw the absolute t of every factor, largest first, with the critical values of some levels."""
+    checked_kind("result", result, ScreenResult)
+    alphas = checked_list("alphas", alphas)
     points = pareto_points(result)
     given = axes is not None
     figure, axes = canvas(axes, 3.6)
@@ -47,6 +51,8 @@ def half_normal_plot(
     result: ScreenResult | TwoLevelEffects, response_label: str = "response", axes: Axes | None = None
 ) -> Figure:
     """Draw the half-normal plot of all effects; hollow points are dummies, the line is the test's error."""
+    if not isinstance(result, ScreenResult | TwoLevelEffects):
+        raise DesignError(f"result must be a ScreenResult or TwoLevelEffects, received {result!r}")
     points = half_normal_points(result.effects)
     figure, axes = canvas(axes, 3.8)
     dummy = points.index.isin(result.design.dummies)

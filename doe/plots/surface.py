@@ -11,6 +11,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
+from doe.checks import checked_kind, checked_number
+from doe.design import checked_setting
 from doe.palette import BLUE, MUTED, VERMILION
 from doe.plot_data import normal_points, surface_grid
 from doe.plots.style import WIDTH, canvas, key, plain
@@ -20,6 +22,7 @@ from doe.surface import Surface
 
 def residual_plots(surface: Surface, axes: tuple[Axes, Axes] | None = None) -> Figure:
     """Draw the studentized residuals: normal plot, and against the fitted response (two axes)."""
+    checked_kind("surface", surface, Surface)
     residuals = surface.studentized_residuals.dropna()
     points = normal_points(residuals)
     if axes is None:
@@ -58,7 +61,14 @@ def contour_plot(
     factors: its shadow on the plane of the axes) and the design's runs. ``x``, ``y``, ``at``, ``extent`` as
     in ``doe.plot_data.surface_grid``; factors off the axes are held at the point when there is one.
     """
-    held = at if point is None or at is not None else {name: point[name] for name in surface.design.names}
+    checked_kind("surface", surface, Surface)
+    if point is not None:
+        point = checked_setting("point", point, surface.design)
+    if region is not None:
+        checked_kind("region", region, Region)
+    if target is not None:
+        checked_number("target", target)
+    held = at if point is None or at is not None else point
     grid = surface_grid(surface, x, y, held, extent, resolution=121)
     x_name, y_name = grid.x_factor.name, grid.y_factor.name
     given = axes is not None
@@ -97,6 +107,8 @@ def surface_plot(
     axes: Axes | None = None,
 ) -> Figure:
     """Draw the fitted surface over two factors in perspective (3d axes), with the target's curve on it."""
+    if target is not None:
+        checked_number("target", target)
     grid = surface_grid(surface, x, y, at, extent, resolution=41)
     if axes is None:
         figure = Figure(figsize=(WIDTH, 5.0), layout="constrained")

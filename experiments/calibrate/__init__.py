@@ -1,20 +1,5 @@
 """The calibration campaign: from the noise floor to the verified optimum."""
 
-from experiments.calibrate.campaign import calibrate
-from experiments.calibrate.cases import Runner, case_seed
-from experiments.calibrate.results import Campaign, ClimbEnd, Decision, Outcome
-from experiments.studyfile.campaign import CampaignSettings, Response, Target, Twin
+import lazy_loader
 
-__all__ = [
-    "Campaign",
-    "CampaignSettings",
-    "ClimbEnd",
-    "Decision",
-    "Outcome",
-    "Response",
-    "Runner",
-    "Target",
-    "Twin",
-    "calibrate",
-    "case_seed",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

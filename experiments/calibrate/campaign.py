@@ -7,6 +7,7 @@ from typing import Any, TypeVar
 
 import pandas as pd
 
+from doe import Design
 from experiments.calibrate.cases import Runner, StageEnd, with_combinations
 from experiments.calibrate.checks import check_study
 from experiments.calibrate.climb import climb, require_crossing
@@ -26,7 +27,7 @@ from experiments.calibrate.screening import analyse_screening, plan_screening, s
 from experiments.calibrate.selection import require_kept, select_factors
 from experiments.calibrate.surface import explore_surface, require_slope
 from experiments.calibrate.target import plan_target, settle_target
-from experiments.calibrate.values import listed, p_text, quantity
+from experiments.calibrate.values import p_text, quantity, worded
 from experiments.calibrate.verification import verify
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import Response
@@ -100,23 +101,20 @@ def _run(study: Study, record: _Record) -> tuple[Outcome, str]:
     settings, response = study.campaign.selection, study.target.leading
     target, noise, screening = _open(study, record)
     selection = record.keep("selection", select_factors(settings, screening, noise, response))
-    require_kept(settings, selection, response)
+    require_kept(study, selection)
     path = climb(study, screening, selection.kept, noise, target, record.run)
     require_crossing(study, record.keep("climb", path), target)
     surface = record.keep("surface", explore_surface(study, path, record.run))
-    require_slope(surface)
+    require_slope(study, surface)
     optimum = record.keep("optimum", find_optimum(study, surface, target))
     verification = record.keep("verification", verify(study, optimum, target, record.run))
-    return _verdict(study.target.responses, optimum, verification)
+    return _verdict(study, optimum, verification)
 
 
 def _open(study: Study, record: _Record) -> tuple[TargetResult, NoiseFloorResult, ScreeningResult]:
     """Run the stages that wait for nothing, in one batch: a twin's target, the noise floor, the screening."""
     design = screening_design(study.factors, study.campaign.screening)
-    plans = [plan_noise_floor(study), plan_screening(study, design)]
-    if study.target.twin is not None:
-        plans = [plan_target(study), *plans]
-    finished = record.run(pd.concat(plans, ignore_index=True)).groupby("stage", sort=False)
+    finished = record.run(plan_opening(study, design)).groupby("stage", sort=False)
     *hidden, noise_cases, screening_cases = (cases.reset_index(drop=True) for _, cases in finished)
     target = record.keep("target", settle_target(study, *hidden))
     noise = record.keep("noise_floor", analyse_noise_floor(study, noise_cases))
@@ -125,17 +123,23 @@ def _open(study: Study, record: _Record) -> tuple[TargetResult, NoiseFloorResult
     return target, noise, record.keep("screening", screening)
 
 
-def _verdict(
-    responses: Sequence[Response], optimum: OptimumResult, verification: VerificationResult
-) -> tuple[Outcome, str]:
+def plan_opening(study: Study, design: Design) -> pd.DataFrame:
+    """Lay out the cases of the stages that wait for nothing."""
+    plans = [plan_noise_floor(study), plan_screening(study, design)]
+    if study.target.twin is not None:
+        plans = [plan_target(study), *plans]
+    return pd.concat(plans, ignore_index=True)
+
+
+def _verdict(study: Study, optimum: OptimumResult, verification: VerificationResult) -> tuple[Outcome, str]:
     """Say how a campaign that reached its last stage ended."""
-    tests = [(response, verification.responses[response.name]) for response in responses]
+    tests = [(response, verification.responses[response.name]) for response in study.target.responses]
     gave = [
         f"{r.name} {quantity(test.a.mean, r.unit)} against {quantity(test.a.mean - test.difference, r.unit)} "
         f"(difference {quantity(test.difference, r.unit, '+')}, {p_text(test.p)})"
         for r, test in tests
     ]
-    found = f"At {listed(optimum.point)} fresh cases gave {'; '.join(gave)}"
+    found = f"At {worded(study, optimum.point)} fresh cases gave {'; '.join(gave)}"
     if missed := [r.name for r, test in tests if test.different]:
         return Outcome.MISSED, f"{found}: the chosen point misses the target of {', '.join(missed)}."
     shown, unproven = (

@@ -4,9 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from experiments.calibrate.screening import screening_design
 from experiments.calibrate.values import UNLIMITED, reach_limits
+from experiments.errors import InputError, StudyError
 from experiments.studyfile import Study
+
+
+def check_calibration(study: Study) -> None:
+    """Check that a study can be calibrated: it has factors, and the campaign's decisions fit them.
+
+    Raises
+    ------
+    InputError
+        When it has none, or one does not fit.
+    """
+    if not study.factors:
+        raise StudyError("a calibration needs at least one [[factor]]", "none", str(study.file))
+    try:
+        check_study(study)
+    except InputError:
+        raise
+    except ValueError as error:
+        raise StudyError("the decisions must fit the factors", str(error), str(study.file)) from error
 
 
 def check_study(study: Study) -> None:
@@ -37,6 +55,9 @@ def check_study(study: Study) -> None:
     if settings.verification.margin is not None and leading.unit != "deg":
         rule = f"is an angle, but {leading.name} leads: state margin_sds instead"
         raise ValueError(f"campaign.verification.margin: {rule} (received {settings.verification.margin:g})")
+    # the designs load the libraries of statistics: what can be said without them is said before
+    from experiments.calibrate.screening import screening_design
+
     screening_design(study.factors, settings.screening)
 
 

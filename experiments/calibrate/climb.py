@@ -33,9 +33,11 @@ from experiments.calibrate.values import (
     kept_factors,
     key_of,
     listed,
+    named,
     numbered_values,
     quantity,
     reach_limits,
+    worded,
 )
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import ClimbSettings, Response
@@ -82,7 +84,7 @@ def climb(
     """
     settings, response = study.campaign.climb, study.target.leading
     line, rule = _line(study, screening.leading.screen, kept)
-    batches, tables = [_first_points(line, settings)], []
+    batches, tables = [_first_points(study, line)], []
     for _ in range(1 + settings.extensions):
         steps = batches[-1][list(kept)]
         tables.append(runner(plan_cases(study, STAGE, steps, settings.replicates, [response])))
@@ -113,23 +115,23 @@ def require_crossing(study: Study, result: ClimbResult, target: TargetResult) ->
     response = study.target.leading
     nearest = quantity(result.path.loc[result.best_step, "mean"], response.unit)
     aim = quantity(target.leading.mean, response.unit)
-    best = f"{nearest} at best ({listed(result.best)}) against {aim}"
+    best = f"{nearest} at best ({worded(study, result.best)}) against {aim}"
     if result.end is ClimbEnd.BOUNDED:
         # The end that the climb was heading for.
         edge, limits = result.path.iloc[0 if result.path["error"].min() > 0.0 else -1], reach_limits(study)
         at_bound = [n for n in result.kept if any(math.isclose(edge[n], bound) for bound in limits[n])]
-        where = f"at the bound: {', '.join(at_bound)}" if at_bound else "all batches were used up"
+        where = f"at the bound: {named(study, at_bound)}" if at_bound else "all batches were used up"
         raise StageEnd(
             Outcome.TARGET_NOT_REACHED,
             f"The climb never reached the target: {best}; {where}. Widen the ranges of "
-            f"{', '.join(result.kept)}, raise climb.reach or climb.extensions, or keep further factors; if "
-            "the ranges are physical, the model lacks a mechanism.",
+            f"{named(study, result.kept)}, raise climb.reach or climb.extensions, or keep further factors; "
+            "if the ranges are physical, the model lacks a mechanism.",
         )
     turned = result.end is ClimbEnd.TURNED
     course = "turned before" if turned else "does not change beyond the noise and never meets"
     raise StageEnd(
         Outcome.PLATEAU,
-        f"The {response.name} {course} the target: {best}. More of {', '.join(result.kept)} does "
+        f"The {response.name} {course} the target: {best}. More of {named(study, result.kept)} does "
         "not help: keep further factors, or look for a mechanism that the model lacks.",
     )
 
@@ -151,13 +153,13 @@ def _line(study: Study, screen: ScreenResult, kept: tuple[str, ...]) -> tuple[_L
     return _Line(screen, kept, start, 2.0 / (settings.steps - 1), limits), rule
 
 
-def _first_points(line: _Line, settings: ClimbSettings) -> pd.DataFrame:
-    points = line.walk(line.start, settings.steps - 1)
+def _first_points(study: Study, line: _Line) -> pd.DataFrame:
+    points = line.walk(line.start, study.campaign.climb.steps - 1)
     if len(points) < LEAST_STEPS:
         raise StageEnd(
             Outcome.TARGET_NOT_REACHED,
-            f"The climb cannot leave its start ({listed(line.start)}), which stands at its bounds: fix "
-            "another climb.start, or raise climb.reach.",
+            f"The climb cannot leave its start ({worded(study, line.start)}), which stands at its bounds: "
+            "fix another climb.start, or raise climb.reach.",
         )
     return points.set_axis(pd.RangeIndex(1, len(points) + 1, name="step"))
 

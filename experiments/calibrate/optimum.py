@@ -25,6 +25,7 @@ from experiments.calibrate.values import (
     listed,
     numbered_values,
     quantity,
+    worded,
 )
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import OptimumSettings, Response
@@ -44,7 +45,7 @@ def find_optimum(study: Study, surface: SurfaceResult, target: TargetResult) -> 
     joint = joint_fit(goals, alpha=1.0 - settings.confidence) if len(goals) > 1 else None
     if joint is None:
         # The box of the two-level part first: inside it the fit is at its best. Axial points reach further.
-        point, rule, extent = _choose(settings, surface, sample.mean, sorted({1.0, reach}))
+        point, rule, extent = _choose(study, surface, sample.mean, sorted({1.0, reach}))
         region = fit.compatible_region(sample, alpha=1.0 - settings.confidence, extent=extent)
     else:
         (point, rule), extent, region = choose_jointly(joint, settings), joint.extent, joint.region()
@@ -84,11 +85,11 @@ def find_optimum(study: Study, surface: SurfaceResult, target: TargetResult) -> 
 
 
 def _choose(
-    settings: OptimumSettings, surface: SurfaceResult, target: float, extents: list[float]
+    study: Study, surface: SurfaceResult, target: float, extents: list[float]
 ) -> tuple[dict[str, float], str, float]:
     """Return the chosen point, the rule that chose it, and the extent that holds it."""
     fit = surface.leading.reduced
-    fixed = fixed_values(settings.point, surface.center)
+    fixed = fixed_values(study.campaign.optimum.point, surface.center)
     if fixed is not None:
         return fixed, "The study fixes the chosen point.", extents[-1] if _reach(fit, fixed) > 1.0 else 1.0
     rule = "The chosen point is the one of the target contour nearest to the design's centre, in coded units."
@@ -101,7 +102,7 @@ def _choose(
             continue
         if np.linalg.norm(_coded(fit, point)) <= radius * (1.0 + 1e-9):
             return point, rule, extent
-        missed = f"the target contour lies beyond the design's runs, nearest at {listed(point)}"
+        missed = f"the target contour lies beyond the design's runs, nearest at {worded(study, point)}"
     raise StageEnd(
         Outcome.NO_CONTOUR,
         f"No point of the composite design's region gives the target: {missed}. Fix surface.center nearer to "

@@ -16,7 +16,8 @@ from experiments.calibrate.results import (
     ScreeningResult,
     SelectionResult,
 )
-from experiments.calibrate.values import key_of, p_text, quantity
+from experiments.calibrate.values import key_of, named, p_text, quantity
+from experiments.studyfile import Study
 from experiments.studyfile.campaign import Response, SelectionSettings
 
 STAGE = "selection"
@@ -55,14 +56,15 @@ def select_factors(
     return SelectionResult(kept, table, visible, decisions)
 
 
-def require_kept(settings: SelectionSettings, selection: SelectionResult, response: Response) -> None:
+def require_kept(study: Study, selection: SelectionResult) -> None:
     """Go on when a factor was kept; else StageEnd."""
+    settings, response = study.campaign.selection, study.target.leading
     if selection.kept:
         return
-    strongest = selection.table.iloc[0]
+    strongest, name = selection.table.iloc[0], named(study, [str(selection.table.index[0])])
     raise StageEnd(
         Outcome.NO_SIGNIFICANT_FACTOR,
-        f"No factor has p below {settings.alpha:g}; the strongest, {selection.table.index[0]}, has an effect "
+        f"No factor has p below {settings.alpha:g}; the strongest, {name}, has an effect "
         f"of {quantity(strongest['effect'], response.unit, '+')} ({p_text(strongest['p'])}). With this noise "
         f"the design sees effects from about {quantity(selection.visible_effect, response.unit)} on: widen "
         "the ranges, add screening replicates or dummies, or name the factors to keep in selection.keep.",

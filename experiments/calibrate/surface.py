@@ -26,6 +26,7 @@ from experiments.calibrate.values import (
     listed,
     numbered_values,
     p_text,
+    worded,
 )
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import Response, SurfaceSettings
@@ -59,15 +60,14 @@ def explore_surface(study: Study, climb: ClimbResult, runner: Runner) -> Surface
     return SurfaceResult(found, cases, design, center, half_range, outside, tuple(decisions))
 
 
-def require_slope(result: SurfaceResult) -> None:
+def require_slope(study: Study, result: SurfaceResult) -> None:
     """Go on when the leading response's reduced surface has a term left; else StageEnd."""
     if not result.leading.reduced.terms:
         name = next(iter(result.responses))
         raise StageEnd(
             Outcome.PLATEAU,
-            f"Around {listed(result.center)} no term of the surface is significant: the {name} does not "
-            f"depend on {', '.join(result.center)} beyond the noise. Widen surface.half_range or add "
-            "replicates.",
+            f"Around {worded(study, result.center)} no term of the surface is significant: the {name} does "
+            "not depend on them beyond the noise. Widen surface.half_range or add replicates.",
         )
 
 
@@ -187,8 +187,7 @@ def _fit_decision(
         "A full quadratic; lack of fit is tested against the replicates at "
         f"{settings.lack_of_fit_alpha:g}. Then {rule}.",
         numbers,
-        f"The model of the {response.name} has {p_text(p_model)}. {fit} Left out: {gone}. Surface: "
-        f"{reduced.equation(digits=4)}.",
+        f"The model of the {response.name} has {p_text(p_model)}. {fit} Left out: {gone}.",
     )
 
 

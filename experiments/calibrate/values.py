@@ -34,6 +34,19 @@ def listed(values: Mapping[str, float]) -> str:
     return ", ".join(f"{name} = {value:.4g}" for name, value in values.items())
 
 
+def named(study: Study, names: Iterable[str]) -> str:
+    """Name factors in words: ``grain-grain static friction (E), grain-steel static friction (F)``."""
+    labels = {section.name: section.label for section in study.factor_sections}
+    return ", ".join(f"{labels[name]} ({name})" for name in names)
+
+
+def worded(study: Study, values: Mapping[str, float]) -> str:
+    """Write values with their factors in words: ``grain-grain static friction (E) 0.48, ...``."""
+    units = {section.name: section.unit for section in study.factor_sections}
+    parts = (f"{named(study, [name])} {value:.4g} {units[name]}".rstrip() for name, value in values.items())
+    return ", ".join(parts)
+
+
 def numbered_values(prefix: str, values: Mapping[str, float]) -> dict[str, float]:
     """Return values keyed for a decision's numbers: ``start E``, ``start F``."""
     return {f"{prefix} {name}": float(value) for name, value in values.items()}

@@ -6,7 +6,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from dem_warp import simulate
 from dem_warp.registry import Registry
 from experiments.cases.contract import command_program
 from experiments.cases.driver import Driver
@@ -101,8 +100,3 @@ def _engine_named(section: EngineSection, place: str) -> Engine:
     if section.time_limit is not None:
         raise StudyError("this engine runs no program that a limit could end", section.time_limit, place)
     return engine
-
-
-def simulator_of(study: Study) -> Engine:
-    """Engine of a study, dem-warp's own where it names none; errors as by `engine_of`."""
-    return engine_of(study) or simulate

@@ -4,25 +4,32 @@ from __future__ import annotations
 
 import logging
 import math
-import os
 import shutil
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
-from dem_warp import Case, CaseResult, Progress, simulate
+from dem_warp import Case, CaseResult, Progress
 from experiments.cases.engine import NO_ANSWER
+from experiments.cases.measuring import measuring_processes
 from experiments.cases.store import Store
+from experiments.cases.workers.own import THIS_MACHINE
+from experiments.cases.workers.workers import Workers
 from experiments.errors import StudyError
 from experiments.measurement.observables import ANGLE
 from experiments.measurement.states import Observed, observe
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import TARGET_SCENE
+from experiments.studyfile.study import MeasurementSection
 
 RESULT_COLUMNS = ("status", "reason", ANGLE, "angle_se", "case_key")
 """Columns that `run_cases` adds, beside one for every observable of the scene."""
+
+MANY = 64
+"""Cases that are worth the start of processes that measure them."""
 
 _log = logging.getLogger(__name__)
 
@@ -31,8 +38,7 @@ def run_cases(
     study: Study,
     table: pd.DataFrame,
     store: Store,
-    device: str | None = None,
-    workers: int | None = None,
+    workers: Workers = THIS_MACHINE,
     progress: Callable[[Progress], None] | None = None,
 ) -> pd.DataFrame:
     """Simulate every case of a table that is not stored yet, all at once, and measure every heap.
@@ -50,8 +56,10 @@ def run_cases(
         what another program gave no valid answer to is not saved, and so tried again by the next run. A run
         that the machine ends raises, and leaves no result of what was running. Checkpoints of the running
         cases are kept there too: what an interrupted run had begun goes on where it was.
-    device, workers, progress
-        As of `dem_warp.simulate`.
+    workers
+        Workers that simulate; left out: this machine's own.
+    progress
+        Called with the progress now and then.
 
     Returns
     -------
@@ -71,14 +79,13 @@ def run_cases(
     by_key = {key: case for key, case in zip(keys, cases, strict=True) if case}
     scenes = dict(zip(keys, _scene_names(table), strict=True))
 
-    def measure(key: str, result: CaseResult) -> dict[str, Any]:
-        leaves_a_heap = study.scenes[scenes[key]].leaves_a_heap
-        return _outcome(result.status, observe(study.measurement, result, leaves_a_heap))
+    def order(key: str) -> tuple[MeasurementSection, bool]:
+        return study.measurement, study.scenes[scenes[key]].leaves_a_heap
 
-    with ThreadPoolExecutor(max_workers=workers or os.cpu_count()) as pool:
-        outcomes = _simulate_missing(by_key, store, pool, measure, device, workers, progress)
+    with _measurers(workers, len(by_key)) as pool:
+        outcomes = _simulate_missing(by_key, store, pool, order, workers, progress)
         for key in by_key.keys() - outcomes.keys():
-            outcomes[key] = pool.submit(lambda key: measure(key, store.load(key)), key)
+            outcomes[key] = pool.submit(_stored_outcome, store.folder, key, *order(key))
         rows = [
             outcomes[key].result() if key else _outcome("refused", Observed(reason=reason))
             for key, reason in zip(keys, refused, strict=True)
@@ -121,10 +128,9 @@ def _scene_names(table: pd.DataFrame) -> list[str]:
 def _simulate_missing(
     cases: dict[str, Case],
     store: Store,
-    pool: ThreadPoolExecutor,
-    measure: Callable[[str, CaseResult], dict[str, Any]],
-    device: str | None,
-    workers: int | None,
+    pool: Executor,
+    order: Callable[[str], tuple[MeasurementSection, bool]],
+    workers: Workers,
     progress: Callable[[Progress], None] | None,
 ) -> dict[str, Future[dict[str, Any]]]:
     """Simulate what the store lacks, in one call; save each result as it finishes, and measure it.
@@ -141,20 +147,30 @@ def _simulate_missing(
         key = missing[index]
         if result.status != NO_ANSWER:
             store.save(key, result)
-        outcomes[key] = pool.submit(measure, key, result)
+        outcomes[key] = pool.submit(_measured, result, *order(key))
 
     if missing:
-        run = store.engine or simulate
-        run(
-            [cases[key] for key in missing],
-            device=device,
-            workers=workers,
-            on_result=keep,
-            on_progress=progress,
-            checkpoint=store.unfinished,
-        )
+        chosen = [cases[key] for key in missing]
+        workers.simulate(chosen, store.engine, keep, progress, store.unfinished)
         shutil.rmtree(store.unfinished, ignore_errors=True)
     return outcomes
+
+
+def _measurers(workers: Workers, count: int) -> Executor:
+    """Measure in processes where there is much to measure and the cores of this machine are free for it."""
+    if count >= MANY and workers.leaves_cores:
+        return measuring_processes(workers.helpers)
+    return ThreadPoolExecutor(max_workers=workers.helpers)
+
+
+def _stored_outcome(
+    folder: Path, key: str, measurement: MeasurementSection, leaves_a_heap: bool
+) -> dict[str, Any]:
+    return _measured(Store(folder).load(key), measurement, leaves_a_heap)
+
+
+def _measured(result: CaseResult, measurement: MeasurementSection, leaves_a_heap: bool) -> dict[str, Any]:
+    return _outcome(result.status, observe(measurement, result, leaves_a_heap))
 
 
 def _outcome(status: str, found: Observed) -> dict[str, Any]:

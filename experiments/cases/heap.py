@@ -9,16 +9,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from dem_warp import CaseResult, Progress
-from experiments.cases.engines import simulator_of
+from dem_warp import CaseResult, Film, Progress, simulate_frames
+from experiments.cases.engines import engine_of
+from experiments.cases.frames import write_frames
+from experiments.cases.movie import write_movie
+from experiments.cases.polydata import poly, save
+from experiments.cases.workers.own import THIS_MACHINE, OwnWorkers
+from experiments.cases.workers.workers import Workers
+from experiments.errors import InputError
 from experiments.files import replacing, write_text
 from experiments.measurement.observables import observables_of
 from experiments.measurement.states import Observed, observe
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import TARGET_SCENE
-from imaging import HeapAngle, overlay, save_picture, snapshot
+from imaging import HeapAngle, Snapshot, overlay, save_picture, snapshot
 
 
 @dataclass(frozen=True)
@@ -37,6 +41,8 @@ class Heap:
     """Measurements of it."""
     scene: str = TARGET_SCENE
     """Name of its scene."""
+    film: Film | None = None
+    """Frames of its course, where they were asked for and it could begin."""
 
     @property
     def angle(self) -> HeapAngle | None:
@@ -83,64 +89,74 @@ def simulate_heap(
     study: Study,
     settings: Mapping[str, float],
     seed: int,
-    device: str | None = None,
+    workers: Workers = THIS_MACHINE,
     progress: Callable[[Progress], None] | None = None,
     scene: str = TARGET_SCENE,
+    frames: int | None = None,
 ) -> Heap:
     """Simulate one case with the study's engine, and measure its heap.
 
-    Settings, seed and scene are those of `Study.case`.
+    Settings, seed and scene are those of `Study.case`. With a number of `frames` its course is kept, and the
+    result is the same to the bit.
 
     Raises
     ------
     StudyError
         When there is no such factor or scene, or a value leaves what is physical.
+    InputError
+        When frames are asked of another engine than dem-warp's own.
     """
-    run, case = simulator_of(study), study.case(settings, seed, scene)
-    [result] = run([case], device=device, workers=1, on_progress=progress)
+    case, film = study.case(settings, seed, scene), None
+    engine = engine_of(study)
+    if frames is None:
+        [result] = workers.simulate([case], engine, on_progress=progress)
+    elif engine is not None:
+        other = study.engine and (study.engine.name or study.engine.command)
+        raise InputError("must run on dem-warp's own engine", other, "--frames")
+    elif not isinstance(workers, OwnWorkers):
+        raise InputError("must run on this machine", workers.machine, "--frames")
+    else:
+        result, film = simulate_frames(case, frames, workers.name, progress)
     values = {factor.name: settings.get(factor.name, factor.center) for factor in study.factors}
     observed = observe(study.measurement, result, study.scenes[scene].leaves_a_heap)
-    return Heap(study, values, seed, result, observed, scene)
+    return Heap(study, values, seed, result, observed, scene, film)
 
 
-def heap_picture(study: Study, result: CaseResult, angle: HeapAngle | None, view: int = 0) -> np.ndarray:
-    """Draw a heap, with the flanks that were fitted in one of its views; without an angle, without flanks.
-
-    Returns
-    -------
-    numpy.ndarray
-        Picture (rows, columns, 3), blue-green-red.
-    """
-    picture = snapshot(
+def heap_snapshot(study: Study, result: CaseResult, angle: HeapAngle | None, view: int = 0) -> Snapshot:
+    """Draw a heap as one of the views of its angle saw it."""
+    return snapshot(
         result.sphere_centers,
         result.sphere_radii,
         azimuth=angle.azimuths[view] if angle else 0.0,
         pixels=study.measurement.pixels,
         grains=result.sphere_grain,
     )
-    return overlay(picture, angle.views[view]) if angle else picture.image
 
 
-def write_heap(heap: Heap, folder: Path) -> None:
-    """Write ``heap.vtp``, ``snapshot.png`` and ``angle.json`` into a folder, made when it is missing.
+def write_heap(heap: Heap, folder: Path, movie: str = "gif") -> None:
+    """Write ``heap.vtp``, pictures and ``angle.json`` into a folder, made when it is missing.
 
-    Where no grain is left, as may be in a hopper, there is nothing to draw.
+    ``snapshot.png`` has the fitted flanks drawn on it; ``snapshot-clean.png``, the same picture without them,
+    can be measured again. Frames, if there are any, come into the folder ``frames``, and as a film, of one of
+    `experiments.cases.movie.MOVIES`, beside it. Where no grain is left, as may be in a hopper, there is no
+    picture.
     """
     if len(heap.result.positions):
         with replacing(folder / "heap.vtp") as temporary:
             write_spheres(temporary, heap.result)
-        with replacing(folder / "snapshot.png") as temporary:
-            save_picture(temporary, heap_picture(heap.study, heap.result, heap.angle))
+        clean = heap_snapshot(heap.study, heap.result, heap.angle)
+        annotated = overlay(clean, heap.angle.views[0]) if heap.angle else clean.image
+        for name, picture in (("snapshot-clean.png", clean.image), ("snapshot.png", annotated)):
+            with replacing(folder / name) as temporary:
+                save_picture(temporary, picture)
+    if heap.film:
+        write_frames(heap.film, folder / "frames")
+        write_movie(heap.film, folder / f"heap.{movie}")
     write_text(folder / "angle.json", json.dumps(heap.to_dict(), indent=1, allow_nan=False) + "\n")
 
 
 def write_spheres(path: Path, result: CaseResult) -> None:
-    """Write a heap's spheres as points [m] with ``radius`` [m], ``grain`` and ``shape``, for ParaView."""
-    # PyVista is slow to import and absent on some machines that only calibrate.
-    import pyvista
-
-    points = pyvista.PolyData(result.sphere_centers)
-    points["radius"] = result.sphere_radii
-    points["grain"] = result.sphere_grain
-    points["shape"] = result.shapes[result.sphere_grain]
-    points.save(path)
+    """Write a heap's spheres as points [m] with ``radius`` [m], ``grain`` and ``shape``."""
+    grains = result.sphere_grain
+    arrays = {"radius": result.sphere_radii, "grain": grains, "shape": result.shapes[grains]}
+    save(poly(result.sphere_centers, arrays), path)

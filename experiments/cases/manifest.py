@@ -22,9 +22,13 @@ LARGEST = 10_000_000
 
 
 def describe(study: Study) -> dict[str, Any]:
-    """Everything that a study says, its clumps included, as JSON-able data."""
+    """Everything that a study says of its results, its clumps included, as JSON-able data.
+
+    Where its cases are simulated changes none of them.
+    """
     digests = [hashlib.sha256(clump.read_bytes()).hexdigest() for clump in study.grain.files]
-    return {"study": study.document, "scale": study.scale, "clump_sha256": digests}
+    document = {key: value for key, value in study.document.items() if key != "cluster"}
+    return {"study": document, "scale": study.scale, "clump_sha256": digests}
 
 
 def study_hash(study: Study) -> str:

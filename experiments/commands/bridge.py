@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from experiments.commands.console import FAILED_RUN, CaseProgress, clear_errors, messages
-from experiments.commands.options import AsJson, Out, Resume
+from experiments.commands.options import AsJson, Cluster, Out, Resume, Scheduler
 
 BRIDGE_EXAMPLE = "Example: [bold]dem-warp bridge out/mygrain/material.toml --engine liggghts[/]"
 
@@ -32,6 +32,8 @@ def bridge(
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Root of the seeds of all runs.")] = 1,
     workers: Annotated[int | None, typer.Option(min=1, help="Runs at once. Left out: one a core.")] = None,
+    scheduler: Scheduler = None,
+    cluster: Cluster = None,
     time_limit: Annotated[
         str | None, typer.Option(help='Wall time of a run, as "10 min". Left out: none.')
     ] = None,
@@ -56,6 +58,8 @@ def bridge(
             margin=margin,
             seed=seed,
             workers=workers,
+            scheduler=scheduler,
+            cluster=cluster,
             time_limit=time_limit,
             approximate=approximate,
             resume=resume,

@@ -72,7 +72,8 @@ def clump(
             _reach(protrusion, tolerance), unit,
         )  # fmt: skip
         mass_density = quantity(density, "density", "--density") if density else None
-        made = make_clump(request, print_trial if tolerance else lambda trial: None)
+        with messages.status("Fitting spheres"):
+            made = make_clump(request, print_trial if tolerance else lambda trial: None)
         if out:
             write_clump(made.shape, out)
         if picture:
@@ -88,6 +89,8 @@ def _print_remarks(made: Clump, source: str) -> None:
     """Say how a file was read, and what may be done about a poor fit."""
     if made.told:
         messages.print(f"Read: {source}: {made.told}")
+    if made.doubt:
+        messages.print(f"Doubtful: {made.doubt}")
     if made.advice:
         messages.print(f"Advice: {made.advice}")
 

@@ -6,9 +6,10 @@ import errno
 import logging
 import shlex
 import signal
+import subprocess
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import BrokenExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -27,10 +28,14 @@ if TYPE_CHECKING:
 BAD_INPUT, FAILED_RUN, INTERRUPTED, TERMINATED = 2, 1, 130, 143
 """Exit codes."""
 
+ENDED_OUTSIDE = "a process was ended from outside, perhaps for lack of memory: fewer --workers need less."
+
 QUIET_START = 2.0
 """Least duration that shows progress [s]."""
 FIRST_GUESS = 0.01
 """Part of the work that is done before the time left is guessed."""
+WELL_BEGUN, LEAST_LEFT = 0.1, 0.1
+"""Part of the work from which on its speed alone counts, and of the time expected that is always left."""
 MANIFEST = "study.json"
 """File of a folder that a run can go on in; `experiments.cases.manifest` writes it."""
 
@@ -43,7 +48,7 @@ HIDDEN = ("Cc", "Cf", "Cs", "Zl", "Zp")
 WAYS_OUT = {
     errno.ENOSPC: "free some room on the disk",
     errno.EDQUOT: "free some room in your quota",
-    errno.EACCES: "see to the permissions, or name another place",
+    errno.EACCES: "see to the permissions, close the program that has it open, or name another place",
     errno.EPERM: "see to the permissions, or name another place",
     errno.EROFS: "name a place that can be written to",
     errno.ENOENT: "see to it that nothing is moved or removed while a command runs",
@@ -58,6 +63,11 @@ def plain(text: str) -> str:
         else character.encode("unicode_escape", "surrogatepass").decode()
         for character in text
     )  # fmt: skip
+
+
+def shell_line(words: Sequence[str]) -> str:
+    """Join the words of a command as the system's shell reads them."""
+    return subprocess.list2cmdline(words) if sys.platform == "win32" else shlex.join(words)
 
 
 class Messages(Console):
@@ -98,7 +108,7 @@ class Attempt:
         for name, value in {"out": out, **options}.items():
             if value is not None and value is not False:
                 words += [f"--{name.replace('_', '-')}", *([] if value is True else [str(value)])]
-        return cls(shlex.join(words), out)
+        return cls(shell_line(words), out)
 
     def __str__(self) -> str:
         """Say how to go on."""
@@ -125,9 +135,9 @@ def clear_errors(advice: object = "") -> Iterator[None]:
         except KeyboardInterrupt:
             messages.print(f"Interrupted. {advice}")
             raise typer.Exit(INTERRUPTED) from None
-        except BrokenExecutor:
-            rule = "a process was ended from outside, perhaps for lack of memory: fewer --workers need less."
-            fail(f"{rule} {advice}", FAILED_RUN)
+        except BrokenExecutor as error:
+            what = str(error) if _are_lost_workers(error) else ENDED_OUTSIDE
+            fail(f"{what} {advice}", FAILED_RUN)
         except MemoryError:
             fail(f"there is not enough memory: fewer --workers need less. {advice}", FAILED_RUN)
         except OSError as error:
@@ -162,6 +172,12 @@ def _is_input(error: ValueError) -> bool:
     kinds = [("experiments.errors", "InputError"), ("imaging", "PictureError"), ("doe", "DesignError")]
     loaded = (getattr(sys.modules.get(module), name, ()) for module, name in kinds)
     return isinstance(error, tuple(kind for kind in loaded if kind))
+
+
+def _are_lost_workers(error: BrokenExecutor) -> bool:
+    """Tell that an error says which workers were lost."""
+    module = sys.modules.get("experiments.cases.workers.workers")
+    return module is not None and isinstance(error, module.WorkersLostError)
 
 
 def fail(message: str, code: int = BAD_INPUT) -> NoReturn:
@@ -219,10 +235,21 @@ def describe_progress(progress: BatchProgress, first: BatchProgress | None = Non
     done, seconds = progress.fraction, progress.seconds
     if first is not None:
         done, seconds = done - first.fraction, seconds - first.seconds
-    if done >= FIRST_GUESS and progress.fraction < 1.0:
-        left = seconds * (1.0 - progress.fraction) / done
+    left = _seconds_left(progress, done, seconds)
+    if left is not None and progress.fraction < 1.0:
         parts.insert(0, f"{duration(left)} left")
     return ", ".join(parts)
+
+
+def _seconds_left(progress: BatchProgress, done: float, seconds: float) -> float | None:
+    """Time left by the speed so far, and before that shows by what was expected of this machine."""
+    expected, rest = getattr(progress, "expected", None), 1.0 - progress.fraction
+    if expected is None:
+        return seconds * rest / done if done >= FIRST_GUESS else None
+    trust = min(done / WELL_BEGUN, 1.0)
+    # what has shown nothing yet has still the time to come that has passed
+    begun = max(expected * rest - (seconds if done < FIRST_GUESS else 0.0), LEAST_LEFT * expected)
+    return begun if done <= 0.0 else trust * seconds * rest / done + (1.0 - trust) * begun
 
 
 def duration(seconds: float) -> str:

@@ -1,24 +1,77 @@
-"""Checks of what a command is given that need no library: a mistyped file is answered at once."""
+"""Checks of what a command is given, before the libraries that it works with are loaded."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from experiments.errors import StudyError
-from experiments.toml_files import read_toml
+if TYPE_CHECKING:
+    from experiments.studyfile import Study
+
+BY_DEVICE = ("bench", "paper")
+"""Scales of which the device chooses one where none is named."""
 
 
-def check_study_file(path: Path | None, scale: str | None = None) -> None:
-    """Refuse a study file that cannot be read, is no TOML, or has no such scale; its values wait.
+def check_study_file(path: Path | None, scale: str | None = None, engine: str | None = None) -> None:
+    """Refuse a study file that breaks a rule, or lacks the scale, or an engine that is none.
+
+    Where the device chooses the scale, a study passes that is right at one of them; the command itself reads
+    it again, at that scale.
 
     Raises
     ------
-    StudyError
-        With the place of the first fault.
+    InputError
+        With every fault and its place.
     """
-    if path is None:
+    _readable(path, scale, engine)
+
+
+def check_calibration_file(path: Path | None, scale: str | None = None, engine: str | None = None) -> None:
+    """Refuse besides a study that cannot be calibrated; pictures of its target are found, and not measured.
+
+    Raises
+    ------
+    InputError
+        With every fault and its place.
+    """
+    if (study := _readable(path, scale, engine)) is None:
         return
-    scales = read_toml(path)[1].get("scale", {})
-    if scale is not None and isinstance(scales, dict) and scale not in scales:
-        known = ", ".join(scales) or "none"
-        raise StudyError(f"the scale must be one that the study has, known: {known}", scale, str(path))
+    from experiments.calibrate.checks import check_calibration
+    from experiments.measurement.pictures import find_pictures
+    from experiments.measurement.target import with_measurements
+
+    section = study.target_section
+    if section is not None and section.pictures is not None:
+        find_pictures(section.pictures, study.file.parent, f"{study.file}: target.pictures")
+    else:
+        check_calibration(with_measurements(study)[0])
+
+
+def _readable(path: Path | None, scale: str | None, engine: str | None) -> Study | None:
+    """Read a study file; None where none is named and the study that ships is meant."""
+    if path is None and engine is None:
+        return None
+    from experiments.errors import InputError
+    from experiments.toml_files import read_toml
+
+    if path is not None:
+        read_toml(path)
+    from experiments.studyfile import load_study, study_scales
+
+    known = study_scales(path)
+    wanted = [scale] if scale else dict.fromkeys(one if one in known else None for one in BY_DEVICE)
+    read, faults = [], []
+    for each in wanted:
+        try:
+            read.append(load_study(path, each))
+        except InputError as error:
+            faults.append(error)
+    if not read:
+        raise faults[0]
+    study = read[0]
+    if engine is not None or study.engine is not None:
+        from experiments.cases import engine_of, with_engine
+
+        study = with_engine(study, engine)
+        engine_of(study)
+    return study

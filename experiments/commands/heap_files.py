@@ -46,13 +46,11 @@ class MeasuredHeap:
     spheres: Spheres
     """Spheres [m] on the plate z = 0."""
 
-    def picture(self) -> Picture:
-        """Draw the heap with the flanks fitted in its first view."""
-        settings = MeasurementSection()
-        shaded = snapshot(
-            self.spheres.centers, self.spheres.radii, azimuth=self.angle.azimuths[0], pixels=settings.pixels
-        )
-        return overlay(shaded, self.angle.views[0])
+    def pictures(self) -> tuple[Picture, Picture]:
+        """Draw the heap with the flanks fitted in its first view, and without."""
+        pixels, azimuth = MeasurementSection().pixels, self.angle.azimuths[0]
+        clean = snapshot(self.spheres.centers, self.spheres.radii, azimuth=azimuth, pixels=pixels)
+        return overlay(clean, self.angle.views[0]), clean.image
 
 
 def heap_settings(unit: str | None, plate_height: str | None) -> HeapSettings:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import shlex
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from experiments.commands.console import clear_errors, plain
+from experiments.commands.console import clear_errors, plain, shell_line
 
 NEW_EXAMPLE = "Example: [bold]dem-warp new mygrain[/] writes mygrain.toml"
 
@@ -34,5 +33,5 @@ def new(
             from experiments.studyfile import write_template
 
             path, words = write_template(name), ["calibrate"]
-    then = shlex.join(["dem-warp", *words, str(path)])
+    then = shell_line(["dem-warp", *words, str(path)])
     typer.echo(plain(f"Wrote {path}. Fill it in, then: {then}"))

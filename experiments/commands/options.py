@@ -17,15 +17,31 @@ Scale = Annotated[
         "device, bench without, where the study has it.",
     ),
 ]
-Device = Annotated[str | None, typer.Option(help="cpu, cuda or cuda:N. Left out: the GPU if there is one.")]
-Devices = Annotated[
+Device = Annotated[
     str | None,
     typer.Option(
-        "--device",
-        help="cpu, cuda, cuda:N or several GPUs, as cuda:0,cuda:1. Left out: the GPU if there is one.",
+        help="cpu, cuda, cuda:N or several GPUs, as cuda:0,cuda:1. Left out: the GPU if there is one."
     ),
 ]
-Workers = Annotated[int | None, typer.Option(min=1, help="Processes on the CPU. Left out: one a core.")]
+Workers = Annotated[
+    int | None,
+    typer.Option(
+        min=1,
+        help="Processes on the CPU, GPUs of this machine, or workers of a cluster. Left out: one a core, one "
+        "GPU, or as the cluster's profile says.",
+    ),
+]
+Scheduler = Annotated[
+    str | None,
+    typer.Option(metavar="ADDRESS", help="Dask scheduler whose workers simulate, as tcp://HOST:8786."),
+]
+Cluster = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="PROFILE.toml",
+        help="File with a \\[cluster], whose workers are started. Left out: the study's, or none.",
+    ),
+]
 EngineName = Annotated[
     str | None,
     typer.Option(
@@ -34,6 +50,10 @@ EngineName = Annotated[
 ]
 Out = Annotated[Path | None, typer.Option(help="Folder of the results, new or empty.")]
 Resume = Annotated[bool, typer.Option("--resume", help="Go on in the folder of an earlier run.")]
+DryRun = Annotated[
+    bool,
+    typer.Option("--dry-run", help="Show cases, grains, steps, time, memory and disk, and run nothing."),
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Write the result to standard output as JSON.")]
 
 

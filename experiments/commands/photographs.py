@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
@@ -36,6 +36,8 @@ ROW_VALUES = (
     "left", "right", "mean", "se", "low", "high", "tilt", "elevation", "distance", "plate", "heap_pixels",
 )  # fmt: skip
 """Measured values of a row."""
+NOT_IN_NAMES = str.maketrans("", "", '/\\:*?"<>|')
+"""Characters that no file's name has on every system."""
 
 
 def view_of(
@@ -99,7 +101,7 @@ def measure_pictures(
         Name of a fit, one of ``imaging.FITS``.
     overlay_folder
         Where copies with the fitted flanks are drawn: ``NAME-angle.png`` for each picture, with its folder's
-        name before where two have one name.
+        name before where two have one name; of a file of spheres also ``NAME-angle-clean.png``, without them.
     view
         What is known of every picture beforehand.
     heaps
@@ -138,14 +140,16 @@ def measure_pictures(
                 row["source"] = "file of spheres"
                 heap = measure_heap_file(picture, fit, heaps or HeapSettings())
                 row |= values_of(heap, LEVEL)
-                drawn = heap.picture
+                drawn: Callable[[], tuple[Picture, ...]] = heap.pictures
             else:
                 angle = measure_photograph(picture, fit, view)
                 row |= _values(angle)
                 drawn = partial(_drawn_photograph, picture, angle)
             if overlay_folder:
-                with replacing(overlay_folder / name) as temporary:
-                    save_picture(temporary, drawn())
+                clean = f"{Path(name).stem}-clean.png"
+                for kept, drawing in zip((name, clean), drawn(), strict=False):
+                    with replacing(overlay_folder / kept) as temporary:
+                        save_picture(temporary, drawing)
                 row["overlay"] = str(overlay_folder / name)
         except (PictureError, InputError) as error:
             row["reason"] = str(error) if str(picture) in str(error) else f"{picture}: {error}"
@@ -159,26 +163,28 @@ def measure_pictures(
     return rows
 
 
-def _drawn_photograph(picture: Path, angle: ReposeAngle) -> Picture:
-    return overlay(read_picture(picture), angle)
+def _drawn_photograph(picture: Path, angle: ReposeAngle) -> tuple[Picture]:
+    """Copy of a photograph with its flanks; the photograph itself is the one without."""
+    return (overlay(read_picture(picture), angle),)
 
 
 def drawn_names(pictures: Sequence[Path]) -> list[str]:
     """Names of the drawn copies: as short as they can be, and all different."""
     names = [f"{picture.stem}-angle.png" for picture in pictures]
     for depth in range(2, 2 + max((len(picture.parts) for picture in pictures), default=0)):
-        count = Counter(names)
+        # as on systems whose names have no case, and without what no name there may have
+        count = Counter(name.casefold() for name in names)
         names = [
-            "_".join((*picture.parts[-depth:-1], name_of(picture))).replace("/", "")
-            if count[name] > 1
+            "_".join((*picture.parts[-depth:-1], name_of(picture))).translate(NOT_IN_NAMES)
+            if count[name.casefold()] > 1
             else name
             for picture, name in zip(pictures, names, strict=True)
         ]
     seen: Counter[str] = Counter()
     different = []
     for name in names:
-        seen[name] += 1
-        different.append(name if seen[name] == 1 else f"{name.removesuffix('.png')}-{seen[name]}.png")
+        times = seen[name.casefold()] = seen[name.casefold()] + 1
+        different.append(name if times == 1 else f"{name.removesuffix('.png')}-{times}.png")
     return different
 
 

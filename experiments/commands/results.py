@@ -14,7 +14,7 @@ from experiments.commands.console import messages, plain
 
 if TYPE_CHECKING:
     from experiments.calibrate.results import StageResult
-    from experiments.cases import Heap
+    from experiments.cases import Heap, Resources
     from experiments.commands.clump_search import Trial
     from experiments.studyfile import Study
 
@@ -25,9 +25,14 @@ def show_stage(name: str, result: StageResult) -> None:
         messages.print(f"{name.replace('_', ' ')}: {decision.outcome}")
 
 
-def print_study(study: Study, device: str) -> None:
+def print_study(study: Study, resources: Resources) -> None:
     """Say which study runs where, and what is doubtful about it."""
-    messages.print(f"{study.name}, on {device}", study.note, sep="\n")
+    messages.print(f"{study.name}, on {resources}", study.note, sep="\n")
+    print_narrowness(study)
+
+
+def print_narrowness(study: Study) -> None:
+    """Say that the container is narrow for its grains, where it is."""
     if narrow := study.narrowness():
         messages.print(f"Doubtful: {narrow}")
 

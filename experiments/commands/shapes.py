@@ -17,7 +17,7 @@ from experiments.commands.clump_search import Trial, fit_by_volume, fit_within
 from experiments.errors import InputError
 from experiments.files import replacing
 from experiments.sphere_files import format_of, length_unit, read_clump
-from experiments.sphere_files.clump_file import check_grain_size
+from experiments.sphere_files.clump_file import GRAIN_SIZES, check_grain_size
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
@@ -86,6 +86,16 @@ class Clump:
         share, more = 100.0 * abs(self.fit.volume_error), self.fit.volume_error > 0.0
         told = f"the clump has {share:.0f} % {'more' if more else 'less'} volume, and mass, than the solid"
         return f"{told}: --protrusion auto keeps the volume, --tolerance finds the number of spheres too"
+
+    @property
+    def doubt(self) -> str:
+        """Say that it is longer or shorter than any grain, whatever unit was named; empty where it is not."""
+        size = self.solid.extents.max() if self.solid is not None else 2.0 * self.shape.bounding_radius
+        low, high = GRAIN_SIZES
+        if low <= size <= high:
+            return ""
+        usual = f"{1e3 * low:g} to {1e3 * high:g} mm"
+        return f"the grain is {1e3 * size:.4g} mm long, and grains are {usual}: see to --unit"
 
     def draw(self, path: Path) -> None:
         """Draw the clump, beside its solid; see `draw_clump`."""

@@ -9,8 +9,9 @@ import numpy as np
 
 from dem_warp import Case, CaseResult, Progress
 from doe.discrepancy import Outcomes, Point
-from experiments.cases import engine_of
+from experiments.cases import Workers, engine_of
 from experiments.cases.key import case_key
+from experiments.cases.workers.own import THIS_MACHINE
 from experiments.discover.library import Mechanism, with_mechanisms
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.wave import WaveRunner
@@ -22,7 +23,7 @@ from experiments.studyfile import Study
 class EngineSimulator:
     """Answers points of a study with the observables of its test, simulated by the study's engine.
 
-    All points of a call are simulated in as few launches as possible; they are measured in processes of their
+    All points of a call are simulated as one wave; they are measured in processes of their
     own while the next are simulated, and kept. A point whose case a study refuses has that as its reason.
 
     Use it as a context, or call `close`, to end its processes.
@@ -35,7 +36,7 @@ class EngineSimulator:
         Mechanisms that points may name, from its `library_for`.
     table
         Where outcomes are kept; what is there already is not simulated again.
-    device, workers, worlds, drivers, progress
+    workers, progress
         As of `WaveRunner`, a wave being all points of a call that are not kept yet.
 
     Raises
@@ -49,10 +50,7 @@ class EngineSimulator:
         study: Study,
         library: Sequence[Mechanism],
         table: OutcomeTable,
-        device: str | None = None,
-        workers: int | None = None,
-        worlds: int | None = None,
-        drivers: int | None = None,
+        workers: Workers = THIS_MACHINE,
         progress: Callable[[Progress], None] | None = None,
     ) -> None:
         self.study, self.table, self.engine = study, table, engine_of(study)
@@ -60,17 +58,7 @@ class EngineSimulator:
         told = getattr(self.engine, "observables", names)
         self.observables = tuple(name for name in names if name in (*PHOTOGRAPHED, *told))
         """Names of what it answers with."""
-        self._runner = WaveRunner(
-            study.measurement,
-            table,
-            device,
-            workers,
-            worlds,
-            drivers,
-            progress,
-            self.engine,
-            self.observables,
-        )
+        self._runner = WaveRunner(study.measurement, table, workers, progress, self.engine, self.observables)
         self._library = {mechanism.name: mechanism for mechanism in library}
         self._factors = [factor.name for factor in study.factors]
         self._conditions = [condition.name for condition in study.conditions]
@@ -94,7 +82,6 @@ class EngineSimulator:
         ValueError
             When a point names an unknown mechanism or condition, or has not one value for every factor.
         """
-        self._runner.expect(len(points))
         cases: dict[str, Case] = {}
         keys, refused = [], {}
         for point in points:

@@ -1,24 +1,5 @@
 """Cards and tests for other codes: contacts in their words, and the same test as their input."""
 
-from experiments.export.contact import Contact, Term, contacts_of, values
-from experiments.export.exporter import ExportedTest, Exporter, Translation
-from experiments.export.facts import case_terms, term_warnings
-from experiments.export.folder import export_input, write_export
-from experiments.export.library import EXPORTERS
-from experiments.export.translated import Translated
+import lazy_loader
 
-__all__ = [
-    "EXPORTERS",
-    "Contact",
-    "ExportedTest",
-    "Exporter",
-    "Term",
-    "Translated",
-    "Translation",
-    "case_terms",
-    "contacts_of",
-    "export_input",
-    "term_warnings",
-    "values",
-    "write_export",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from scipy.optimize import brentq
 
 from experiments.export.contact import Contact, Term, contacts_of, values
 from experiments.export.exporter import ExportedTest, Exporter, Translation
@@ -122,6 +121,8 @@ def tsuji_restitution(damping: float) -> float:
     ValueError
         If the polynomial does not reach so far.
     """
+    from scipy.optimize import brentq
+
     return float(brentq(lambda e: np.polyval(TSUJI, e) - math.sqrt(1.5) * damping, 0.0, 1.0))
 
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 import numpy as np
-from scipy import stats
 
 from doe.discrepancy import Measured
 
@@ -102,6 +101,9 @@ def _outliers(groups: Mapping[str, np.ndarray], level: float) -> Iterator[tuple[
     dof = sum(len(values) - 1 for values in groups.values()) - 1
     if dof < 1:
         return
+    # loads slowly, and a file that breaks a rule never comes here
+    from scipy import stats
+
     limit = stats.t.isf(level / 2.0, dof)
     residuals = {condition: values - values.mean() for condition, values in groups.items()}
     square = sum(float(residual @ residual) for residual in residuals.values())
@@ -121,6 +123,8 @@ def _scattered(groups: Mapping[str, np.ndarray], level: float) -> Iterator[tuple
     """
     if len(groups) < 2:
         return
+    from scipy import stats
+
     worst = max(groups, key=lambda condition: groups[condition].var(ddof=1))
     others = [values for condition, values in groups.items() if condition != worst]
     dof = sum(len(values) - 1 for values in others)

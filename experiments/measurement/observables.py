@@ -10,12 +10,15 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dem_warp import LiftedCylinder
 from dem_warp.scenes.scene import Observable as Told
-from imaging import HeapAngle, HeapShape, ReposeAngle, heap_shape
+
+if TYPE_CHECKING:
+    from imaging import HeapAngle, HeapShape, ReposeAngle
 
 ANGLE = "angle"
 """Spelling of the repose angle in study files and tables of cases."""
@@ -49,6 +52,9 @@ class View:
     @classmethod
     def of(cls, angle: ReposeAngle) -> View:
         """Measure the shape of the outline that an angle was fitted on."""
+        # a study names observables without a picture at hand
+        from imaging import heap_shape
+
         return cls(angle, heap_shape(angle.outline))
 
 

@@ -8,9 +8,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from glob import glob
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from experiments.errors import InputError, Problem
-from imaging import FitSettings, PictureError, ReposeAngle, compare, measure_photograph
+from imaging import FITS, FitSettings, PictureError
+
+if TYPE_CHECKING:
+    from imaging import ReposeAngle
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp")
 """Endings of the pictures that are looked for in a folder."""
@@ -34,6 +38,10 @@ def require_same_fit(fit: str, own: str, place: str) -> None:
     InputError
         When the two do not compare, or there is no such fit.
     """
+    if fit == own and fit in FITS:
+        return
+    from imaging import compare
+
     try:
         compare(*(_Stated(FitSettings.of(name)) for name in (fit, own)))
     except PictureError as error:
@@ -67,6 +75,8 @@ def measure_pictures(paths: Sequence[Path], fit: str) -> list[ReposeAngle]:
     InputError
         With every picture that shows no measurable heap.
     """
+    from imaging import measure_photograph
+
     angles, problems = [], []
     for path in paths:
         try:

@@ -15,7 +15,6 @@ from experiments.measurement.plausible import SizeOfTest
 from experiments.rows import Row
 from experiments.studyfile.units import Quantity
 from experiments.texts import nearest_name
-from imaging import find_outline, measure, read_picture
 
 CLOGGED = "the tube clogged"
 """Reason of a replicate that left no heap because the grains stayed in the tube."""
@@ -104,6 +103,9 @@ def _seen(row: Row, size: SizeOfTest, fit: str, known: Mapping[str, Observable])
     pixel = _pixel(row)
     if name and pixel is None and known[name].unit == "m":
         raise row.error("a length in a picture needs the size of its pixels, as 0.1 mm", "pixel")
+    # a file of numbers needs no pictures
+    from imaging import find_outline, measure, read_picture
+
     outline = find_outline(read_picture(path), meters_per_pixel=pixel, place=str(path))
     views = [View.of(measure(outline, fit, str(path)))]
     for observable in OBSERVABLES:

@@ -1,7 +1,5 @@
 """Reports of campaigns: one self-contained page, the results as JSON, the tables as CSV."""
 
-from experiments.report.campaign_page import render_page
-from experiments.report.pictures import HeapPicture, heap_pictures
-from experiments.report.writer import write_report
+import lazy_loader
 
-__all__ = ["HeapPicture", "heap_pictures", "render_page", "write_report"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -6,25 +6,18 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from experiments.calibrate.results import STAGES, Campaign, Outcome
+from experiments.report.cautions import cautions
 from experiments.report.companion import Replay, companion_of
 from experiments.report.kit import html
 from experiments.report.other_codes import other_codes_chapter
+from experiments.report.paper_text import pastes
 from experiments.report.pictures import HeapPicture
 from experiments.report.sections import TITLES, Context, chapter, failed_chapter, stage_chapters
+from experiments.report.solid import SolidHeap
+from experiments.report.stage_tables import values_table
 from experiments.report.study_facts import study_facts
+from experiments.report.verdict import HEADLINES, verdict_sentence
 from experiments.studyfile import Study
-
-OUTCOMES = {
-    Outcome.CALIBRATED: "Calibrated",
-    Outcome.NOT_TOLD_APART: "Not told apart",
-    Outcome.MISSED: "Target missed",
-    Outcome.NO_SIGNIFICANT_FACTOR: "No significant factor",
-    Outcome.TARGET_NOT_REACHED: "Target not reached",
-    Outcome.PLATEAU: "Plateau before the target",
-    Outcome.NO_CONTOUR: "No setting gives the target",
-    Outcome.TOO_MANY_FAILED_RUNS: "Too many failed runs",
-}
-"""Outcomes as headlines."""
 
 
 def render_page(
@@ -33,6 +26,7 @@ def render_page(
     pictures: Sequence[HeapPicture] = (),
     provenance: Mapping[str, Any] | None = None,
     replay: Replay | None = None,
+    solid: SolidHeap | None = None,
 ) -> str:
     """Render the report of a campaign as one self-contained HTML page.
 
@@ -46,22 +40,30 @@ def render_page(
         What made the numbers: names and values, nested as they come.
     replay
         Published runs simulated again, to be shown beside.
+    solid
+        A heap to be turned.
     """
     companion = companion_of(study)
     labels = {section.name: section.label for section in study.factor_sections}
     context = Context(campaign, labels, companion.published())
-    chapters = stage_chapters(context)
+    chapters = [chapter("heaps")] if pictures or solid else []
+    chapters += stage_chapters(context)
+    values = None
     if campaign.optimum is not None:
-        chapters.append(other_codes_chapter(study, campaign.optimum))
-    if pictures:
-        chapters.append(chapter("heaps"))
+        values = values_table(campaign, campaign.optimum, labels)
+        chapters += [other_codes_chapter(study, campaign.optimum), chapter("paper_text")]
     chapters.append(failed_chapter(campaign))
     chapters += replay.chapters(campaign) if replay else ()
     chapters += [*companion.campaign_chapters(campaign), chapter("provenance")]
     drawn_on = {
         "campaign": campaign,
         "study": study,
-        "outcome": OUTCOMES[campaign.outcome],
+        "headline": HEADLINES[campaign.outcome],
+        "sentence": verdict_sentence(campaign),
+        "cautions": cautions(campaign, study),
+        "values": values,
+        "pastes": pastes(campaign, study, provenance or {}),
+        "solid": solid,
         "calibrated": campaign.outcome is Outcome.CALIBRATED,
         "unreached": [TITLES[name] for name in STAGES if name not in campaign.stages],
         "published": context.published,

@@ -18,23 +18,21 @@ NAME = "other_codes"
 
 
 def other_codes_chapter(study: Study, optimum: OptimumResult) -> Chapter:
-    """Build the chapter of the values at the chosen point, for every code that they can be exported to."""
+    """Build the chapter of the values at the chosen point, a table for every code that they can go to."""
     case = study.case(optimum.settings, 1)
-    tables = {"terms": _terms_table(case)}
-    if warnings := [(EXPORTERS[name].code, text) for name in EXPORTERS for text in term_warnings(name, case)]:
-        frame = pd.DataFrame(warnings, columns=["code", "lacking"])
-        heads: Layout = ["code", *columns(lacking="what it has not got, and what stands for it")]
-        tables["lacking"] = make_table("codes-lack", frame, heads, "Not the same there.")
-    return chapter(NAME, tables)
+    return chapter(NAME, {EXPORTERS[name].code: _terms_table(name, case) for name in EXPORTERS})
 
 
-def _terms_table(case: Case[Any]) -> Table:
+def _terms_table(name: str, case: Case[Any]) -> Table:
+    """Lay out the terms of one code; its note says what it has not got, and what stands for it."""
     rows = [
-        {"code": EXPORTERS[name].code, "subject": subject, "name": term.name, "value": f"{term.value:.6g}"}
+        {"subject": subject, "name": term.name, "value": f"{term.value:.6g}"}
         | {"unit": "" if term.unit == "1" else term.unit, "formula": term.formula}
-        for name in EXPORTERS
         for subject, term in case_terms(name, case)
     ]
     heads = columns(subject="of", name="name there", value="value", formula="formula")
-    shown: Layout = ["code", *heads[:3], "unit", heads[3]]
-    return make_table("codes", pd.DataFrame(rows), shown, "Values in the terms of other codes.")
+    shown: Layout = [*heads[:3], "unit", heads[3]]
+    lacking = ". ".join(text.rstrip(".") for text in term_warnings(name, case))
+    note = f"Not the same there: {lacking}." if lacking else ""
+    caption = f"Values in the terms of {EXPORTERS[name].code}."
+    return make_table(f"code-{name}", pd.DataFrame(rows), shown, caption, note)

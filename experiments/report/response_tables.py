@@ -117,7 +117,7 @@ def _directions_table(joint: JointFit, settings: OptimumSettings) -> Table:
     table["moves"] = [direction_text(row) for _, row in joint.directions.iterrows()]
     table["open"] = np.where(table.index.isin(left), "open", "pinned down")
     shown: Layout = [
-        Column("direction", "", "label"),
+        Column("direction", "no.", "label"),
         "moves",
         *(Column(name, f"{name} coded", "coded") for name in names),
         Column("half_width", "half width, coded", "free"),

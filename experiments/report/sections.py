@@ -23,7 +23,7 @@ from experiments.report.kit.chart import Chart
 from experiments.report.kit.html import Chapter
 from experiments.report.kit.table import Table
 from experiments.report.published import Published
-from experiments.report.response_tables import goals_table, response_tables
+from experiments.report.response_tables import response_tables
 from experiments.studyfile.campaign import Response
 
 TITLES = {
@@ -37,7 +37,8 @@ TITLES = {
     "optimum": "Optimum and compatible region",
     "responses": "Several responses",
     "verification": "Verification",
-    "other_codes": "Enter these values in your DEM code",
+    "other_codes": "The values in the words of each code",
+    "paper_text": "For your paper",
     "heaps": "Heaps",
     "failed": "Failed runs",
     "provenance": "Settings and provenance",
@@ -97,7 +98,7 @@ def failed_chapter(campaign: Campaign) -> Chapter:
 
 
 def _target(context: Context, result: TargetResult) -> Chapter:
-    campaign, tables = context.campaign, {"responses": goals_table(context.campaign)}
+    campaign, tables = context.campaign, {"target": stage_tables.target_table(context.campaign)}
     if result.cases is not None:
         caption = "The cases whose means are the target."
         table = stage_tables.cases_table("target-cases", result.cases, campaign.responses, caption)
@@ -159,7 +160,7 @@ def _surface(context: Context, result: SurfaceResult) -> Chapter:
 
 
 def _optimum(context: Context, result: OptimumResult) -> Chapter:
-    return chapter("optimum", {"ranges": stage_tables.ranges_table(result)})
+    return chapter("optimum")
 
 
 def _responses(context: Context) -> list[Chapter]:
@@ -168,7 +169,6 @@ def _responses(context: Context) -> list[Chapter]:
     if campaign.surface is None or campaign.optimum is None or campaign.optimum.joint is None:
         return []
     tables = response_tables(campaign)
-    del tables["responses"]  # it stands with the target
     drawn = joint_charts(campaign.surface, campaign.optimum, context.target, campaign.responses)
     return [chapter("responses", tables, drawn)]
 

@@ -22,7 +22,7 @@ from experiments.calibrate.results import (
 from experiments.report.kit.numbers import unit_sign
 from experiments.report.kit.table import Column, Layout, Table, columns, make_table
 from experiments.report.published import QUALITY, Published, quality_of
-from experiments.studyfile.campaign import Response
+from experiments.studyfile.campaign import TARGET_SCENE, Response
 
 SIGNIFICANT = 0.05
 """Rows of an analysis of variance with p below this are marked."""
@@ -49,6 +49,28 @@ def factors_table(
     heads = columns("level", low="low (−1)", center="middle (0)", high="high (+1)", truth="hidden truth")
     shown: Layout = ["factor", Column("label", "parameter"), *heads, "unit"]
     return make_table("factors", frame, shown, "Factors and their levels.")
+
+
+def target_table(campaign: Campaign) -> Table:
+    """Lay out what is to be matched; empty rows before the target is known."""
+    samples = campaign.target.responses if campaign.target else {}
+    rows = [
+        {
+            "response": response.name,
+            "scene": "own" if response.scene == TARGET_SCENE else response.scene,
+            "unit": unit_sign(response.unit),
+            "role": "held out" if response.held_out else "fitted",
+            "target_se": samples[response.name].se,
+        }
+        | vars(samples[response.name])
+        for response in campaign.responses
+        if response.name in samples
+    ]
+    heads = columns("free", mean="mean", sd="standard deviation")
+    shown: Layout = ["response", "scene", "role", "unit", *heads, "n"]
+    shown.append(Column("target_se", "standard error", "free"))
+    note = "Scene: the study's own, or a further one by its name. The first response leads the climb."
+    return make_table("target", pd.DataFrame(rows), shown, "What is to be matched.", note)
 
 
 def cases_table(name: str, cases: pd.DataFrame, responses: Sequence[Response], caption: str) -> Table:
@@ -179,14 +201,13 @@ def coefficients_table(surface: Surface, response: Response) -> Table:
     sign = unit_sign(response.unit)
     frame = pd.DataFrame(
         {
-            "natural": surface.coefficients,
             "coded": surface.coded_coefficients,
             "coded_se": surface.fit.bse,
             "p": surface.fit.pvalues,
         }
     ).rename_axis("term")
     coded = columns("sum", sign, coded="coded", coded_se="se (coded)")
-    shown: Layout = ["term", *columns("free", sign, natural="natural units"), *coded, "p"]
+    shown: Layout = ["term", *coded, "p"]
     frame = frame.loc[surface.coefficients.index]
     return make_table("coefficients", frame, shown, "Coefficients of the reduced model.")
 
@@ -201,21 +222,37 @@ def quality_table(result: FittedResponse, published: Published | None) -> Table:
     return make_table("quality", frame, shown, "Quality of the fits.")
 
 
-def ranges_table(optimum: OptimumResult) -> Table:
-    """Lay out the chosen point with the values that are as good."""
-    factors = optimum.region.factors
-    frame = optimum.region.ranges[["low", "high"]].loc[[factor.name for factor in factors]]
-    frame = frame.assign(chosen=pd.Series(optimum.point), unit=[factor.unit for factor in factors])
-    frame["pinned"] = ["no" if name in optimum.unidentified else "yes" for name in frame.index]
-    if optimum.truth is not None:
-        frame["truth"] = pd.Series(optimum.truth.values)
-    heads = columns("free", chosen="chosen", low="compatible from", high="to", truth="hidden truth")
-    shown: Layout = ["factor", *heads, "unit", Column("pinned", "pinned down by the target")]
-    frame, caption = frame.rename_axis("factor"), "Chosen values and compatible ranges."
-    note = (
-        "The factors trade off against one another: not every combination inside these ranges is compatible."
-    )
-    return make_table("ranges", frame, shown, caption, note)
+def values_table(campaign: Campaign, optimum: OptimumResult, labels: Mapping[str, str]) -> Table:
+    """Lay out the value of every factor, with the values that are as good where it was calibrated."""
+    region, chosen = optimum.region, optimum.point
+    frame = pd.DataFrame(
+        {
+            "label": labels,
+            "value": optimum.settings,
+            "unit": {factor.name: factor.unit for factor in campaign.factors},
+            "low": region.ranges["low"],
+            "high": region.ranges["high"],
+            "how": {name: _how(name, optimum) for name in optimum.settings},
+        }
+    ).rename_axis("factor")
+    frame = frame.loc[[*chosen, *(name for name in optimum.settings if name not in chosen)]]
+    shown: Layout = [
+        *columns(label="parameter", factor="symbol"),
+        Column("value", "value", "level"),
+        "unit",
+        *columns("free", low="as good from", high="to"),
+        Column("how", "how it was found"),
+    ]
+    several = " Not every combination inside the ranges is as good: the values trade off against one another."
+    marks = ["chosen" if name in chosen else "" for name in frame.index]
+    caption = "Calibrated values (marked), and those that every case shared."
+    return make_table("values", frame, shown, caption, several.strip() if len(chosen) > 1 else "", marks)
+
+
+def _how(name: str, optimum: OptimumResult) -> str:
+    if name not in optimum.point:
+        return "middle of its range"
+    return "calibrated, left open" if name in optimum.unidentified else "calibrated"
 
 
 def tests_table(

@@ -20,6 +20,7 @@ from experiments.report.campaign_page import render_page
 from experiments.report.companion import Replay
 from experiments.report.material_card import write_material_card
 from experiments.report.pictures import HeapPicture
+from experiments.report.solid import SolidHeap
 from experiments.studyfile import Study
 
 LIBRARIES = ("warp-lang", "numpy", "scipy", "pandas", "statsmodels", "scikit-learn", "opencv-python-headless")
@@ -35,12 +36,13 @@ def write_report(
     pictures: Sequence[HeapPicture] = (),
     provenance: Mapping[str, Any] | None = None,
     replay: Replay | None = None,
+    solid: SolidHeap | None = None,
 ) -> Path:
     """Write ``report.html``, ``results.json``, ``tables/*.csv``, ``material.toml``, each whole or not at all.
 
     Parameters
     ----------
-    campaign, study, pictures, replay
+    campaign, study, pictures, replay, solid
         As of `render_page`.
     out_dir
         Folder of the files; it is made when it is missing.
@@ -54,7 +56,7 @@ def write_report(
     """
     folder = Path(out_dir)
     made_by = {**(provenance or {}), "study": study_hash(study), "versions": library_versions()}
-    page = render_page(campaign, study, pictures, made_by, replay)
+    page = render_page(campaign, study, pictures, made_by, replay, solid)
     tables = campaign.tables() | (replay.tables() if replay else {})
     write_files(folder, study, page, {"campaign": campaign.to_dict()}, made_by, tables)
     write_material_card(campaign, study, folder)

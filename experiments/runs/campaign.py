@@ -17,15 +17,16 @@ from dem_warp import Progress
 from dem_warp.version import source_commit
 from experiments.calibrate import Campaign, calibrate
 from experiments.calibrate.campaign import StageHook
-from experiments.calibrate.checks import check_study
+from experiments.calibrate.checks import check_calibration
 from experiments.calibrate.export import jsonable
-from experiments.cases import Store, open_folder, run_cases
+from experiments.cases import Store, Workers, open_folder, run_cases
 from experiments.cases.key import engine_identity
 from experiments.cases.outputs import publishing
-from experiments.errors import InputError, StudyError
+from experiments.cases.workers.own import THIS_MACHINE
+from experiments.errors import StudyError
 from experiments.files import write_text
 from experiments.measurement.target import with_measurements
-from experiments.report import heap_pictures, write_report
+from experiments.report import heap_pictures, verified_heap, write_report
 from experiments.report.companion import Replay, companion_of
 from experiments.report.kit.markdown import WALL_TIMES
 from experiments.report.writer import library_versions
@@ -45,13 +46,12 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Desk:
-    """Place and means of running cases: a study, its folder, the device."""
+    """Place and means of running cases: a study, its folder, the workers."""
 
     study: Study
     folder: Path
     store: Store
-    device: str | None
-    workers: int | None
+    workers: Workers
     watch: Watch
 
     @classmethod
@@ -59,12 +59,11 @@ class Desk:
         cls,
         study: Study,
         folder: Path,
-        device: str | None = None,
-        workers: int | None = None,
+        workers: Workers = THIS_MACHINE,
         resume: bool = False,
         watch: Watch = lambda title: nullcontext(),
     ) -> Desk:
-        """Make the folder of a study, or go on in it; parameters as of `experiments.api.calibrate`.
+        """Make the folder of a study, or go on in it.
 
         Raises
         ------
@@ -74,13 +73,13 @@ class Desk:
         store, changes = open_folder(folder, study, resume)
         for change in changes:
             _log.warning("The study has changed since the earlier run: %s", change)
-        return cls(study, folder, store, device, workers, watch)
+        return cls(study, folder, store, workers, watch)
 
     def run(self, table: pd.DataFrame, title: str) -> pd.DataFrame:
         """Simulate a table of cases as one batch, and note the wall time of what was not stored yet."""
         before, started = len(self.store), time.perf_counter()
         with self.watch(title) as progress:
-            cases = run_cases(self.study, table, self.store, self.device, self.workers, progress)
+            cases = run_cases(self.study, table, self.store, self.workers, progress)
         if simulated := len(self.store) - before:
             self._note_wall_time(title, simulated, time.perf_counter() - started)
         return cases
@@ -113,14 +112,14 @@ def run_campaign(desk: Desk, on_stage: StageHook | None = None, replay: Replay |
     campaign = calibrate(desk.study, runner, on_stage)
     provenance = {
         **_source_and_day(),
-        "device": desk.device,
-        "workers": desk.workers,
+        **desk.workers.described,
         "seconds": round(time.perf_counter() - started, 1),
         "engine": _engine(desk, campaign.cases),
     }
     pictures = heap_pictures(campaign, desk.study, desk.store.load)
+    solid = verified_heap(campaign, desk.store.load)
     with desk.publishing() as drafts:
-        write_report(campaign, desk.study, drafts, pictures, provenance, replay)
+        write_report(campaign, desk.study, drafts, pictures, provenance, replay, solid)
     return campaign
 
 
@@ -169,17 +168,10 @@ def check_runs(study: Study, campaign: bool = True, paper: bool = False) -> Stud
         raise _no_published_runs(study)
     if not campaign:
         return study
-    if not study.factors:
-        raise StudyError("a calibration needs at least one [[factor]]", "none", str(study.file))
     study, notes = with_measurements(study)
     for note in notes:
         _log.warning("The measurements: %s", note)
-    try:
-        check_study(study)
-    except InputError:
-        raise
-    except ValueError as error:
-        raise StudyError("the decisions must fit the factors", str(error), str(study.file)) from error
+    check_calibration(study)
     return study
 
 

@@ -1,31 +1,62 @@
-"""Choices where nothing is named: the device, the scale of the study, the folder of results."""
+"""Choices where nothing is named: the workers, the scale of the study, the folder of results."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
-from dem_warp.device import resolve_device
-from experiments.discover.devices import resolve_devices
+from experiments.cases import Resources
 from experiments.errors import InputError
 from experiments.studyfile import Study, StudyError, load_study, study_scales
+from experiments.studyfile.cluster_section import read_profile
 
 
-def chosen_device(device: str | None, several: bool = False) -> str:
-    """Name of the device to run on, or of several between commas: as asked, or the GPU if there is one.
+def chosen_resources(
+    device: str | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    cluster: str | Path | None = None,
+) -> Resources:
+    """Workers that are asked for; what is not named is this machine's.
+
+    Parameters
+    ----------
+    device
+        ``"cpu"``, ``"cuda"``, ``"cuda:1"``, or several GPUs between commas.
+    workers
+        Processes on the CPU, GPUs, or workers of a cluster.
+    scheduler
+        Address of a Dask scheduler.
+    cluster
+        File with a ``[cluster]``.
 
     Raises
     ------
     InputError
-        When one is not there or is named twice, or the CPU stands beside a GPU.
+        When a device is not there or the file breaks a rule, or a scheduler and a file are both named.
     """
-    try:
-        return ",".join(resolve_devices(device)) if several else resolve_device(device)
-    except ValueError as error:
-        raise InputError(str(error), device, "--device") from None
+    if scheduler is not None and cluster is not None:
+        raise InputError(
+            "workers are those of a scheduler or of a profile", f"{scheduler}; {cluster}", "--scheduler"
+        )
+    section = read_profile(Path(cluster)) if cluster is not None else None
+    resources = Resources(device, workers, scheduler, section)
+    _ = resources.count  # finds devices that are not there
+    return resources
 
 
-def chosen_study(study: Study | str | Path | None, scale: str | None, device: str) -> Study:
-    """Load a study at the scale asked for, or at the one for the device: paper on a GPU, bench on a CPU.
+def resources_for(study: Study, resources: Resources) -> Resources:
+    """Take the workers of a study's own ``[cluster]`` where none of a cluster are asked for.
+
+    A device that is named means this machine.
+    """
+    if study.cluster is None or resources.is_cluster or resources.device is not None:
+        return resources
+    return replace(resources, cluster=study.cluster)
+
+
+def chosen_study(study: Study | str | Path | None, scale: str | None, resources: Resources) -> Study:
+    """Load a study at the scale asked for, or at the one for the workers: paper on GPUs, bench on CPUs.
 
     A study that is loaded stays as it is.
 
@@ -40,7 +71,7 @@ def chosen_study(study: Study | str | Path | None, scale: str | None, device: st
         return study
     path = None if study is None else Path(study)
     if scale is None:
-        suited = "paper" if device.startswith("cuda") else "bench"
+        suited = "paper" if resources.on_gpu else "bench"
         scale = suited if suited in study_scales(path) else None
     return load_study(path, scale)
 

@@ -13,9 +13,10 @@ from typing import Any
 from dem_warp import Progress
 from dem_warp.version import source_commit
 from doe.discrepancy import Bank, Discovery, Fit, Measured, Outcomes, Point, drive
-from experiments.cases import engine_of, open_folder, require_unused
+from experiments.cases import Workers, engine_of, open_folder, require_unused
 from experiments.cases.folder import locked
 from experiments.cases.outputs import publishing, sha256_of
+from experiments.cases.workers.own import THIS_MACHINE
 from experiments.discover.engine import EngineSimulator
 from experiments.discover.maker import fingerprint_of, maker_of_today
 from experiments.discover.outcome_table import OutcomeTable
@@ -23,7 +24,7 @@ from experiments.discover.search import Search
 from experiments.files import replacing
 from experiments.measurement.measured_file import read_measured
 from experiments.measurement.observables import Instrument
-from experiments.report import HeapPicture
+from experiments.report import HeapPicture, SolidHeap
 from experiments.report.companion import Companion, companion_of
 from experiments.report.discovery import Terms, write_discovery
 from experiments.report.discovery.pictures import photograph, simulated_heaps
@@ -45,8 +46,7 @@ class Job:
     folder: Path
     bank: Path | None = None
     photographs_only: bool = False
-    device: str | None = None
-    workers: int | None = None
+    workers: Workers = THIS_MACHINE
     seed: int = 1
 
 
@@ -66,9 +66,7 @@ class _Watched:
 
     def __init__(self, search: Search, job: Job, watch: Watch) -> None:
         table = OutcomeTable(job.folder / OUTCOMES)
-        self.engine = EngineSimulator(
-            search.study, search.library, table, job.device, job.workers, progress=self._report
-        )
+        self.engine = EngineSimulator(search.study, search.library, table, job.workers, self._report)
         self.observables = self.engine.observables
         self.title = "library waves"
         self.waves: list[dict[str, Any]] = []
@@ -103,7 +101,7 @@ def run_search(job: Job, resume: bool = False, watch: Watch = lambda title: null
         require_unused(job.folder, "; --resume goes on in it")
     companion, search = companion_of(job.study), Search.of(job.study)
     terms = Terms.of(search.library, job.study.scene.measurable, job.study.factor_sections)
-    bank = _known_bank(job, search)
+    bank = known_bank(job)
     measured = _measured(job)
     for note in measured.notes if measured else ():
         _log.warning("The data: %s", note)
@@ -137,12 +135,14 @@ def _search(
         simulator.title, started = "fresh runs", time.perf_counter()
         found = drive(search.analysis(measured, bank, job.seed), simulator)
         waves = [*simulator.waves, {"wave": "analysis, its waves included", "seconds": _since(started)}]
-        pictures = heaps_side_by_side(simulator.engine, found, terms, measured, job)
+        pictures, solid = heaps_side_by_side(simulator.engine, found, terms, measured, job)
     further = companion.discovery_chapters(found, terms, job.measured) if job.measured else ()
     made = _provenance(job, bank, waves)
     with _publishing(job) as drafts:
         search.settings.write(drafts / SETTINGS)
-        page = write_discovery(found, job.study, terms, search.settings, drafts, pictures, made, further)
+        page = write_discovery(
+            found, job.study, terms, search.settings, drafts, pictures, made, further, solid
+        )
     return SearchResult(found, terms, job.folder / page.relative_to(drafts))
 
 
@@ -153,10 +153,13 @@ def _publishing(job: Job) -> AbstractContextManager[Path]:
 
 def heaps_side_by_side(
     engine: EngineSimulator, found: Discovery, terms: Terms, measured: Measured, job: Job
-) -> list[HeapPicture]:
-    """Draw a measured heap, where there is a photograph, that of the base, and that with the mechanism."""
+) -> tuple[list[HeapPicture], SolidHeap | None]:
+    """Draw a measured heap, where there is a photograph, that of the base, and that with the mechanism.
+
+    The last of them comes to be turned, too; None where it is no heap.
+    """
     if found.base is None or not job.study.scene.leaves_a_heap:
-        return []
+        return [], None
     fitted = [condition.name for condition in job.study.conditions if not condition.held_out]
     training = [name for name in measured.conditions if name in fitted]
     condition = next((name for name in training if measured.pictures.get(name)), training[0])
@@ -167,11 +170,20 @@ def heaps_side_by_side(
     photographs = measured.pictures.get(condition, ())[:1]
     taken = [photograph(path, condition, job.study.measurement.fit) for path in photographs]
     drawn = simulated_heaps(dict(zip(models, results, strict=True)), condition, job.study.under(condition))
-    return [picture for picture in taken if picture is not None] + drawn
+    shown = [picture for picture in taken if picture is not None] + drawn
+    title = list(models)[-1]
+    return shown, SolidHeap.of(f"{title}: a heap under the condition “{condition}”.", results[-1])
 
 
-def _known_bank(job: Job, search: Search) -> Bank | None:
-    """The bank that is named, that of the folder, or that which lies beside the study; None: to be made."""
+def known_bank(job: Job) -> Bank | None:
+    """Read the bank that is named, that of the folder, or that beside the study; None: it is to be made.
+
+    Raises
+    ------
+    InputError
+        When it is no bank, or that of another study.
+    """
+    search = Search.of(job.study)
     beside = job.study.file.with_name(f"bank-{job.study.scale}.npz" if job.study.scale else BANK)
     if job.bank is not None:
         return search.read_bank(job.bank)
@@ -193,8 +205,7 @@ def _point(fit: Fit, condition: str, seed: int) -> Point:
 
 def _provenance(job: Job, bank: Bank, waves: Sequence[dict[str, Any]]) -> dict[str, Any]:
     return {
-        "device": job.device,
-        "workers": job.workers,
+        **job.workers.described,
         "commit": source_commit(),
         "engine": fingerprint_of(engine_of(job.study)),
         "bank": dict(bank.maker) or None,

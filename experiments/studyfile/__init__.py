@@ -1,17 +1,5 @@
 """Studies: one TOML file each, its sections and units, every rule checked with the place of a breach."""
 
-from experiments.errors import StudyError
-from experiments.studyfile.conditions import Condition
-from experiments.studyfile.study import BUCKWHEAT, Study, load_card, load_study, study_scales
-from experiments.studyfile.template import write_template
+import lazy_loader
 
-__all__ = [
-    "BUCKWHEAT",
-    "Condition",
-    "Study",
-    "StudyError",
-    "load_card",
-    "load_study",
-    "study_scales",
-    "write_template",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -87,7 +87,7 @@ RawQuantity = Annotated[Quantity, PlainValidator(Quantity.parse)]
 class Section(BaseModel):
     """A frozen section: an unknown key is an error, so that a misspelt value is never ignored."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
     @field_validator("*", mode="before")
     @classmethod

@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from dem_warp import Case, ClumpShape, GrainPopulation, Numerics, ShapeMixture, WallPart
-from dem_warp.laws.contact_law import check_forms
+from dem_warp.laws.mechanism import check_forms
 from dem_warp.population import FRACTION_TOLERANCE, size_of_mean_mass
 from experiments.studyfile.generated import section_for
 from experiments.studyfile.mechanisms import MechanismsSection, mechanisms_section
@@ -191,9 +191,7 @@ class Physics(Section):
     """Time step, softening, precision."""
     solver: SolverSection = SolverSection()
     """Conventions of the contact law."""
-    mechanism: Annotated[MechanismsSection, Generated(mechanisms_section)] = Field(
-        default_factory=lambda: mechanisms_section()()
-    )
+    mechanism: Annotated[MechanismsSection, Generated(mechanisms_section)] = MechanismsSection()
     """Physical effects beside those of the base contact law."""
 
     @model_validator(mode="after")

@@ -56,8 +56,9 @@ def setter_at(parameter: str) -> Setter:
     ValueError
         When there is no quantity.
     """
-    # A place may lead elsewhere once a library has grown.
-    return _compiled(parameter, scene_section(), mechanisms_section())
+    # A place may lead elsewhere once a library has grown; laws are loaded for a place in one of them alone.
+    laws = (mechanisms_section(),) if parameter.startswith("mechanism.") else ()
+    return _compiled(parameter, scene_section(), *laws)
 
 
 @cache

@@ -20,6 +20,7 @@ from doe import Factor
 from experiments.errors import StudyError
 from experiments.studyfile.campaign import TARGET_SCENE, CampaignSettings, Target
 from experiments.studyfile.card import card_document, with_material
+from experiments.studyfile.cluster_section import ClusterSection
 from experiments.studyfile.conditions import BASE, Condition, Conditions, under_condition
 from experiments.studyfile.engine_section import EngineSection
 from experiments.studyfile.factor_section import (
@@ -99,6 +100,8 @@ class Study(Physics):
     """The search for a missing effect."""
     engine: EngineSection | None = None
     """The program that simulates the cases; left out: dem-warp itself."""
+    cluster: ClusterSection | None = None
+    """The workers that simulate the cases; left out: this machine's own."""
 
     _document: dict[str, Any] = PrivateAttr(default_factory=dict)
     _places: Places = PrivateAttr(default_factory=lambda: Places(BUCKWHEAT, {}))

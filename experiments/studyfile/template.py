@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from experiments.errors import InputError
-from experiments.files import write_text
+from experiments.files import is_device_name, write_text
 
 TEMPLATE = Path(__file__).parents[1] / "studies" / "template.toml"
 
@@ -21,6 +21,9 @@ def write_template(name: str, folder: Path | None = None) -> Path:
     name = name.removesuffix(".toml")
     if not name or not all(character.isalnum() or character in " _-" for character in name):
         raise InputError("a name has letters, digits, spaces, - and _ only", name, "NAME")
+    if is_device_name(name) or name != name.strip():
+        rule = "a name has no blank at its ends, and is none of a device of Windows (con, nul, com1, ...)"
+        raise InputError(rule, repr(name), "NAME")
     path = (folder or Path()) / f"{name}.toml"
     if path.exists():
         raise InputError("a new study never overwrites a file", "one that exists", str(path))

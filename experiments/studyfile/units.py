@@ -16,7 +16,7 @@ UNITS: dict[str, dict[str, float]] = {
     "speed": {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3},
     "rate": {"1/s": 1.0, "1/min": 1.0 / 60.0},
     "frequency": {"Hz": 1.0},
-    "time": {"s": 1.0, "ms": 1e-3, "min": 60.0},
+    "time": {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0},
     "mass": {"kg": 1.0, "g": 1e-3, "mg": 1e-6},
     "mass flow": {"kg/s": 1.0, "g/s": 1e-3},
     "volume": {"m^3": 1.0, "cm^3": 1e-6, "mm^3": 1e-9, "l": 1e-3, "ml": 1e-6, "ul": 1e-9},

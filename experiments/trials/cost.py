@@ -6,14 +6,13 @@ from collections.abc import Sequence
 
 import pandas as pd
 
-from doe.discrepancy import Bank, Settings
+from doe.discrepancy import Bank
+from experiments.discover.fresh_cases import search_cases
 from experiments.trials.declaration import Declaration
 from experiments.trials.truth import Sealed
 
 PER_CASE = 0.0105
 """Seconds of an H200 that the steps of a case of 400 grains of three spheres take, with 512 at once."""
-
-_LIKELY_RIVALS = 2
 
 
 def planned_cases(sealed: Sequence[Sealed], declared: Declaration, bank: Bank) -> pd.DataFrame:
@@ -34,17 +33,3 @@ def planned_cases(sealed: Sequence[Sealed], declared: Declaration, bank: Bank) -
         rows.append((f"analyses, {part}", count, with_gap * likely, with_gap * most))
     table = pd.DataFrame(rows, columns=["what", "trials", "cases", "at most"])
     return table.assign(seconds=table["cases"] * PER_CASE, **{"seconds at most": table["at most"] * PER_CASE})
-
-
-def search_cases(settings: Settings, conditions: int) -> tuple[int, int]:
-    """Cases that an analysis with a gap asks for: likely, and at the most.
-
-    The base runs once around its optimum, its rivals in rounds that halve and in the finish, and so do
-    pairs; at the end the base and the chosen model run side by side.
-    """
-    one_model = settings.refinement_points * settings.refinement_repeats * conditions
-    rounds = [max(1, settings.shortlist >> number) for number in range(settings.refinement_rounds)]
-    finish = settings.shortlist * settings.finish_points * settings.refinement_repeats * conditions
-    most_rounds = (1 + 2 * sum(rounds)) * one_model + 2 * finish
-    end = 2 * settings.direct_runs * conditions
-    return (_LIKELY_RIVALS + 1) * one_model + end, most_rounds + end

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from experiments.discover.devices import resolve_devices
+from experiments.cases.workers.resources import resolve_devices
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.report.kit.machine import machine
 

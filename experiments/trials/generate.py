@@ -19,13 +19,13 @@ import numpy as np
 import typer
 
 from doe.discrepancy import Bank, Simulator, fit_emulator
+from experiments.cases import Resources, open_workers
 from experiments.commands.console import clear_errors
 from experiments.discover.engine import EngineSimulator
 from experiments.discover.library import library_for
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.search import Search
 from experiments.errors import InputError
-from experiments.runs.choices import chosen_device
 from experiments.studyfile import Study, load_study
 from experiments.toml_files import read_toml
 from experiments.trials.declaration import Declaration, declared_effects, read_declaration, with_names
@@ -129,7 +129,7 @@ def measure(
 ) -> None:
     """Simulate and measure the heaps of the trials."""
     with clear_errors("Resume with the same command."):
-        place, device = Folder(folder), chosen_device(device, several=True)
+        place = Folder(folder)
         declaration = read_declaration(place.declared)
         sealed = [trial for trial in read_sealed(place.sealed) if part in (None, trial.part)]
         labels = list(revealed(read_labels(place.hidden_labels), sealed).values())
@@ -137,7 +137,8 @@ def measure(
         library = (*library_for(study), *library_for(study, STRANGERS))
         table = OutcomeTable(place.hidden / "outcomes.sqlite")
         with (
-            EngineSimulator(study, library, table, device, workers) as simulator,
+            open_workers(Resources(device, workers)) as simulators,
+            EngineSimulator(study, library, table, simulators) as simulator,
             noted_run(place, f"heaps, {part or 'all'}", device, table),
         ):
             measure_trials(place, labels, declaration, simulator)

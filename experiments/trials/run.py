@@ -20,13 +20,13 @@ from typing import Annotated
 import typer
 
 from doe.discrepancy import fit_emulator, load_bank
+from experiments.cases import Resources, open_workers
 from experiments.commands.console import clear_errors
 from experiments.discover.engine import EngineSimulator
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.search import Search
 from experiments.errors import InputError
 from experiments.report.kit.markdown import markdown_table
-from experiments.runs.choices import chosen_device
 from experiments.studyfile import load_study
 from experiments.trials.cost import planned_cases
 from experiments.trials.declaration import read_declaration
@@ -80,7 +80,8 @@ def run_trials(
     desk = Desk(emulator, declaration.settings, measured, withheld)
     table = OutcomeTable(folder.root / "outcomes.sqlite")
     with (
-        EngineSimulator(search.study, search.library, table, device, workers) as engine,
+        open_workers(Resources(device, workers)) as simulators,
+        EngineSimulator(search.study, search.library, table, simulators) as engine,
         process_crew(desk, workers or os.cpu_count() or 1) as crew,
         noted_run(folder, f"analyses, {' and '.join(views)}", device, table),
     ):
@@ -124,7 +125,7 @@ def main(
             return
         trials = chosen(read_sealed(place.sealed), part, every)
         try:
-            run_trials(place, trials, bank, views, chosen_device(device, several=True), workers, seconds)
+            run_trials(place, trials, bank, views, device, workers, seconds)
         except OutOfTime:
             print(f"time is up; {len(open_jobs(place, trials, views))} analyses have not ended: run it again")
             raise typer.Exit(UNFINISHED) from None

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from worlds import GRAIN, GRAVITY, RADIUS, grains, pair, solve, world
 
+from dem_warp.entries import SPHERE_MASK
 from dem_warp.materials import rayleigh_time
 from dem_warp.solver import Solver
-from dem_warp.types import SPHERE_MASK
 from dem_warp.walls import Motion, Plane
 
 SPEED = 1e-4

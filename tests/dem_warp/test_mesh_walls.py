@@ -22,10 +22,10 @@ from worlds import (
     world,
 )
 
+from dem_warp.entries import SPHERE_MASK
 from dem_warp.materials import rayleigh_time
 from dem_warp.snapshot import put_snapshot, take_snapshot
 from dem_warp.triangles import TriangleTable
-from dem_warp.types import SPHERE_MASK
 from dem_warp.walls import Mesh, Motion, Plane
 
 TIME_STEP = 0.25 * rayleigh_time(RADIUS, GRAIN)

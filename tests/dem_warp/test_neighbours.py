@@ -18,8 +18,9 @@ from worlds import (
     world,
 )
 
+from dem_warp.entries import SPHERE_BITS, SPHERE_MASK
 from dem_warp.solver import Solver
-from dem_warp.types import SPHERE_BITS, SPHERE_MASK, WorldFlag
+from dem_warp.types import WorldFlag
 from dem_warp.walls import Plane
 
 FALL = 0.12

@@ -9,8 +9,9 @@ import pandas as pd
 import pytest
 
 from doe import Factor, Sample
-from experiments.calibrate import CampaignSettings, ClimbEnd, Outcome, Response, Target, Twin, calibrate
+from experiments.calibrate import ClimbEnd, Outcome, calibrate
 from experiments.calibrate.results import STAGES
+from experiments.studyfile.campaign import CampaignSettings, Response, Target, Twin
 
 NOISE = 0.3
 """Standard deviation of one analytic heap [deg]."""
@@ -23,7 +24,6 @@ FACTORS = (
     Factor("G", 0.03, 0.08),
 )
 Angle = Callable[[Mapping[str, float]], float]
-
 ANGLE = Response("angle", "angle", "deg")
 
 

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from doe import Design, Factor, Sample, compare_means, noise_floor
-from experiments.calibrate import CampaignSettings, ClimbEnd, Response, Target
+from experiments.calibrate import ClimbEnd
 from experiments.calibrate.climb import climb, require_crossing
 from experiments.calibrate.optimum import find_optimum
 from experiments.calibrate.results import (
@@ -25,6 +25,7 @@ from experiments.calibrate.surface import explore_surface
 from experiments.calibrate.target import settle_target
 from experiments.calibrate.verification import verify
 from experiments.studies.buckwheat.paper import factors, published
+from experiments.studyfile.campaign import CampaignSettings, Response, Target
 
 ANGLE = "repose_angle_deg"
 

@@ -13,7 +13,8 @@ import pandas as pd
 import pytest
 
 from doe import Factor, Sample
-from experiments.calibrate import Campaign, CampaignSettings, Outcome, Response, Target, Twin, calibrate
+from experiments.calibrate import Campaign, Outcome, calibrate
+from experiments.studyfile.campaign import CampaignSettings, Response, Target, Twin
 
 FACTORS = (Factor("A", 0.1, 0.3), Factor("E", 0.3, 0.6), Factor("F", 0.2, 0.6), Factor("G", 0.02, 0.08))
 

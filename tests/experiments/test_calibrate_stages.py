@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from doe import Design, Factor
-from experiments.calibrate import CampaignSettings, Response, Target, Twin, calibrate, case_seed
+from experiments.calibrate import calibrate, case_seed
 from experiments.calibrate.cases import plan_cases, response_table
 from experiments.calibrate.climb import _Line
 from experiments.calibrate.results import STAGES
@@ -16,7 +16,14 @@ from experiments.calibrate.screening import analyse_screening, screening_design
 from experiments.calibrate.surface import fit_inside
 from experiments.calibrate.target import plan_target
 from experiments.studyfile import load_study
-from experiments.studyfile.campaign import ScreeningSettings, SeedSettings
+from experiments.studyfile.campaign import (
+    CampaignSettings,
+    Response,
+    ScreeningSettings,
+    SeedSettings,
+    Target,
+    Twin,
+)
 
 ANGLE = Response("angle", "angle", "deg")
 

@@ -2,17 +2,19 @@
 
 import math
 from dataclasses import dataclass, field
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
 
 from doe import Factor, Sample
-from experiments.calibrate import CampaignSettings, ClimbEnd, Outcome, Response, Target
+from experiments.calibrate import ClimbEnd, Outcome
 from experiments.calibrate.cases import StageEnd
 from experiments.calibrate.optimum import find_optimum
 from experiments.calibrate.results import ClimbResult, SurfaceResult, TargetResult
 from experiments.calibrate.surface import explore_surface, require_slope
+from experiments.studyfile.campaign import CampaignSettings, Response, Target
 
 CENTER = {"E": 1.0, "F": 1.0}
 HALF_RANGE = 0.4
@@ -27,6 +29,9 @@ MEASURED = Target((Response("angle", "angle", "deg", measured=Sample(20.0, NOISE
 class PlaneStudy:
     campaign: CampaignSettings = field(default_factory=CampaignSettings)
     factors: tuple[Factor, ...] = (Factor("E", 0.0, 2.0), Factor("F", 0.0, 2.0))
+    factor_sections: tuple[SimpleNamespace, ...] = tuple(
+        SimpleNamespace(name=name, label=f"friction {name}", unit="") for name in "EF"
+    )
     target: Target = MEASURED
     limits: dict[str, tuple[float, float]] = field(
         default_factory=lambda: dict.fromkeys("EF", (-math.inf, math.inf))
@@ -120,9 +125,10 @@ def test_a_region_of_higher_confidence_is_wider() -> None:
 
 def test_a_surface_without_slope_is_a_plateau() -> None:
     strict = CampaignSettings.model_validate({"surface": {"reduce_alpha": 1e-6}})
-    surface = explored(0.0, campaign=strict)
+    surface, named = explored(0.0, campaign=strict), PlaneStudy()
     assert surface.leading.reduced.terms == ()
     with pytest.raises(StageEnd) as end:
-        require_slope(surface)
+        require_slope(named, surface)
     assert end.value.outcome is Outcome.PLATEAU
-    require_slope(explored(3.0))
+    assert "Around friction E (E) 1, friction F (F) 1 no term" in end.value.reason
+    require_slope(named, explored(3.0))

@@ -14,7 +14,8 @@ import pandas as pd
 import pytest
 
 from dem_warp import Case, CaseResult, Progress, simulate, simulation
-from experiments.cases import Store, execute, run_cases
+from experiments.cases import OwnWorkers, Store, run_cases
+from experiments.cases.workers import own
 from experiments.studyfile import Study
 
 Cone = Callable[..., CaseResult]
@@ -58,7 +59,7 @@ class Engine:
 @pytest.fixture
 def engine(cone: Cone, monkeypatch: pytest.MonkeyPatch) -> Engine:
     engine = Engine(cone)
-    monkeypatch.setattr(execute, "simulate", engine)
+    monkeypatch.setattr(own, "simulate", engine)
     return engine
 
 
@@ -131,11 +132,13 @@ def test_checkpoints_outlive_an_interruption_and_no_more(
 def test_an_interrupted_case_goes_on_in_the_middle(
     small_study: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(execute, "simulate", partial(simulate, checkpoint_every=0.0))
+    monkeypatch.setattr(own, "simulate", partial(simulate, checkpoint_every=0.0))
     monkeypatch.setattr(simulation, "REPORT_EVERY", 0.0)
 
     def run(folder: str, progress: Callable[[Progress], None] | None = None) -> pd.DataFrame:
-        return run_cases(small_study, table_of([0.3]), Store(tmp_path / folder), "cpu", 1, progress)
+        return run_cases(
+            small_study, table_of([0.3]), Store(tmp_path / folder), OwnWorkers("cpu", 1), progress
+        )
 
     def interrupt(progress: Progress) -> None:
         if progress.fraction > 0.5:

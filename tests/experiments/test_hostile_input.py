@@ -192,7 +192,22 @@ HOSTILE = {
                    "ITEM: ATOMS id x y z\n1 0 0 0\n"},
     ),
     "a plate in kilograms": Hostile("angle h.csv --plate-height 3kg", ("--plate-height", "length", "3kg")),
+    # Frames
+    "a film of no frames": Hostile(
+        "heap s.toml --device cpu --movie gif --out o", ("--movie", "--frames N", "gif"),
+        {"s.toml": SMALL_STUDY},
+    ),
+    "an unknown film": Hostile(
+        "heap s.toml --device cpu --frames 4 --movie avi --out o", ("--movie", "gif, mp4", "avi"),
+        {"s.toml": SMALL_STUDY},
+    ),
+    # Other codes
+    "no such code": Hostile(
+        "export s.toml --to magic --out o", ("--to", "magic", "liggghts"), {"s.toml": SMALL_STUDY}
+    ),
+    "a bridge without a card": Hostile("bridge none.toml --engine lammps --out o", ("none.toml",)),
     # Names
+    "a name of a device": Hostile("new nul", ("NAME", "device of Windows", "nul")),
     "a name with a path": Hostile("new ../rye", ("NAME", "letters", "../rye")),
     "a study that is there": Hostile(
         "new s", ("s.toml", "never overwrites", "exists"), {"s.toml": SMALL_STUDY}

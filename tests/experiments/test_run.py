@@ -18,6 +18,7 @@ from experiments import api
 from experiments.calibrate import Campaign, Outcome
 from experiments.calibrate.campaign import StageHook
 from experiments.cases import execute
+from experiments.cases.workers import own
 from experiments.errors import InputError
 from experiments.measurement.states import Observed
 from experiments.runs import campaign as run
@@ -51,7 +52,7 @@ class Engine:
 @pytest.fixture
 def engine(cone: Callable[..., CaseResult], monkeypatch: pytest.MonkeyPatch) -> Engine:
     engine = Engine(cone())
-    monkeypatch.setattr(execute, "simulate", engine)
+    monkeypatch.setattr(own, "simulate", engine)
     monkeypatch.setattr(
         execute,
         "observe",

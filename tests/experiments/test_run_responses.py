@@ -17,7 +17,8 @@ from typer.testing import CliRunner
 from dem_warp import CaseResult, Drum, Hopper
 from dem_warp.scenes.drum_surface import STATIONS
 from experiments.calibrate import Outcome
-from experiments.cases import Store, execute, run_cases
+from experiments.cases import OwnWorkers, Store, execute, run_cases
+from experiments.cases.workers import own
 from experiments.cli import app
 from experiments.measurement.states import Observed
 from experiments.runs import campaign as run
@@ -51,7 +52,7 @@ def study(write_study: Callable[..., Path]) -> Study:
 
 def test_heap_and_bin_are_simulated_together(study: Study, tmp_path: Path) -> None:
     table = pd.DataFrame({"seed": [1, 2], "scene": ["target", "bin"], "E": [0.4, 0.4]})
-    heap, outflow = run_cases(study, table, Store(tmp_path), "cpu", 1).to_dict("records")
+    heap, outflow = run_cases(study, table, Store(tmp_path), OwnWorkers("cpu", 1)).to_dict("records")
     assert (heap["status"], outflow["status"]) == ("finished", "finished")
     assert 0.0 < heap["angle"] < 90.0
     assert math.isnan(outflow["angle"])
@@ -108,7 +109,7 @@ def observe(_: object, result: CaseResult, leaves_a_heap: bool) -> Observed:
 @pytest.fixture
 def engine(cone: Callable[..., CaseResult], monkeypatch: pytest.MonkeyPatch) -> Engine:
     engine = Engine(cone())
-    monkeypatch.setattr(execute, "simulate", engine)
+    monkeypatch.setattr(own, "simulate", engine)
     monkeypatch.setattr(execute, "observe", observe)
     monkeypatch.setattr(run, "heap_pictures", lambda *_: [])
     return engine

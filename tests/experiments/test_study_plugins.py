@@ -51,8 +51,8 @@ class Sticky(Mechanism):
 
 @pytest.fixture(autouse=True)
 def grown(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(SCENES._known, TiltedHopper.name, TiltedHopper)
-    monkeypatch.setitem(MECHANISMS._known, Sticky.name, Sticky)
+    monkeypatch.setitem(SCENES._outside, TiltedHopper.name, TiltedHopper)
+    monkeypatch.setitem(MECHANISMS._outside, Sticky.name, Sticky)
 
 
 def test_a_new_scene_has_its_section_with_units_bounds_and_rules(write_study: WriteStudy) -> None:

@@ -12,6 +12,7 @@ import pytest
 from dem_warp import DrawDown, Drum, Hopper, LiftedCylinder
 from doe import Sample
 from experiments.cases import Store, execute, run_cases
+from experiments.cases.workers import own
 from experiments.errors import StudyError
 from experiments.measurement.observables import DIMENSIONS
 from experiments.measurement.states import Observed
@@ -102,7 +103,7 @@ def test_a_table_is_simulated_each_row_in_its_scene(
         for index, _ in enumerate(cases):
             on_result(index, cone())
 
-    monkeypatch.setattr(execute, "simulate", engine)
+    monkeypatch.setattr(own, "simulate", engine)
     monkeypatch.setattr(
         execute,
         "observe",

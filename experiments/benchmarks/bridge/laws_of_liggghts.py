@@ -15,7 +15,7 @@ import typer
 from doe import compare_means
 from experiments import api
 from experiments.bridge.source import read_source
-from experiments.cases import open_folder, run_cases, with_engine
+from experiments.cases import OwnWorkers, open_folder, run_cases, with_engine
 from experiments.commands.console import CaseProgress, clear_errors
 from experiments.studyfile import Study, load_study
 
@@ -48,7 +48,7 @@ def prove(study: Study, folder: Path, laws: str, seeds: int, workers: int | None
     store, _ = open_folder(folder / "liggghts", there, resume=True)
     table = pd.DataFrame([source.point] * seeds).assign(seed=range(1001, 1001 + seeds))
     with CaseProgress("LIGGGHTS") as progress:
-        cases = run_cases(there, table, store, workers=workers, progress=progress)
+        cases = run_cases(there, table, store, OwnWorkers(workers=workers), progress)
     good = cases[cases["status"] == "finished"].dropna(subset=[source.observable])
     test = compare_means(good[source.observable].to_numpy(), source.target, margin=MARGIN)
     low, high = test.interval

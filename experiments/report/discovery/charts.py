@@ -11,9 +11,7 @@ from experiments.report.discovery.tables import shown_candidates
 from experiments.report.discovery.terms import Terms, condition_name, spaced
 from experiments.report.kit.chart import Chart, add_bars, add_points, new_figure
 from experiments.report.kit.numbers import MISSING, capital, fixed
-
-DIVERGING = [[0.0, "#b35806"], [0.25, "#fdb863"], [0.5, "#f7f7f7"], [0.75, "#92c5de"], [1.0, "#2166ac"]]
-"""Orange below, blue above: even steps of lightness, told apart by colour-blind readers."""
+from experiments.report.kit.theme import DIVERGING
 
 MAP_REACH = 6.0
 """Residual at which the colours of a map end [standard deviations]."""
@@ -72,7 +70,7 @@ def confounding_chart(confounding: Confounding, terms: Terms) -> Chart:
         "Correlation of what two mechanisms leave after calibration: near 1 or −1 these data cannot tell them"
         " apart, near 0 they cannot be taken for one another."
     )
-    return Chart("confounding-chart", caption, figure, height="tall")
+    return Chart("confounding-chart", caption, figure, height="tall", broad=True)
 
 
 def gap_chart(found: Discovery) -> Chart:
@@ -155,7 +153,8 @@ def _residual_map(name: str, found: Discovery, fit: Fit, caption: str) -> Chart:
     figure = new_figure(legend=False)
     _add_map(figure, fit.residuals, conditions, observables, MAP_REACH, texts)
     figure.update_xaxes(tickangle=-40)
-    return Chart(name, f"{caption} * : beyond chance after Holm's adjustment (p < {SIGNIFICANT}).", figure)
+    caption += f" * : beyond chance after Holm's adjustment (p < {SIGNIFICANT})."
+    return Chart(name, caption, figure, broad=True)
 
 
 def _add_map(
@@ -172,7 +171,7 @@ def _add_map(
         y=rows,
         zmin=-reach,
         zmax=reach,
-        colorscale=DIVERGING,
+        colorscale=list(zip(np.linspace(0.0, 1.0, len(DIVERGING)), DIVERGING, strict=True)),
         text=texts,
         texttemplate="%{text}",
         hovertemplate="%{y}, %{x}: %{z:.2f}<extra></extra>",

@@ -7,7 +7,9 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from doe.discrepancy import Discovery, Settings, Verdict
+from experiments.report.cautions import Caution, study_cautions
 from experiments.report.discovery import charts, tables
+from experiments.report.discovery.paper_text import search_pastes
 from experiments.report.discovery.terms import Terms, percent
 from experiments.report.discovery.verdict import (
     SETTLED,
@@ -19,9 +21,10 @@ from experiments.report.discovery.verdict import (
 )
 from experiments.report.kit.chart import Chart
 from experiments.report.kit.html import Chapter, flat, render_page
-from experiments.report.kit.numbers import capital, trimmed
+from experiments.report.kit.numbers import trimmed
 from experiments.report.kit.table import Table
 from experiments.report.pictures import HeapPicture
+from experiments.report.solid import SolidHeap
 from experiments.report.study_facts import study_facts
 from experiments.studyfile import Study
 
@@ -33,7 +36,8 @@ TITLES = {
     "heaps": "Heaps side by side",
     "power": "What these data could show",
     "changes": "What would change the verdict",
-    "data": "The data, and notes on them",
+    "data": "The data",
+    "paper_text": "For your paper",
     "provenance": "Settings and provenance",
 }
 """Headings by chapter, in the order of the page."""
@@ -55,6 +59,7 @@ def render_discovery(
     files: Sequence[str] = (),
     provenance: Mapping[str, Any] | None = None,
     further: Sequence[Chapter] = (),
+    solid: SolidHeap | None = None,
 ) -> str:
     """Render the report of an analysis as one self-contained HTML page.
 
@@ -72,6 +77,8 @@ def render_discovery(
         What made the numbers: names and values, nested as they come.
     further
         Chapters that the study's companion adds.
+    solid
+        A heap to be turned.
     """
     if found.verdict is Verdict.NOT_IDENTIFIABLE:
         # A fit with nothing left to test it by would fill the page with zeros.
@@ -90,7 +97,13 @@ def render_discovery(
         "explained": found.named,
         "next_step": next_step(found, terms),
         "changes": changes(found, terms, settings),
+        "cautions": [
+            *study_cautions(study),
+            *(Caution(f"{note.rstrip('.')}.", "data") for note in found.notes),
+        ],
+        "pastes": search_pastes(found, study, terms, provenance or {}),
         "pictures": pictures,
+        "solid": solid,
         "files": files,
         "facts": study_facts(study),
         "provenance": flat(provenance or {}),
@@ -111,19 +124,18 @@ class Card:
 
 
 def _cards(found: Discovery, terms: Terms) -> list[Card]:
-    cards = []
-    if found.base:
+    """Build the figures that the sentence of the verdict does not tell."""
+    cards, verdict = [], found.verdict
+    if found.base and verdict not in (Verdict.NONE, Verdict.UNKNOWN):
         df, limit = found.base.degrees_of_freedom, trimmed(found.base.q_limit, 3)
         more = f"{df:.0f} degrees of freedom, limit {limit}"
         cards.append(Card("Q of the calibrated base", trimmed(found.base.q, 3), more))
-    if found.gap and found.gap.drop_mechanism and not found.chosen:
+    if found.gap and found.gap.drop_mechanism and verdict is Verdict.NONE:
         more = f"{terms.title(found.gap.drop_mechanism)}; limit {trimmed(found.gap.drop_limit, 3)}"
         cards.append(Card("Largest fall of Q by one mechanism", trimmed(found.gap.largest_drop, 3), more))
-    if found.chosen:
-        for name, size in zip(found.chosen.mechanisms, found.chosen.sizes, strict=True):
-            ends = f"90 % interval {trimmed(size.low, 3)} to {trimmed(size.high, 3)}"
-            cards.append(Card(capital(terms.title(name)), terms.value(name, size.value), ends))
     for both in found.before_after:
+        if verdict is Verdict.NAMED and not both.held_out:
+            continue
         where = "held out" if both.held_out else "training"
         ends = f"90 % interval {percent(both.removed.low)} to {percent(both.removed.high)}, fresh runs"
         cards.append(Card(f"Excess removed, {where}", percent(both.removed.value), ends))
@@ -142,6 +154,9 @@ def _chapters(found: Discovery, terms: Terms) -> list[Chapter]:
         "power": _chapter("power", {"power": tables.power_table(found, terms)}) if found.power else None,
         "changes": _chapter("changes"),
         "data": _chapter("data", {"data": tables.data_table(found, terms)}),
+        "paper_text": Chapter("paper_text", TITLES["paper_text"], template="sections/paper_text.html.j2")
+        if found.base
+        else None,
         "provenance": _chapter("provenance"),
     }
     return [chapter for name in TITLES if (chapter := built[name]) is not None]
@@ -152,7 +167,7 @@ def _gap(found: Discovery, terms: Terms) -> Chapter | None:
         return None
     shown = {"parameters": tables.parameters_table(found, terms)}
     if found.drifts:
-        shown["drifts"] = tables.drifts_table(found)
+        shown["drifts"] = tables.drifts_table(found, terms)
     return _chapter("gap", shown, {"maps": charts.residual_maps(found, terms)})
 
 

@@ -17,6 +17,7 @@ from experiments.report.discovery.terms import Terms
 from experiments.report.discovery.verdict import headline, verdict_sentence
 from experiments.report.kit.html import Chapter
 from experiments.report.pictures import HeapPicture
+from experiments.report.solid import SolidHeap
 from experiments.report.writer import PAGE, library_versions, write_files
 from experiments.studyfile import Study
 
@@ -30,12 +31,13 @@ def write_discovery(
     pictures: Sequence[HeapPicture] = (),
     provenance: Mapping[str, Any] | None = None,
     further: Sequence[Chapter] = (),
+    solid: SolidHeap | None = None,
 ) -> Path:
     """Write ``report.html``, ``results.json``, ``tables/*.csv`` and ``study-with-NAME.toml``.
 
     Parameters
     ----------
-    found, study, terms, settings, pictures, further
+    found, study, terms, settings, pictures, further, solid
         As of `render_discovery`.
     folder
         Folder of the files; it is made when it is missing.
@@ -49,7 +51,7 @@ def write_discovery(
     """
     made_by = {**(provenance or {}), "study": study_hash(study), "versions": library_versions()}
     files = [path.name for path in write_study_files(found, study, terms, folder)]
-    page = render_discovery(found, study, terms, settings, pictures, files, made_by, further)
+    page = render_discovery(found, study, terms, settings, pictures, files, made_by, further, solid)
     results = results_of(found, terms) | {"settings": asdict(settings)}
     write_files(folder, study, page, results, made_by, frames(found))
     return folder / PAGE

@@ -11,7 +11,7 @@ import pandas as pd
 from doe.discrepancy import BeforeAfter, Candidate, Discovery, Drift, Fit, Interval, Power
 from experiments.report.discovery.terms import GAP, Terms, condition_name
 from experiments.report.kit.numbers import MISSING, estimate, trimmed
-from experiments.report.kit.table import Column, Table, columns, make_table
+from experiments.report.kit.table import Column, Layout, Table, columns, make_table
 
 T = TypeVar("T")
 Entries = dict[Column, Callable[[T], object]]
@@ -89,7 +89,7 @@ def candidates_table(found: Discovery, terms: Terms) -> Table:
     excess = found.base.excess if found.base else 0.0
     ranks = {id(candidate): rank for rank, candidate in enumerate(shown, start=1)}
     entries: Entries[Candidate] = {
-        Column("rank", "", "count"): lambda one: ranks[id(one)],
+        Column("rank", "rank", "count"): lambda one: ranks[id(one)],
         Column("mechanism", "mechanism"): lambda one: terms.titles(one.mechanisms),
         Column("explained", "explains", "percent", "% of excess"): lambda one: (
             100.0 * one.explained if excess else None
@@ -143,7 +143,9 @@ def power_table(found: Discovery, terms: Terms) -> Table:
 def before_after_table(found: Discovery) -> Table:
     """Lay out the gap of fresh runs before and after."""
     entries: Entries[BeforeAfter] = {
-        Column("set", ""): lambda one: "held-out conditions" if one.held_out else "training conditions",
+        Column("set", "conditions"): lambda one: (
+            "held-out conditions" if one.held_out else "training conditions"
+        ),
         Column("df", "degrees of freedom", "count"): lambda one: one.degrees_of_freedom,
         Column("before", "Q of the base"): lambda one: _interval(one.before, 1),
         Column("after", "Q with the mechanism"): lambda one: _interval(one.after, 1),
@@ -174,10 +176,10 @@ def parameters_table(found: Discovery, terms: Terms) -> Table:
     return make_table("parameters", frame, ["factor", words[0], *numbers, *words[1:]], "The fitted factors.")
 
 
-def drifts_table(found: Discovery) -> Table:
+def drifts_table(found: Discovery, terms: Terms) -> Table:
     """Lay out the factors fitted to one condition at a time."""
     rows = [
-        {"factor": drift.factor}
+        {"factor": drift.factor, "label": terms.factors[drift.factor].label}
         | {name: _estimate(value, se) for name, value, se in _by_condition(drift)}
         | {"p": drift.p_value}
         for drift in found.drifts
@@ -188,7 +190,8 @@ def drifts_table(found: Discovery) -> Table:
         " to change to follow the condition. This describes; the verdict does not rest on it."
     )
     marks = ["strong" if drift.p_value < 0.05 else "" for drift in found.drifts]
-    caption, shown = "Factors of the base, fitted condition by condition.", ["factor", *names, "p"]
+    caption = "Factors of the base, fitted condition by condition."
+    shown: Layout = ["factor", Column("label", "what it is"), *names, "p"]
     return make_table("drifts", pd.DataFrame(rows), shown, caption, note, marks)
 
 

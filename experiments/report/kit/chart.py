@@ -23,6 +23,8 @@ class Chart:
     figure: go.Figure
     height: str = ""
     """"tall" or "low" where it takes more or less height than the usual."""
+    broad: bool = False
+    """True where its columns need more width than a phone has: it then scrolls in its box."""
 
     @property
     def json(self) -> str:
@@ -40,8 +42,8 @@ def new_figure(x: str = "", y: str = "", legend: bool = True) -> go.Figure:
     figure.update_layout(
         template="none",
         font={"family": family, "size": 13, "color": INK},
-        paper_bgcolor="#ffffff",
-        plot_bgcolor="#ffffff",
+        paper_bgcolor="rgba(0,0,0,0)",  # that of the page, light or dark
+        plot_bgcolor="rgba(0,0,0,0)",
         margin={"l": 56, "r": 18, "t": 36 if legend else 14, "b": 48},
         showlegend=legend,
         legend=above | {"itemsizing": "constant"},

@@ -11,13 +11,16 @@ import jinja2
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
-from doe import palette
-from experiments.report.kit import numbers
+from experiments.report.kit import numbers, theme
 from experiments.report.kit.chart import Chart
 from experiments.report.kit.table import Table
 
 TEMPLATE = "chapter.html.j2"
 """Template of a chapter that needs none of its own: its text, its charts, its tables."""
+
+
+SHORT_ROWS = 20
+"""Rows up to which a table is not broken between two sheets of paper."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +44,7 @@ class Chapter:
 def render_page(
     kind: str, heading: str, summary: str, chapters: Sequence[Chapter], context: Mapping[str, Any]
 ) -> str:
-    """Render a page.
+    """Render a page: 4.8 MB of plotly.js, and what it holds.
 
     Parameters
     ----------
@@ -55,7 +58,7 @@ def render_page(
         What the templates of summary and chapters draw on.
     """
     page = environment().get_template("page.html.j2")
-    shared = {"palette": palette, "plotly": Markup(get_plotlyjs())}
+    shared = {"theme": theme, "plotly": Markup(get_plotlyjs()), "SHORT_ROWS": SHORT_ROWS}
     return page.render(kind=kind, heading=heading, summary=summary, chapters=chapters, **shared, **context)
 
 

@@ -63,7 +63,9 @@ def wall_times_table(facts: Mapping[str, Any], what: str) -> str:
 
 
 def _texts(row: Row) -> list[str]:
-    first, *rest = [str(cell.text).replace("|", "\\|") for cell in row.cells]
+    # Apostrophes and quotes are escaped in HTML and stand as they are in Markdown.
+    texts = (str(cell.text).replace("&#39;", "'").replace("&#34;", '"') for cell in row.cells)
+    first, *rest = [text.replace("|", "\\|") for text in texts]
     return [f"**{first}**" if row.mark in ("strong", "chosen") else first, *rest]
 
 

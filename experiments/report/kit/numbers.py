@@ -86,7 +86,7 @@ def p_value(value: float | None) -> str:
     return fixed(value, 4)
 
 
-def p_clause(value: float) -> str:
+def p_clause(value: float | None) -> str:
     """Write a p value behind its sign: "= 0.0312" or "< 0.0001"."""
     text = p_value(value)
     return text if text.startswith("<") else f"= {text}"

@@ -12,7 +12,7 @@ import pandas as pd
 import typer
 
 from doe import Design, climb_table
-from experiments.cases import Store, run_cases
+from experiments.cases import OwnWorkers, Store, run_cases
 from experiments.studyfile import load_study
 
 START = {"E": 0.30, "F": 0.15}
@@ -33,7 +33,7 @@ def main(
 
     cases = points.loc[points.index.repeat(REPLICATES)].reset_index(drop=True)
     cases = cases.assign(seed=range(FIRST_SEED, FIRST_SEED + len(cases)))
-    cases = run_cases(study, cases, Store(out / "cases"), device)
+    cases = run_cases(study, cases, Store(out / "cases"), OwnWorkers(device))
     cases.to_csv(out / f"climb-{scale}.csv", index=False)
 
     table = climb_table(path, cases["angle"].to_numpy().reshape(POINTS, REPLICATES), target)

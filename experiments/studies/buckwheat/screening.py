@@ -10,7 +10,7 @@ from pathlib import Path
 import typer
 
 from doe import plackett_burman, screen
-from experiments.cases import Store, run_cases
+from experiments.cases import OwnWorkers, Store, run_cases
 from experiments.studyfile import load_study
 
 RUNS = 12  # eight factors and three dummy columns, which are the error
@@ -24,7 +24,7 @@ def main(scale: str = "bench", out: Path = Path("out/scripts"), device: str | No
     design = plackett_burman(study.factors, runs=RUNS)
 
     cases = design.natural.assign(seed=range(FIRST_SEED, FIRST_SEED + RUNS))
-    cases = run_cases(study, cases, Store(out / "cases"), device)
+    cases = run_cases(study, cases, Store(out / "cases"), OwnWorkers(device))
     cases.to_csv(out / f"screening-{scale}.csv")
 
     effects = screen(design, cases["angle"])

@@ -10,7 +10,7 @@ from pathlib import Path
 import typer
 
 from doe import Factor, Sample, TargetError, central_composite, fit_surface
-from experiments.cases import Store, run_cases
+from experiments.cases import OwnWorkers, Store, run_cases
 from experiments.studyfile import load_study
 
 CENTER = {"E": 0.48, "F": 0.45}
@@ -33,7 +33,7 @@ def main(
     design = central_composite(factors, center=CENTER_POINTS)
 
     cases = design.natural.assign(seed=range(FIRST_SEED, FIRST_SEED + len(design.natural)))
-    cases = run_cases(study, cases, Store(out / "cases"), device)
+    cases = run_cases(study, cases, Store(out / "cases"), OwnWorkers(device))
     cases.to_csv(out / f"surface-{scale}.csv")
 
     surface = fit_surface(design, cases["angle"]).reduce()

@@ -11,7 +11,7 @@ import pandas as pd
 import typer
 
 from doe import Sample, compare_means
-from experiments.cases import Store, run_cases
+from experiments.cases import OwnWorkers, Store, run_cases
 from experiments.studyfile import load_study
 
 POINT = {"E": 0.482, "F": 0.446}
@@ -31,7 +31,7 @@ def main(
     """Simulate fresh heaps; print the t-test and the equivalence test against the measurement."""
     study = load_study(scale=scale)
     cases = pd.DataFrame([POINT | {"seed": FIRST_SEED + replicate} for replicate in range(REPLICATES)])
-    cases = run_cases(study, cases, Store(out / "cases"), device)
+    cases = run_cases(study, cases, Store(out / "cases"), OwnWorkers(device))
     cases.to_csv(out / f"verification-{scale}.csv", index=False)
 
     result = compare_means(cases["angle"].to_numpy(), Sample(target, target_sd, target_n), margin=MARGIN)

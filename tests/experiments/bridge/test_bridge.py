@@ -205,16 +205,18 @@ def test_a_wrong_order_ends_with_code_2_and_leaves_nothing(
     ],
 )
 def test_a_file_that_is_no_card_is_refused(tmp_path: Path, text: str, said: str) -> None:
-    (tmp_path / "material.toml").write_text(text)
+    (tmp_path / "material.toml").write_text(text, encoding="utf-8")
     code, _, err = bridge(tmp_path / "material.toml", "--command", COMMAND)
     assert code == 2
     assert said in " ".join(err.split())
 
 
 def test_a_card_without_its_surface_is_refused(card: Path, tmp_path: Path) -> None:
-    text = card.read_text()
+    text = card.read_text(encoding="utf-8")
     start = text.index("[surface.angle]")
-    (tmp_path / "material.toml").write_text(text[:start] + text[text.index("[material.grain]") :])
+    (tmp_path / "material.toml").write_text(
+        text[:start] + text[text.index("[material.grain]") :], encoding="utf-8"
+    )
     code, _, err = bridge(tmp_path / "material.toml", "--command", COMMAND)
     assert code == 2
     assert "a bridge corrects the surface of one response" in " ".join(err.split())

@@ -9,15 +9,10 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from experiments import api
 from experiments.cli import app
-from experiments.discover import devices
-from experiments.discover.outcome_table import OutcomeTable
-from experiments.discover.wave import WaveRunner
 from experiments.measurement.observables import PHOTOGRAPHED
-from experiments.report.discovery import Terms
 from experiments.runs.campaign import check_runs
-from experiments.runs.search import OUTCOMES, Job, SearchResult, run_search
+from experiments.runs.search import OUTCOMES, Job, run_search
 from experiments.studyfile import load_study
 
 TRIAL = Path(__file__).parents[3] / "experiments" / "studies" / "trial"
@@ -71,59 +66,6 @@ def test_a_file_that_is_no_bank_is_an_error_and_leaves_nothing(tmp_path: Path) -
     assert not (tmp_path / "out").exists()
 
 
-@pytest.fixture
-def two_gpus(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A machine with two GPUs, as far as names go."""
-    known = ["cpu", "cuda:0", "cuda:1"]
-
-    def resolve(name: str | None) -> str:
-        name = {None: "cuda:0", "cuda": "cuda:0"}.get(name, name)
-        if name not in known:
-            raise ValueError(f"device: must be one of {known}, got {name!r}")
-        return name
-
-    monkeypatch.setattr(devices, "resolve_device", resolve)
-
-
-@pytest.mark.usefixtures("two_gpus")
-@pytest.mark.parametrize(
-    ("asked", "said"),
-    [
-        ("cuda:0,cuda:2", "must be one of"),
-        ("cuda:0,", "must be one of"),
-        ("cuda,cuda:0", "must name each device once"),
-        ("cpu,cuda:0", "must be the CPU alone or GPUs only"),
-    ],
-)
-def test_devices_that_cannot_work_together_end_with_code_2(tmp_path: Path, asked: str, said: str) -> None:
-    out = tmp_path / "out"
-    code, _, err = discover(DATA / "nothing-missing.csv", "--out", out, device=asked)
-    assert code == 2
-    assert "--device" in err
-    assert said in err
-    assert asked in err
-    assert not out.exists()
-
-
-@pytest.mark.usefixtures("two_gpus")
-def test_a_wave_is_spread_over_the_devices_that_are_named(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    asked: list[str | None] = []
-
-    def note(job: Job, *_: object) -> SearchResult:
-        asked.append(job.device)
-        return SearchResult(None, Terms({}, {}, {}), job.folder)
-
-    monkeypatch.setattr(api, "run_search", note)
-    code, _, err = discover(DATA / "nothing-missing.csv", "--out", tmp_path / "out", device="cuda, cuda:1")
-    assert (code, asked) == (0, ["cuda:0,cuda:1"])
-    assert "on cuda:0,cuda:1" in err
-    study = load_study(STUDY, "bench")
-    runner = WaveRunner(study.measurement, OutcomeTable(tmp_path / "outcomes.sqlite"), asked[0], drivers=4)
-    assert runner.drivers == ["cuda:0", "cuda:1", "cuda:0", "cuda:1"]
-
-
 def test_heaps_that_lack_nothing_raise_no_alarm_with_a_balance_or_photographs_only(tmp_path: Path) -> None:
     out = tmp_path / "out"
     code, said, err = discover(DATA / "nothing-missing.csv", "--out", out)
@@ -146,7 +88,7 @@ def test_a_tilted_plate_is_found_on_the_real_engine(tmp_path: Path) -> None:
     # Fewer fresh runs than the study's own: the tilt is many standard errors.
     few = {"refinement_points": 2, "refinement_rounds": 1, "shortlist": 1, "direct_runs": 2}
     study = load_study(STUDY, "bench", {"discover": {"settings": few}})
-    ended = run_search(Job(study, TRIAL / "tilted-bench.csv", tmp_path / "out", device="cpu"))
+    ended = run_search(Job(study, TRIAL / "tilted-bench.csv", tmp_path / "out"))
     found = ended.discovery
     assert found is not None
     assert found.named == ("plate_tilt",)

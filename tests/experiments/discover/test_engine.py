@@ -10,6 +10,8 @@ import pytest
 
 from dem_warp import Case, CaseResult, Progress, simulate
 from doe.discrepancy import Point
+from experiments.cases import OwnWorkers
+from experiments.cases.workers import own
 from experiments.discover import wave
 from experiments.discover.engine import EngineSimulator
 from experiments.discover.library import library_for
@@ -65,7 +67,7 @@ def table(tmp_path: Path) -> OutcomeTable:
 
 
 def build(study: Study, table: OutcomeTable, progress: Callable[[Progress], None] | None = None):
-    return EngineSimulator(study, library_for(study), table, "cpu", workers=1, progress=progress)
+    return EngineSimulator(study, library_for(study), table, OwnWorkers("cpu", 1), progress)
 
 
 def test_points_are_answered_by_heaps_measured_and_kept(
@@ -82,24 +84,9 @@ def test_points_are_answered_by_heaps_measured_and_kept(
         np.testing.assert_array_equal(outcomes.values[0], outcomes.values[3])
         assert (outcomes.values[0] != outcomes.values[2]).any()
 
-    monkeypatch.setattr(wave, "simulate", Scripted([]))
+    monkeypatch.setattr(own, "simulate", Scripted([]))
     again = build(study, table)(POINTS)
     np.testing.assert_array_equal(again.values, outcomes.values[:3])
-
-
-def test_several_launches_at_once_give_the_same(study: Study, table: OutcomeTable) -> None:
-    seen: list[Progress] = []
-    with EngineSimulator(
-        study, library_for(study), table, "cpu", workers=1, worlds=1, drivers=2, progress=seen.append
-    ) as several:
-        outcomes = several(POINTS[:2])
-        heaps = several.heaps(POINTS[:2])
-    assert [progress.done for progress in seen] == [1, 2]
-    alone = simulate([study.under(p.condition).case({"E": p.theta[0]}, p.seed) for p in POINTS[:2]], "cpu", 1)
-    for heap, result in zip(heaps, alone, strict=True):
-        np.testing.assert_array_equal(heap.positions, result.positions)
-    expected = [measure(study.measurement, result)[0] for result in alone]
-    np.testing.assert_array_equal(outcomes.values, expected)
 
 
 def test_a_run_that_was_killed_keeps_what_it_had_measured(
@@ -128,10 +115,10 @@ def test_cases_that_fail_are_kept_with_their_reasons_and_not_simulated_again(
     reasons = ("the tube is clogged", "a grain was too fast", "a neighbour list overflowed")
     statuses = ("failed", "diverged", "overflow")
     endings = [cone(status=status, reason=why) for status, why in zip(statuses, reasons, strict=True)]
-    monkeypatch.setattr(wave, "simulate", Scripted(endings))
+    monkeypatch.setattr(own, "simulate", Scripted(endings))
     with build(study, table) as simulator:
         assert simulator(POINTS).reasons == reasons
-    monkeypatch.setattr(wave, "simulate", Scripted([]))
+    monkeypatch.setattr(own, "simulate", Scripted([]))
     again = build(study, table)(POINTS)
     assert again.reasons == reasons
     assert np.isnan(again.values).all()
@@ -141,13 +128,22 @@ def test_a_case_that_the_machine_ended_is_no_outcome(
     study: Study, table: OutcomeTable, monkeypatch: pytest.MonkeyPatch, cone: Callable[..., CaseResult]
 ) -> None:
     clogged = cone(status="failed", reason="the tube is clogged")
-    monkeypatch.setattr(wave, "simulate", Scripted([clogged, MemoryError()]))
+    sizes: list[int] = []
+
+    def full(cases: Sequence[Case], on_result: Callable[[int, CaseResult], None], **_: object) -> None:
+        sizes.append(len(cases))
+        if len(cases) == len(POINTS):
+            on_result(0, clogged)
+        raise MemoryError
+
+    monkeypatch.setattr(own, "simulate", full)
     with pytest.raises(MemoryError):
         build(study, table)(POINTS)
+    assert sizes == [3, 1], "what is left is halved, and a case alone is too much for the machine"
     # The first may have been measured by then, or not.
     kept = len(table)
     assert kept <= 1
-    monkeypatch.setattr(wave, "simulate", Scripted([clogged] * (len(POINTS) - kept)))
+    monkeypatch.setattr(own, "simulate", Scripted([clogged] * (len(POINTS) - kept)))
     with build(study, table) as simulator:
         assert simulator(POINTS).reasons == (clogged.reason,) * len(POINTS)
     assert len(table) == len(POINTS)

@@ -140,7 +140,7 @@ def at_rest(result: CaseResult) -> bool:
 @pytest.mark.parametrize("name", REAL)
 def test_the_real_code_ends_in_a_heap(write_study: Write, name: str) -> None:
     study = study_for(write_study, name)
-    heap = simulate_heap(study, {"E": 0.5}, seed=3, device="cpu")
+    heap = simulate_heap(study, {"E": 0.5}, seed=3)
     assert heap.result.status == "finished", heap.reason
     assert len(heap.result.sphere_radii) == 30
     assert at_rest(heap.result)
@@ -151,7 +151,7 @@ def test_the_real_code_ends_in_a_heap(write_study: Write, name: str) -> None:
 @pytest.mark.parametrize("name", REAL)
 def test_the_same_seed_is_the_same_heap_and_another_is_another(write_study: Write, name: str) -> None:
     study = study_for(write_study, name)
-    first, again, other = (simulate_heap(study, {}, seed, "cpu").result for seed in (1, 1, 2))
+    first, again, other = (simulate_heap(study, {}, seed).result for seed in (1, 1, 2))
     np.testing.assert_array_equal(first.sphere_centers, again.sphere_centers)
     assert first.sphere_centers.tolist() != other.sphere_centers.tolist()
 

@@ -18,6 +18,7 @@ import pytest
 from typer.testing import CliRunner
 
 from experiments import api
+from experiments.cases import OwnWorkers
 from experiments.cases.contract import command_program
 from experiments.cases.program import ProgramEngine
 from experiments.cli import app
@@ -104,7 +105,7 @@ def test_a_search_asks_a_program_and_keeps_what_it_answers(write_study: Write, t
 
     points = [Point((0.3,), (), "base", 2), Point((0.5,), (), "base", 4), Point((0.4,), (), "base", 1)]
     table = OutcomeTable(tmp_path / "out" / "outcomes.sqlite")
-    with EngineSimulator(study, library_for(study), table, "cpu", workers=2) as simulator:
+    with EngineSimulator(study, library_for(study), table, OwnWorkers("cpu", 2)) as simulator:
         outcomes = simulator(points)
         assert simulator.observables == PHOTOGRAPHED
     assert outcomes.reasons[:2] == ("", "")
@@ -112,7 +113,7 @@ def test_a_search_asks_a_program_and_keeps_what_it_answers(write_study: Write, t
     assert len(table) == 2, "a failure of the program is tried again"
     low, high, _ = outcomes.values[:, 0]  # noqa: PD011  (an array)
     assert high > low + 3.0, "more friction, a steeper cone"
-    with EngineSimulator(study, library_for(study), table, "cpu", workers=1) as simulator:
+    with EngineSimulator(study, library_for(study), table, OwnWorkers("cpu", 1)) as simulator:
         again = simulator(points)
     np.testing.assert_array_equal(again.values, outcomes.values)
     assert runs(tmp_path / "out") == {"2": 1, "4": 1, "1": 2}

@@ -9,10 +9,14 @@ from html.parser import HTMLParser
 import numpy as np
 import pandas as pd
 import pytest
+from discoveries import made_discovery, made_terms
 
-from experiments.calibrate import Campaign, CampaignSettings, calibrate
+from doe.discrepancy import Discovery, Verdict
+from experiments.calibrate import Campaign, calibrate
 from experiments.report import render_page
+from experiments.report.discovery import Terms
 from experiments.studyfile import Study, load_study
+from experiments.studyfile.campaign import CampaignSettings
 
 Angle = Callable[[Mapping[str, float]], float]
 Runner = Callable[[pd.DataFrame], pd.DataFrame]
@@ -105,7 +109,7 @@ class Page(HTMLParser):
 
     def handle_data(self, data: str) -> None:
         if self._script is not None:
-            if self._script.get("type") == "application/json":
+            if "data-plot" in self._script:
                 self.charts[str(self._script["data-plot"])] = json.loads(data)
             return
         if self._cell is not None:
@@ -160,3 +164,18 @@ def campaign(study: Study) -> Campaign:
 @pytest.fixture(scope="session")
 def page(campaign: Campaign, study: Study) -> Page:
     return Page(render_page(campaign, study, provenance={"device": "cpu", "seconds": 12.5}))
+
+
+@pytest.fixture(scope="session")
+def discovered() -> Callable[[Verdict], Discovery]:
+    return made_discovery
+
+
+@pytest.fixture(scope="session")
+def whole_study() -> Study:
+    return load_study()
+
+
+@pytest.fixture(scope="session")
+def terms(whole_study: Study) -> Terms:
+    return made_terms(whole_study)

@@ -9,6 +9,7 @@ import pytest
 from experiments.calibrate import Outcome, calibrate
 from experiments.report import render_page
 from experiments.report.kit.numbers import prose
+from experiments.report.verdict import HEADLINES, verdict_sentence
 from experiments.studyfile import Study, load_study
 
 
@@ -60,7 +61,8 @@ def test_every_ending_is_a_clear_report(
     assert campaign.outcome is outcome
     page = read_page(render_page(campaign, study))
     assert page.mismatches == []
-    assert prose(campaign.reason) in page.text
+    told = campaign.reason if campaign.verification is None else verdict_sentence(campaign)
+    assert f"{HEADLINES[outcome]}. {prose(told)}" in page.text
     reached = set(campaign.stages)
     assert reached <= set(page.ids)
     assert not {"climb", "surface", "optimum", "verification"} - reached & set(page.ids)

@@ -13,6 +13,7 @@ import pytest
 
 from dem_warp import Case, CaseResult
 from experiments.cases import execute
+from experiments.cases.workers import own
 from experiments.measurement.states import Observed
 from experiments.studies.buckwheat import climb, screening, surface, verification
 
@@ -41,7 +42,7 @@ def _plane_engine(cone: Callable[..., CaseResult], monkeypatch: pytest.MonkeyPat
     def observe(_: object, result: CaseResult, __: bool) -> Observed:
         return Observed({"angle": result.observables["truth"]}, SimpleNamespace(se=0.1))
 
-    monkeypatch.setattr(execute, "simulate", simulate)
+    monkeypatch.setattr(own, "simulate", simulate)
     monkeypatch.setattr(execute, "observe", observe)
 
 

@@ -14,6 +14,7 @@ import pytest
 from dem_warp import Case, CaseResult
 from dem_warp.clumps import ClumpShape
 from experiments.cases import Store, execute
+from experiments.cases.workers import own
 from experiments.errors import InputError, StoreError
 from experiments.measurement.states import Observed
 from experiments.studies.buckwheat import clumps
@@ -129,7 +130,7 @@ def batches(cone: Callable[..., CaseResult], monkeypatch: pytest.MonkeyPatch) ->
         lower = 2.0 if settings.fit == "middle" else 0.0
         return Observed({"angle": result.observables["truth"] - lower}, SimpleNamespace(se=0.1))
 
-    monkeypatch.setattr(execute, "simulate", simulate)
+    monkeypatch.setattr(own, "simulate", simulate)
     monkeypatch.setattr(execute, "observe", observe)
     return sizes
 

@@ -16,7 +16,7 @@ from typing import Annotated, Any
 import pandas as pd
 import typer
 
-from experiments.cases import Store, run_cases
+from experiments.cases import OwnWorkers, Store, run_cases
 from experiments.files import write_text
 from experiments.studies.buckwheat.sensitivity.folder import open_settings
 from experiments.studies.buckwheat.sensitivity.sensitivities import Sensitivities
@@ -38,7 +38,7 @@ def run_variant(
     chooses.
     """
     study = variant.load_study(settings["scale"], settings["modulus_scale"])
-    cases = run_cases(study, variant.planned_cases(settings["replicates"]), store, device)
+    cases = run_cases(study, variant.planned_cases(settings["replicates"]), store, OwnWorkers(device))
     return cases.reindex(columns=COLUMNS)
 
 

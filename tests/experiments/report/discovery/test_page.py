@@ -13,6 +13,7 @@ import pytest
 from doe.discrepancy import Answer, Discovery, Question, Settings, Verdict
 from experiments.report import HeapPicture
 from experiments.report.discovery import Terms, render_discovery, verdict_sentence
+from experiments.report.discovery.paper_text import search_pastes
 from experiments.report.discovery.tables import SHOWN_PAIRS, data_table, shown_candidates
 from experiments.report.discovery.terms import percent
 from experiments.report.discovery.verdict import changes
@@ -174,3 +175,16 @@ def test_candidates_stand_in_their_order_with_their_judgement(
         assert row[1][0] == terms.titles(candidate.mechanisms)
         assert row[2][1] == 100.0 * candidate.explained
         assert row[-1][0] == ("admitted" if candidate.admitted else candidate.objection)
+
+
+def test_a_search_has_a_paragraph_and_a_table_to_paste(
+    discovered: Discovered, whole_study: Study, terms: Terms
+) -> None:
+    found = discovered(Verdict.NAMED)
+    by_name = {paste.name: paste.text for paste in search_pastes(found, whole_study, terms, {})}
+    text = by_name["methods-markdown"]
+    assert "fitted to 48 means of 12 observables under 4 conditions; 1 further condition was held out" in text
+    assert f"{found.effort.bank_cases + found.effort.fresh_cases} cases were simulated." in text
+    assert verdict_sentence(found, terms) in text
+    assert by_name["table-latex"].isascii()
+    assert search_pastes(discovered(Verdict.NOT_IDENTIFIABLE), whole_study, terms, {}) == []

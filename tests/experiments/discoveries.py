@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
-import pytest
 
 from doe.discrepancy import (
     Answer,
@@ -27,7 +25,7 @@ from doe.discrepancy import (
     Verdict,
 )
 from experiments.report.discovery import Terms
-from experiments.studyfile import Study, load_study
+from experiments.studyfile import Study
 
 CONDITIONS = ("base", "fast", "wide", "rough", "fast-wide")
 HELD_OUT = (False, False, False, False, True)
@@ -242,18 +240,3 @@ def made_discovery(verdict: Verdict) -> Discovery:
         power=(),
         confounding=None,
     )
-
-
-@pytest.fixture(scope="session")
-def discovered() -> Callable[[Verdict], Discovery]:
-    return made_discovery
-
-
-@pytest.fixture(scope="session")
-def whole_study() -> Study:
-    return load_study()
-
-
-@pytest.fixture(scope="session")
-def terms(whole_study: Study) -> Terms:
-    return made_terms(whole_study)

@@ -1,0 +1,86 @@
+"""Forces of the contacts of a world between two steps, found without a trace in its state."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+
+from dem_warp.entries import SPHERE_MASK
+from dem_warp.kernels.probe import probe_kernels
+from dem_warp.rollback import Rollback
+from dem_warp.solver import Solver
+
+NO_GRAIN = NO_WALL = -1
+"""Partner of a contact that is none of the kind."""
+
+
+@dataclass(frozen=True, eq=False)
+class ContactForces:
+    """Contacts that bear a force; each pair of spheres once, of a sphere and a wall too."""
+
+    grains: np.ndarray
+    """Slot of the grain that the force acts on, shape (n,)."""
+    partners: np.ndarray
+    """Slot of the grain that it comes from, NO_GRAIN for a wall, shape (n,)."""
+    walls: np.ndarray
+    """Number of the wall that it comes from, NO_WALL for a grain, shape (n,)."""
+    forces: np.ndarray
+    """[N], shape (n, 3)."""
+    points: np.ndarray
+    """Where the two surfaces meet [m], shape (n, 3)."""
+    normals: np.ndarray
+    """Unit vectors from the partner to the grain, shape (n, 3)."""
+
+    def __len__(self) -> int:
+        """Count the contacts."""
+        return len(self.grains)
+
+
+class ForceProbe:
+    """Finds the forces that the next step of a batch begins with.
+
+    The law moves on the histories of the contacts that it is asked about. So all that steps change is kept
+    before and put back after: the run goes on to the same bits.
+    """
+
+    def __init__(self, solver: Solver) -> None:
+        self._solver, self._kept = solver, Rollback(solver)
+        self._bear = probe_kernels(solver.build).bear
+
+    def forces(self, world: int) -> ContactForces:
+        """Contacts of a world, between two calls of `Solver.advance`."""
+        solver, real = self._solver, self._solver.precision
+        slots, capacity = solver.layout.grain_count, solver.neighbours.capacity
+        for wall in range(solver.layout.wall_count):
+            solver.wall_pose(world, wall)
+        out = [wp.zeros(slots * capacity, dtype=kind, device=solver.device) for kind in (real.vec3, wp.vec3d)]
+        forces, points, normals = (*out, wp.zeros_like(out[0]))
+        self._kept.keep()
+        inputs = [world, solver.model, solver.grains[0], solver.alive, solver.neighbours]
+        wp.launch(self._bear, slots, inputs=[*inputs, forces, points, normals], device=solver.device)
+        self._kept.restore(world)
+        for reactions in (solver.neighbours.reactions.force, solver.neighbours.reactions.torque):
+            reactions.zero_()
+        borne = forces.numpy()
+        found = np.flatnonzero((borne != 0.0).any(axis=1))
+        return self._named(world, found, borne[found], points.numpy()[found], normals.numpy()[found])
+
+    def _named(
+        self, world: int, found: np.ndarray, forces: np.ndarray, points: np.ndarray, normals: np.ndarray
+    ) -> ContactForces:
+        """Name the two of each entry that was found; of a pair that both lists have, the first stays."""
+        solver, setup = self._solver, self._solver.worlds[world]
+        layout, capacity = solver.layout, solver.neighbours.capacity
+        grains = found // capacity
+        row = int(solver.neighbours.list.numpy()[world]) * layout.grain_total + world * layout.grain_count
+        partner = solver.neighbours.entry.numpy()[row * capacity + found] & SPHERE_MASK
+        number = partner - layout.grain_count * layout.sphere_count
+        is_wall = number >= 0
+        partners = np.where(is_wall, NO_GRAIN, partner // layout.sphere_count)
+        # after the walls stand the triangles of the first mesh, of the next, and so on
+        counts = [wall.triangle_count for wall, _ in setup.walls]
+        owners = np.concatenate([np.arange(layout.wall_count), np.repeat(np.arange(len(counts)), counts)])
+        walls = np.where(is_wall, owners[np.where(is_wall, number, 0)], NO_WALL)
+        once = is_wall | (grains < partners) | (not solver.build.cooperative)
+        columns = (grains, partners, walls, forces.astype(float), points, normals.astype(float))
+        return ContactForces(*(column[once] for column in columns))

@@ -1,0 +1,50 @@
+"""The public names: each is loaded with its module when it is first used."""
+
+from .analysis import Analysis, analyse, drive
+from .contest.gap import Answer, Question
+from .contest.power import Power
+from .emulation.bank import Bank, bank_points, load_bank, make_bank
+from .emulation.emulator import Emulator, fit_emulator
+from .fitting.fit import Interval
+from .problem.measured import Measured
+from .problem.settings import Settings, settings_of
+from .problem.simulator import Outcomes, Point, Simulator
+from .problem.space import MechanismRange, SearchSpace
+from .verdict.before_after import BeforeAfter
+from .verdict.discovery import Candidate, Confounding, Data, Discovery, Drift, Effort, Fit, Gap, Verdict
+from .verdict.next_experiment import NextExperiment
+
+__all__ = [
+    "Analysis",
+    "Answer",
+    "Bank",
+    "BeforeAfter",
+    "Candidate",
+    "Confounding",
+    "Data",
+    "Discovery",
+    "Drift",
+    "Effort",
+    "Emulator",
+    "Fit",
+    "Gap",
+    "Interval",
+    "Measured",
+    "MechanismRange",
+    "NextExperiment",
+    "Outcomes",
+    "Point",
+    "Power",
+    "Question",
+    "SearchSpace",
+    "Settings",
+    "Simulator",
+    "Verdict",
+    "analyse",
+    "bank_points",
+    "drive",
+    "fit_emulator",
+    "load_bank",
+    "make_bank",
+    "settings_of",
+]

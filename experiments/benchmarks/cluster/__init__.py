@@ -1,0 +1,1 @@
+"""Campaigns on a real batch system: one node of SLURM on this machine."""

@@ -1,0 +1,73 @@
+"""One worker and two on the same wave: how much faster, and are the bits the same?
+
+    python -m experiments.benchmarks.cluster.scaling --cases 12
+
+The wave is of bench heaps of the paper's study. It runs on this machine's own processes and on workers of
+Dask, with one and with two of each; kernels are compiled before. The load of the machine is part of the
+answer: on one that others use, two workers get what is left.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import pandas as pd
+import typer
+
+from dem_warp import Case, CaseResult
+from experiments.benchmarks.results import write_results
+from experiments.cases import Resources, Workers, open_workers
+from experiments.studyfile import load_study
+from experiments.studyfile.cluster_section import ClusterSection
+
+
+def timed(workers: Workers, cases: Sequence[Case]) -> tuple[float, list[CaseResult]]:
+    """Wall time of a wave from its first progress on, and its results: the start of processes is apart."""
+    first: list[float] = []
+
+    def note(progress: object) -> None:
+        if not first and getattr(progress, "fraction", 0.0) > 0.0:
+            first.append(time.perf_counter())
+
+    results = workers.simulate(cases, on_progress=note)
+    return time.perf_counter() - first[0], results
+
+
+def same_bits(some: Sequence[CaseResult], others: Sequence[CaseResult]) -> bool:
+    """Tell that heaps agree in every bit."""
+    pairs = zip(some, others, strict=True)
+    return all(np.array_equal(a.positions, b.positions) and a.observables == b.observables for a, b in pairs)
+
+
+def main(
+    cases: Annotated[int, typer.Option(help="Heaps of the wave.")] = 12,
+    out: Annotated[Path, typer.Option(help="Folder of the table.")] = Path("out/scaling"),
+) -> None:
+    """Run the wave on one worker and on two, and write the table."""
+    study = load_study(None, "bench")
+    wave = [study.case({}, seed) for seed in range(cases)]
+    rows, reference = [], None
+    for kind in ("own processes", "Dask"):
+        alone = None
+        for count in (1, 2):
+            section = ClusterSection(workers=count, gpu=False) if kind == "Dask" else None
+            with open_workers(Resources("cpu", count, None, section)) as workers:
+                workers.simulate(wave[:1])
+                seconds, results = timed(workers, wave)
+            reference, alone = reference or results, alone or seconds
+            bits = "same" if same_bits(results, reference) else "DIFFERENT"
+            load = os.getloadavg()[0]
+            rows.append((kind, count, seconds, alone / seconds, bits, load))
+    columns = ["workers", "number", "seconds", "times as fast", "bits", "load at the end"]
+    table = pd.DataFrame(rows, columns=columns)
+    text = f"{cases} bench heaps on {os.cpu_count()} cores; the load counts this run too."
+    print(write_results(out, "scaling", [("scaling", text, table)]).read_text(encoding="utf-8"))
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -1,0 +1,1 @@
+"""Faults by doing them: runs that are killed, disks that are full, two runs in one folder."""

@@ -1,0 +1,15 @@
+"""The public names: each is loaded with its module when it is first used."""
+
+from .campaign import calibrate
+from .cases import Runner, case_seed
+from .results import Campaign, ClimbEnd, Decision, Outcome
+
+__all__ = [
+    "Campaign",
+    "ClimbEnd",
+    "Decision",
+    "Outcome",
+    "Runner",
+    "calibrate",
+    "case_seed",
+]

@@ -1,0 +1,69 @@
+"""Batches: which cases run in one launch, so that a device is full and workers end together."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from dem_warp import Case
+from dem_warp.simulation import batches
+from experiments.cases.cost import cost_of, device_bytes
+
+WORLDS = 1024
+"""Worlds that one launch on a GPU holds at the most: few enough that a killed run loses little."""
+
+FULL_GRAINS = 330_000
+"""Grains with which a large GPU reaches 95 % of its speed (`experiments/benchmarks/README.md`, cost)."""
+
+MEMORY_SHARE = 0.8
+"""Part of a device's free memory that the worlds of a launch may take, by what is predicted of them."""
+
+
+def plan_batches(
+    cases: Sequence[Case], costs: np.ndarray, workers: int = 1, memory: float | None = None
+) -> list[list[int]]:
+    """Deal cases out to batches, the costly ones first.
+
+    Parameters
+    ----------
+    costs : array
+        Predicted work of each case, (n,).
+    workers : int
+        Workers that take the batches.
+    memory : float, optional
+        Free memory of a GPU [bytes]; None: of workers on CPUs, which simulate one case at a time.
+
+    Returns
+    -------
+    list of list of int
+        Indices of the cases of each batch. On a GPU these share all that kernels are compiled for.
+    """
+    if memory is None:
+        return [[int(index)] for index in _falling(costs)]
+    dealt = []
+    for group in batches(cases, one_each=False):
+        members = np.array(group)[_falling(costs[group])]
+        dealt += _dealt(members, worlds_at_once([cases[i] for i in group], memory), workers)
+    return sorted(dealt, key=lambda batch: -float(costs[batch].sum()))
+
+
+def worlds_at_once(cases: Sequence[Case], memory: float) -> int:
+    """Worlds of a launch: enough to fill a GPU, no more than its free memory holds [bytes]."""
+    largest = max(cases, key=lambda case: cost_of(case).spheres)
+    enough = math.ceil(FULL_GRAINS / max(cost_of(largest).grains, 1))
+    room = int(MEMORY_SHARE * memory / device_bytes(largest))
+    return max(min(enough, room, WORLDS), 1)
+
+
+def _falling(costs: np.ndarray) -> np.ndarray:
+    """Places of the costs from the highest on, equal ones in their order."""
+    return np.argsort(-costs, kind="stable")
+
+
+def _dealt(members: np.ndarray, worlds: int, workers: int) -> list[list[int]]:
+    """Deal members out in rounds of a batch a worker; in each round all batches cost much the same."""
+    rounds = math.ceil(len(members) / (workers * worlds))
+    parts = np.array_split(members, rounds)
+    return [part[w::workers].tolist() for part in parts for w in range(min(workers, len(part)))]

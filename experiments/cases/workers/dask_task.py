@@ -1,0 +1,175 @@
+"""The task of a Dask worker: a batch of cases, each result sent to the client as it ends."""
+
+from __future__ import annotations
+
+import pickle
+import tempfile
+import threading
+import time
+import uuid
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import warp as wp
+from filelock import FileLock, Timeout
+
+from dem_warp import Case, CaseResult, Progress
+from dem_warp.device import resolve_device
+from dem_warp.provenance import engine_fingerprint
+from experiments.cases.engine import Engine
+from experiments.cases.workers.own import OwnWorkers
+from experiments.errors import InputError
+
+PATIENCE = 120.0
+"""Time that a worker waits for the client's word before it takes it for gone [s]."""
+
+REPORT_EVERY = 2.0
+"""Time between two reports of a worker [s]."""
+
+_one_at_a_time = threading.Lock()
+"""Warp is driven by one thread of a process."""
+
+_claiming = threading.Lock()
+
+_own: list[tuple[str, FileLock | None]] = []
+"""Device of this process, and what keeps others from it."""
+
+
+class GoneError(Exception):
+    """Nobody waits for the batch any more."""
+
+
+@dataclass(frozen=True)
+class Order:
+    """A batch of cases."""
+
+    channel: str
+    """Name of the queue that the client listens to."""
+    number: int
+    """Number of the batch."""
+    cases: tuple[Case, ...]
+    engine: Engine | None
+    """Engine that simulates; None: dem-warp's own."""
+    checkpoint: str | None
+    """Folder of checkpoints; one that this machine does not see is not used."""
+    fingerprint: str
+    """Engine of the client, whose meaning the worker's must have."""
+
+
+@dataclass(frozen=True)
+class Message:
+    """Word of a worker about a batch."""
+
+    number: int
+    reply: str = ""
+    """Of a beginning: name of the queue that the answer goes to, the places of the cases still wanted."""
+    index: int = 0
+    result: CaseResult | None = None
+    """Of a case that has ended, its place in the batch and its result."""
+    progress: Progress | None = None
+    """Of those that were wanted."""
+
+
+def simulate_batch(order: Order) -> None:
+    """Simulate those cases of a batch that the client still wants, and send each result as it ends.
+
+    Raises
+    ------
+    InputError
+        When this worker has another version of dem-warp.
+    GoneError
+        When the client is gone.
+    """
+    from distributed import Queue, get_worker
+
+    if fingerprint_of(order.cases) != order.fingerprint:
+        rule = "workers must have the same dem-warp as the one that gives the orders"
+        raise InputError(rule, f"another version on {get_worker().address}", "the cluster")
+    with _one_at_a_time:
+        line = _Line(order, Queue(order.channel), get_worker())
+        wanted = line.ask()
+        folder = order.checkpoint
+        OwnWorkers(own_device(), 1).simulate(
+            [order.cases[index] for index in wanted],
+            order.engine,
+            lambda number, result: line.send(index=wanted[number], result=result),
+            line.report,
+            folder if folder and Path(folder).is_dir() else None,
+        )
+
+
+def fingerprint_of(cases: Sequence[Case]) -> str:
+    """Fingerprint of all code that simulates some cases."""
+    return engine_fingerprint(*dict.fromkeys(kind for case in cases for kind in case.kinds))
+
+
+class _Line:
+    """The way from a worker to the client."""
+
+    def __init__(self, order: Order, queue: Any, worker: Any) -> None:
+        self._order, self._queue, self._worker = order, queue, worker
+        self._task = worker.get_current_task()
+        self._reported = time.monotonic()
+
+    def ask(self) -> list[int]:
+        """Ask which cases are wanted: another worker may have sent some before it was lost."""
+        from distributed import Queue
+
+        reply = Queue(f"{self._order.channel}-{uuid.uuid4().hex}")
+        try:
+            self.send(reply=reply.name)
+            return list(reply.get(timeout=PATIENCE))
+        except TimeoutError:
+            raise GoneError("the client gave no answer") from None
+        finally:
+            reply.close()
+
+    def send(self, **said: Any) -> None:
+        """Send a message; GoneError where nobody listens."""
+        task = self._worker.state.tasks.get(self._task)
+        if task is None or task.state == "cancelled":
+            raise GoneError("the batch was taken back")
+        self._queue.put(pickle.dumps(Message(self._order.number, **said)))
+
+    def report(self, progress: Progress) -> None:
+        """Send how far the batch is, now and then."""
+        if time.monotonic() - self._reported >= REPORT_EVERY:
+            self._reported = time.monotonic()
+            self.send(progress=progress)
+
+
+def own_device() -> str:
+    """Device of this process: a GPU that no other worker of this machine has, or the CPU."""
+    with _claiming:
+        if not _own:
+            resolve_device(None)
+            _own.append(_claimed((device.alias, str(device.uuid)) for device in wp.get_cuda_devices()))
+        return _own[0][0]
+
+
+def _claimed(gpus: Iterable[tuple[str, str]]) -> tuple[str, FileLock | None]:
+    """Claim the first GPU that is free; where all are taken, the first is shared."""
+    names = []
+    for name, identity in gpus:
+        names.append(name)
+        lock = FileLock(Path(tempfile.gettempdir()) / f"dem-warp-{identity}.lock", timeout=0)
+        try:
+            lock.acquire()
+        except (Timeout, OSError):
+            continue
+        return name, lock
+    return (names[0] if names else "cpu"), None
+
+
+def describe_worker() -> dict[str, Any]:
+    """Device of this worker, and its free memory where it is a GPU [bytes]."""
+    name = own_device()
+    on_gpu = name != "cpu"
+    device = wp.get_device(name)
+    return {
+        "on_gpu": on_gpu,
+        "device": str(device.name) if on_gpu else "CPU",
+        "memory": float(device.free_memory) if on_gpu else None,
+    }

@@ -1,0 +1,235 @@
+"""Workers of Dask: batches of cases as tasks, results stored here as they end, lost batches given again."""
+
+from __future__ import annotations
+
+import logging
+import os
+import pickle
+import uuid
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from dem_warp import Case, CaseResult
+from dem_warp.result import OnProgress, OnResult
+from experiments.cases.engine import Engine
+from experiments.cases.workers.batches import plan_batches
+from experiments.cases.workers.dask_task import (
+    Message,
+    Order,
+    describe_worker,
+    fingerprint_of,
+    simulate_batch,
+)
+from experiments.cases.workers.speed import expected_seconds
+from experiments.cases.workers.wave import Wave
+from experiments.cases.workers.workers import WorkersLostError
+from experiments.errors import InputError
+
+if TYPE_CHECKING:
+    from distributed import Client, Future
+
+LISTEN = 0.5
+"""Time between two looks at what has become of the batches [s]."""
+
+AHEAD = 4
+"""Batches a worker that the scheduler holds at once; the others wait here and take none of its memory."""
+
+_log = logging.getLogger(__name__)
+
+
+class DaskWorkers:
+    """Workers of a Dask cluster, one thread each: one a GPU, or one a core.
+
+    Parameters
+    ----------
+    client
+        Connection to the scheduler.
+    described
+        Name of the cluster for the provenance of results.
+    machine
+        Name under which its speed is stored.
+    expected : int, optional
+        Workers that were asked for; None: those that are there.
+    """
+
+    def __init__(
+        self, client: Client, described: dict[str, Any], machine: str, expected: int | None = None
+    ) -> None:
+        self._client, self._described, self._expected = client, described, expected
+        self.machine = machine
+
+    @property
+    def count(self) -> int:
+        """Workers that are asked for, or there."""
+        return self._expected or max(len(self._addresses()), 1)
+
+    @property
+    def on_gpu(self) -> bool:
+        """Tell that the workers have GPUs."""
+        return self._memory() is not None
+
+    @property
+    def helpers(self) -> int:
+        """Cores of the machine of the client."""
+        return os.cpu_count() or 1
+
+    @property
+    def leaves_cores(self) -> bool:
+        """Tell that they leave the cores of this machine to those who measure."""
+        return True
+
+    @property
+    def described(self) -> dict[str, Any]:
+        """Kind, place and number of the workers."""
+        return self._described | {"workers": self.count}
+
+    def simulate(
+        self,
+        cases: Sequence[Case],
+        engine: Engine | None = None,
+        on_result: OnResult | None = None,
+        on_progress: OnProgress | None = None,
+        checkpoint: str | Path | None = None,
+    ) -> list[CaseResult]:
+        """Simulate cases, as `Workers.simulate` does.
+
+        Checkpoints need a folder that the workers see under the same name.
+        """
+        if not cases:
+            return []
+        self._await_workers()
+        wave = Wave(cases, on_result, on_progress, expected_seconds(cases, self, engine))
+        memory = self._memory() if engine is None else None
+        batches = plan_batches(cases, wave.costs, self.count, memory)
+        if checkpoint is not None:
+            Path(checkpoint).mkdir(parents=True, exist_ok=True)
+        folder = None if checkpoint is None else str(Path(checkpoint).resolve())
+        session = _Session(self._client, wave, cases, engine, folder)
+        try:
+            session.run(batches, AHEAD * self.count)
+        finally:
+            session.close()
+        return wave.in_order()
+
+    def _addresses(self) -> list[str]:
+        return list(self._client.scheduler_info(n_workers=-1)["workers"])
+
+    def _await_workers(self) -> None:
+        """Wait for the first worker, and see to it that each has one thread."""
+        if not self._addresses():
+            _log.warning("waiting for the first worker of the cluster")
+            self._client.wait_for_workers(1)
+        for address, facts in self._client.scheduler_info(n_workers=-1)["workers"].items():
+            if facts["nthreads"] != 1:
+                rule = "each worker must have one thread: dask worker --nthreads 1 --nworkers N"
+                raise InputError(rule, f"{facts['nthreads']} threads of {address}", "the cluster")
+
+    def _memory(self) -> float | None:
+        """Least free memory of the workers' GPUs [bytes]; None where a worker has none."""
+        found = [facts["memory"] for facts in self._client.run(describe_worker, on_error="ignore").values()]
+        return None if not found or None in found else min(found)
+
+
+@dataclass
+class _Session:
+    """Batches of a wave that are under way."""
+
+    client: Client
+    wave: Wave
+    cases: Sequence[Case]
+    engine: Engine | None
+    checkpoint: str | None
+    name: str = field(default_factory=lambda: f"dem-warp-{uuid.uuid4().hex}")
+    batches: list[list[int]] = field(default_factory=list)
+    running: dict[int, Future] = field(default_factory=dict)
+    wanted: dict[int, list[int]] = field(default_factory=dict)
+    """Cases that were wanted of a batch when a worker began it."""
+
+    def __post_init__(self) -> None:
+        from distributed import Queue
+
+        self._queue = Queue(self.name, client=self.client)
+        self._fingerprint = fingerprint_of(self.cases)
+
+    def run(self, batches: list[list[int]], most: int) -> None:
+        """Run batches in their order, at most so many in the hands of the scheduler at once."""
+        pile = batches[::-1]
+        while pile or self.running:
+            while pile and len(self.running) < most:
+                self._submit(pile.pop())
+            self._listen()
+            pile += self._collect()
+
+    def close(self) -> None:
+        """Take back what still runs."""
+        self.client.cancel(list(self.running.values()), force=True)
+        self._queue.close()
+
+    def _submit(self, members: list[int]) -> None:
+        number = len(self.batches)
+        self.batches.append(members)
+        chosen = tuple(self.cases[index] for index in members)
+        order = Order(self.name, number, chosen, self.engine, self.checkpoint, self._fingerprint)
+        self.running[number] = self.client.submit(
+            simulate_batch, order, key=f"{self.name}-{number}", priority=-number, pure=False
+        )
+
+    def _listen(self) -> None:
+        """Take what the workers say, waiting a while for a first word."""
+        try:
+            self._hear(self._queue.get(timeout=LISTEN))
+        except TimeoutError:
+            self.wave.report()
+        self._hear_all()
+
+    def _hear_all(self) -> None:
+        """Take all that has been said."""
+        for said in self._queue.get(batch=True):
+            self._hear(said)
+
+    def _hear(self, said: bytes) -> None:
+        from distributed import Queue
+
+        message: Message = pickle.loads(said)
+        members = self.batches[message.number]
+        if message.reply:
+            places = [place for place, index in enumerate(members) if index not in self.wave.results]
+            if message.number in self.wanted:
+                _log.warning("a worker was lost: %d of its cases go to another one", len(places))
+            self.wanted[message.number] = [members[place] for place in places]
+            Queue(message.reply, client=self.client).put(places)
+        elif message.result is not None:
+            self.wave.take(members[message.index], message.result)
+        elif message.progress is not None:
+            self.wave.follow(message.number, self.wanted[message.number], message.progress)
+
+    def _collect(self) -> list[list[int]]:
+        """Take leave of batches that have ended; return those that must run once more."""
+        again = []
+        ended = [(number, future) for number, future in self.running.items() if future.done()]
+        if ended:  # they said their last before they ended
+            self._hear_all()
+        for number, future in ended:
+            del self.running[number]
+            members = self.batches[number]
+            left = self.wave.left(members)
+            if left:
+                again += self._divided(left, future)
+            self.wave.end(number)
+        return again
+
+    def _divided(self, left: list[int], future: Future) -> list[list[int]]:
+        """Return the halves of a batch that lost its workers again and again; raise any other error."""
+        from distributed import KilledWorker
+
+        error = future.exception() if future.status == "error" else None
+        if isinstance(error, KilledWorker) and len(left) > 1:
+            half = (len(left) + 1) // 2
+            return [left[half:], left[:half]]
+        if isinstance(error, KilledWorker):
+            raise WorkersLostError("a case lost its worker again and again, perhaps for lack of memory.")
+        if error is not None:
+            raise error
+        raise WorkersLostError("the scheduler lost its tasks: see to it that it runs on.")

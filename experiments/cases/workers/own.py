@@ -1,0 +1,106 @@
+"""This machine's own workers: a world a core on a CPU, batches on one GPU."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
+from pathlib import Path
+from typing import Any
+
+import warp as wp
+
+from dem_warp import Case, CaseResult, simulate
+from dem_warp.device import resolve_device
+from dem_warp.result import OnProgress, OnResult
+from experiments.cases.engine import Engine
+from experiments.cases.workers.batches import plan_batches
+from experiments.cases.workers.division import run_divided
+from experiments.cases.workers.speed import cpu_name, expected_seconds
+from experiments.cases.workers.wave import Wave
+
+
+@dataclass(frozen=True)
+class OwnWorkers:
+    """Processes on the CPU, or this process on a GPU; they need no configuration."""
+
+    device: str | None = None
+    """``"cpu"``, ``"cuda"`` or ``"cuda:1"``; None: the GPU if there is one."""
+    workers: int | None = None
+    """Processes on the CPU; None: one a core."""
+
+    @cached_property
+    def name(self) -> str:
+        """Name of the device."""
+        return resolve_device(self.device)
+
+    @property
+    def on_gpu(self) -> bool:
+        """Tell that the device is a GPU."""
+        return self.name != "cpu"
+
+    @property
+    def count(self) -> int:
+        """Cases at once on a CPU, 1 on a GPU."""
+        return 1 if self.on_gpu else self.workers or os.cpu_count() or 1
+
+    @property
+    def machine(self) -> str:
+        """Name of the GPU, or of this machine and its number of processes."""
+        return str(wp.get_device(self.name).name) if self.on_gpu else cpu_name(self.count)
+
+    @property
+    def helpers(self) -> int:
+        """Processes that may measure meanwhile."""
+        return self.workers or os.cpu_count() or 1
+
+    @property
+    def leaves_cores(self) -> bool:
+        """Tell that they leave the cores of this machine to those who measure."""
+        return self.on_gpu
+
+    @property
+    def described(self) -> dict[str, Any]:
+        """Device and number of processes."""
+        return {"device": self.name, "workers": self.workers}
+
+    def simulate(
+        self,
+        cases: Sequence[Case],
+        engine: Engine | None = None,
+        on_result: OnResult | None = None,
+        on_progress: OnProgress | None = None,
+        checkpoint: str | Path | None = None,
+    ) -> list[CaseResult]:
+        """Simulate cases, as `Workers.simulate` does.
+
+        On a CPU all are one batch, whose processes take the costly cases first.
+        """
+        wave = Wave(cases, on_result, on_progress, expected_seconds(cases, self, engine))
+
+        def run(batch: int, members: list[int]) -> None:
+            (engine or simulate)(
+                [cases[index] for index in members],
+                device=self.name,
+                workers=self.workers,
+                on_result=lambda number, result: wave.take(members[number], result),
+                on_progress=partial(wave.follow, batch, members),
+                checkpoint=checkpoint,
+            )
+
+        for number, batch in enumerate(self._batches(cases, wave, engine)):
+            run_divided(wave, batch, partial(run, number))
+            wave.end(number)
+        return wave.in_order()
+
+    def _batches(self, cases: Sequence[Case], wave: Wave, engine: Engine | None) -> list[list[int]]:
+        if not cases:
+            return []
+        if self.on_gpu and engine is None:
+            return plan_batches(cases, wave.costs, memory=wp.get_device(self.name).free_memory)
+        return [[index for batch in plan_batches(cases, wave.costs) for index in batch]]
+
+
+THIS_MACHINE = OwnWorkers()
+"""Workers where none are named."""

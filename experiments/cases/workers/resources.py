@@ -1,0 +1,114 @@
+"""What a person asks for, against what there is: devices, number of workers, name of the machine."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+
+import warp as wp
+
+from dem_warp.device import resolve_device
+from experiments.cases.workers.speed import cpu_name
+from experiments.errors import InputError
+from experiments.studyfile.cluster_section import ClusterSection
+
+
+@dataclass(frozen=True)
+class Resources:
+    """Workers as a person asks for them; nothing named: this machine's own."""
+
+    device: str | None = None
+    """``"cpu"``, ``"cuda"``, ``"cuda:1"``, or several GPUs between commas; None: the GPU if there is one."""
+    workers: int | None = None
+    """Processes on the CPU, GPUs, or workers of a cluster; None: one a core, one GPU, the cluster's own."""
+    scheduler: str | None = None
+    """Address of a Dask scheduler whose workers are used."""
+    cluster: ClusterSection | None = None
+    """Workers that are started for the run."""
+
+    @property
+    def is_cluster(self) -> bool:
+        """Tell that the workers are those of a cluster."""
+        return self.scheduler is not None or self.cluster is not None
+
+    @property
+    def submits_jobs(self) -> bool:
+        """Tell that the workers are jobs of a batch system."""
+        return self.scheduler is None and self.cluster is not None and self.cluster.kind != "local"
+
+    @property
+    def gpus(self) -> list[str]:
+        """Names of the GPUs of this machine that are used; empty: the CPU is.
+
+        Raises
+        ------
+        InputError
+            When a device is not there, or more workers are asked for than there are GPUs.
+        """
+        if self.cluster is not None and self.cluster.gpu is False:
+            return []
+        devices = resolve_devices(self.device)
+        if devices == ["cpu"]:
+            if self.cluster is not None and self.cluster.gpu:
+                raise InputError("a worker with a GPU needs one", "none here", "cluster.gpu")
+            return []
+        there = devices if self.device else [gpu.alias for gpu in wp.get_cuda_devices()]
+        wanted = self.workers or (self.cluster.workers or len(there) if self.cluster else len(devices))
+        if wanted > len(there):
+            rule = f"is one a GPU, of {len(there)} here; processes on the CPU are had with --device cpu"
+            raise InputError(rule, wanted, "--workers")
+        return there[:wanted]
+
+    @property
+    def count(self) -> int:
+        """Workers, as far as is known before they are there."""
+        asked = self.workers or (self.cluster.workers if self.cluster else None)
+        if self.scheduler is not None or self.submits_jobs:
+            return asked or 1
+        return len(self.gpus) or asked or os.cpu_count() or 1
+
+    @property
+    def on_gpu(self) -> bool:
+        """Tell that the workers have GPUs, as far as is known before they are there."""
+        if self.submits_jobs:
+            return bool(self.cluster and self.cluster.gpu)
+        return self.scheduler is None and bool(self.gpus)
+
+    @property
+    def machine(self) -> str:
+        """Name under which their speed is stored."""
+        if self.scheduler is not None:
+            return f"workers of {self.scheduler}"
+        if self.submits_jobs and self.cluster is not None:
+            what = "GPU" if self.on_gpu else "CPU"
+            return f"{self.cluster.kind}, queue {self.cluster.queue or 'default'}, {what}"
+        return str(wp.get_device(self.gpus[0]).name) if self.gpus else cpu_name(self.count)
+
+    def __str__(self) -> str:
+        """Say in words where cases are simulated."""
+        number = f"{self.count} {'worker' if self.count == 1 else 'workers'}"
+        if self.scheduler is not None:
+            return f"the workers of {self.scheduler}"
+        if self.submits_jobs and self.cluster is not None:
+            return f"{number} of {self.cluster.kind}"
+        return ",".join(self.gpus) or (f"cpu, {number}" if self.cluster else "cpu")
+
+
+def resolve_devices(names: str | None) -> list[str]:
+    """Names of the devices to run on: as asked, several GPUs as ``"cuda:0,cuda:1"``, or the engine's choice.
+
+    Raises
+    ------
+    InputError
+        If one is not there or is named twice, or the CPU stands beside a GPU.
+    """
+    asked = [None] if names is None else [name.strip() for name in names.split(",")]
+    try:
+        found = [resolve_device(name) for name in asked]
+    except ValueError as error:
+        raise InputError(str(error), names, "--device") from None
+    if len(set(found)) < len(found):
+        raise InputError("must name each device once", names, "--device")
+    if len(found) > 1 and "cpu" in found:
+        raise InputError("must be the CPU alone or GPUs only", names, "--device")
+    return found

@@ -1,0 +1,105 @@
+"""One call of workers: what its batches have given so far, and how far they are."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from dem_warp import Case, CaseResult, Progress
+from dem_warp.result import OnProgress, OnResult
+from experiments.cases.cost import relative_costs
+
+
+@dataclass(frozen=True)
+class WaveProgress(Progress):
+    """Progress of a wave."""
+
+    expected: float | None = None
+    """Wall time of all of it, as predicted before it began [s]; None where it could not be."""
+
+
+class Wave:
+    """Results and progress of a call, gathered from its batches.
+
+    Parameters
+    ----------
+    cases
+        All cases of the call.
+    on_result, on_progress
+        As of `Workers.simulate`; errors of theirs end the call.
+    expected
+        Predicted wall time of all [s].
+    """
+
+    def __init__(
+        self,
+        cases: Sequence[Case],
+        on_result: OnResult | None,
+        on_progress: OnProgress | None,
+        expected: float | None = None,
+    ) -> None:
+        self.costs = relative_costs(cases)
+        """Predicted work of each case, (n,)."""
+        self.results: dict[int, CaseResult] = {}
+        self.fault: BaseException | None = None
+        """Error of the caller's own functions."""
+        self._on_result, self._on_progress, self._expected = on_result, on_progress, expected
+        self._started = time.perf_counter()
+        self._fractions = np.zeros(len(cases))
+        self._phases: dict[int, Mapping[str, int]] = {}
+
+    def left(self, members: Sequence[int]) -> list[int]:
+        """Members of a batch that have given no result yet."""
+        return [index for index in members if index not in self.results]
+
+    def take(self, index: int, result: CaseResult) -> None:
+        """Take the result of a case, and hand it on."""
+        if index in self.results:
+            return
+        self.results[index] = result
+        self._fractions[index] = 1.0
+        if self._on_result is not None:
+            self._call(self._on_result, index, result)
+
+    def follow(self, batch: int, members: Sequence[int], progress: Progress) -> None:
+        """Take the progress of some members of a batch, and tell that of all."""
+        if left := self.left(members):
+            ended = len(members) - len(left)
+            self._fractions[left] = np.clip((progress.fraction * len(members) - ended) / len(left), 0.0, 1.0)
+        self._phases[batch] = progress.phase_counts
+        self.report()
+
+    def end(self, batch: int) -> None:
+        """Note that a batch has ended, and tell how far all is."""
+        self._phases.pop(batch, None)
+        self.report()
+
+    def report(self) -> None:
+        """Tell how far all is."""
+        if self._on_progress is None:
+            return
+        done, total = len(self.results), len(self.costs)
+        phases: Counter[str] = Counter()
+        for counts in self._phases.values():
+            phases.update(counts)
+        if (waiting := total - done - phases.total()) > 0:
+            phases["waiting"] += waiting
+        fraction = 1.0 if done == total else float(self.costs @ self._fractions / self.costs.sum())
+        seconds = time.perf_counter() - self._started
+        progress = WaveProgress(done, total, fraction, dict(phases), seconds, self._expected)
+        self._call(self._on_progress, progress)
+
+    def in_order(self) -> list[CaseResult]:
+        """Results of all cases."""
+        return [self.results[index] for index in range(len(self.costs))]
+
+    def _call(self, function: Callable[..., None], *arguments: object) -> None:
+        try:
+            function(*arguments)
+        except BaseException as error:
+            self.fault = error
+            raise

@@ -1,0 +1,55 @@
+"""``dem-warp doctor``: what this machine has, and what will be used."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from experiments.commands.console import FAILED_RUN, clear_errors, messages, plain
+from experiments.commands.options import AsJson, Cluster, Device, Scheduler, Workers
+
+if TYPE_CHECKING:
+    from experiments.runs.examination import Finding
+
+DOCTOR_EXAMPLE = "Example: [bold]dem-warp doctor --measure[/]"
+
+
+def doctor(
+    device: Device = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+    cluster: Cluster = None,
+    measure: Annotated[
+        bool, typer.Option("--measure", help="Measure the speed anew, for --dry-run and times left.")
+    ] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Examine this machine: GPU, driver, kernels' cache, cores, memory, OpenGL, and what will be used.
+
+    The exit code is 0 where cases can be simulated, else 1.
+    """
+    with clear_errors():
+        from experiments.runs.choices import chosen_resources
+        from experiments.runs.examination import examine
+        from experiments.runs.plan import measure_and_store
+
+        resources = chosen_resources(device, workers, scheduler, cluster)
+        if measure:
+            messages.print(f"Measuring the speed of {resources}.")
+            measure_and_store(resources)
+        findings = examine(resources)
+    if as_json:
+        typer.echo(json.dumps([finding.to_dict() for finding in findings], allow_nan=False))
+    else:
+        _print(findings)
+    if not all(finding.good for finding in findings if finding.needed):
+        raise typer.Exit(FAILED_RUN)
+
+
+def _print(findings: list[Finding]) -> None:
+    width = max(len(finding.name) for finding in findings)
+    for finding in findings:
+        mark = "ok  " if finding.good else "FAIL" if finding.needed else "-   "
+        typer.echo(plain(f"{mark} {finding.name:{width}}  {finding.text}"))

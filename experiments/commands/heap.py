@@ -1,0 +1,106 @@
+"""``dem-warp heap``: one case simulated, measured, drawn and filmed."""
+
+from __future__ import annotations
+
+import json
+from functools import partial
+from typing import Annotated
+
+import typer
+
+from experiments.commands.console import FAILED_RUN, CaseProgress, clear_errors, fail, messages
+from experiments.commands.early import check_study_file
+from experiments.commands.options import (
+    AsJson,
+    Cluster,
+    Device,
+    DryRun,
+    EngineName,
+    Out,
+    Scale,
+    Scheduler,
+    StudyFile,
+    assignments,
+)
+from experiments.commands.plans import show_plan
+from experiments.commands.results import print_measured, print_narrowness
+
+HEAP_EXAMPLE = "Example: [bold]dem-warp heap --scale bench --set E=0.48 --set F=0.45 --seed 7 --frames 40[/]"
+
+LEAST_FRAMES, MOST_FRAMES = 2, 1000
+
+
+def heap(
+    study: StudyFile = None,
+    settings: Annotated[
+        list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="Value of a factor.")
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of sizes, places and orientations.")] = 1,
+    scene: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="A further scene of the study, \\[response-scene.NAME]."),
+    ] = None,
+    frames: Annotated[
+        int | None,
+        typer.Option(
+            min=LEAST_FRAMES,
+            max=MOST_FRAMES,
+            metavar="N",
+            help="Keep N frames of the whole test: frames/*.pvd for ParaView and OVITO (spheres; grains with "
+            "orientation, velocity and spin; contacts with their forces; each wall), and a film.",
+        ),
+    ] = None,
+    movie: Annotated[
+        str | None, typer.Option(metavar="KIND", help="Film of the frames: gif or mp4. Left out: gif.")
+    ] = None,
+    out: Out = None,
+    scale: Scale = None,
+    device: Device = None,
+    scheduler: Scheduler = None,
+    cluster: Cluster = None,
+    engine: EngineName = None,
+    dry_run: DryRun = False,
+    as_json: AsJson = False,
+) -> None:
+    """Simulate one heap: heap.vtp (ParaView, OVITO), angle.json, and snapshot.png with the fitted flanks.
+
+    snapshot-clean.png is the same picture without them, to be shown or measured again. A study of a hopper, a
+    drum or a draw-down gives what that test measures instead of the angle; so does --scene with a further
+    scene of the study.
+    """
+    with clear_errors():
+        check_study_file(study, scale, engine)
+        from experiments.cases import open_workers, require_unused, simulate_heap, with_engine, write_heap
+        from experiments.cases.movie import MOVIES, require_movie
+        from experiments.runs.choices import chosen_resources, chosen_study, default_folder, resources_for
+        from experiments.studyfile.campaign import TARGET_SCENE
+
+        require_movie(movie, frames)
+        resources, place = chosen_resources(device, 1, scheduler, cluster), scene or TARGET_SCENE
+        chosen = with_engine(chosen_study(study, scale, resources), engine)
+        values = chosen.natural_settings(assignments(settings or []), "--set")
+        folder, resources = (
+            out or default_folder(chosen, f"{scene or 'heap'}-{seed}"),
+            resources_for(chosen, resources),
+        )
+        if dry_run:
+            from experiments.runs.plan import plan_heap
+
+            show_plan(
+                resources,
+                partial(plan_heap, chosen, resources, case=chosen.case(values, seed, place)),
+                as_json,
+            )
+            return
+        require_unused(folder)
+        print_narrowness(chosen)
+        with open_workers(resources) as crew, CaseProgress(scene or "heap") as progress:
+            simulated = simulate_heap(chosen, values, seed, crew, progress, place, frames)
+        write_heap(simulated, folder, movie or MOVIES[0])
+    if as_json:
+        typer.echo(json.dumps(simulated.to_dict(), allow_nan=False))
+    messages.print(f"Files: {folder}")
+    if simulated.reason:
+        fail(f"the case {simulated.result.status}: {simulated.reason}", FAILED_RUN)
+    elif not as_json:
+        print_measured(simulated)

@@ -1,0 +1,57 @@
+"""``--dry-run``: what a command would run, how long, and on what; nothing is written."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from experiments.commands.console import duration, messages, plain
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from experiments.cases import Resources
+    from experiments.cases.workers.speed import Speed
+    from experiments.runs.plan import Plan
+
+
+def show_plan(resources: Resources, planned: Callable[[Speed], Plan], as_json: bool) -> None:
+    """Show the plan of a command on some workers, whose speed is measured where it never was."""
+    from experiments.cases.workers.speed import stored_speed
+    from experiments.runs.plan import measured_speed
+
+    if stored_speed(resources.machine) is None and not resources.submits_jobs:
+        messages.print(f"Measuring the speed of {resources}, once; a minute at most.")
+    plan = planned(measured_speed(resources, measure=not resources.submits_jobs))
+    if as_json:
+        typer.echo(json.dumps(plan.to_dict(), allow_nan=False))
+        return
+    table = Table(title=plain(f"{plan.study}, on {plan.where}"))
+    table.add_column("wave", overflow="fold")
+    for name in ("cases", "at most", "grains", "steps", "time", "time at most"):
+        table.add_column(name, justify="right")
+    for wave in plan.waves:
+        numbers = (f"{wave.cases:,}", f"{wave.most:,}", f"{wave.grains:,}", f"{wave.steps:,}")
+        table.add_row(wave.name, *numbers, duration(wave.seconds), duration(wave.seconds_most))
+    Console(markup=False).print(table)
+    typer.echo(
+        f"In all {plan.cases:,} cases, at most {plan.most:,}: {duration(plan.seconds)}, at most "
+        f"{duration(plan.seconds_most)}"
+    )
+    what = "of each GPU" if plan.on_gpu else "of this machine"
+    if resources.submits_jobs:
+        what = "of the workers"
+    typer.echo(f"Memory {what}: {_bytes(plan.memory)}. Disk: at most {_bytes(plan.disk)}")
+    typer.echo(f"Speed measured on {plan.speed.on}. Nothing was run, nothing was written.")
+
+
+def _bytes(number: float) -> str:
+    for unit in ("B", "kB", "MB", "GB"):
+        if number < 1000.0:
+            return f"{number:.3g} {unit}"
+        number /= 1000.0
+    return f"{number:.3g} TB"

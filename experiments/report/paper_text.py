@@ -1,0 +1,188 @@
+"""Methods paragraph and table of a campaign, to be pasted into a paper."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import pandas as pd
+
+from dem_warp import EDEM, __version__
+from experiments.calibrate.results import Campaign
+from experiments.report.kit.latex import latex_table, latex_text
+from experiments.report.kit.markdown import markdown_table
+from experiments.report.kit.numbers import enumeration, fixed, p_clause, quantity, significant
+from experiments.report.kit.table import Layout, Table, columns, make_table
+from experiments.report.study_facts import study_facts
+from experiments.studyfile import Study
+from experiments.studyfile.campaign import Response
+
+
+@dataclass(frozen=True)
+class Paste:
+    """One text to be copied."""
+
+    name: str
+    title: str
+    text: str
+
+
+def pastes(campaign: Campaign, study: Study, provenance: Mapping[str, Any]) -> list[Paste]:
+    """Write paragraph and table in Markdown and in LaTeX; none before a point was chosen."""
+    if campaign.optimum is None:
+        return []
+    paragraph = methods_paragraph(campaign, study, provenance)
+    return pastes_of(paragraph, paper_table(campaign, study), "contact-parameters")
+
+
+def pastes_of(paragraph: str, table: Table, label: str) -> list[Paste]:
+    """Write a paragraph and a table, which LaTeX knows by a label, in Markdown and in LaTeX."""
+    return [
+        Paste("methods-markdown", "Methods, as Markdown", f"{paragraph}\n"),
+        Paste("methods-latex", "Methods, as LaTeX", f"{latex_text(paragraph)}\n"),
+        Paste("table-markdown", "Table, as Markdown", markdown_table(table)),
+        Paste("table-latex", "Table, as LaTeX (booktabs)", latex_table(table, label)),
+    ]
+
+
+def software(provenance: Mapping[str, Any]) -> str:
+    """Name dem-warp with its version, and its commit where it is known."""
+    commit = provenance.get("commit")
+    return f"dem-warp {__version__}" + (f" (commit {commit})" if commit else "")
+
+
+def methods_paragraph(campaign: Campaign, study: Study, provenance: Mapping[str, Any]) -> str:
+    """Say how the values were found, with the numbers that a referee asks for."""
+    begin = f"The contact parameters were calibrated with {software(provenance)}."
+    sentences = [begin, *simulated_sentences(study)]
+    for part in (_designs, _choice, _verification):
+        sentences += part(campaign, study)
+    lost = len(campaign.failed_cases)
+    sentences.append(
+        f"In all, {len(campaign.cases)} cases were simulated, of which {lost or 'none'} failed or gave no "
+        "measurement."
+    )
+    return " ".join(sentences)
+
+
+def paper_table(campaign: Campaign, study: Study) -> Table:
+    """Lay out ranges and values as a paper prints them."""
+    optimum = campaign.optimum
+    if optimum is None:
+        raise ValueError("a campaign that chose no point has no values")
+    rows = []
+    for section, factor in zip(study.factor_sections, study.factors, strict=True):
+        calibrated, ranges = factor.name in optimum.point, optimum.region.ranges
+        ends = [significant(float(ranges[end].get(factor.name, float("nan"))), 3) for end in ("low", "high")]
+        rows.append(
+            {
+                "parameter": section.label,
+                "symbol": factor.name,
+                "unit": factor.unit or "1",
+                "explored": f"{factor.low:g} to {factor.high:g}",
+                "value": significant(optimum.settings[factor.name], 3),
+                "compatible": " to ".join(ends) if calibrated else "not calibrated",
+            }
+        )
+    shown: Layout = [
+        *("parameter", "symbol", "unit"),
+        *columns(explored="range explored", value="value", compatible="compatible range"),
+    ]
+    level = fixed(100.0 * campaign.settings.optimum.confidence, 0)
+    note = (
+        f"Compatible: fit and target agree at the {level} % level. Not every combination of compatible "
+        "values is compatible."
+    )
+    caption = "Contact parameters, as calibrated."
+    return make_table("paper", pd.DataFrame(rows), shown, caption, note)
+
+
+def simulated_sentences(study: Study) -> Iterator[str]:
+    """Say what was simulated, and how its heaps were measured."""
+    facts, density = study_facts(study), str(study.document["grain"].get("density", "as in the study"))
+    test = facts.get("Test", f"a lifted cylinder ({facts.get('Tube')}; lifted at {facts.get('Lift')})")
+    yield f"The test was {test}, with {facts['Grains']} (density {_units(density)})."
+    modulus = facts["Shear modulus"]
+    softened = "was not softened" if modulus == "real" else f"was {modulus}"
+    laws = "Hertz and Mindlin's law without slip, with EDEM's damping and rolling friction"
+    if study.solver.laws != EDEM:
+        laws = f"the laws of {facts['Contact laws']}"
+    yield (
+        f"Contacts followed {laws}; the shear modulus {softened}, and the time step was {facts['Time step']}."
+    )
+    yield f"The repose angle was read with the {facts['Angle']}."
+
+
+def _designs(campaign: Campaign, study: Study) -> Iterator[str]:
+    screening, selection, climb = campaign.screening, campaign.selection, campaign.climb
+    if screening is None or selection is None or climb is None or campaign.surface is None:
+        return
+    kind = campaign.settings.screening.design.replace("-", " ").title().replace(" ", "–")
+    yield (
+        f"A {kind} design of {len(screening.design.coded)} runs, {len(screening.cases)} cases, screened "
+        f"{len(campaign.factors)} parameters."
+    )
+    labels = {section.name: section.label for section in study.factor_sections}
+    kept = enumeration(labels[name] for name in selection.kept)
+    yield f"A path of steepest ascent of {len(climb.path)} steps along {kept} led towards the target."
+    fit = campaign.surface.leading
+    yield (
+        f"A central composite design of {len(campaign.surface.design.coded)} runs gave a quadratic response "
+        f"surface, reduced by backward elimination (R² = {fixed(fit.reduced.r2, 2)}, predicted R² = "
+        f"{fixed(fit.reduced.r2_predicted, 2)}; lack of fit p "
+        f"{p_clause(fit.full.anova['p']['lack of fit'])})."
+    )
+
+
+def _choice(campaign: Campaign, study: Study) -> Iterator[str]:
+    optimum, target = campaign.optimum, campaign.target
+    if optimum is None or target is None:
+        return
+    units = {factor.name: factor.unit for factor in campaign.factors}
+    labels = {section.name: section.label for section in study.factor_sections}
+    values = enumeration(
+        f"{labels[name]} {significant(value, 3)} {units[name]}".rstrip()
+        for name, value in optimum.point.items()
+    )
+    source = "simulated with hidden values" if target.truth else "measured"
+    aims = enumeration(
+        f"{_words(one)} {_sample(target.responses[one.name], one)}, {source}" for one in campaign.responses
+    )
+    share = fixed(100.0 * optimum.region.fraction, 0)
+    yield f"The target was {aims}."
+    yield (
+        f"The calibrated values are {values}; {share} % of the settings explored agree with the target at "
+        f"the {fixed(100.0 * campaign.settings.optimum.confidence, 0)} % level."
+    )
+
+
+def _verification(campaign: Campaign, study: Study) -> Iterator[str]:
+    if campaign.verification is None:
+        return
+    for response in campaign.responses:
+        test, unit = campaign.verification.responses[response.name], response.unit
+        level, ends = fixed(100.0 * (1.0 - test.alpha), 0), [quantity(end, unit) for end in test.interval]
+        yield (
+            f"Fresh cases at these values gave {_words(response)} {_sample(test.a, response)}: a difference "
+            f"of {quantity(test.difference, unit)} ({level} % interval {' to '.join(ends)}; Welch's t-test, "
+            f"p {p_clause(test.p)}; two one-sided tests of equivalence within ± "
+            f"{quantity(test.margin, unit)}, p {p_clause(test.equivalence_p)})."
+        )
+
+
+def _units(text: str) -> str:
+    return text.replace("^2", "²").replace("^3", "³")
+
+
+def _sample(sample: Any, response: Response) -> str:
+    return (
+        f"{quantity(sample.mean, response.unit)} (standard deviation {quantity(sample.sd, response.unit)}, "
+        f"n = {sample.n})"
+    )
+
+
+def _words(response: Response) -> str:
+    return (
+        "a repose angle of" if response.observable == "angle" else f"a {response.name.replace('_', ' ')} of"
+    )

@@ -1,0 +1,43 @@
+"""The verdict of a campaign in words; the numbers behind it stand once, below it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from experiments.calibrate.results import Campaign, Outcome
+from experiments.report.kit.numbers import enumeration
+
+HEADLINES = {
+    Outcome.CALIBRATED: "Calibrated",
+    Outcome.NOT_TOLD_APART: "Not told apart",
+    Outcome.MISSED: "Target missed",
+    Outcome.NO_SIGNIFICANT_FACTOR: "No significant factor",
+    Outcome.TARGET_NOT_REACHED: "Target not reached",
+    Outcome.PLATEAU: "Plateau before the target",
+    Outcome.NO_CONTOUR: "No setting gives the target",
+    Outcome.TOO_MANY_FAILED_RUNS: "Too many failed runs",
+}
+"""Outcomes in a few words."""
+
+
+def verdict_sentence(campaign: Campaign) -> str:
+    """Say how a campaign ended; one that ended before its verification with its own reason."""
+    if campaign.verification is None:
+        return campaign.reason
+    tests = campaign.verification.responses
+    if missed := [name for name, test in tests.items() if test.different]:
+        return f"Fresh cases with the values below miss the target of {_words(missed)}."
+    open_ones = [name for name, test in tests.items() if not test.equivalent]
+    if open_ones:
+        return (
+            f"Fresh cases with the values below do not differ from the target, but they are too few, or "
+            f"scatter too much, to show that {_words(open_ones)} lies within its margin: add replicates."
+        )
+    return (
+        f"Fresh cases with the values below agree with the target of {_words(tests)}: no difference is "
+        "found, and what may be left of one is shown to lie within the margin."
+    )
+
+
+def _words(names: Iterable[str]) -> str:
+    return enumeration(name.replace("_", " ") for name in names)

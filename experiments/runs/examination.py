@@ -1,0 +1,145 @@
+"""An examination of the machine: what it has, what works, and what a run would use."""
+
+from __future__ import annotations
+
+import os
+import platform
+import tempfile
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import warp as wp
+
+from dem_warp import __version__, simulate
+from dem_warp.device import resolve_device
+from experiments.cases import Resources
+from experiments.cases.workers.opening import EXTRA, missing_libraries
+from experiments.cases.workers.speed import Speed, few_spheres, stored_speed
+from imaging.opengl import opengl_works
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that was looked at."""
+
+    name: str
+    good: bool
+    text: str
+    needed: bool = False
+    """True of what no case can be simulated without."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything as JSON-able data."""
+        return asdict(self)
+
+
+def examine(resources: Resources) -> list[Finding]:
+    """Look at everything that simulates or draws, and try both on a small heap."""
+    resolve_device(None)
+    versions = f"dem-warp {__version__}, Warp {wp.__version__}, Python {platform.python_version()}"
+    speed = stored_speed(resources.machine)
+    return [
+        Finding("versions", True, versions),
+        *_gpus(),
+        Finding("cores", True, f"{cores()} for this process, {_processor()}"),
+        _memory(),
+        _kernels(),
+        _tried("simulation", _simulates, needed=True),
+        _opengl(),
+        _dask(),
+        Finding("will be used", True, _used(resources)),
+        Finding("speed", speed is not None, _speed_text(speed)),
+    ]
+
+
+def _used(resources: Resources) -> str:
+    scale = "paper" if resources.on_gpu else "bench"
+    return f"{resources}, {resources.count} at once; the paper's study at the scale {scale}"
+
+
+def cores() -> int:
+    """Cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def _gpus() -> list[Finding]:
+    gpus = wp.get_cuda_devices()
+    if not gpus:
+        return [Finding("GPU", False, "no NVIDIA GPU with a CUDA driver: cases run on the CPU")]
+    driver = ".".join(map(str, wp.get_cuda_driver_version() or ("unknown",)))
+    found = []
+    for gpu in gpus:
+        free, there = gpu.free_memory / 1e9, gpu.total_memory / 1e9
+        text = f"{gpu.name}, {free:.3g} of {there:.3g} GB free, driver {driver}"
+        found.append(Finding(str(gpu.alias), True, text))
+    return found
+
+
+def _processor() -> str:
+    return platform.processor() or platform.machine()
+
+
+def _memory() -> Finding:
+    try:
+        page = os.sysconf("SC_PAGE_SIZE")
+        there, free = (page * os.sysconf(name) / 1e9 for name in ("SC_PHYS_PAGES", "SC_AVPHYS_PAGES"))
+    except (AttributeError, ValueError, OSError):
+        return Finding("memory", True, "this system does not tell")
+    return Finding("memory", True, f"{there:.3g} GB, {free:.3g} GB of it unused")
+
+
+def _kernels() -> Finding:
+    """See to it that compiled kernels can be kept."""
+    folder = Path(str(wp.config.kernel_cache_dir))
+    size = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file()) / 1e6
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        return Finding("kernels' cache", False, f"{folder}: {error.strerror or error}", needed=True)
+    return Finding("kernels' cache", True, f"{folder}, {size:.0f} MB", needed=True)
+
+
+def _tried(name: str, what: Callable[[], str], needed: bool = False) -> Finding:
+    """Try something; whatever it raises is what is found."""
+    try:
+        return Finding(name, True, what(), needed)
+    except Exception as error:
+        return Finding(name, False, f"{type(error).__name__}: {error}".splitlines()[0], needed)
+
+
+def _simulates() -> str:
+    [result] = simulate([few_spheres()], workers=1)
+    if result.status != "finished":
+        raise RuntimeError(f"a heap of 30 spheres {result.status}: {result.reason}")
+    return f"a heap of 30 spheres on {result.provenance['device']} came to rest"
+
+
+def _opengl() -> Finding:
+    if opengl_works():
+        return Finding("OpenGL", True, "draws off screen")
+    return Finding("OpenGL", False, "does not draw off screen: silhouettes are drawn without it, more slowly")
+
+
+def _dask() -> Finding:
+    if missing := missing_libraries():
+        return Finding(
+            "clusters", False, f"no {', '.join(missing)}: {EXTRA} adds workers on several GPUs or nodes"
+        )
+    import distributed
+
+    return Finding("clusters", True, f"dask.distributed {distributed.__version__}")
+
+
+def _speed_text(speed: Speed | None) -> str:
+    if speed is None:
+        return "never measured: --measure does, and so does the first --dry-run"
+    return (
+        f"{1e6 * speed.step:.3g} us a step and {1e9 * speed.sphere_step:.3g} ns a sphere beyond, "
+        f"{speed.start:.2g} s to start; measured {speed.on}"
+    )

@@ -1,0 +1,82 @@
+"""``[cluster]``: workers that are started for a run, in a study or in a profile of its own."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field, field_validator
+
+from experiments.studyfile.places import Places
+from experiments.studyfile.schema import Section, Time, validated
+from experiments.toml_files import read_toml
+
+_MEMORY = re.compile(r"\d+(\.\d+)? ?[kMGT]i?B")
+_LINE = re.compile(r"[^\n\r\0]*")
+
+
+class ClusterSection(Section):
+    """``[cluster]``: workers of Dask, on this machine or as jobs of a scheduler; one a GPU, or one a core."""
+
+    kind: Literal["local", "slurm", "pbs", "lsf", "sge", "oar", "htcondor"] = "local"
+    """Where they run: processes of this machine, or jobs of a scheduler."""
+    workers: int | None = Field(default=None, ge=1)
+    """Workers in all; left out: of this machine one a GPU or else one a core, of a scheduler one."""
+    gpu: bool | None = None
+    """Each worker has a GPU; left out: on this machine where there is one, in jobs not."""
+    workers_per_job: int = Field(default=1, ge=1)
+    """Workers of a job."""
+    cores: int = Field(default=1, ge=1)
+    """Cores of a worker that a job asks for; a worker on a CPU uses one, one with a GPU about two."""
+    memory: str = "4 GB"
+    """Memory of a worker that a job asks for."""
+    walltime: Annotated[Time, Field(ge=60.0)] = 14400.0
+    """Time limit of a job; one that reaches it is submitted again while there is work."""
+    queue: str | None = None
+    """Queue or partition."""
+    account: str | None = None
+    """Account that is charged."""
+    directives: tuple[str, ...] = ()
+    """Further options of the scheduler, a line of the job's head each, as "--constraint=h200"."""
+    prologue: tuple[str, ...] = ()
+    """Shell commands of a job before its worker starts, as "module load cuda"."""
+    python: str | None = None
+    """Python that has dem-warp on the nodes; left out: the one that runs this."""
+    interface: str | None = None
+    """Network interface that nodes reach each other by, as "ib0"."""
+    shared: str = "~/.dem-warp"
+    """Folder that all nodes see, for what jobs print and for the certificates of this run's connections."""
+
+    @field_validator("memory")
+    @classmethod
+    def _is_a_size(cls, memory: str) -> str:
+        if not _MEMORY.fullmatch(memory):
+            raise ValueError('must be a size with its unit, as "4 GB"')
+        return memory
+
+    @field_validator("directives", "prologue")
+    @classmethod
+    def _are_lines(cls, lines: tuple[str, ...]) -> tuple[str, ...]:
+        if broken := [line for line in lines if not _LINE.fullmatch(line)]:
+            raise ValueError(f"must be one line each (not {broken[0]!r})")
+        return lines
+
+
+class Profile(Section):
+    """A file with a ``[cluster]`` and nothing beside."""
+
+    cluster: ClusterSection
+    """The cluster."""
+
+
+def read_profile(path: Path) -> ClusterSection:
+    """Read a profile: a TOML file whose one section is ``[cluster]``.
+
+    Raises
+    ------
+    StudyError
+        When it cannot be read or breaks a rule.
+    """
+    text, document = read_toml(path, "a profile of a cluster")
+    return validated(Profile, document, Places.read(path, text)).cluster

@@ -1,0 +1,161 @@
+"""What is said before anything runs: ``--dry-run``, the time left, and ``dem-warp doctor``."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+import warp as wp
+from commandline import dem_warp
+
+from dem_warp import Progress
+from experiments import api
+from experiments.cases import OwnWorkers
+from experiments.cases.cost import Cost
+from experiments.cases.workers.speed import Speed, store_speed, stored_speed, user_folder, wave_seconds
+from experiments.cases.workers.wave import WaveProgress
+from experiments.commands.console import describe_progress
+
+Write = Callable[..., Path]
+
+SPEED = Speed(step=1.0e-4, sphere_step=1.0e-6, start=2.0, on="2026-01-02, 2 workers")
+
+TRIAL = Path(api.__file__).parent / "studies" / "trial" / "study.toml"
+
+
+@pytest.fixture(autouse=True)
+def _own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A user's folder of the test's own, with the speed of this machine in it."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    for workers in (1, 2):
+        store_speed(OwnWorkers("cpu", workers).machine, SPEED)
+
+
+# ---- speed -------------------------------------------------------------------------------------------------
+
+
+def test_a_wave_takes_what_its_workers_share_and_no_less_than_its_longest_case() -> None:
+    small, large = Cost(10, 100, 1000.0), Cost(10, 900, 10000.0)
+    one = 1000.0 * 2.0e-4
+    assert wave_seconds([small] * 8, SPEED, 2, on_gpu=False) == pytest.approx(2.0 + 4 * one)
+    assert wave_seconds([small, large], SPEED, 2, on_gpu=False) == pytest.approx(2.0 + 10000.0 * 1.0e-3)
+    # On a GPU all worlds of a launch take their steps together.
+    assert wave_seconds([small] * 8, SPEED, 1, on_gpu=True) == pytest.approx(2.0 + 1000.0 * 9.0e-4)
+    assert wave_seconds([], SPEED, 1, on_gpu=True) == 0.0
+
+
+def test_speeds_are_stored_for_each_machine_and_a_damaged_file_is_none() -> None:
+    store_speed("another", SPEED)
+    assert stored_speed("another") == SPEED
+    assert stored_speed("never seen") is None
+    (user_folder() / "speeds.json").write_text('{"another": {"step": 1}', encoding="utf-8")
+    assert stored_speed("another") is None
+
+
+def test_the_time_left_is_told_before_the_first_case_has_ended() -> None:
+    begun = WaveProgress(0, 10, 0.0, {"waiting": 10}, 4.0, expected=100.0)
+    assert describe_progress(begun).startswith("1 min 36 s left")
+    # What was expected has passed, and nothing shows yet.
+    late = WaveProgress(0, 10, 0.0, {"fill": 2}, 200.0, expected=100.0)
+    assert describe_progress(late).startswith("10 s left")
+    # Once well begun, the speed so far counts alone.
+    half = WaveProgress(5, 10, 0.5, {"lift": 2}, 300.0, expected=100.0)
+    assert describe_progress(half).startswith("5 min 0 s left")
+    assert "left" not in describe_progress(Progress(0, 10, 0.0, {}, 4.0))
+
+
+# ---- plans -------------------------------------------------------------------------------------------------
+
+
+def planned(*words: object) -> dict:
+    code, out, err = dem_warp(*words, "--device", "cpu", "--workers", 2, "--dry-run", "--json")
+    assert code == 0, err
+    return json.loads(out)
+
+
+def test_a_calibration_is_planned_and_nothing_is_written(write_study: Write, tmp_path: Path) -> None:
+    study, out = write_study(), tmp_path / "out"
+    plan = planned("calibrate", study, "--out", out)
+    assert not out.exists()
+    waves = {wave["name"]: wave for wave in plan["waves"]}
+    # Five replicates and eight runs of the screening; six steps twice, once or twice over; a line of two
+    # points with five at its centre; five fresh cases.
+    assert waves["target, noise floor, screening"]["cases"] == 5 + 8
+    assert (waves["climb"]["cases"], waves["climb"]["most"]) == (12, 24)
+    assert waves["verification"]["cases"] == 5
+    assert waves["climb"]["grains"] == waves["climb"]["spheres"] == 30
+    assert plan["cases"] == sum(wave["cases"] for wave in plan["waves"])
+    seconds = SPEED.start + 12 / 2 * waves["climb"]["steps"] * (SPEED.step + 30 * SPEED.sphere_step)
+    assert waves["climb"]["seconds"] == pytest.approx(seconds, rel=0.01)
+    assert plan["memory"] > 1e8
+    assert plan["disk"] > 0
+
+
+def test_a_plan_reads_well(write_study: Write, tmp_path: Path) -> None:
+    code, out, _ = dem_warp("calibrate", write_study(), "--device", "cpu", "--workers", 2, "--dry-run")
+    assert code == 0
+    assert "verification" in out
+    assert "Nothing was run" in out
+    assert "Speed measured on 2026-01-02, 2 workers" in " ".join(out.split())
+
+
+def test_a_search_is_planned(tmp_path: Path) -> None:
+    plan = planned("discover", TRIAL, "--scale", "bench", TRIAL.with_name("tilted-bench.csv"))
+    assert [wave["name"] for wave in plan["waves"]] == ["fresh runs"], "the bank ships with the study"
+    assert 0 < plan["cases"] < plan["most"]
+
+
+def test_a_heap_is_planned_with_its_settings(write_study: Write) -> None:
+    plan = planned_heap(write_study())
+    assert plan["cases"] == plan["most"] == 1
+
+
+def planned_heap(study: Path) -> dict:
+    code, out, err = dem_warp("heap", study, "--set", "E=0.3", "--device", "cpu", "--dry-run", "--json")
+    assert code == 0, err
+    return json.loads(out)
+
+
+def test_jobs_are_not_submitted_for_a_plan(write_study: Write, tmp_path: Path) -> None:
+    profile = tmp_path / "cluster.toml"
+    profile.write_text('[cluster]\nkind = "slurm"\nworkers = 4\nqueue = "main"\n', encoding="utf-8")
+    words = ("calibrate", write_study(), "--cluster", profile, "--dry-run")
+    code, _, err = dem_warp(*words)
+    assert code == 2
+    assert "dem-warp doctor --measure" in " ".join(err.split())
+    store_speed("slurm, queue main, CPU", SPEED)
+    code, out, _ = dem_warp(*words)
+    assert code == 0
+    assert "4 workers of slurm" in out
+
+
+# ---- doctor ------------------------------------------------------------------------------------------------
+
+
+def test_the_doctor_tells_what_there_is() -> None:
+    code, out, err = dem_warp("doctor", "--device", "cpu", "--workers", 2, "--json")
+    assert code == 0, err
+    found = {finding["name"]: finding for finding in json.loads(out)}
+    for name in ("versions", "cores", "memory", "kernels' cache", "simulation", "OpenGL", "clusters"):
+        assert name in found
+    assert found["simulation"]["good"]
+    assert found["will be used"]["text"].startswith("cpu, 2 at once")
+    assert "100 us a step" in found["speed"]["text"]
+
+
+def test_the_doctors_exit_code_tells_that_nothing_can_be_simulated(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").write_text("in the way", encoding="utf-8")
+    monkeypatch.setattr(wp.config, "kernel_cache_dir", str(tmp_path / "file" / "cache"))
+    code, out, _ = dem_warp("doctor", "--device", "cpu")
+    assert code == 1
+    assert "FAIL kernels' cache" in out
+
+
+def test_a_device_that_is_not_there_ends_with_2() -> None:
+    code, _, err = dem_warp("doctor", "--device", "cuda:7")
+    assert code == 2
+    assert "--device" in err
