@@ -11,7 +11,7 @@ import pytest
 
 from dem_warp import Drum, Interaction, WallPart
 from doe.discrepancy import Point
-from experiments.cases import Store, run_cases
+from experiments.cases import OwnWorkers, Store, run_cases
 from experiments.discover.engine import EngineSimulator
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.search import Search
@@ -50,7 +50,8 @@ def test_a_drum_is_searched_with_what_a_laboratory_measures_of_it(drum: Study, t
     assert [each.name for each in drum.scene.measurable] == MEASURABLE
     search = Search.of(drum)
     assert "plate_tilt" not in search.space.names  # a drum has no plate
-    with EngineSimulator(drum, search.library, OutcomeTable(tmp_path / "o.sqlite"), "cpu", 1) as simulator:
+    table = OutcomeTable(tmp_path / "o.sqlite")
+    with EngineSimulator(drum, search.library, table, OwnWorkers("cpu", 1)) as simulator:
         assert list(simulator.observables) == MEASURABLE
         points = [Point((0.4,), (), name, 1) for name in ("base", "fast")]
         found = simulator(points)
@@ -145,7 +146,7 @@ def test_several_tests_of_one_grain_are_simulated_in_one_campaign(
     study = load_study(write_study((TUBE, DRUM), (ANGLE, ""), add=SEVERAL))
     assert study.target.leading.observable == "dynamic_angle"
     table = pd.DataFrame({"seed": [1, 2, 3], "scene": ["target", "bin", "box"], "E": [0.4] * 3})
-    cases = run_cases(study, table, Store(tmp_path), "cpu", 1)
+    cases = run_cases(study, table, Store(tmp_path), OwnWorkers("cpu", 1))
     assert cases["status"].tolist() == ["finished"] * 3
     assert np.isfinite([cases["dynamic_angle"][0], cases["mass_left"][1], cases["filled_mass"][2]]).all()
 
