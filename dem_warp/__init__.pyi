@@ -6,9 +6,9 @@ from .frames import Film, Frame, simulate_frames
 from .laws.conventions import EDEM, PRESETS, RELATIVE, ContactLaws, laws_named
 from .laws.library import MECHANISMS
 from .laws.mechanism import Mechanism
-from .materials import Interaction, Material, effective_moduli, rayleigh_time
+from .materials import Interaction, Material, WallPart, effective_moduli, rayleigh_time
 from .parameters import Parameter
-from .population import GrainPopulation, ShapeMixture
+from .population import GrainPopulation, ShapeMixture, SizeClasses
 from .result import CaseResult, Progress
 from .scenes.draw_down import DrawDown
 from .scenes.drum import Drum
@@ -42,6 +42,8 @@ __all__ = [
     "Parameter",
     "Progress",
     "ShapeMixture",
+    "SizeClasses",
+    "WallPart",
     "__version__",
     "effective_moduli",
     "laws_named",

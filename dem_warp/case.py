@@ -5,9 +5,9 @@ from typing import Annotated, Any, Generic, Literal, TypeVar, get_args
 
 from dem_warp.laws.conventions import EDEM, ContactLaws
 from dem_warp.laws.mechanism import Mechanism, check_forms
-from dem_warp.materials import Interaction, Material, rayleigh_time
+from dem_warp.materials import Interaction, Material, WallPart, rayleigh_time
 from dem_warp.model import ContactCoefficients
-from dem_warp.parameters import Parameter, check_parameters
+from dem_warp.parameters import LATER, Parameter, check_parameters
 from dem_warp.population import GrainPopulation
 from dem_warp.scenes.scene import Scene
 
@@ -53,9 +53,15 @@ class Case(Generic[SceneT]):
     change the last bits: its code is compiled in."""
     laws: ContactLaws = EDEM
     """Conventions of the contact law."""
+    wall_parts: tuple[WallPart, ...] = field(default=(), metadata=LATER)
+    """Walls of another material than the rest, by the names that the scene has for them."""
 
     def __post_init__(self) -> None:
         check_forms(tuple(type(mechanism) for mechanism in self.mechanisms), self.laws.forms)
+        names = [part.name for part in self.wall_parts]
+        _require(len(set(names)) == len(names), "Case.wall_parts", "must name each part once", names)
+        if names:
+            self.scene.check_parts(names)
         _require(0 <= self.seed < 2**63, "Case.seed", "must be an integer from 0 to 2^63 - 1", self.seed)
 
     @property
@@ -81,19 +87,24 @@ class Case(Generic[SceneT]):
     def contacts(self, wall_material: Material) -> tuple[ContactCoefficients, ContactCoefficients]:
         """Contacts of grains with grains, and with walls of a material."""
         grain = self.grain_material
-        pairs = (("grains", grain, self.grain_grain), ("walls", wall_material, self.grain_wall))
-        first, second = (
-            ContactCoefficients.of_pair(
-                grain,
-                partner,
-                interaction,
-                self.laws,
-                tuple(m for m in self.mechanisms if m.acts_between(kind)),
-                *self._reduced(kind),
-            )
-            for kind, partner, interaction in pairs
+        return (
+            self._contact("grains", grain, self.grain_grain),
+            self._contact("walls", wall_material, self.grain_wall),
         )
-        return first, second
+
+    def contact_with(self, part: WallPart) -> ContactCoefficients:
+        """Contact of grains with a part of the walls."""
+        return self._contact("walls", part.material, part.surface)
+
+    def _contact(self, kind: str, partner: Material, interaction: Interaction) -> ContactCoefficients:
+        return ContactCoefficients.of_pair(
+            self.grain_material,
+            partner,
+            interaction,
+            self.laws,
+            tuple(m for m in self.mechanisms if m.acts_between(kind)),
+            *self._reduced(kind),
+        )
 
     def _reduced(self, kind: str) -> tuple[float, float]:
         """Reduced radius [m] and mass [kg] of a pair of the largest spheres, of grains of middle size."""
@@ -126,7 +137,8 @@ def _plain(value: Any) -> Any:
     if hasattr(value, "to_dict") and not isinstance(value, Case):
         return value.to_dict()
     if is_dataclass(value) and not isinstance(value, type):
-        return {f.name: _plain(getattr(value, f.name)) for f in fields(value)}
+        told = ((f, getattr(value, f.name)) for f in fields(value))
+        return {f.name: _plain(own) for f, own in told if not (f.metadata == LATER and own == f.default)}
     return value
 
 

@@ -140,6 +140,11 @@ class ClumpShape:
             drawn.centers * scale, drawn.radii * scale, self.volume, drawn.inertia_over_mass * scale**2
         )
 
+    def scaled(self, scale: float) -> "ClumpShape":
+        """Return the shape larger by a factor, in the same frame."""
+        moments = self.inertia_over_mass * scale**2
+        return ClumpShape(self.centers * scale, self.radii * scale, self.volume * scale**3, moments)
+
     @classmethod
     def read(cls, path: str | Path) -> "ClumpShape":
         """Read spheres, one a line: ``x y z r`` in mm; ``#`` starts a comment.

@@ -70,6 +70,18 @@ class Interaction:
             _require(math.isfinite(value) and value >= 0.0, "finite and 0 or more", name, value)
 
 
+@dataclass(frozen=True)
+class WallPart:
+    """Walls of one name that are of another material than the rest."""
+
+    name: str
+    """Name that the scene has for them, as ``"ends"`` of a drum."""
+    material: Material
+    """Their material."""
+    surface: Interaction
+    """Contact of grains with them."""
+
+
 def rayleigh_time(radius: float, material: Material) -> float:
     """Time that a Rayleigh wave takes to cross a sphere's half circumference.
 

@@ -16,6 +16,11 @@ UNITS = (
 """Units that a parameter may have; a study file knows a dimension for each."""
 
 
+LATER = {"later": True}
+"""Metadata of a field that came after cases had keys: at its default a case does not tell of it, so that its
+key stays."""
+
+
 @dataclass(frozen=True)
 class Parameter:
     """Unit and bounds of a number, which is finite in any case.

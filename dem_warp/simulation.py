@@ -124,6 +124,7 @@ def batches(cases: Sequence[Case], one_each: bool) -> list[list[int]]:
     for i, case in enumerate(cases):
         mechanisms = frozenset(mechanism.name for mechanism in case.mechanisms)
         kind, forms = type(case.scene), case.laws.forms
-        build = (kind, case.numerics.precision, case.grains.sphere_count, mechanisms, forms)
+        parts = len(case.wall_parts)
+        build = (kind, case.numerics.precision, case.grains.sphere_count, mechanisms, forms, parts)
         groups.setdefault(build, []).append(i)
     return list(groups.values())

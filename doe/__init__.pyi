@@ -34,6 +34,7 @@ from .noise import (
     variance_ratio,
 )
 from .optimum import StationaryPoint
+from .profiles import Mode, ProfileSample
 from .region import Region
 from .sample import Sample
 from .screening import ScreenResult, aliases, screen
@@ -60,7 +61,9 @@ __all__ = [
     "JointFit",
     "LinearFit",
     "Mixture",
+    "Mode",
     "NoiseFloor",
+    "ProfileSample",
     "Region",
     "RobustTable",
     "Sample",

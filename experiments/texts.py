@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import difflib
 import re
 from pathlib import Path
 
@@ -77,3 +78,9 @@ def delimiter_of(line: str) -> str | None:
         if len(cells) > 1 and all(is_number(cell, delimiter) for cell in cells):
             return delimiter
     return None
+
+
+def nearest_name(name: str, known: list[str]) -> str:
+    """Suggest what a misspelt name may have meant, as the end of a sentence."""
+    near = difflib.get_close_matches(name, known, n=1)
+    return f"did you mean {near[0]!r}?" if near else f"known: {', '.join(known) or 'none'}"

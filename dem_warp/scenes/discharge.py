@@ -9,6 +9,7 @@ import numpy as np
 
 from dem_warp.case import Case
 from dem_warp.model import WorldSetup
+from dem_warp.scenes.averages import mean_over_time
 from dem_warp.scenes.poured_controller import UNREST, Phase, PouredController
 from dem_warp.scenes.scene import Course, Decision, Observable
 from dem_warp.scenes.surfaces import LEAST_POINTS, slope
@@ -27,6 +28,11 @@ DISCHARGE_OBSERVABLES = {
         "kg/s",
         "slope of the least-squares line of the mass fallen over time, from 20 to 70 % of all that falls; "
         "absent where fewer than three looks fall in between, and where the test failed",
+    ),
+    "flow_rate_se": Observable(
+        "kg/s",
+        "standard error of the mean flow of that part, which knows how long the flow remembers; absent where "
+        "fewer than four looks fall in between",
     ),
     "clogged": Observable(
         "1", "1: grains rest over the middle of the outlet, or none came out; 0: the way is free"
@@ -51,10 +57,22 @@ class Discharge(Course):
     @property
     def flow_rate(self) -> float | None:
         """Rate of the steady part [kg/s]; None where too few looks show it."""
-        time, mass = np.array(self.fallen).T
-        low, high = np.array(STEADY) * mass[-1]
-        within = (mass >= low) & (mass <= high)
-        return slope(time[within], mass[within]) if within.sum() >= LEAST_POINTS else None
+        time, mass = self._steady
+        return slope(time, mass) if len(mass) >= LEAST_POINTS else None
+
+    @property
+    def flow_rate_se(self) -> float | None:
+        """Standard error of the mean flow of the steady part [kg/s]; None where too few looks show it."""
+        time, mass = self._steady
+        mean = mean_over_time(np.diff(mass) / np.diff(time))
+        return mean.standard_error if mean else None
+
+    @property
+    def _steady(self) -> np.ndarray:
+        """Time and mass of the looks of the steady part, (2, k)."""
+        looks = np.array(self.fallen).T
+        low, high = np.array(STEADY) * looks[1, -1]
+        return looks[:, (looks[1] >= low) & (looks[1] <= high)]
 
 
 class DischargeController(PouredController[Discharge]):
@@ -152,4 +170,6 @@ class DischargeController(PouredController[Discharge]):
         seen |= self.measure(view)
         if (rate := self.course.flow_rate) is not None:
             seen["flow_rate"] = rate
+        if (error := self.course.flow_rate_se) is not None:
+            seen["flow_rate_se"] = error
         return ""

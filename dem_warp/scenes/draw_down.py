@@ -65,6 +65,8 @@ class DrawDown(PouredScene):
         }
     )
 
+    part_names = (("base",), ("box",), ("box",))
+
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.slot >= self.width:

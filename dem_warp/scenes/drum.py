@@ -3,33 +3,54 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Any, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar, get_args
 
 import numpy as np
 
 from dem_warp.case import Case
 from dem_warp.materials import Material
 from dem_warp.model import GRAVITY, WorldSetup
-from dem_warp.parameters import Parameter
+from dem_warp.parameters import LATER, Parameter
+from dem_warp.scenes.averages import mean_over_time
+from dem_warp.scenes.drum_surface import (
+    STATIONS,
+    DrumView,
+    Picture,
+    SurfaceAngles,
+    bed_volume,
+    half_chord,
+    level_of,
+    surface_angles,
+    surface_heights,
+)
 from dem_warp.scenes.poured_controller import Phase, PouredController
 from dem_warp.scenes.poured_scene import FILL_OBSERVABLES, PouredScene
 from dem_warp.scenes.rain import CrossSection
 from dem_warp.scenes.scene import Course, Decision, Observable
-from dem_warp.scenes.surfaces import profile, slope
 from dem_warp.view import WorldView
 from dem_warp.walls import Cylinder, Disc, Motion, Wall
 
 SHELL, ENDS = 0, (1, 2)
-MOST_FILLED = 0.5
-"""Part of the drum that a rain can fill: above the axis its wall closes over the bed."""
+MOST_FILLED = 0.8
+"""Part of the drum that a rain can fill: higher up its wall closes over the bed."""
 
-SURFACE = 0.8
-"""The slope is fitted over this part of the surface's chord, clear of the drum's wall at both ends."""
+OPEN_FILLED = 0.5
+"""Part that a rain fills across the whole width of the drum."""
+
+HATCH = 0.8
+"""Height above the axis, over the radius, of the hatch that the grains of any other bed fall from."""
+
+FLYING = 0.5
+"""A raining grain that is faster than this part of its first speed has not landed."""
 
 
 @dataclass(frozen=True)
 class Drum(PouredScene):
-    """A horizontal drum, part filled by a rain of grains, turns about its axis, which is along y."""
+    """A drum, part filled by a rain of grains, turns about its axis, which is along y.
+
+    z is up in the cross-section. Where the axis is inclined, gravity is turned instead of the drum: its
+    front, the end at -y, is the lower one.
+    """
 
     diameter: Annotated[float, Parameter("m", above=0.0)]
     """Inner diameter of the drum."""
@@ -45,27 +66,69 @@ class Drum(PouredScene):
     """Revolutions before measuring."""
     revolutions: Annotated[float, Parameter("1", above=0.0)] = 2.0
     """Revolutions while measuring."""
+    inclination: Annotated[float, Parameter("rad", at_least=0.0, below=math.pi / 2)] = field(
+        default=0.0, metadata=LATER
+    )
+    """Inclination of the axis from the horizontal: the front end is the lower."""
+    picture: Picture = field(default="depth", metadata=LATER)
+    """Picture that the slopes are read from: depth, the mean surface over the length of the drum; silhouette,
+    the outline that a camera sees through the front end against a light behind the drum; end, the grains that
+    lie against the front end."""
+    camera_distance: Annotated[float | None, Parameter("m", above=0.0)] = field(default=None, metadata=LATER)
+    """Distance of the camera from the front end, on the axis, of a silhouette; left out: from far away."""
 
     name = "drum"
     wall_names = ("shell", "end-1", "end-2")
-    observables: ClassVar[Mapping[str, Observable]] = FILL_OBSERVABLES | {
-        "dynamic_angle": Observable(
-            "deg",
-            "slope of the least-squares line through the middle 80 % of the surface, mean over time",
-        ),
-        "dynamic_angle_sd": Observable("deg", "standard deviation of that slope from look to look"),
-        "upper_angle": Observable("deg", "the same slope, of the upper half of that part"),
-        "lower_angle": Observable("deg", "the same slope, of the lower half of that part"),
-        "mass_angle": Observable(
-            "deg",
-            "turn of the line from the axis to the bed's centre of mass from the vertical, mean over time",
-        ),
-        "grains_lost": Observable("1", "grains that left the drum"),
-    }
+    observables: ClassVar[Mapping[str, Observable]] = (
+        FILL_OBSERVABLES
+        | {
+            "dynamic_angle": Observable(
+                "deg",
+                "slope of the least-squares line through the middle 80 % of the surface, mean over time",
+            ),
+            "dynamic_angle_sd": Observable("deg", "standard deviation of that slope from look to look"),
+            "dynamic_angle_se": Observable(
+                "deg",
+                "standard error of the mean over time, which knows how long the slope remembers; absent of "
+                "fewer than four looks",
+            ),
+            "dynamic_angle_freedom": Observable(
+                "1", "degrees of freedom of that standard error: an interval takes Student's t of as many"
+            ),
+            "upper_angle": Observable("deg", "the same slope, of the upper half of that part"),
+            "lower_angle": Observable("deg", "the same slope, of the lower half of that part"),
+            "mass_angle": Observable(
+                "deg",
+                "turn of the line from the axis to the bed's centre of mass from the vertical, mean over "
+                "time",
+            ),
+            "mass_angle_se": Observable("deg", "its standard error, as of the other"),
+            "grains_lost": Observable("1", "grains that left the drum"),
+        }
+        | {
+            f"surface_{number}": Observable(
+                "m", f"height of the surface above the axis at x = {place:+g} of the radius, mean over time"
+            )
+            for number, place in enumerate(STATIONS, 1)
+        }
+    )
+    part_names = (("shell",), ("ends", "front"), ("ends", "back"))
     floor = 0.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.picture not in get_args(Picture):
+            known = ", ".join(get_args(Picture))
+            raise ValueError(f"Drum.picture: must be one of {known}, got {self.picture!r}")
+        if self.camera_distance is not None and self.picture != "silhouette":
+            rule = 'must be left out of a picture other than "silhouette"'
+            raise ValueError(f"Drum.camera_distance: {rule}, got {self.camera_distance!r}")
+        if self.is_hatched and self.highest > self.hatch:
+            raise ValueError(
+                f"Drum.filling: must leave the bed at the lower end below {self.hatch:.4g} m, where grains "
+                f"fall in: lower the filling, the inclination or the length, got {self.filling!r} and a bed "
+                f"of {self.highest:.4g} m"
+            )
         if self.froude_number >= 1:
             fastest = self.rotation_rate / math.sqrt(self.froude_number)
             raise ValueError(
@@ -81,14 +144,37 @@ class Drum(PouredScene):
     @property
     def froude_number(self) -> float:
         """Centripetal acceleration of the shell over gravity."""
-        return self.spin**2 * self.diameter / 2 / GRAVITY
+        return self.spin**2 * self.diameter / 2 / (GRAVITY * math.cos(self.inclination))
+
+    @property
+    def gravity(self) -> tuple[float, float, float]:
+        """In the frame of the drum [m/s2]."""
+        return 0.0, -GRAVITY * math.sin(self.inclination), -GRAVITY * math.cos(self.inclination)
+
+    @property
+    def view(self) -> DrumView:
+        """The picture that is taken."""
+        return DrumView(self.diameter / 2, self.length, self.picture, self.camera_distance)
 
     @property
     def brim(self) -> float:
         """Height of a level bed that takes `filling` of the drum, the shell's lowest line being at 0 [m]."""
-        angles = np.linspace(0.0, math.pi, 10_001)
-        angle = np.interp(self.filling, (angles - np.sin(angles)) / (2 * math.pi), angles)
-        return float(self.diameter / 2 * (1 - np.cos(angle / 2)))
+        return level_of(self.filling, self.diameter / 2)
+
+    @property
+    def is_hatched(self) -> bool:
+        """The bed is not level, or above the axis: grains fall from a hatch until it has its volume."""
+        return self.inclination > 0.0 or self.filling > OPEN_FILLED
+
+    @property
+    def hatch(self) -> float:
+        """Height of the hatch [m]."""
+        return (1 + HATCH) * self.diameter / 2
+
+    @property
+    def highest(self) -> float:
+        """Height of the bed at the lower end where it has run level [m]."""
+        return self.brim + self.length / 2 * math.tan(self.inclination)
 
     def volume_below(self, height: float) -> float:
         """Volume of the drum up to a height [m3]."""
@@ -98,7 +184,7 @@ class Drum(PouredScene):
 
     def release(self, reach: float) -> float:
         """Above the bed, where the drum is wide [m]."""
-        return max(self.brim + reach, self.diameter / 2)
+        return self.hatch if self.is_hatched else max(self.brim + reach, self.diameter / 2)
 
     def cross_section(self, reach: float) -> CrossSection:
         """The widest box for a grain at the height of its release."""
@@ -129,21 +215,14 @@ class Drum(PouredScene):
         return DrumController(case, setup, chunk)
 
 
-class SurfaceAngles(NamedTuple):
-    """Slopes of a bed at one look [deg], as the observables of `Drum` define them."""
-
-    dynamic_angle: float
-    upper_angle: float
-    lower_angle: float
-    mass_angle: float
-
-
 @dataclass
 class Turning(Course):
     """Course of a drum."""
 
     angles: list[list[float]] = field(default_factory=list)
     """`SurfaceAngles` of every look at which all of them could be seen."""
+    heights: list[list[float]] = field(default_factory=list)
+    """Heights of the surface at `STATIONS` of every look at which it could be seen [m]."""
 
 
 class DrumController(PouredController[Turning]):
@@ -154,6 +233,40 @@ class DrumController(PouredController[Turning]):
         self.scene = scene = case.scene
         self.phases["start up"] = Phase(self._start_up, scene.start_up / scene.rotation_rate)
         self.phases["turn"] = Phase(self._turn, scene.revolutions / scene.rotation_rate)
+
+    def is_full(self, view: WorldView) -> bool:
+        """Tell that the grains that have landed take their part of the drum; a counted fill is never full."""
+        if not self.scene.is_hatched:
+            return super().is_full(view)
+        if self.poured.grain_count is not None:
+            return False
+        landed = view.alive & view.released & ~self._flying(view)
+        return self._volume(view, landed) >= self.scene.volume
+
+    def surplus(self, view: WorldView) -> np.ndarray:
+        """Grains above the brim; of a bed that is not level, those that have not landed when it is full."""
+        if not self.scene.is_hatched:
+            return super().surplus(view)
+        raining = view.alive & (self.course.phase == "fill")
+        return raining & self._flying(view)
+
+    def level(self, view: WorldView, kept: np.ndarray) -> float:
+        """Height of the surface of the bed, or that of as large a bed that is level [m]."""
+        if not self.scene.is_hatched:
+            return super().level(view, kept)
+        filling = self._volume(view, kept) / self.scene.volume_below(self.scene.diameter)
+        return level_of(filling, self.scene.diameter / 2)
+
+    def _volume(self, view: WorldView, bed: np.ndarray) -> float:
+        """Volume of the drum below the surface of some grains [m3]."""
+        scene = self.scene
+        return bed_volume(self._from_axis(view, bed), scene.diameter / 2, scene.length, self.grain_reach)
+
+    def _flying(self, view: WorldView) -> np.ndarray:
+        return np.linalg.norm(view.velocities, axis=1) > FLYING * self.scene.rain_speed
+
+    def _from_axis(self, view: WorldView, which: np.ndarray) -> np.ndarray:
+        return view.positions[which] - np.array([0.0, 0.0, self.scene.diameter / 2])
 
     def begin(self, view: WorldView, kept: np.ndarray) -> Mapping[int, Motion]:
         """Turn the drum, so that its lowest line moves towards -x."""
@@ -166,12 +279,14 @@ class DrumController(PouredController[Turning]):
         return Decision()
 
     def _turn(self, view: WorldView) -> Decision:
-        radius, level = self.scene.diameter / 2, self.course.observables["fill_height"]
-        half_chord = math.sqrt(max(level * (2 * radius - level), 0.0))
-        from_axis = view.positions[view.alive] - np.array([0.0, 0.0, radius])
-        angles = surface_angles(from_axis, half_chord, self.grain_reach)
+        chord = half_chord(self.course.observables["fill_height"], self.scene.diameter / 2)
+        from_axis = self._from_axis(view, view.alive)
+        angles = surface_angles(from_axis, chord, self.grain_reach, self.scene.view)
         if angles is not None:
             self.course.angles.append(list(angles))
+        heights = surface_heights(from_axis, chord, self.grain_reach, self.scene.view)
+        if heights is not None:
+            self.course.heights.append(heights.tolist())
         if view.time - self.course.phase_start < self.phases["turn"].expected:
             return Decision()
         return Decision(done=True, failure=self._finish(view))
@@ -186,37 +301,10 @@ class DrumController(PouredController[Turning]):
         means = np.mean(self.course.angles, axis=0)
         seen |= {name: float(mean) for name, mean in zip(SurfaceAngles._fields, means, strict=True)}
         seen["dynamic_angle_sd"] = float(np.std([angles[0] for angles in self.course.angles]))
+        for place, name in enumerate(SurfaceAngles._fields):
+            mean = mean_over_time([angles[place] for angles in self.course.angles])
+            known = {f"{name}_se": mean.standard_error, f"{name}_freedom": mean.freedom} if mean else {}
+            seen |= {key: value for key, value in known.items() if key in self.scene.observables}
+        surface = np.mean(self.course.heights, axis=0)
+        seen |= {f"surface_{number}": float(height) for number, height in enumerate(surface, 1)}
         return ""
-
-
-def surface_angles(positions: np.ndarray, half_chord: float, reach: float) -> SurfaceAngles | None:
-    """Slopes of the bed in a drum; None where a part of its surface is too short for a line.
-
-    The bed is turned back by the angle of its centre of mass, so that its surface is nearly level and steep
-    parts can be seen as well as flat ones.
-
-    Parameters
-    ----------
-    positions : (n, 3) array
-        Grain centres from the drum's axis, which is along y; the bed is high at -x [m].
-    half_chord : float
-        Half the length of the surface in the cross-section [m].
-    reach : float
-        Bounding radius of a grain [m].
-    """
-    if not len(positions):
-        return None
-    center = positions.mean(axis=0)
-    turn = math.atan2(-center[0], -center[2])
-    x, y, z = positions.T
-    cosine, sine = math.cos(turn), math.sin(turn)
-    level = np.column_stack([x * cosine - z * sine, y, x * sine + z * cosine])
-    along, height = profile(level, reach)
-    middle = np.abs(along) < SURFACE * half_chord
-    gradients = [
-        slope(along[part], height[part]) for part in (middle, middle & (along < 0), middle & (along > 0))
-    ]
-    whole, upper, lower = (None if g is None else math.degrees(turn - math.atan(g)) for g in gradients)
-    if whole is None or upper is None or lower is None:
-        return None
-    return SurfaceAngles(whole, upper, lower, math.degrees(turn))

@@ -41,6 +41,7 @@ class Hopper(PouredScene):
     name = "hopper"
     wall_names = ("bin", "floor", "plug")
     observables: ClassVar[Mapping[str, Observable]] = FILL_OBSERVABLES | DISCHARGE_OBSERVABLES
+    part_names = (("bin",), ("floor",), ("floor",))
     floor = 0.0
 
     def __post_init__(self) -> None:

@@ -1,7 +1,7 @@
 """The lifted-cylinder test: fill an open tube on a plate, strike it off, lift it, wait for the heap."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, ClassVar
 
@@ -100,6 +100,7 @@ class LiftedCylinder(PouredScene):
     wall_names = ("plate", "tube")
     leaves_a_heap = True
     observables: ClassVar[Mapping[str, Observable]] = FILL_OBSERVABLES | LIFT_OBSERVABLES
+    part_names = (("plate",), ("tube",))
     densest_fill = 0.58
     floor = 0.0
     weighed = TUBE
@@ -177,6 +178,17 @@ class LiftedCylinder(PouredScene):
     def contact_of(self, wall: int) -> int:
         """Which of the contacts holds for a wall, by its number."""
         return 2 if wall == PLATE else 1
+
+    def check_parts(self, names: Sequence[str]) -> None:
+        """Check names of parts of the walls, and that the plate has one friction."""
+        super().check_parts(names)
+        if "plate" in names and (self.plate_friction is not None or self.plate_friction_excess):
+            value = (
+                f"plate_friction {self.plate_friction}, plate_friction_excess {self.plate_friction_excess}"
+            )
+            raise ValueError(
+                f"LiftedCylinder: a plate of its own material has its friction there, got {value}"
+            )
 
     def room(self, reach: float) -> tuple[float, float, float]:
         """Wide enough for the flattest heap."""

@@ -90,15 +90,23 @@ class PouredController(ABC, Generic[CourseT]):
             failure = f"the filling did not end within {self.FILL_MARGIN:g} s of the rain; {UNREST}"
             return Decision(done=True, failure=failure)
         awaited = view.alive & ~view.released
-        if not (self._is_full(view) or (not awaited.any() and self.rests(view))):
+        if not (self.is_full(view) or (not awaited.any() and self.rests(view))):
             return Decision()
         self.course.enter("settle", view)
         if self.poured.grain_count is not None:
             return Decision()
-        above = view.alive & (view.positions[:, 2] > self.poured.brim)
-        return Decision(remove=np.flatnonzero(above | awaited))
+        return Decision(remove=np.flatnonzero(self.surplus(view) | awaited))
 
-    def _is_full(self, view: WorldView) -> bool:
+    def surplus(self, view: WorldView) -> np.ndarray:
+        """Grains that are struck off a container filled to the brim, (n,) bool."""
+        return view.alive & (view.positions[:, 2] > self.poured.brim)
+
+    def level(self, view: WorldView, kept: np.ndarray) -> float:
+        """Height of the surface of the bed that the grains kept make [m]."""
+        half_sides = self.poured.cross_section(self.reach).half_sides
+        return bed_level(view.positions[kept], half_sides, self.grain_reach)
+
+    def is_full(self, view: WorldView) -> bool:
         """Tell that slow grains are heaped above the brim; a counted fill is never full."""
         if self.poured.grain_count is not None or view.highest <= self.poured.brim:
             return False
@@ -112,7 +120,7 @@ class PouredController(ABC, Generic[CourseT]):
             return Decision(done=True, failure=failure)
         if not self.rests(view):
             return Decision()
-        above = view.alive & (view.positions[:, 2] > self.poured.brim)
+        above = self.surplus(view)
         if self.poured.grain_count is not None:
             above[:] = False
         kept = view.alive & ~above
@@ -120,10 +128,8 @@ class PouredController(ABC, Generic[CourseT]):
         return Decision(remove=np.flatnonzero(above), move=self.begin(view, kept))
 
     def _measure_fill(self, view: WorldView, kept: np.ndarray) -> None:
-        scene, reach = self.poured, self.grain_reach
+        scene, level = self.poured, self.level(view, kept)
         volumes = self.setup.masses / self.setup.grains.densities
-        half_sides = scene.cross_section(self.reach).half_sides
-        level = bed_level(view.positions[kept], half_sides, reach)
         self.course.observables |= {
             "grain_count": float(np.count_nonzero(kept)),
             "fill_height": level - scene.floor,

@@ -9,6 +9,7 @@ import numpy as np
 
 from dem_warp.case import Case
 from dem_warp.entries import MAX_PARTNERS
+from dem_warp.materials import WallPart
 from dem_warp.model import GRAVITY, ContactCoefficients, Grains, WorldSetup
 from dem_warp.parameters import Parameter, check_parameters
 from dem_warp.scenes.rain import CrossSection, Rain, place_rain
@@ -51,6 +52,9 @@ class PouredScene(ABC):
     observables: ClassVar[Mapping[str, Observable]] = FILL_OBSERVABLES
     densest_fill: ClassVar[float] = 0.64
     """Solid fraction that no poured bed is expected to pass: how many grains are kept ready."""
+    part_names: ClassVar[tuple[tuple[str, ...], ...]] = ()
+    """Names that each wall answers to where it may be of another material than the rest, from the general to
+    the special; empty: all walls are alike."""
     weighed: ClassVar[int | None] = None
     """Number of the wall whose impulse is summed up."""
 
@@ -101,6 +105,34 @@ class PouredScene(ABC):
     def contact_of(self, wall: int) -> int:
         """Which of the contacts holds for a wall, by its number."""
         return 1
+
+    def check_parts(self, names: Sequence[str]) -> None:
+        """Check names of parts of the walls.
+
+        Raises
+        ------
+        ValueError
+            When the scene has no such part.
+        """
+        known = list(dict.fromkeys(name for wall in self.part_names for name in wall))
+        for name in names:
+            if name not in known:
+                rule = f"the walls have the parts {', '.join(known) or 'none'}"
+                raise ValueError(f"{type(self).__name__}: {rule}, got {name!r}")
+
+    def surfaces(self, case: Case[Any], wall_count: int) -> tuple[tuple[ContactCoefficients, ...], list[int]]:
+        """Contacts of a case, and which of them holds for each wall, those of another material included."""
+        contacts = self.contacts(case)
+        place = {part: len(contacts) + number for number, part in enumerate(case.wall_parts)}
+        parts = [self.part_of(case, wall) for wall in range(wall_count)]
+        holds = [self.contact_of(wall) if part is None else place[part] for wall, part in enumerate(parts)]
+        return (*contacts, *map(case.contact_with, case.wall_parts)), holds
+
+    def part_of(self, case: Case[Any], wall: int) -> WallPart | None:
+        """Part of another material that a wall belongs to, by its most special name; None of the rest."""
+        parts = {part.name: part for part in case.wall_parts}
+        names = self.part_names[wall] if parts and self.part_names else ()
+        return next((parts[name] for name in reversed(names) if name in parts), None)
 
     def release(self, reach: float) -> float:
         """Height from which grains fall freely [m]."""
@@ -163,11 +195,13 @@ def _world(case: Case[Any], rain: Rain) -> WorldSetup:
     reach = rain.grains.bounding_radii.max()
     grains = _falling(case, rain, scene.release(reach), reach)
     half_x, half_y, bottom = scene.room(reach)
+    walls = scene.walls(reach)
+    contacts, holds = scene.surfaces(case, len(walls))
     return WorldSetup(
         grains=grains,
         shapes=rain.grains.clumps,
-        contacts=scene.contacts(case),
-        walls=tuple((wall, scene.contact_of(number)) for number, wall in enumerate(scene.walls(reach))),
+        contacts=contacts,
+        walls=tuple(zip(walls, holds, strict=True)),
         time_step=case.time_step,
         skin=case.numerics.skin or default_skin(case),
         speed_limit=20 * scene.top_speed,

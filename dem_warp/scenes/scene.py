@@ -118,6 +118,10 @@ class Scene(Protocol):
         """Everything that the scene may measure, by name."""
         ...
 
+    def check_parts(self, names: Sequence[str]) -> None:
+        """Check that each name is that of a part of the walls; a ValueError says which there are."""
+        ...
+
     def prepare(self, cases: Sequence[Any], device: Any) -> list[WorldSetup]:
         """Worlds of cases (of this kind of scene, each with its own parameters) before the first step."""
         ...

@@ -11,7 +11,7 @@ from experiments.bridge.result import Crossing
 from experiments.bridge.source import BRIDGE
 from experiments.files import copy_file, write_text
 from experiments.report.material_card import CARD, compatible_points, quantity_text, sample_table, short
-from experiments.studyfile.card import MATERIAL, SECTIONS, shapes_of
+from experiments.studyfile.card import MATERIAL, SECTIONS, files_of
 from experiments.studyfile.factor_section import with_factor_values
 from experiments.toml_files import toml_text
 
@@ -32,9 +32,9 @@ def write_crossing(crossing: Crossing, folder: Path) -> None:
     if crossing.point is None:
         return
     card = corrected_card(crossing)
-    for shape in shapes_of(card[MATERIAL]):
-        source = Path(shape["clump"])
-        shape["clump"] = source.name
+    for table, key in files_of(card[MATERIAL]):
+        source = Path(table[key])
+        table[key] = source.name
         copy_file(source, folder / source.name)
     write_text(folder / CARD, HEAD.format(engine=crossing.engine) + toml_text(card))
 

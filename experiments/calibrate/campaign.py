@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
 import pandas as pd
 
 from doe import Design
-from experiments.calibrate.cases import Runner, StageEnd
+from experiments.calibrate.cases import Runner, StageEnd, with_combinations
 from experiments.calibrate.checks import check_study
 from experiments.calibrate.climb import climb, require_crossing
 from experiments.calibrate.noise_floor import analyse_noise_floor, plan_noise_floor
@@ -30,6 +30,7 @@ from experiments.calibrate.target import plan_target, settle_target
 from experiments.calibrate.values import p_text, quantity, worded
 from experiments.calibrate.verification import verify
 from experiments.studyfile import Study
+from experiments.studyfile.campaign import Response
 
 Found = TypeVar("Found", bound=StageResult)
 
@@ -62,7 +63,7 @@ def calibrate(study: Study, runner: Runner, on_stage: StageHook | None = None) -
         When a setting does not fit the study's factors; nothing is simulated then.
     """
     check_study(study)
-    record = _Record(runner, on_stage)
+    record = _Record(runner, on_stage, study.target.responses)
     try:
         outcome, reason = _run(study, record)
     except StageEnd as end:
@@ -75,15 +76,15 @@ def calibrate(study: Study, runner: Runner, on_stage: StageHook | None = None) -
 class _Record:
     """Cases and results of a campaign so far."""
 
-    def __init__(self, runner: Runner, on_stage: StageHook | None) -> None:
+    def __init__(self, runner: Runner, on_stage: StageHook | None, responses: Sequence[Response]) -> None:
         self.stages: dict[str, Any] = {}
         self.tables: list[pd.DataFrame] = []
-        self._runner = runner
+        self._runner, self._responses = runner, responses
         self._on_stage = on_stage
 
     def run(self, table: pd.DataFrame) -> pd.DataFrame:
         """Simulate a table of cases and remember them."""
-        cases = self._runner(table)
+        cases = with_combinations(self._runner(table), self._responses)
         self.tables.append(cases)
         return cases
 

@@ -80,6 +80,18 @@ def plan_cases(
     return pd.DataFrame(rows)
 
 
+def with_combinations(cases: pd.DataFrame, responses: Iterable[Response]) -> pd.DataFrame:
+    """Add the columns of responses that are weighted sums of observables."""
+    combined = {
+        response.observable: sum(
+            weight * cases.get(name, pd.Series(np.nan, cases.index)) for name, weight in response.weights
+        )
+        for response in responses
+        if response.weights
+    }
+    return cases.assign(**combined)
+
+
 def measured(cases: pd.DataFrame, response: Response) -> pd.DataFrame:
     """Return the cases that gave a response."""
     if response.observable not in cases.columns:  # where every case failed before it could be measured

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from dem_warp import Case, CaseResult, Material
+from dem_warp import Case, CaseResult, GrainPopulation, Material
 from dem_warp.population import SIZE_LIMIT
 from experiments.cases.program import AnswerError, empty_result
 from experiments.cases.surfaces import stl_text, triangles_of
@@ -145,7 +145,7 @@ def write_case(case: Case[Any], folder: Path) -> None:
         "grain": {
             "material": _material(case.grain_material),
             "clumps": clumps,
-            "size": {"mean": grains.size_mean, "sd": grains.size_sd, "cut": SIZE_LIMIT},
+            "size": _sizes(grains),
         },
         "wall": {"material": _material(scene.wall_material)},
         "contact": {
@@ -162,6 +162,15 @@ def write_case(case: Case[Any], folder: Path) -> None:
         },
     }
     write_text(folder / CASE, json.dumps(document, indent=1, allow_nan=False) + "\n")
+
+
+def _sizes(grains: GrainPopulation) -> dict[str, Any]:
+    """Distribution of the sizes: a normal one, cut, or classes."""
+    told: dict[str, Any] = {"mean": grains.size_mean, "sd": grains.size_sd}
+    if grains.classes is None:
+        return told | {"cut": SIZE_LIMIT}
+    pairs = zip(grains.classes.sizes, grains.classes.fractions, strict=True)
+    return told | {"classes": [{"size": size, "fraction": fraction} for size, fraction in pairs]}
 
 
 def _material(material: Material) -> dict[str, float]:
@@ -188,14 +197,14 @@ def _scene(case: Case[Any]) -> dict[str, Any]:
 def _walls(case: Case[Any], folder: Path) -> list[dict[str, Any]]:
     """Walls where they stand before anything moves: shape, surface, and a file of triangles each."""
     grains, scene = case.grains, case.scene
-    largest = grains.size_mean + SIZE_LIMIT * grains.size_sd
-    reach = largest * max(shape.bounding_radius for shape in grains.mixture.shapes)
+    reach = grains.size_range[1] * max(shape.bounding_radius for shape in grains.mixture.shapes)
     half_width = max(scene.room(reach)[:2])
-    contacts, told = scene.contacts(case), []
-    for number, wall in enumerate(scene.walls(reach)):
+    walls, told = scene.walls(reach), []
+    contacts, holds = scene.surfaces(case, len(walls))
+    for number, wall in enumerate(walls):
         name = f"wall-{number + 1}.stl"
         write_text(folder / name, stl_text(triangles_of(wall, half_width), f"wall-{number + 1}"))
-        contact = contacts[scene.contact_of(number)]
+        contact = contacts[holds[number]]
         told.append(
             {
                 "kind": type(wall).__name__.lower(),
@@ -209,6 +218,8 @@ def _walls(case: Case[Any], folder: Path) -> list[dict[str, Any]]:
                 "rolling_friction": contact.rolling_friction,
             }
         )
+        if part := scene.part_of(case, number):
+            told[-1] |= {"restitution": part.surface.restitution, "material": _material(part.material)}
     return told
 
 

@@ -26,7 +26,7 @@ def describe(study: Study) -> dict[str, Any]:
 
     Where its cases are simulated changes none of them.
     """
-    digests = [hashlib.sha256(clump.read_bytes()).hexdigest() for clump in study.grain.clump_files]
+    digests = [hashlib.sha256(clump.read_bytes()).hexdigest() for clump in study.grain.files]
     document = {key: value for key, value in study.document.items() if key != "cluster"}
     return {"study": document, "scale": study.scale, "clump_sha256": digests}
 

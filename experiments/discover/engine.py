@@ -16,12 +16,12 @@ from experiments.discover.library import Mechanism, with_mechanisms
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.wave import WaveRunner
 from experiments.errors import StudyError
-from experiments.measurement.observables import NAMES, PHOTOGRAPHED, VERSION
+from experiments.measurement.observables import PHOTOGRAPHED, VERSION
 from experiments.studyfile import Study
 
 
 class EngineSimulator:
-    """Answers points of a study with the observables of heaps, simulated by the study's engine.
+    """Answers points of a study with the observables of its test, simulated by the study's engine.
 
     All points of a call are simulated as one wave; they are measured in processes of their
     own while the next are simulated, and kept. A point whose case a study refuses has that as its reason.
@@ -54,8 +54,9 @@ class EngineSimulator:
         progress: Callable[[Progress], None] | None = None,
     ) -> None:
         self.study, self.table, self.engine = study, table, engine_of(study)
-        told = getattr(self.engine, "observables", NAMES)
-        self.observables = tuple(name for name in NAMES if name in (*PHOTOGRAPHED, *told))
+        names = [each.name for each in study.scene.measurable]
+        told = getattr(self.engine, "observables", names)
+        self.observables = tuple(name for name in names if name in (*PHOTOGRAPHED, *told))
         """Names of what it answers with."""
         self._runner = WaveRunner(study.measurement, table, workers, progress, self.engine, self.observables)
         self._library = {mechanism.name: mechanism for mechanism in library}

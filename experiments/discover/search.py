@@ -31,7 +31,7 @@ from experiments.discover.library import FORMER_NAMES, Mechanism, library_for
 from experiments.discover.maker import notes_on
 from experiments.errors import InputError, StudyError
 from experiments.studyfile import Study
-from experiments.studyfile.schema import nearest_name
+from experiments.texts import nearest_name
 
 WITHOUT_EFFECT = (
     "name", "note", "companion", "target", "response", "campaign", "discover", "factor", "engine",
@@ -54,12 +54,10 @@ class Search:
         Raises
         ------
         StudyError
-            When the study cannot be searched: its test leaves no heap, nothing varies, every condition is
-            held out, or ``[discover]`` names what it cannot have.
+            When the study cannot be searched: nothing varies, every condition is held out, or
+            ``[discover]`` names what it cannot have.
         """
         file = str(study.file)
-        if not study.scene.leaves_a_heap:
-            raise StudyError("the search measures heaps: [scene.lifted-cylinder]", "another test", file)
         if not study.factors:
             raise StudyError("a search calibrates first, so it needs at least one [[factor]]", "none", file)
         if all(condition.held_out for condition in study.conditions):

@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from dem_warp import Case, Material
+from experiments.errors import InputError
 from experiments.export.contact import Contact, Term
 from experiments.export.laws import LawsOfCode
 from experiments.export.translated import Translated
@@ -26,6 +27,11 @@ class ExportedTest:
     """Values of the factors with their units, by name."""
     estimator: str = "repose angle"
     """Reading of the result, in words."""
+
+    def __post_init__(self) -> None:
+        if parts := [part.name for part in self.case.wall_parts]:
+            rule = "the walls of a test that leaves for another code are all of one material"
+            raise InputError(rule, f"others for {', '.join(parts)}", self.source)
 
 
 @dataclass(frozen=True)

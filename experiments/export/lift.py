@@ -13,7 +13,7 @@ from dem_warp.scenes.lifted_cylinder import LiftController
 from dem_warp.scenes.poured_controller import CALM, HEAPED
 from experiments.errors import InputError
 from experiments.export.exporter import ExportedTest
-from experiments.export.sizes import size_classes
+from experiments.export.sizes import classes_of
 
 FIRST_SEED = 10_000
 """LIGGGHTS wants primes above it."""
@@ -104,7 +104,7 @@ class Lift:
         return tuple(
             Template(shape, size, part * share, density)
             for shape, part in zip(grains.mixture.shapes, grains.mixture.fractions, strict=True)
-            for size, share in size_classes(grains.size_mean, grains.size_sd)
+            for size, share in classes_of(grains)
         )
 
     @property

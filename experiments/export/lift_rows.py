@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from experiments.export.lift import SIDES, Lift
+from experiments.export.sizes import sizes_text
 from experiments.export.translated import Translated
 
 
@@ -12,7 +13,7 @@ def lift_rows(lift: Lift, exact_tube: bool = False) -> tuple[Translated, ...]:
     scale = case.numerics.modulus_scale
     shear, softened = case.grains.material.shear_modulus, case.grain_material.shear_modulus
     softening = "as it is" if scale == 1.0 else f"softened by {scale:g}: {softened:.6g} Pa"
-    sizes = f"{case.grains.size_mean:g} +- {case.grains.size_sd:g} of the shape, normal, cut at 3 sd"
+    sizes = sizes_text(case.grains)
     filled = f"{scene.grain_count} grains" if scene.grain_count else "to the rim, struck off there"
     rate = f"{lift.rain_rate:.4g} grains a second, {scene.rain_speed:g} m/s"
     slower = "" if lift.rain_rate == scene.rain_rate else " (so many find a place at random)"

@@ -20,6 +20,7 @@ from dem_warp.scenes.poured_controller import CALM, HEAPED
 from experiments.export.exporter import Translated
 from experiments.export.lift import LOOK, Lift
 from experiments.export.lift_rows import lift_rows
+from experiments.export.sizes import sizes_text
 
 SCRIPT, RAIN_FILE, TEST_FILE, HEAP = "lift.py", "rain.csv", "test.json", "heap.dump"
 
@@ -126,11 +127,10 @@ def template(name: str) -> str:
 def same_rain_rows(lift: Lift) -> list[Translated]:
     """Rows of the README on the test, with what a program has as it is here and other inputs have not."""
     scene, grains = lift.scene, lift.case.grains
-    sizes = f"{grains.size_mean:g} +- {grains.size_sd:g} of the shape, normal, cut at 3 sd"
     filled = f"{scene.grain_count} grains" if scene.grain_count else "to the rim, struck off there"
     filling = f"{filled}; {scene.rain_rate:g} grains a second, {scene.rain_speed:g} m/s"
     changes = {
-        "sizes": (sizes, "the same grains, one by one"),
+        "sizes": (sizes_text(grains), "the same grains, one by one"),
         "filling": (filling, "the same places, orientations and times, one by one"),
         "seed": (f"{lift.case.seed}", "the same rain; another seed is another export"),
         "end": (_end(lift), "the same"),

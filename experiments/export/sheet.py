@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from dem_warp.population import SIZE_LIMIT
 from experiments.export.contact import Term
 from experiments.export.exporter import Translation
 from experiments.export.lift import Lift
@@ -63,10 +62,15 @@ def term_entries(dialog: str, terms: Iterable[Term]) -> list[Entry]:
 
 
 def size_entries(lift: Lift, dialog: str, names: tuple[str, str, str, str]) -> list[Entry]:
-    """Entries of a normal distribution of sizes: mean, standard deviation, smallest and largest."""
+    """Entries of sizes: mean, standard deviation, smallest and largest of a normal spread; or classes."""
     grains = lift.case.grains
-    reach = SIZE_LIMIT * grains.size_sd
-    values = (grains.size_mean, grains.size_sd, grains.size_mean - reach, grains.size_mean + reach)
+    if grains.classes is not None:
+        pairs = zip(grains.classes.sizes, grains.classes.fractions, strict=True)
+        return [
+            Entry(dialog, f"user defined {number}: scale, part of the number", f"{size:.6g}, {part:.6g}")
+            for number, (size, part) in enumerate(pairs, 1)
+        ]
+    values = (grains.size_mean, grains.size_sd, *grains.size_range)
     return [Entry(dialog, name, f"{value:.6g}") for name, value in zip(names, values, strict=True)]
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from dem_warp import GrainPopulation
 from dem_warp.population import SIZE_LIMIT
 
 CLASSES = 5
@@ -11,6 +12,21 @@ CLASSES = 5
 
 _NODES = 200
 """Nodes of the quadrature that the moments are integrated by."""
+
+
+def classes_of(grains: GrainPopulation) -> tuple[tuple[float, float], ...]:
+    """Sizes of a population, and the part of the number of grains that each stands for."""
+    if grains.classes is None:
+        return size_classes(grains.size_mean, grains.size_sd)
+    return tuple(zip(grains.classes.sizes, grains.classes.fractions, strict=True))
+
+
+def sizes_text(grains: GrainPopulation) -> str:
+    """Describe the sizes of a population in words."""
+    if grains.classes is None:
+        return f"{grains.size_mean:g} +- {grains.size_sd:g} of the shape, normal, cut at {SIZE_LIMIT:g} sd"
+    low, high = grains.size_range
+    return f"{len(grains.classes.sizes)} classes from {low:.4g} to {high:.4g} of the shape"
 
 
 def size_classes(mean: float, sd: float, count: int = CLASSES) -> tuple[tuple[float, float], ...]:

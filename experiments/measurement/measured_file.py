@@ -24,12 +24,12 @@ import numpy as np
 from doe.discrepancy import Measured
 from experiments.errors import InputError, Problem
 from experiments.measurement.notes import data_notes
-from experiments.measurement.observables import NAMES
+from experiments.measurement.observables import Observable
 from experiments.measurement.plausible import SizeOfTest, inversions, size_of_test
 from experiments.measurement.readings import CLOGGED, CLOGGED_ROW, Reading, readings_of
-from experiments.measurement.table import Row, read_rows
+from experiments.rows import Row, read_rows
 from experiments.studyfile import Condition, Study
-from experiments.studyfile.schema import nearest_name
+from experiments.texts import nearest_name
 from imaging import PictureError
 
 COLUMNS = ("condition", "replicate", "observable", "value", "unit", "picture", "pixel", "fit")
@@ -45,22 +45,26 @@ def read_measured(path: Path, study: Study) -> Measured:
     ------
     InputError
         When the file cannot be read or breaks a rule: every rule, the values received, and their rows. When
-        no value is left. When the study's test leaves no heap.
+        no value is left.
     """
     sizes = {condition.name: size_of_test(study.under(condition.name)) for condition in study.conditions}
-    found = _Found()
+    observables = study.scene.measurable
+    found = _Found({name: each for each in observables for name in (each.name, each.column)})
     for row in read_rows(path, NEEDED, COLUMNS):
         found.add(row, sizes, study.measurement.fit)
     found.require_sound()
     notes = [*found.notes, *_set_aside(found.doubts)]
     notes += [f"{found.empty} rows are empty: not measured"] if found.empty else []
-    return _gather(path, {key: heap for key, heap in found.heaps.items() if heap}, study.conditions, notes)
+    heaps = {key: heap for key, heap in found.heaps.items() if heap}
+    return _gather(path, heaps, study.conditions, [each.name for each in observables], notes)
 
 
 @dataclass
 class _Found:
     """Contents of a file: heaps by condition and replicate, and what is wrong, each with its row."""
 
+    known: Mapping[str, Observable]
+    """Observables of the test, by name and by alias."""
     heaps: dict[tuple[str, str], list[Reading]] = field(default_factory=dict)
     doubts: list[tuple[int, Problem]] = field(default_factory=list)
     """Values of wrong units, which are set aside."""
@@ -73,7 +77,7 @@ class _Found:
         """Read a row."""
         try:
             heap = self.heaps.setdefault(_heap_of(row, sizes), [])
-            readings = list(readings_of(row, sizes[row["condition"]], fit))
+            readings = list(readings_of(row, sizes[row["condition"]], fit, self.known))
         except InputError as error:
             self.problems += [(row.line, problem) for problem in error.problems]
         except PictureError as error:
@@ -136,6 +140,7 @@ def _gather(
     path: Path,
     heaps: Mapping[tuple[str, str], list[Reading]],
     conditions: Sequence[Condition],
+    names: Sequence[str],
     notes: list[str],
 ) -> Measured:
     """Set heaps side by side."""
@@ -143,7 +148,7 @@ def _gather(
     found = {name for heap in settled.values() if heap for name in heap}
     if not found:
         raise InputError("needs at least one measured value", "none", str(path))
-    observables = tuple(name for name in NAMES if name in found)
+    observables = tuple(name for name in names if name in found)
     values, reasons = {}, {}
     for condition in conditions:
         if group := [heap for (name, _), heap in settled.items() if name == condition.name]:

@@ -198,6 +198,19 @@ PHOTOGRAPHED = tuple(observable.name for observable in OBSERVABLES if observable
 BY_NAME = {name: each for each in OBSERVABLES for name in (each.name, each.column)}
 """The same by name and by alias."""
 
+OF_THE_RUN = ("grain_count", "simulated_time", "grains_lost", "clogged")
+"""Observables of a test that tell of its simulation, and of no measurement."""
+
+_INSTRUMENTS = {
+    "deg": Instrument.PHOTOGRAPH,
+    "m": Instrument.RULER,
+    "s": Instrument.FILM,
+    "kg": Instrument.BALANCE,
+    "kg/s": Instrument.BALANCE,
+    "1": Instrument.BALANCE,
+}
+"""Instrument of each unit, in a test that leaves no heap."""
+
 VERSION = 2
 """Of the definitions; values measured by other ones are measured again."""
 
@@ -210,3 +223,18 @@ def observables_of(told: Mapping[str, Told], leaves_a_heap: bool) -> dict[str, O
         for name, (unit, meaning) in told.items()
         if name not in heap
     }
+
+
+def measurable(told: Mapping[str, Told], leaves_a_heap: bool) -> tuple[Observable, ...]:
+    """List what a laboratory can measure of a test, in the order of every table.
+
+    Of a test that leaves no heap it is all that the scene tells of, but for what is about the simulation, and
+    for the error, the spread or a side of another observable, whose name begins with that of the other.
+    """
+    if leaves_a_heap:
+        return OBSERVABLES
+    return tuple(
+        Observable(name, name.replace("_", " "), unit, meaning, _INSTRUMENTS[unit])
+        for name, (unit, meaning) in told.items()
+        if name not in OF_THE_RUN and not any(name.startswith(f"{other}_") for other in told)
+    )

@@ -10,7 +10,6 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from dem_warp import LiftedCylinder
-from experiments.errors import StudyError
 from experiments.measurement.observables import OBSERVABLES, Observable
 from experiments.studyfile import Study
 
@@ -20,33 +19,30 @@ PATIENCE = 10.0
 
 @dataclass(frozen=True)
 class SizeOfTest:
-    """Size and duration of a lifted-cylinder test."""
+    """Size and duration of a test."""
 
     grain: float
     """Radius of the smallest sphere of a grain [m]: no heap is lower."""
     length: float
-    """Radius of the flattest heap that the grains of the tube can make [m]."""
+    """Radius of the flattest heap that the grains of the tube can make, or the room of another test [m]."""
     time: float
-    """Time from the start of the lift until long after its end [s]."""
+    """Time from the start of the lift until long after its end, endless of another test [s]."""
 
     def limits(self, observable: Observable) -> tuple[float, float]:
         """Smallest and largest value that an observable can have, in its unit (deg, m, s or 1)."""
         by_unit = {"deg": (0.0, 90.0), "m": (self.grain, self.length), "s": (0.0, self.time)}
-        return observable.limits or by_unit.get(observable.unit, (-math.inf, math.inf))
+        masses = {"kg": (0.0, math.inf), "kg/s": (0.0, math.inf)}
+        return observable.limits or (by_unit | masses).get(observable.unit, (-math.inf, math.inf))
 
 
 def size_of_test(study: Study) -> SizeOfTest:
-    """Size of the test of a study.
-
-    Raises
-    ------
-    StudyError
-        When it is no lifted cylinder.
-    """
+    """Size of the test of a study."""
     case = study.case({}, seed=0)
     scene = case.scene
     if not isinstance(scene, LiftedCylinder):
-        raise StudyError("heaps need a [scene.lifted-cylinder]", type(scene).__name__, str(study.file))
+        half_x, half_y, bottom = scene.room(case.grains.grain_reach)
+        room = max(2.0 * half_x, 2.0 * half_y, scene.brim - bottom)
+        return SizeOfTest(case.grains.smallest_sphere, room, math.inf)
     reach = 4.0 * scene.diameter + 2.0 * scene.height
     return SizeOfTest(case.grains.smallest_sphere, reach, PATIENCE + 10.0 * scene.height / scene.lift_speed)
 

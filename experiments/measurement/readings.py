@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from experiments.errors import Problem
-from experiments.measurement.observables import BY_NAME, DIMENSIONS, OBSERVABLES, Observable, View
+from experiments.measurement.observables import DIMENSIONS, OBSERVABLES, Observable, View
 from experiments.measurement.pictures import require_same_fit
 from experiments.measurement.plausible import SizeOfTest
-from experiments.measurement.table import Row
-from experiments.studyfile.schema import nearest_name
+from experiments.rows import Row
 from experiments.studyfile.units import Quantity
+from experiments.texts import nearest_name
 
 CLOGGED = "the tube clogged"
 """Reason of a replicate that left no heap because the grains stayed in the tube."""
@@ -38,8 +38,10 @@ class Reading:
     """Reason that its unit, or the size of the picture's pixels, cannot be right."""
 
 
-def readings_of(row: Row, size: SizeOfTest, fit: str) -> Iterator[Reading]:
+def readings_of(row: Row, size: SizeOfTest, fit: str, known: Mapping[str, Observable]) -> Iterator[Reading]:
     """Read everything that a row says of its heap, in a test of a size; pictures by a fit of the flanks.
+
+    What the test yields is ``known`` by name and by alias.
 
     Raises
     ------
@@ -53,17 +55,17 @@ def readings_of(row: Row, size: SizeOfTest, fit: str) -> Iterator[Reading]:
         if row["value"] or row["picture"]:
             raise row.error("stands without a value and a picture: there is no heap", "observable")
         yield Reading(row, CLOGGED_ROW, np.nan)
-    elif name and name not in BY_NAME:
-        rule = f"must be an observable or {CLOGGED_ROW!r}, {nearest_name(name, [*BY_NAME, CLOGGED_ROW])}"
+    elif name and name not in known:
+        rule = f"must be an observable or {CLOGGED_ROW!r}, {nearest_name(name, [*known, CLOGGED_ROW])}"
         raise row.error(rule, "observable")
     elif row["value"]:
         if not name:
             raise row.error("must say what the value is of", "observable")
         if row["fit"]:
             require_same_fit(row["fit"], fit, f"{row.file}:{row.line}: fit")
-        yield _written(row, BY_NAME[name], size)
+        yield _written(row, known[name], size)
     elif row["picture"]:
-        yield from _seen(row, size, fit)
+        yield from _seen(row, size, fit, known)
 
 
 def _written(row: Row, observable: Observable, size: SizeOfTest) -> Reading:
@@ -89,15 +91,17 @@ def _quantity(row: Row) -> Quantity:
         raise row.error(str(error), "value") from None
 
 
-def _seen(row: Row, size: SizeOfTest, fit: str) -> Iterator[Reading]:
+def _seen(row: Row, size: SizeOfTest, fit: str, known: Mapping[str, Observable]) -> Iterator[Reading]:
     """Values of a row's picture: the observable that it names, or all of them."""
     path, name = row.file.parent / row["picture"], row["observable"]
-    if name and not BY_NAME[name].by_photograph:
+    if name and not known[name].by_photograph:
         raise row.error("needs a value: no photograph shows it", "observable")
+    if not any(each.by_photograph for each in known.values()):
+        raise row.error("must be left out of a test without a heap: write the values", "picture")
     if not os.path.isfile(path):  # a name too long is none, and raises nothing
         raise row.error(f"must name a picture file, relative to this one (looked for {path})", "picture")
     pixel = _pixel(row)
-    if name and pixel is None and BY_NAME[name].unit == "m":
+    if name and pixel is None and known[name].unit == "m":
         raise row.error("a length in a picture needs the size of its pixels, as 0.1 mm", "pixel")
     # a file of numbers needs no pictures
     from imaging import find_outline, measure, read_picture
@@ -105,7 +109,7 @@ def _seen(row: Row, size: SizeOfTest, fit: str) -> Iterator[Reading]:
     outline = find_outline(read_picture(path), meters_per_pixel=pixel, place=str(path))
     views = [View.of(measure(outline, fit, str(path)))]
     for observable in OBSERVABLES:
-        wanted = observable is BY_NAME[name] if name else observable.unit != "m" or pixel
+        wanted = observable is known[name] if name else observable.unit != "m" or pixel
         if wanted and observable.by_photograph:
             value = observable.in_pictures(views)
             yield Reading(row, observable.name, value, row["picture"], _doubt(row, observable, value, size))

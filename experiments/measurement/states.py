@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from dem_warp import CaseResult
-from experiments.measurement.observables import BY_NAME, NAMES, OBSERVABLES, View
+from experiments.measurement.observables import BY_NAME, NAMES, OBSERVABLES, PHOTOGRAPHED, View
 from experiments.studyfile.study import MeasurementSection
 from imaging import HeapAngle, PictureError, heap_angle
 
@@ -65,7 +65,9 @@ def observe(settings: MeasurementSection, result: CaseResult, leaves_a_heap: boo
 def measure(
     settings: MeasurementSection, result: CaseResult, names: Sequence[str] = NAMES
 ) -> tuple[np.ndarray, str]:
-    """Measure named observables of a heap, left out all of `OBSERVABLES`, or none.
+    """Measure named observables of a case, all or none; left out those of a heap, `OBSERVABLES`.
+
+    Only where a photograph shows one of them is there a heap to be measured.
 
     Returns
     -------
@@ -74,9 +76,10 @@ def measure(
     reason : str
         Why a case has none: it failed, its heap cannot be measured, or one was not told; else empty.
     """
-    found = observe(settings, result)
-    columns = [BY_NAME[name].column for name in names]
+    leaves_a_heap = any(name in PHOTOGRAPHED for name in names)
+    found = observe(settings, result, leaves_a_heap)
+    columns = [BY_NAME[name].column if name in BY_NAME else name for name in names]
     untold = [column for column in columns if column not in found.observables]
-    if found.angle is None or untold:
+    if result.status != "finished" or (leaves_a_heap and found.angle is None) or untold:
         return np.full(len(names), np.nan), found.reason or f"was not told: {', '.join(untold)}"
     return np.array([found.observables[column] for column in columns]), ""

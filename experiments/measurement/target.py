@@ -13,6 +13,7 @@ from experiments.errors import InputError
 from experiments.measurement.measured_file import read_measured
 from experiments.measurement.observables import ANGLE, BY_NAME
 from experiments.measurement.pictures import find_pictures, measure_pictures, require_same_fit
+from experiments.measurement.profiles import with_profiles
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import TARGET_SCENE
 
@@ -28,7 +29,7 @@ class Replicated:
 
 
 def with_measurements(study: Study) -> tuple[Study, tuple[str, ...]]:
-    """Take the numbers of a study's ``[target]`` from its pictures or its file.
+    """Take the numbers of a study's ``[target]`` from its pictures or its file, and those of its profiles.
 
     Returns
     -------
@@ -42,6 +43,7 @@ def with_measurements(study: Study) -> tuple[Study, tuple[str, ...]]:
     InputError
         When a picture or the file cannot be used, or angles were measured otherwise than the study says.
     """
+    study = with_profiles(study)
     section, place = study.target_section, f"{study.file}: target"
     if section is None or section.twin is not None:
         return study, ()
@@ -99,7 +101,8 @@ def _given(study: Study, measured: list[Replicated], note: str) -> Study:
 
 def _table(study: Study, one: Replicated) -> dict[str, Any]:
     """Write one as the table of a response: numbers that read back as the same floats."""
-    unit, column = BY_NAME[one.observable].unit, _column(one)
+    units = {name: each.unit for each in study.scene.measurable for name in (each.name, each.column)}
+    unit, column = units[one.observable], _column(one)
     numbers: dict[str, Any] = {
         key: value if unit == "1" else f"{value!r} {unit}"
         for key, value in (("mean", float(one.sample.mean)), ("sd", float(one.sample.sd)))
@@ -112,4 +115,4 @@ def _table(study: Study, one: Replicated) -> dict[str, Any]:
 
 
 def _column(one: Replicated) -> str:
-    return BY_NAME[one.observable].column
+    return BY_NAME[one.observable].column if one.observable in BY_NAME else one.observable

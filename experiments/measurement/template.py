@@ -12,7 +12,6 @@ from typing import Any
 from experiments.errors import InputError
 from experiments.files import write_text
 from experiments.measurement.measured_file import COLUMNS
-from experiments.measurement.observables import OBSERVABLES
 from experiments.measurement.readings import CLOGGED_ROW
 from experiments.studyfile import Condition, Study
 
@@ -23,7 +22,7 @@ LABORATORY_UNITS = {"m": "mm"}
 """Units that the file is filled in with, where they are not those of the observables."""
 
 _HEAD = """\
-Heaps measured for the study {study}: a row a measurement. Fill in what was measured, then
+Tests measured for the study {study}: a row a measurement. Fill in what was measured, then
     dem-warp discover {study} {file}
 or name it in the study, as the file of its [target], and calibrate.
 A row without a value is not measured; whole rows may be left out or added, with other units too. A value
@@ -34,8 +33,10 @@ condition: how the test was done, a condition of the study.
 
 replicate: one heap, a label. Five or more of each condition show small effects; a copy of a heap shows none.
 
-observable: what was measured, or {clogged} (without a value) where the tube held its grains: no heap.
-{observables}
+observable: what was measured, or {clogged} (without a value) where the grains got stuck: no result.
+{observables}"""
+
+_PICTURES = """
 
 picture: instead of a value, a photograph of the heap from the side, level with the plate, x of the study to
 the right; its file relative to this one. pixel: the size of one of its pixels at the heap, as 0.08 mm;
@@ -60,8 +61,9 @@ def write_measured_template(study: Study, folder: Path | None = None) -> Path:
         file=path.name,
         clogged=CLOGGED_ROW,
         conditions="\n".join(_described(condition) for condition in study.conditions),
-        observables="\n".join(_defined()),
+        observables="\n".join(_defined(study)),
     )
+    head += _PICTURES if study.scene.leaves_a_heap else ""
     text = io.StringIO()
     text.writelines(f"# {line}".rstrip() + "\n" for line in head.splitlines())
     writer = csv.DictWriter(text, COLUMNS, lineterminator="\n")
@@ -87,9 +89,9 @@ def _flat(table: Mapping[str, Any], place: str = "") -> Iterator[tuple[str, Any]
             yield name, value
 
 
-def _defined() -> Iterator[str]:
-    """Every observable, with its unit, its instrument and its definition."""
-    for observable in OBSERVABLES:
+def _defined(study: Study) -> Iterator[str]:
+    """Every observable of a study's test, with its unit, its instrument and its definition."""
+    for observable in study.scene.measurable:
         unit = LABORATORY_UNITS.get(observable.unit, observable.unit)
         text = f"{observable.name} [{unit}], {observable.instrument}: {observable.definition}"
         yield textwrap.fill(text, 108, initial_indent=4 * " ", subsequent_indent=8 * " ")
@@ -98,7 +100,7 @@ def _defined() -> Iterator[str]:
 def _empty_rows(study: Study) -> Iterator[dict[str, object]]:
     for condition in study.conditions:
         for replicate in range(1, REPLICATES + 1):
-            for observable in OBSERVABLES:
+            for observable in study.scene.measurable:
                 yield {
                     "condition": condition.name,
                     "replicate": replicate,

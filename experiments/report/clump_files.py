@@ -1,4 +1,4 @@
-"""Clump files of a document, gathered beside it."""
+"""Files of the grain that a document names, gathered beside it."""
 
 from __future__ import annotations
 
@@ -7,20 +7,20 @@ from pathlib import Path
 from typing import Any
 
 from experiments.files import copy_file, existing
-from experiments.studyfile.card import shapes_of
+from experiments.studyfile.card import files_of
 
 
 def gather_clumps(sections: Mapping[str, Any], source: Path, folder: Path, prefix: str = "") -> None:
-    """Copy the clump files that sections name relative to `source`, and name the copies there.
+    """Copy the files of the grain that sections name relative to `source`, and name the copies there.
 
     A copy has the name of its file; where files of several folders share one, all but the first are numbered.
     """
     taken: dict[str, bytes] = {}
-    for shape in shapes_of(sections):
-        file = existing(source / shape["clump"])
+    for table, key in files_of(sections):
+        file = existing(source / table[key])
         name, number, content = f"{prefix}{file.name}", 1, file.read_bytes()
         while taken.setdefault(name.casefold(), content) != content:
             number += 1
             name = f"{prefix}{file.stem}-{number}{file.suffix}"
         copy_file(file, folder / name)
-        shape["clump"] = name
+        table[key] = name

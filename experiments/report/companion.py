@@ -20,7 +20,7 @@ from experiments.errors import StudyError
 from experiments.report.kit.html import Chapter
 from experiments.report.published import Published
 from experiments.studyfile import Study
-from experiments.studyfile.schema import nearest_name
+from experiments.texts import nearest_name
 
 if TYPE_CHECKING:
     from doe.discrepancy import Discovery

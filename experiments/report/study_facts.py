@@ -21,16 +21,27 @@ def study_facts(study: Study) -> dict[str, str]:
     if tube is not None:
         size = f"{1e3 * tube.diameter:g} mm wide, {1e3 * tube.height:g} mm high"
         test = {"Tube": size, "Lift": f"{tube.lift_speed:g} m/s"}
+    sizes = study.grain.sizes
+    measured = {"Sizes": sizes.cut_into_classes().told} if sizes else {}
+    walls = {f"Walls “{name}”": _part_text(part) for name, part in study.document.get("walls", {}).items()}
     further = study.document.get("response-scene", {})
     return {
         "Scale": study.scale or "the study as written",
         **test,
         "Grains": f"{grains}, {spheres} each",
+        **measured,
+        **walls,
         "Contact laws": _laws_text(study.solver.laws),
         "Shear modulus": softened,
         "Time step": f"{100.0 * numerics.time_step_fraction:g} % of the Rayleigh time",
         "Angle": f"“{measurement.fit}” fit, mean of {measurement.azimuths} views of a heap, both flanks",
     } | {f"Scene “{name}”": _scene_text(scene) for name, scene in further.items()}
+
+
+def _part_text(part: Mapping[str, Any]) -> str:
+    """Describe a part of the walls as the study writes it."""
+    told = ", ".join(f"{key.replace('_', ' ')} {value}" for key, value in part.items())
+    return told or "varied by factors"
 
 
 def _laws_text(laws: ContactLaws) -> str:

@@ -24,7 +24,7 @@ from experiments.discover.search import Search
 from experiments.files import replacing
 from experiments.live.trail.journal import Journal
 from experiments.measurement.measured_file import read_measured
-from experiments.measurement.observables import OBSERVABLES, PHOTOGRAPHED
+from experiments.measurement.observables import Instrument
 from experiments.report import HeapPicture, SolidHeap
 from experiments.report.companion import Companion, companion_of
 from experiments.report.discovery import Terms, write_discovery
@@ -101,7 +101,7 @@ def run_search(job: Job, resume: bool = False, watch: Watch = lambda title: null
     if not resume:
         require_unused(job.folder, "; --resume goes on in it")
     companion, search = companion_of(job.study), Search.of(job.study)
-    terms = Terms.of(search.library, OBSERVABLES, job.study.factor_sections)
+    terms = Terms.of(search.library, job.study.scene.measurable, job.study.factor_sections)
     bank = known_bank(job)
     measured = _measured(job)
     for note in measured.notes if measured else ():
@@ -164,7 +164,7 @@ def heaps_side_by_side(
 
     The last of them comes to be turned, too; None where it is no heap.
     """
-    if found.base is None:
+    if found.base is None or not job.study.scene.leaves_a_heap:
         return [], None
     fitted = [condition.name for condition in job.study.conditions if not condition.held_out]
     training = [name for name in measured.conditions if name in fitted]
@@ -200,7 +200,8 @@ def _measured(job: Job) -> Measured | None:
     if job.measured is None:
         return None
     measured = read_measured(job.measured, job.study)
-    return measured.only(PHOTOGRAPHED) if job.photographs_only else measured
+    shown = [each.name for each in job.study.scene.measurable if each.instrument is Instrument.PHOTOGRAPH]
+    return measured.only(shown) if job.photographs_only else measured
 
 
 def _point(fit: Fit, condition: str, seed: int) -> Point:

@@ -211,6 +211,8 @@ class Response:
     """Measurements of the physical test, in its unit; None where a twin study simulates them."""
     held_out: bool = False
     """Takes no part in any fit; only judges the chosen point."""
+    weights: tuple[tuple[str, float], ...] = ()
+    """Observables that its column is the weighted sum of; empty where an observable is its column."""
 
 
 @dataclass(frozen=True)

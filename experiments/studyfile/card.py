@@ -85,12 +85,12 @@ def read_card(path: Path) -> dict[str, Any]:
     if not isinstance(sections, dict) or not set(sections) <= set(SECTIONS):
         rule = f"a material card has the tables {', '.join(f'[{MATERIAL}.{name}]' for name in SECTIONS)}"
         raise StudyError(rule, sorted(card), str(path))
-    for shape in shapes_of(sections):
-        shape["clump"] = str(path.parent.resolve() / shape["clump"])
+    for table, key in files_of(sections):
+        table[key] = str(path.parent.resolve() / table[key])
     return sections
 
 
-FITTED = ("measurement", "numerics")
+FITTED = ("walls", "measurement", "numerics")
 """Further sections of a study that a card keeps, among what it was fitted to."""
 
 
@@ -115,7 +115,8 @@ def card_document(card: Mapping[str, Any], path: Path) -> dict[str, Any]:
     return {"name": name, "scene": fitted["test"]} | kept | read_card(path)
 
 
-def shapes_of(sections: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Tables of a document that name a clump file."""
+def files_of(sections: Mapping[str, Any]) -> list[tuple[dict[str, Any], str]]:
+    """Tables of a document that name a file of the grain, each with its key."""
     grain = sections.get("grain", {})
-    return [table for table in (grain, *grain.get("shapes", {}).values()) if "clump" in table]
+    tables = (grain, *grain.get("shapes", {}).values(), grain.get("sizes", {}))
+    return [(table, key) for table in tables for key in ("clump", "sieves", "counts") if key in table]

@@ -26,6 +26,8 @@ class Condition(Section):
     """Values of the grains that differ, as their size."""
     wall: dict[str, Any] | None = None
     """Values of the walls that differ."""
+    walls: dict[str, Any] | None = None
+    """Values of parts of the walls that differ."""
     contact: dict[str, Any] | None = None
     """Values of a pair of surfaces that differ."""
     scene: dict[str, Any] | None = None

@@ -11,9 +11,10 @@ from pydantic import Field, PlainValidator, ValidationInfo, field_validator, mod
 from doe import Factor
 from experiments.errors import StudyError
 from experiments.studyfile.places import Places, nested, value_at
-from experiments.studyfile.schema import Dimension, RawQuantity, Section, nearest_name
+from experiments.studyfile.schema import Dimension, RawQuantity, Section
 from experiments.studyfile.setters import Setter, setter_at
 from experiments.studyfile.units import Quantity
+from experiments.texts import nearest_name
 
 
 def _read_parameters(value: object) -> tuple[str, ...]:

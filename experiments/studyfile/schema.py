@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, TypeVar, get_args, get_origin
@@ -23,6 +22,7 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 from experiments.errors import Problem, StudyError
 from experiments.studyfile.places import KeyPath, Places, value_at
 from experiments.studyfile.units import Quantity, unit_size
+from experiments.texts import nearest_name
 
 SectionT = TypeVar("SectionT", bound=BaseModel)
 
@@ -181,12 +181,6 @@ def marks_of(field: FieldInfo) -> Iterator[Any]:
     yield from field.metadata
     for kind in get_args(field.annotation):
         yield from getattr(kind, "__metadata__", ())
-
-
-def nearest_name(name: str, known: list[str]) -> str:
-    """Suggest what a misspelt name may have meant, as the end of a sentence."""
-    near = difflib.get_close_matches(name, known, n=1)
-    return f"did you mean {near[0]!r}?" if near else f"known: {', '.join(known) or 'none'}"
 
 
 def validated(

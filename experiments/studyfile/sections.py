@@ -12,30 +12,17 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from dem_warp import Case, ClumpShape, GrainPopulation, Interaction, Material, Numerics, ShapeMixture
+from dem_warp import Case, ClumpShape, GrainPopulation, Numerics, ShapeMixture, WallPart
 from dem_warp.laws.mechanism import check_forms
 from dem_warp.population import FRACTION_TOLERANCE, size_of_mean_mass
 from experiments.studyfile.generated import section_for
 from experiments.studyfile.mechanisms import MechanismsSection, mechanisms_section
 from experiments.studyfile.proportions import narrowness
 from experiments.studyfile.scene_sections import SceneSection, scene_section
-from experiments.studyfile.schema import Density, Generated, Length, Number, Pressure, Section, nested_error
+from experiments.studyfile.schema import Generated, Length, Number, Section, nested_error
+from experiments.studyfile.sizes_section import SizesSection
 from experiments.studyfile.solver_section import SolverSection
-
-
-class MaterialSection(Section):
-    """Material of a grain or a wall."""
-
-    density: Density = Field(gt=0.0)
-    """Mass of the solid per volume."""
-    shear_modulus: Pressure = Field(ge=1e3)
-    """Shear modulus."""
-    poisson_ratio: Number = Field(ge=0.0, le=0.5)
-    """Poisson's ratio."""
-
-    def material(self) -> Material:
-        """Build the engine's material."""
-        return Material(self.density, self.shear_modulus, self.poisson_ratio)
+from experiments.studyfile.wall_sections import InteractionSection, MaterialSection, WallPartSection
 
 
 class ShapeSection(Section):
@@ -107,10 +94,19 @@ class GrainSection(MaterialSection, ShapeSection):
     """Standard deviation of the size."""
     elongation: Number = Field(default=0.0, ge=0.0)
     """Every shape is drawn out by this part along its longest axis, at the same volume."""
+    sizes: SizesSection | None = None
+    """Sizes as they were measured, in place of size_mean and size_sd."""
 
     @model_validator(mode="after")
     def _has_its_shapes(self) -> Self:
-        self.shape()
+        shape = self.shape()
+        if self.sizes is None:
+            return self
+        if isinstance(shape, ShapeMixture):
+            raise ValueError("takes sizes ([grain.sizes]) of one shape, not of several ([grain.shapes.NAME])")
+        if both := sorted({"size_mean", "size_mean_of", "size_sd"} & self.model_fields_set):
+            raise ValueError(f"takes sizes ([grain.sizes]) or {' and '.join(both)}, not both")
+        self.sizes.check_shape(shape)
         return self
 
     def shape(self) -> ClumpShape | ShapeMixture:
@@ -135,16 +131,20 @@ class GrainSection(MaterialSection, ShapeSection):
         return tuple(max(rest, 0.0) if fraction is None else fraction for fraction in parts)
 
     @property
-    def clump_files(self) -> tuple[Path, ...]:
-        """Every file of spheres, in order."""
-        return tuple(section.clump for section in (self, *self.shapes.values()) if section.clump is not None)
+    def files(self) -> tuple[Path, ...]:
+        """Every file of spheres, in order, and that of the sizes."""
+        clumps = (section.clump for section in (self, *self.shapes.values()) if section.clump is not None)
+        return (*clumps, *(self.sizes.files if self.sizes else ()))
 
     def population(self) -> GrainPopulation:
         """Build the engine's population."""
+        shape = self.shape()
+        if self.sizes is not None and isinstance(shape, ClumpShape):
+            return self.sizes.population(shape, self.material())
         mean, spread = self.size_mean, self.size_sd
         if self.size_mean_of == "masses":
             mean = size_of_mean_mass(mean, spread)
-        return GrainPopulation(shape=self.shape(), material=self.material(), size_mean=mean, size_sd=spread)
+        return GrainPopulation(shape=shape, material=self.material(), size_mean=mean, size_sd=spread)
 
 
 # The integrals over a shape take milliseconds, and every case of a campaign needs them.
@@ -158,21 +158,6 @@ def _read_clump(path: Path, unit: str | None, modified: int) -> ClumpShape:
 
 _elongated = lru_cache(maxsize=32)(ClumpShape.elongated)
 _sphere = lru_cache(maxsize=32)(ClumpShape.sphere)
-
-
-class InteractionSection(Section):
-    """One pair of surfaces."""
-
-    restitution: Number = Field(ge=0.01, le=1.0)
-    """Coefficient of restitution."""
-    static_friction: Number = Field(ge=0.0)
-    """Coefficient of static friction."""
-    rolling_friction: Number = Field(ge=0.0)
-    """Coefficient of rolling friction."""
-
-    def interaction(self) -> Interaction:
-        """Build the engine's interaction."""
-        return Interaction(**dict(self))
 
 
 class ContactSection(Section):
@@ -195,6 +180,9 @@ class Physics(Section):
     """The grains."""
     wall: MaterialSection
     """Tube and plate, or whatever holds the grains."""
+    walls: dict[str, WallPartSection] = Field(default_factory=dict)
+    """Parts of the walls that are of another material than the rest, by the names that the test has for them,
+    as ends of a drum."""
     contact: ContactSection
     """Contact properties of each pair of surfaces."""
     scene: Scene
@@ -225,10 +213,22 @@ class Physics(Section):
             raise nested_error([{"loc": ("scene",), "type": "value_error", "msg": str(error)}]) from None
         return self
 
+    @model_validator(mode="after")
+    def _walls_have_their_parts(self) -> Self:
+        scene = self.scene.scene(self.wall.material())
+        for name in self.walls:
+            try:
+                scene.check_parts([name])
+            except ValueError as error:
+                at = {"loc": ("walls", name), "type": "value_error", "msg": str(error)}
+                raise nested_error([at]) from None
+        return self
+
     def narrowness(self) -> str:
         """Say that the container is narrow for its grains; empty where it is not."""
-        scene = self.scene.scene(self.wall.material())
-        return narrowness(getattr(scene, "diameter", None), self.grain.shape(), self.grain.size_mean)
+        scene, grains = self.scene.scene(self.wall.material()), self.grain.population()
+        size = grains.size_mean if grains.classes is None else grains.size_range[1]
+        return narrowness(getattr(scene, "diameter", None), grains.shape, size)
 
     def build_case(self, seed: int) -> Case:
         """Build one case of the engine."""
@@ -241,4 +241,10 @@ class Physics(Section):
             numerics=self.numerics.build(),
             mechanisms=self.mechanism.mechanisms(),
             laws=self.solver.laws,
+            wall_parts=self.wall_parts(),
         )
+
+    def wall_parts(self) -> tuple[WallPart, ...]:
+        """Build the engine's parts of the walls, in the order of their names."""
+        parts = sorted(self.walls.items())
+        return tuple(part.part(name, self.wall, self.contact.grain_wall) for name, part in parts)

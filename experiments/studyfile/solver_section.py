@@ -10,7 +10,8 @@ from pydantic import Field, ValidationError, ValidationInfo, model_validator
 
 from dem_warp import EDEM, PRESETS, ContactLaws
 from experiments.studyfile.generated import EngineSection, section_for
-from experiments.studyfile.schema import Generated, Section, nearest_name, nested_error
+from experiments.studyfile.schema import Generated, Section, nested_error
+from experiments.texts import nearest_name
 
 BASE = "base"
 """Key of ``[solver.laws]`` that names the set of which its other keys change something."""

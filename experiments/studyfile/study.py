@@ -34,10 +34,11 @@ from experiments.studyfile.factor_section import (
 from experiments.studyfile.places import Places
 from experiments.studyfile.reserved_names import check_factor_names
 from experiments.studyfile.scene_sections import SceneSection
-from experiments.studyfile.schema import Section, nearest_name, validated
+from experiments.studyfile.schema import Section, validated
 from experiments.studyfile.sections import Physics, Scene
 from experiments.studyfile.setters import changed
 from experiments.studyfile.target_section import ResponseSection, TargetSection, build_target
+from experiments.texts import nearest_name
 from experiments.toml_files import read_toml
 from imaging import FITS
 
@@ -136,7 +137,7 @@ class Study(Physics):
             rule = "is the angle of a heap, which this test does not leave: name an observable of the test"
             raise StudyError(rule, "no observable", f"{self.file}: target")
         if self._target is None and self.target_section is not None:
-            rule = "names pictures or a file: measurement.target.with_measurements takes numbers from them"
+            rule = "names pictures, profiles or a file: with_measurements takes numbers from them"
             raise StudyError(rule, "no numbers", f"{self.file}: target")
         if self._target is None:
             raise StudyError("a calibration needs a [target] or a [[response]]", "none", str(self.file))

@@ -13,12 +13,13 @@ from experiments.measurement.observables import ANGLE, DIMENSIONS, Observable, o
 from experiments.studyfile.campaign import TARGET_SCENE, FactorValues, Response, Target, Twin
 from experiments.studyfile.places import KeyPath, Places
 from experiments.studyfile.scene_sections import SceneSection
-from experiments.studyfile.schema import RawQuantity, Section, nearest_name
+from experiments.studyfile.schema import RawQuantity, Section
+from experiments.texts import nearest_name
 
 MEASUREMENTS = ("mean", "sd", "n")
 """Keys that tell of the physical test."""
 
-SOURCES = ("pictures", "file")
+SOURCES = ("pictures", "file", "profiles")
 """Keys of ``[target]`` that name where the measurements are taken from."""
 
 
@@ -35,7 +36,12 @@ class ResponseSection(Section):
     """``[[response]]``: a number to be matched, beside the ``[target]`` or instead of it."""
 
     observable: str
-    """Observable of the scene, as ``"solid_fraction"``; ``"angle"`` of a scene that leaves a heap."""
+    """Observable of the scene, as ``"solid_fraction"``; ``"angle"`` of a scene that leaves a heap;
+    ``"surface"``, with profiles, of a drum."""
+    weights: dict[str, float] | None = Field(default=None, min_length=1)
+    """Observables of one unit that the response is the weighted sum of; observable is then its name."""
+    profiles: str | None = None
+    """File of measured profiles, instead of numbers: their heights, with the covariance, are matched."""
     name: str | None = Field(default=None, pattern=r"^[A-Za-z_]\w*$")
     """Name in tables; left out: as the observable."""
     scene: str = TARGET_SCENE
@@ -70,7 +76,8 @@ class ResponseSection(Section):
                 rule = f"needs mean, sd and n of what was measured; missing: {', '.join(missing)}"
                 raise StudyError(rule, self.title, places.of(path))
             sample = Sample(values["mean"], values["sd"], int(self.n or 0))
-        return Response(self.title, self.observable, unit, self.scene, sample)
+        weights = tuple((self.weights or {}).items())
+        return Response(self.title, self.observable, unit, self.scene, sample, weights=weights)
 
     def _value(self, name: str, unit: str, path: KeyPath, places: Places) -> float:
         """Convert a measurement; NaN where it was left out."""
@@ -140,6 +147,9 @@ def build_target(
     built: list[Response] = []
     for path, section in sections:
         _check_name(section, built, path, places)
+        if section.profiles is not None:
+            waiting = waiting or "profiles"
+            continue
         unit = _observable(section, scenes, path, places).unit
         measured = twin is None and not (waiting and section is target)
         response = section.response(unit, measured, path, places)
@@ -183,7 +193,26 @@ def _observable(
         raise StudyError(rule, section.scene, places.of((*path, "scene")))
     scene = scenes[section.scene]
     known = observables_of(scene.observables, scene.leaves_a_heap)
+    if section.weights is not None:
+        return _combined(section.weights, known, path, places)
     if section.observable not in known:
         rule = f"must be what the scene measures, {nearest_name(section.observable, list(known))}"
         raise StudyError(rule, section.observable, places.of((*path, "observable")))
     return known[section.observable]
+
+
+def _combined(
+    weights: Mapping[str, float], known: Mapping[str, Observable], path: KeyPath, places: Places
+) -> Observable:
+    """Find an observable that has the unit of all that are combined."""
+    place = places.of((*path, "weights"))
+    for name in weights:
+        if name not in known:
+            raise StudyError(
+                f"must name what the scene measures, {nearest_name(name, list(known))}", name, place
+            )
+    found = [known[name] for name in weights]
+    if len({each.unit for each in found}) > 1:
+        units = ", ".join(f"{each.name} [{each.unit}]" for each in found)
+        raise StudyError("must name observables of one unit", units, place)
+    return found[0]

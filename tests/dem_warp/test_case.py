@@ -16,6 +16,8 @@ from dem_warp import (
     Material,
     Numerics,
     ShapeMixture,
+    SizeClasses,
+    WallPart,
     rayleigh_time,
 )
 from dem_warp.laws.linear_cohesion import LinearCohesion
@@ -87,6 +89,8 @@ OTHER = {
     "air_drag": 1.0,
     "seed": 2,
     "modulus_scale": 200.0,
+    "classes": SizeClasses((0.95, 1.05), (0.5, 0.5)),
+    "wall_parts": (WallPart("tube", STEEL, Interaction(0.5, 0.1, 0.0)),),
     "mechanisms": (LinearCohesion(cohesion_energy_density=1e4),),
 }
 """Another valid value, where it is not 0.9 of the present one."""

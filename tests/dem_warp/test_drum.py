@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 from worlds import STEEL, assert_measured_as_told, ball_case, run_batch
 
-from dem_warp import Case, CaseResult, Drum
+from dem_warp import Case, CaseResult, Drum, Interaction, Material, WallPart
+from dem_warp.model import GRAVITY
+from dem_warp.scenes.drum_surface import STATIONS, DrumView, bed_volume, surface_angles, surface_heights
 
 DRUM = Drum(
     diameter=0.05,
@@ -82,7 +84,14 @@ def test_the_level_of_the_filling_encloses_its_part_of_the_drum():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"filling": 0.6}, "Drum.filling: must be at most 0.5, got 0.6"),
+        ({"filling": 0.9}, "Drum.filling: must be at most 0.8, got 0.9"),
+        (
+            {"inclination": 1.5},
+            "Drum.filling: must leave the bed at the lower end below 0.045 m, .* got 0.35",
+        ),
+        ({"inclination": 1.6}, "Drum.inclination: must be below 1.5708 .*, got 1.6"),
+        ({"picture": "side"}, "Drum.picture: must be one of depth, silhouette, end, got 'side'"),
+        ({"camera_distance": 0.3}, "Drum.camera_distance: must be left out of a picture .*, got 0.3"),
         ({"filling": 0.0}, "Drum.filling: must be positive and finite, got 0.0"),
         ({"start_up": -1.0}, "Drum.start_up: must be finite and 0 or more, got -1.0"),
         # w^2 r = g at 3.153 revolutions a second.
@@ -92,3 +101,140 @@ def test_the_level_of_the_filling_encloses_its_part_of_the_drum():
 def test_a_drum_that_cannot_be_is_refused(changes, message):
     with pytest.raises(ValueError, match=message):
         replace(DRUM, **changes)
+
+
+HALF_TURNED = replace(DRUM, revolutions=0.5)
+DEEP, INCLINED = (
+    replace(HALF_TURNED, filling=0.7),
+    replace(HALF_TURNED, filling=0.4, inclination=math.radians(30.0)),
+)
+
+
+@pytest.fixture(scope="module")
+def beds() -> dict[Drum, CaseResult]:
+    """Results of a drum filled above its axis, and of one whose axis is inclined."""
+    return {scene: run_batch([ball_case(scene, 0.3)])[0] for scene in (DEEP, INCLINED)}
+
+
+@pytest.mark.parametrize("scene", [DEEP, INCLINED])
+def test_a_bed_that_is_not_level_fills_its_part_of_the_drum(beds, scene):
+    run, seen = beds[scene], beds[scene].observables
+    assert (run.status, run.reason) == ("finished", "")
+    assert_measured_as_told(ball_case(scene, 0.3), run)
+    assert seen["grains_lost"] == 0
+    # The last grains to land, some ten a look, and those that then roll are within a twentieth of the bed.
+    assert seen["fill_height"] == pytest.approx(scene.brim, rel=0.05)
+    assert 0.5 < seen["solid_fraction"] < 0.7
+    from_axis = np.hypot(run.positions[:, 0], run.positions[:, 2] - scene.diameter / 2)
+    assert (from_axis + 0.9 * run.sphere_radii < scene.diameter / 2).all()
+
+
+def test_gravity_is_turned_and_the_bed_lies_against_the_lower_end(beds):
+    assert np.hypot(*INCLINED.gravity[1:]) == pytest.approx(GRAVITY, rel=1e-12)
+    assert INCLINED.gravity[1] == pytest.approx(-GRAVITY / 2, rel=1e-12)
+    # The surface of a bed that ran level would fall by tan 30 over the length; friction keeps a part of it.
+    assert beds[INCLINED].positions[:, 1].mean() < -0.03 * INCLINED.length
+    assert abs(beds[DEEP].positions[:, 1].mean()) < 0.01 * DEEP.length
+
+
+def test_an_inclined_bed_without_friction_runs_level():
+    scene = replace(INCLINED, start_up=0.0, revolutions=0.05)
+    [run] = run_batch([ball_case(scene, 0.0)]).values()
+    tops = [run.positions[np.abs(run.positions[:, 1] - y) < 4e-3][:, 2].max() for y in (-7e-3, 7e-3)]
+    # tan 30 over 14 mm are 8.1 mm; the top of a layer of balls of 4 mm is good to half a ball.
+    assert tops[0] - tops[1] == pytest.approx(8.1e-3, abs=2.5e-3)
+
+
+def test_every_wall_part_has_its_own_contact_and_the_special_name_wins():
+    case = ball_case(DRUM, 0.4)
+    glass, felt = Material(2500.0, 1e9, 0.2), Material(300.0, 1e6, 0.3)
+    smooth, rough = Interaction(0.5, 0.0, 0.0), Interaction(0.5, 0.9, 0.2)
+    parts = (WallPart("ends", felt, rough), WallPart("front", glass, smooth))
+    contacts, holds = DRUM.surfaces(replace(case, wall_parts=parts), 3)
+    assert holds == [1, 3, 2]
+    assert [contacts[i].static_friction for i in holds] == [0.4, 0.0, 0.9]
+    assert contacts[3].modulus > contacts[2].modulus
+    assert DRUM.surfaces(case, 3) == (case.contacts(STEEL), [1, 1, 1])
+
+
+def test_rough_ends_carry_a_bed_that_smooth_ends_let_slip():
+    cases = [
+        replace(ball_case(DRUM, 0.5), wall_parts=(WallPart("ends", STEEL, Interaction(0.5, friction, 0.0)),))
+        for friction in (0.0, 0.9)
+    ]
+    runs = run_batch(cases)
+    smooth, rough = (runs[i].observables["dynamic_angle"] for i in (0, 1))
+    # Nine balls between two ends: half of them touch one.
+    assert rough > smooth + 3.0
+
+
+@pytest.mark.parametrize(
+    ("names", "message"),
+    [
+        (("lid",), "Drum: the walls have the parts shell, ends, front, back, got 'lid'"),
+        (("ends", "ends"), "Case.wall_parts: must name each part once"),
+    ],
+)
+def test_a_part_that_the_walls_lack_is_refused(names, message):
+    parts = tuple(WallPart(name, STEEL, Interaction(0.5, 0.5, 0.0)) for name in names)
+    with pytest.raises(ValueError, match=message):
+        replace(ball_case(DRUM, 0.5), wall_parts=parts)
+
+
+def slab(tilt: float, back: float = 0.0) -> np.ndarray:
+    """Centres of a dense bed below a plane through the drum's axis, higher by `back` at the far end [m]."""
+    step = 1e-3
+    x, y, z = np.meshgrid(*[np.arange(-0.025, 0.025, step)] * 3, indexing="ij")
+    points = np.column_stack([x.ravel(), 0.36 * y.ravel(), z.ravel()])
+    x, y, z = points.T
+    level = -math.tan(math.radians(tilt)) * x + back * (y / 0.018 + 0.5)
+    return points[(np.hypot(x, z) < 0.0245) & (z < level)]
+
+
+@pytest.mark.parametrize("picture", ["depth", "silhouette", "end"])
+@pytest.mark.parametrize("tilt", [0.0, 25.0, 50.0])
+def test_every_picture_of_a_plane_bed_shows_its_slope(picture, tilt):
+    view = DrumView(0.025, 0.018, picture)
+    angles = surface_angles(slab(tilt), 0.025, 5e-4, view)
+    # The heights of a lattice of 1 mm over a surface of 40 mm.
+    assert angles.dynamic_angle == pytest.approx(tilt, abs=1.0)
+
+
+def test_a_camera_sees_the_highest_line_against_the_light_and_the_near_one_by_its_grains():
+    bed, reach = slab(20.0, back=6e-3), 5e-4
+    tops = {}
+    for picture, distance in (("end", None), ("silhouette", None), ("silhouette", 0.05)):
+        seen = DrumView(0.025, 0.018, picture, distance).seen(bed, reach)
+        tops[picture, distance] = seen[np.abs(seen[:, 0]) < 1e-3, 2].max()
+    # A bed that rises by 6 mm to the far end: near grains are at its foot, the outline is at its top.
+    assert tops["end", None] == pytest.approx(0.3e-3, abs=1e-3)
+    assert tops["silhouette", None] == pytest.approx(6e-3, abs=1e-3)
+    # From 50 mm the far end, 18 mm behind, looks smaller by 50 / 68.
+    assert tops["silhouette", 0.05] == pytest.approx(6e-3 * 50 / 68, abs=1e-3)
+
+
+def test_the_volume_below_a_bed_is_that_of_the_drum_below_its_plane():
+    # Half the drum, whatever the slope: within half a grain over the surface, 0.25 of 19.6 mm.
+    half = math.pi / 2 * 0.025**2 * 0.018
+    for tilt in (0.0, 30.0):
+        assert bed_volume(slab(tilt), 0.025, 0.018, 5e-4) == pytest.approx(half, rel=0.05)
+    assert bed_volume(np.empty((0, 3)), 0.025, 0.018, 5e-4) == 0.0
+
+
+@pytest.mark.parametrize("picture", ["depth", "silhouette", "end"])
+@pytest.mark.parametrize("tilt", [0.0, 30.0, 50.0])
+def test_the_heights_of_a_plane_bed_are_those_of_its_plane(picture, tilt):
+    view = DrumView(0.025, 0.018, picture)
+    heights = surface_heights(slab(tilt), 0.025, 5e-4, view)
+    x = 0.025 * np.array(STATIONS)
+    wall = np.sqrt(0.025**2 - x**2)
+    plane = np.clip(-math.tan(math.radians(tilt)) * x, -wall, wall)
+    # A lattice of 1 mm, whose balls reach 0.3 mm less to the shell than the plane does.
+    assert heights == pytest.approx(plane, abs=0.9e-3 / math.cos(math.radians(tilt)))
+
+
+def test_a_drum_tells_of_its_surface_from_end_to_end(runs):
+    level, steep = ([runs[f].observables[f"surface_{i}"] for i in range(1, 10)] for f in (0.0, 0.6))
+    # Without friction the bed is level from -0.6 to 0.6 of the radius, to half a ball; with it, it falls.
+    assert np.ptp(level[2:7]) < 2e-3
+    assert all(np.diff(steep[2:7]) < 0.0)

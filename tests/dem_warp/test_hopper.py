@@ -34,7 +34,10 @@ def test_what_was_filled_in_comes_out_or_stays(runs, outlet):
     run, seen = runs[outlet], runs[outlet].observables
     assert (run.status, run.reason) == ("finished", "")
     assert [phase["name"] for phase in run.phases] == ["fill", "settle", "open", "discharge"]
-    assert_measured_as_told(hopper_case(outlet), run)
+    # Four looks, three rates in between: too few to say how good their mean is.
+    absent = frozenset({"flow_rate_se"}) if outlet == WIDE else frozenset()
+    assert_measured_as_told(hopper_case(outlet), run, absent)
+    assert absent or 0.0 < seen["flow_rate_se"] < 0.2 * seen["flow_rate"]
     # Masses are kept in single precision: 6e-8 of each, and of the sum of some hundred.
     assert seen["fallen_mass"] + seen["mass_left"] == pytest.approx(seen["filled_mass"], rel=1e-6)
     balls = GRAIN.density * np.pi / 6.0 * (BALL_DIAMETER * run.sizes) ** 3
@@ -87,7 +90,7 @@ def test_nothing_passes_a_hole_smaller_than_a_ball(runs):
     run, seen = runs[CLOSED], runs[CLOSED].observables
     assert run.status == "failed"
     assert run.reason.startswith("the outlet is clogged: 0.0")
-    assert_measured_as_told(hopper_case(CLOSED), run, absent=frozenset({"flow_rate"}))
+    assert_measured_as_told(hopper_case(CLOSED), run, absent=frozenset({"flow_rate", "flow_rate_se"}))
     assert (seen["clogged"], seen["fallen_mass"], seen["discharge_time"]) == (1, 0, 0)
     assert seen["mass_left"] == seen["filled_mass"]
     assert len(run.positions) == seen["grain_count"]

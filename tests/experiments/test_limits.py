@@ -19,8 +19,8 @@ from doe.discrepancy import load_bank
 from experiments.cases.manifest import read_manifest
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.errors import InputError, StudyError
-from experiments.measurement.table import read_rows
 from experiments.measurement.target import with_measurements
+from experiments.rows import read_rows
 from experiments.studyfile import load_study
 from experiments.studyfile.units import Quantity
 from experiments.toml_files import read_toml

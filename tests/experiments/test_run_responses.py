@@ -9,11 +9,13 @@ from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
 from dem_warp import CaseResult, Drum, Hopper
+from dem_warp.scenes.drum_surface import STATIONS
 from experiments.calibrate import Outcome
 from experiments.cases import OwnWorkers, Store, execute, run_cases
 from experiments.cases.workers import own
@@ -86,6 +88,9 @@ class Engine:
             seen = {"grain_count": 30.0, "simulated_time": 1.5}
             if isinstance(case.scene, Drum):
                 seen["dynamic_angle"] = 15.0 + 50.0 * friction + 0.5 * noise
+                jitter = np.random.default_rng(case.seed).normal(0.0, 2e-5, len(STATIONS))
+                heights = -(friction + 0.005 * noise) * 0.03 * np.array(STATIONS) + jitter
+                seen |= {f"surface_{i}": float(height) for i, height in enumerate(heights, 1)}
             elif isinstance(case.scene, Hopper):
                 seen["discharge_time"] = 0.5 + 0.4 * friction + 0.01 * noise
             else:
@@ -160,3 +165,43 @@ def test_an_interrupted_campaign_of_two_scenes_goes_on_to_the_same_end(
     costs = pd.read_csv(tables / "scene_costs.csv", index_col="scene")
     assert costs["cases"].to_dict() == whole.cases["scene"].value_counts().to_dict()
     assert pd.read_csv(tables / "joint_shrinkage.csv")["response"].iloc[0] == "angle"
+
+
+PROFILES = """
+[scene.drum]
+diameter = "60 mm"
+length = "20 mm"
+rotation_rate = "30 1/min"
+grain_count = 30
+
+[target]
+observable = "surface"
+profiles = "profiles.csv"
+"""
+
+
+@pytest.mark.usefixtures("engine")
+def test_the_profiles_of_a_drum_may_be_the_only_target(
+    write_study: Callable[..., Path], tmp_path: Path
+) -> None:
+    """The stand-in engine turns a plane: profiles of slope 0.5 are those of a friction of 0.5."""
+    x = np.linspace(-20.0, 20.0, 21)
+    rng = np.random.default_rng(1)
+    rows = [
+        f"{label},{place} mm,{height!r} mm"
+        for label in range(8)
+        for slope, offset in [rng.normal([-0.5, 0.0], [0.005, 0.05])]
+        for place, height in zip(x, (slope * x + offset + rng.normal(0.0, 0.02, 21)).tolist(), strict=True)
+    ]
+    (tmp_path / "profiles.csv").write_text("\n".join(["replicate,x,z", *rows]), encoding="utf-8")
+    heap = (
+        '[scene.lifted-cylinder]\ndiameter = "28 mm"\nheight = "28 mm"\ngrain_count = 30\n',
+        '[target]\nmean = "30 deg"\nsd = "0.5 deg"\nn = 5\n',
+    )
+    study = check_runs(load_study(write_study(*((text, "") for text in heap), add=PROFILES)))
+    names = [response.name for response in study.target.responses]
+    # Stations from -0.6 to 0.6 of 30 mm lie within the 20 mm that were measured.
+    assert names == [f"surface_mode_{number}" for number in range(1, 8)]
+    assert {name for name, _ in study.target.leading.weights} == {f"surface_{i}" for i in range(2, 9)}
+    found = run.run_campaign(Desk.open(study, tmp_path / "out"))
+    assert found.optimum.point["E"] == pytest.approx(0.5, abs=0.02)

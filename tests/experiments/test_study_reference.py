@@ -35,7 +35,7 @@ def test_every_section_and_key_has_its_meaning_in_one_line(rows: dict[tuple[str,
     [
         ("[scene.lifted-cylinder]", "lift_speed", "m/s, cm/s, mm/s", "0.05 m/s", "> 0"),
         ("[scene.lifted-cylinder]", "tilt", "deg, rad", "0 deg", ">= 0, < 90"),
-        ("[scene.drum]", "filling", "number", "0.35", "> 0, <= 0.5"),
+        ("[scene.drum]", "filling", "number", "0.35", "> 0, <= 0.8"),
         ("[mechanism.jkr]", "work_of_adhesion", "J/m^2, mJ/m^2, N/m, mN/m", "0 J/m^2", ">= 0"),
         ("[mechanism.jkr]", "between", '"all" or "grains" or "walls"', '"all"', ""),
         ("[[factor]]", "low", "quantity", "", ""),

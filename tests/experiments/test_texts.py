@@ -13,7 +13,7 @@ from dem_warp.device import resolve_device
 from experiments.cli import app
 from experiments.commands.results import print_angles
 from experiments.errors import LONGEST_VALUE, MOST_PROBLEMS, InputError, Problem
-from experiments.measurement.table import read_rows
+from experiments.rows import read_rows
 from experiments.studyfile import load_study
 from experiments.studyfile.units import Quantity
 from experiments.texts import read_text

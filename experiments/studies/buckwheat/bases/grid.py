@@ -16,7 +16,8 @@ from experiments.errors import InputError
 from experiments.studies.buckwheat.sensitivity.variants import Variant
 from experiments.studyfile.factor_section import merge
 from experiments.studyfile.places import Places
-from experiments.studyfile.schema import Section, nearest_name, validated
+from experiments.studyfile.schema import Section, validated
+from experiments.texts import nearest_name
 from imaging import FITS
 
 _FILE = Path(__file__).with_name("bases.toml")

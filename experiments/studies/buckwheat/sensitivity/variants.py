@@ -16,7 +16,8 @@ from experiments.studies.buckwheat.replay.runs import DESIGNS, planned_cases
 from experiments.studyfile import Study, load_study
 from experiments.studyfile.factor_section import merge
 from experiments.studyfile.places import Places
-from experiments.studyfile.schema import Section, nearest_name, validated
+from experiments.studyfile.schema import Section, validated
+from experiments.texts import nearest_name
 
 BASE = "base"
 """The study as written, which every variant is held against."""

@@ -10,8 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from experiments.errors import InputError
-from experiments.studyfile.schema import nearest_name
-from experiments.texts import read_text
+from experiments.texts import nearest_name, read_text
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,105 @@
+"""Profiles as data: generalised least squares, few repeats, and what an outline tells beyond an angle."""
+
+import numpy as np
+import pytest
+
+from doe import Factor, Goal, ProfileSample, Sample, central_composite, fit_surface, joint_fit
+from doe.errors import RuleError
+
+PLACES = np.linspace(-1.0, 1.0, 9)
+
+
+def covariance(length: float = 0.4, noise: float = 0.1) -> np.ndarray:
+    """Neighbouring heights scatter together."""
+    return np.exp(-0.5 * ((PLACES[:, None] - PLACES) / length) ** 2) + noise * np.eye(len(PLACES))
+
+
+def drawn(count: int, seed: int, scale: float = 1.0) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    return scale * rng.multivariate_normal(np.zeros(len(PLACES)), covariance(), count)
+
+
+def test_modes_make_generalised_least_squares_of_ordinary_ones() -> None:
+    sample = ProfileSample.of(3.0 * PLACES**2 + drawn(12, 1))
+    heights = 2.0 * PLACES
+    away = heights - sample.mean
+    general = away @ np.linalg.solve(sample.covariance, away)
+    ordinary = sum(
+        ((mode.weights @ heights - mode.target.mean) / mode.target.sd) ** 2 for mode in sample.modes
+    )
+    assert ordinary == pytest.approx(general, rel=1e-9)
+    assert all(mode.target.n == 12 for mode in sample.modes)
+    spreads = [mode.target.sd for mode in sample.modes]
+    assert spreads == sorted(spreads, reverse=True)
+
+
+def test_many_profiles_give_their_covariance_and_few_a_shrunk_one() -> None:
+    true = covariance()
+    many = ProfileSample.of(drawn(4000, 2))
+    # Elements of a covariance of 4,000 rows are good to sqrt(2 / 4000) of the variances.
+    assert many.covariance == pytest.approx(true, abs=5.0 * np.sqrt(2.0 / 4000) * true.max())
+    assert many.shrinkage < 0.05
+    rows = [drawn(5, seed) for seed in range(60)]
+    shrunk = [np.linalg.norm(ProfileSample.of(each).covariance - true) for each in rows]
+    plain = [np.linalg.norm(np.cov(each.T) - true) for each in rows]
+    assert np.mean(shrunk) < 0.9 * np.mean(plain)
+    # Five rows span four directions of nine; shrinkage leaves no direction without a scatter.
+    assert min(np.linalg.eigvalsh(ProfileSample.of(each).covariance)[0] for each in rows) > 0.0
+
+
+def test_the_covariance_of_equal_and_independent_places_keeps_its_size() -> None:
+    found = [
+        np.trace(ProfileSample.of(np.random.default_rng(seed).normal(0.0, 2.0, (5, 9))).covariance) / 9
+        for seed in range(200)
+    ]
+    # The mean of 200 traces of 36 degrees of freedom each.
+    assert np.mean(found) == pytest.approx(4.0, rel=4.0 * np.sqrt(2.0 / 36 / 200))
+
+
+@pytest.mark.parametrize(
+    ("profiles", "message"),
+    [
+        (np.zeros((2, 9)), r"profiles: are rows, 3 or more \(received shape \(2, 9\)\)"),
+        (np.zeros(9), r"profiles: are rows, 3 or more"),
+        (np.ones((4, 9)), r"profiles: must scatter \(received the same one each time\)"),
+        (np.vstack([np.ones((3, 2)), [[1.0, np.nan]]]), r"profiles\[3\]: must be finite"),
+    ],
+)
+def test_profiles_that_tell_nothing_are_refused(profiles: np.ndarray, message: str) -> None:
+    with pytest.raises(RuleError, match=message):
+        ProfileSample.of(profiles)
+
+
+FACTORS = (Factor("friction", 0.1, 0.9), Factor("rolling", 0.0, 0.4))
+
+
+def surface_of(friction: float, rolling: float) -> np.ndarray:
+    """Heights of a bed: its slope goes with the sum of both frictions, its S with rolling alone."""
+    slope = 0.4 + 0.5 * friction + 1.0 * rolling
+    return -slope * PLACES - 0.8 * rolling * (PLACES**3 - 0.6 * PLACES)
+
+
+def test_an_outline_pins_what_an_angle_leaves_open() -> None:
+    """Twin data of 20 profiles: the region compatible with the outline is less than half of the angle's."""
+    design = central_composite(FACTORS)
+    scatter = 0.02
+    rng = np.random.default_rng(40)
+    runs = np.array([surface_of(*row) for row in design.natural.to_numpy()])
+    runs += scatter * rng.multivariate_normal(np.zeros(9), covariance(), len(runs))
+    hidden = {"friction": 0.5, "rolling": 0.2}
+    measured = surface_of(*hidden.values()) + drawn(20, 5, scatter)
+    slopes = PLACES / (PLACES @ PLACES)
+    angle = joint_fit({"angle": Goal(fit_surface(design, runs @ slopes), Sample.of(measured @ slopes))})
+    goals = {
+        f"mode {number}": Goal(fit_surface(design, runs @ mode.weights), mode.target)
+        for number, mode in enumerate(ProfileSample.of(measured).modes, 1)
+    }
+    outline = joint_fit(goals)
+    assert 0.0 < outline.share() < 0.5 * angle.share()
+    ranges = {"angle": angle.region().ranges, "outline": outline.region().ranges}
+    for found in ranges.values():
+        assert all(found["low"][name] <= value <= found["high"][name] for name, value in hidden.items())
+    width = {kind: found["high"]["rolling"] - found["low"]["rolling"] for kind, found in ranges.items()}
+    # The angle leaves all of rolling open; the outline pins it.
+    assert width["angle"] > 0.35
+    assert width["outline"] < 0.75 * width["angle"]
