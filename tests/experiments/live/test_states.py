@@ -18,8 +18,8 @@ from experiments.benchmarks.fuzz.mutations import mutated
 from experiments.cases import Store, open_folder
 from experiments.cases.folder import JOURNAL, is_used
 from experiments.live.charts import charts_of
-from experiments.live.trail.journal import BEAT, CASES, PROGRESS, Journal
 from experiments.live.state import RunState
+from experiments.live.trail.journal import BEAT, CASES, PROGRESS, Journal
 from experiments.live.watched import state_text
 from experiments.studyfile import Study
 
