@@ -87,7 +87,7 @@ BLOCKS = [block for page in TEXTS for block in blocks_of(page)]
 
 
 def commands_in(text: str) -> Iterator[list[str]]:
-    """Find the words of each call of dem-warp in shell text; a variable stands as 1, what a command prints as nothing."""
+    """Find the words of each call in shell text; a variable stands as 1, what a command prints as nothing."""
     text = re.sub(r"\\\n", " ", text)
     for line in (line for line in text.splitlines() if not line.lstrip().startswith("#")):
         plain = re.sub(r"\$\w+", "1", re.sub(r"\$\([^)]*\)", "", line))
