@@ -87,10 +87,11 @@ BLOCKS = [block for page in TEXTS for block in blocks_of(page)]
 
 
 def commands_in(text: str) -> Iterator[list[str]]:
-    """Find the words of each call of dem-warp in shell text; a variable of the shell stands as 1."""
+    """Find the words of each call in shell text; a variable stands as 1, what a command prints as nothing."""
     text = re.sub(r"\\\n", " ", text)
     for line in (line for line in text.splitlines() if not line.lstrip().startswith("#")):
-        lexer = shlex.shlex(re.sub(r"\$\w+", "1", line), posix=True, punctuation_chars=True)
+        plain = re.sub(r"\$\w+", "1", re.sub(r"\$\([^)]*\)", "", line))
+        lexer = shlex.shlex(plain, posix=True, punctuation_chars=True)
         lexer.whitespace_split = True
         words: list[str] | None = None
         for word in [*lexer, ";"]:
