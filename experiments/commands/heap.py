@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from functools import partial
 from typing import Annotated
 
 import typer
@@ -22,7 +21,7 @@ from experiments.commands.options import (
     StudyFile,
     assignments,
 )
-from experiments.commands.plans import show_plan
+from experiments.commands.plans import show_heap
 from experiments.commands.results import print_measured, print_narrowness
 
 HEAP_EXAMPLE = "Example: [bold]dem-warp heap --scale bench --set E=0.48 --set F=0.45 --seed 7 --frames 40[/]"
@@ -84,14 +83,7 @@ def heap(
             resources_for(chosen, resources),
         )
         if dry_run:
-            from experiments.runs.plan import plan_heap
-
-            show_plan(
-                resources,
-                partial(plan_heap, chosen, resources, case=chosen.case(values, seed, place)),
-                as_json,
-            )
-            return
+            return show_heap(chosen, resources, chosen.case(values, seed, place), as_json)
         require_unused(folder)
         print_narrowness(chosen)
         with open_workers(resources) as crew, CaseProgress(scene or "heap") as progress:
