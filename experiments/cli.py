@@ -8,7 +8,6 @@ from __future__ import annotations
 import io
 import json
 import sys
-from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -43,7 +42,7 @@ from experiments.commands.options import (
     StudyFile,
     Workers,
 )
-from experiments.commands.plans import show_plan
+from experiments.commands.plans import show_calibration, show_search
 from experiments.commands.results import print_study, show_stage
 from experiments.commands.watch import WATCH_EXAMPLE, watch
 from experiments.live.server import live_page
@@ -113,12 +112,7 @@ def calibrate(
         chosen = chosen_study(study, scale, resources)
         folder = out or default_folder(chosen)
         if dry_run:
-            from experiments.runs.campaign import check_runs
-            from experiments.runs.plan import plan_calibration
-
-            checked, used = check_runs(chosen), resources_for(chosen, resources)
-            show_plan(used, partial(plan_calibration, checked, used), as_json)
-            return
+            return show_calibration(chosen, resources_for(chosen, resources), as_json)
     go_on = Attempt.of(
         "calibrate", study, out=folder, scale=chosen.scale, device=device, workers=workers,
         scheduler=scheduler, cluster=cluster, engine=engine,
@@ -146,7 +140,7 @@ def calibrate(
     if as_json:
         typer.echo(json.dumps(ended.to_dict(), allow_nan=False))
     if (campaign := ended.campaign) is None:
-        return
+        return None
     messages.print(f"{campaign.outcome}: {campaign.reason}")
     messages.print(f"Report: {ended.report}")
     if campaign.outcome == "too-many-failed-runs":
@@ -192,14 +186,8 @@ def discover(
         chosen = chosen_study(study, scale, resources)
         folder = out or default_folder(chosen, "discover")
         if dry_run:
-            from experiments.runs.plan import plan_search
-            from experiments.runs.search import Job, known_bank
-
-            used = resources_for(chosen, resources)
-            has_bank = known_bank(Job(chosen, measured, folder, bank)) is not None
-            plan = partial(plan_search, chosen, used, has_bank=has_bank, analysed=measured is not None)
-            show_plan(used, plan, as_json)
-            return
+            files = (measured, folder, bank)
+            return show_search(chosen, resources_for(chosen, resources), files, as_json)
     go_on = Attempt.of(
         "discover", study, measured, out=folder, bank=bank, photographs_only=photographs_only, scale=scale,
         device=device, workers=workers, scheduler=scheduler, cluster=cluster, seed=seed, engine=engine,
@@ -224,7 +212,7 @@ def discover(
         )
     if ended.discovery is None:
         messages.print(f"Library waves: {ended.page}")
-        return
+        return None
     if as_json:
         typer.echo(json.dumps(results_of(ended.discovery, ended.terms), allow_nan=False))
     messages.print(verdict_line(ended.discovery, ended.terms))

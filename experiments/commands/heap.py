@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from functools import partial
 from typing import Annotated
 
 import typer
@@ -23,7 +22,7 @@ from experiments.commands.options import (
     StudyFile,
     assignments,
 )
-from experiments.commands.plans import show_plan
+from experiments.commands.plans import show_heap
 from experiments.commands.results import print_measured, print_narrowness
 from experiments.live.server import live_page
 
@@ -90,14 +89,7 @@ def heap(
             resources_for(chosen, resources),
         )
         if dry_run:
-            from experiments.runs.plan import plan_heap
-
-            show_plan(
-                resources,
-                partial(plan_heap, chosen, resources, case=chosen.case(values, seed, place)),
-                as_json,
-            )
-            return
+            return show_heap(chosen, resources, chosen.case(values, seed, place), as_json)
         require_unused(folder)
         print_narrowness(chosen)
         chosen.case(values, seed, place)  # what it refuses is refused before anything is written

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from typing import TYPE_CHECKING
 
 import typer
@@ -13,10 +14,41 @@ from experiments.commands.console import duration, messages, plain
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from pathlib import Path
 
+    from dem_warp import Case
     from experiments.cases import Resources
     from experiments.cases.workers.speed import Speed
     from experiments.runs.plan import Plan
+    from experiments.studyfile import Study
+
+
+def show_calibration(study: Study, resources: Resources, as_json: bool) -> None:
+    """Show the plan of a calibration."""
+    from experiments.runs.campaign import check_runs
+    from experiments.runs.plan import plan_calibration
+
+    show_plan(resources, partial(plan_calibration, check_runs(study), resources), as_json)
+
+
+def show_search(
+    study: Study, resources: Resources, files: tuple[Path | None, Path, Path | None], as_json: bool
+) -> None:
+    """Show the plan of a search; its files are the measured heaps, the folder and the bank."""
+    from experiments.runs.plan import plan_search
+    from experiments.runs.search import Job, known_bank
+
+    measured, folder, bank = files
+    known = known_bank(Job(study, measured, folder, bank)) is not None
+    analysed = measured is not None
+    show_plan(resources, partial(plan_search, study, resources, has_bank=known, analysed=analysed), as_json)
+
+
+def show_heap(study: Study, resources: Resources, case: Case, as_json: bool) -> None:
+    """Show the plan of one case."""
+    from experiments.runs.plan import plan_heap
+
+    show_plan(resources, partial(plan_heap, study, resources, case=case), as_json)
 
 
 def show_plan(resources: Resources, planned: Callable[[Speed], Plan], as_json: bool) -> None:
