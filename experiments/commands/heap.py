@@ -83,7 +83,7 @@ def heap(
             resources_for(chosen, resources),
         )
         if dry_run:
-            return show_heap(chosen, resources, chosen.case(values, seed, place), as_json)
+            show_heap(chosen, resources, chosen.case(values, seed, place), as_json)
         require_unused(folder)
         print_narrowness(chosen)
         with open_workers(resources) as crew, CaseProgress(scene or "heap") as progress:
