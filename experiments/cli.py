@@ -9,7 +9,7 @@ import io
 import json
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -47,6 +47,10 @@ from experiments.commands.results import print_study, show_stage
 from experiments.commands.watch import WATCH_EXAMPLE, watch
 from experiments.live.server import live_page
 from experiments.live.ui.command import UI_EXAMPLE, ui
+
+if TYPE_CHECKING:
+    from experiments.api import Calibration
+    from experiments.runs.search import SearchResult
 
 app = typer.Typer(
     name="dem-warp",
@@ -108,14 +112,14 @@ def calibrate(
         from experiments import api
         from experiments.runs.choices import chosen_resources, chosen_study, default_folder, resources_for
 
-        resources = chosen_resources(device, workers, scheduler, cluster)
+        asked: Any = {"device": device, "workers": workers, "scheduler": scheduler, "cluster": cluster}
+        resources = chosen_resources(**asked)
         chosen = chosen_study(study, scale, resources)
         folder = out or default_folder(chosen)
         if dry_run:
-            return show_calibration(chosen, resources_for(chosen, resources), as_json)
+            show_calibration(chosen, resources_for(chosen, resources), as_json)
     go_on = Attempt.of(
-        "calibrate", study, out=folder, scale=chosen.scale, device=device, workers=workers,
-        scheduler=scheduler, cluster=cluster, engine=engine,
+        "calibrate", study, out=folder, scale=chosen.scale, **asked, engine=engine,
         follow_paper=follow_paper, only_paper=only_paper, live=live,
         paper_replicates=paper_replicates if follow_paper or only_paper else None, json=as_json,
     )  # fmt: skip
@@ -124,10 +128,7 @@ def calibrate(
         ended = api.calibrate(
             chosen,
             folder,
-            device=device,
-            workers=workers,
-            scheduler=scheduler,
-            cluster=cluster,
+            **asked,
             engine=engine,
             resume=resume,
             published_replicates=paper_replicates if follow_paper or only_paper else 0,
@@ -135,12 +136,17 @@ def calibrate(
             watch=CaseProgress,
             on_stage=show_stage,
         )
+    _tell_calibration(ended, as_json)
+
+
+def _tell_calibration(ended: Calibration, as_json: bool) -> None:
+    """Say how a calibration ended, and where its pages are."""
     if ended.record is not None:
         messages.print(f"Published runs: {ended.record}")
     if as_json:
         typer.echo(json.dumps(ended.to_dict(), allow_nan=False))
     if (campaign := ended.campaign) is None:
-        return None
+        return
     messages.print(f"{campaign.outcome}: {campaign.reason}")
     messages.print(f"Report: {ended.report}")
     if campaign.outcome == "too-many-failed-runs":
@@ -179,19 +185,17 @@ def discover(
     with clear_errors():
         check_study_file(study, scale, engine)
         from experiments import api
-        from experiments.report.discovery import results_of, verdict_line
         from experiments.runs.choices import chosen_resources, chosen_study, default_folder, resources_for
 
-        resources = chosen_resources(device, workers, scheduler, cluster)
+        asked: Any = {"device": device, "workers": workers, "scheduler": scheduler, "cluster": cluster}
+        resources = chosen_resources(**asked)
         chosen = chosen_study(study, scale, resources)
         folder = out or default_folder(chosen, "discover")
         if dry_run:
-            files = (measured, folder, bank)
-            return show_search(chosen, resources_for(chosen, resources), files, as_json)
+            show_search(chosen, resources_for(chosen, resources), (measured, folder, bank), as_json)
     go_on = Attempt.of(
         "discover", study, measured, out=folder, bank=bank, photographs_only=photographs_only, scale=scale,
-        device=device, workers=workers, scheduler=scheduler, cluster=cluster, seed=seed, engine=engine,
-        live=live, json=as_json,
+        **asked, seed=seed, engine=engine, live=live, json=as_json,
     )  # fmt: skip
     with clear_errors(go_on), live_page(folder, live, messages.print):
         print_study(chosen, resources_for(chosen, resources))
@@ -202,17 +206,21 @@ def discover(
             bank=bank,
             photographs_only=photographs_only,
             seed=seed,
-            device=device,
-            workers=workers,
-            scheduler=scheduler,
-            cluster=cluster,
+            **asked,
             engine=engine,
             resume=resume,
             watch=CaseProgress,
         )
+    _tell_search(ended, as_json)
+
+
+def _tell_search(ended: SearchResult, as_json: bool) -> None:
+    """Say what a search found, and where its page is."""
+    from experiments.report.discovery import results_of, verdict_line
+
     if ended.discovery is None:
         messages.print(f"Library waves: {ended.page}")
-        return None
+        return
     if as_json:
         typer.echo(json.dumps(results_of(ended.discovery, ended.terms), allow_nan=False))
     messages.print(verdict_line(ended.discovery, ended.terms))

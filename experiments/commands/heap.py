@@ -30,27 +30,28 @@ HEAP_EXAMPLE = "Example: [bold]dem-warp heap --scale bench --set E=0.48 --set F=
 
 LEAST_FRAMES, MOST_FRAMES = 2, 1000
 
+Settings = Annotated[list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="Value of a factor.")]
+Scene = Annotated[
+    str | None, typer.Option(metavar="NAME", help="A further scene of the study, \\[response-scene.NAME].")
+]
+Frames = Annotated[
+    int | None,
+    typer.Option(
+        min=LEAST_FRAMES,
+        max=MOST_FRAMES,
+        metavar="N",
+        help="Keep N frames of the whole test: frames/*.pvd for ParaView and OVITO (spheres; grains with "
+        "orientation, velocity and spin; contacts with their forces; each wall), and a film.",
+    ),
+]
+
 
 def heap(
     study: StudyFile = None,
-    settings: Annotated[
-        list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="Value of a factor.")
-    ] = None,
+    settings: Settings = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of sizes, places and orientations.")] = 1,
-    scene: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", help="A further scene of the study, \\[response-scene.NAME]."),
-    ] = None,
-    frames: Annotated[
-        int | None,
-        typer.Option(
-            min=LEAST_FRAMES,
-            max=MOST_FRAMES,
-            metavar="N",
-            help="Keep N frames of the whole test: frames/*.pvd for ParaView and OVITO (spheres; grains with "
-            "orientation, velocity and spin; contacts with their forces; each wall), and a film.",
-        ),
-    ] = None,
+    scene: Scene = None,
+    frames: Frames = None,
     movie: Annotated[
         str | None, typer.Option(metavar="KIND", help="Film of the frames: gif, mp4 or none. Left out: gif.")
     ] = None,
@@ -84,15 +85,13 @@ def heap(
         resources, place = chosen_resources(device, 1, scheduler, cluster), scene or TARGET_SCENE
         chosen = with_engine(chosen_study(study, scale, resources), engine)
         values = chosen.natural_settings(assignments(settings or []), "--set")
-        folder, resources = (
-            out or default_folder(chosen, f"{scene or 'heap'}-{seed}"),
-            resources_for(chosen, resources),
-        )
+        folder = out or default_folder(chosen, f"{scene or 'heap'}-{seed}")
+        resources = resources_for(chosen, resources)
+        case = chosen.case(values, seed, place)  # what it refuses is refused before anything is written
         if dry_run:
-            return show_heap(chosen, resources, chosen.case(values, seed, place), as_json)
+            show_heap(chosen, resources, case, as_json)
         require_unused(folder)
         print_narrowness(chosen)
-        chosen.case(values, seed, place)  # what it refuses is refused before anything is written
         with (
             live_page(folder, live, messages.print),
             open_workers(resources) as crew,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 import typer
 from rich.console import Console
@@ -23,18 +23,19 @@ if TYPE_CHECKING:
     from experiments.studyfile import Study
 
 
-def show_calibration(study: Study, resources: Resources, as_json: bool) -> None:
-    """Show the plan of a calibration."""
+def show_calibration(study: Study, resources: Resources, as_json: bool) -> NoReturn:
+    """Show the plan of a calibration, and end the command."""
     from experiments.runs.campaign import check_runs
     from experiments.runs.plan import plan_calibration
 
     show_plan(resources, partial(plan_calibration, check_runs(study), resources), as_json)
+    raise typer.Exit
 
 
 def show_search(
     study: Study, resources: Resources, files: tuple[Path | None, Path, Path | None], as_json: bool
-) -> None:
-    """Show the plan of a search; its files are the measured heaps, the folder and the bank."""
+) -> NoReturn:
+    """Show the plan of a search, and end the command; files: measured heaps, folder, bank."""
     from experiments.runs.plan import plan_search
     from experiments.runs.search import Job, known_bank
 
@@ -42,13 +43,15 @@ def show_search(
     known = known_bank(Job(study, measured, folder, bank)) is not None
     analysed = measured is not None
     show_plan(resources, partial(plan_search, study, resources, has_bank=known, analysed=analysed), as_json)
+    raise typer.Exit
 
 
-def show_heap(study: Study, resources: Resources, case: Case, as_json: bool) -> None:
-    """Show the plan of one case."""
+def show_heap(study: Study, resources: Resources, case: Case, as_json: bool) -> NoReturn:
+    """Show the plan of one case, and end the command."""
     from experiments.runs.plan import plan_heap
 
     show_plan(resources, partial(plan_heap, study, resources, case=case), as_json)
+    raise typer.Exit
 
 
 def show_plan(resources: Resources, planned: Callable[[Speed], Plan], as_json: bool) -> None:
