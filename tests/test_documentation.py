@@ -32,6 +32,17 @@ MOST_NOT_RUN = 10
 BASE = Path(__file__).parent / "experiments" / "small.toml"
 """Study that a piece of one is merged over."""
 
+DRUM = {"diameter": "40 mm", "length": "12 mm", "rotation_rate": "15 1/min", "filling": 0.3}
+"""Test of the pieces that need one of their own."""
+
+MEASURED = {
+    "sieves.csv": "opening,passing_percent\n0.5 mm,2\n1 mm,80\n1.4 mm,100\n",
+    "analyser.csv": "diameter\n900\n1000\n1100\n",
+    "profiles.csv": "replicate,x,z\n"
+    + "".join(f"{n},{x} mm,{0.3 * x + 0.2 * n} mm\n" for n in range(4) for x in range(-18, 19, 2)),
+}
+"""Files that the pieces name."""
+
 COMMANDS = get_command(app)
 FENCED = re.compile(r"^[ ]*```.*?^[ ]*```$", re.MULTILINE | re.DOTALL)
 
@@ -157,10 +168,18 @@ def test_studies_load(block: Block, tmp_path: Path) -> None:
     """A whole study as it is; a piece of one merged over a small study."""
     changes = tomllib.loads(block.code)
     changes.pop("material", None)
+    for name, rows in MEASURED.items():
+        (tmp_path / name).write_text(rows, encoding="utf-8")
     for clump in re.findall(r'clump = "(\S+)"', block.code):
         (tmp_path / clump).write_text("0 0 0 2\n", encoding="utf-8")
     text = BASE.read_text(encoding="utf-8")
-    if "grain-grain" in changes.get("contact", {}):
+    if "walls" in changes:
+        changes |= {"scene": {"drum": DRUM}, "target": {"observable": "dynamic_angle"}}
+        changes |= {"contact": {"grain-grain": {"static_friction": 0.4}}}
+    elif "profiles" in changes.get("target", {}):
+        text = re.sub(r"\[target\].*?\n\n", "", text, flags=re.DOTALL)
+        changes |= {"scene": {"drum": DRUM}}
+    elif "grain-grain" in changes.get("contact", {}):
         text = text.replace("[contact.grain-grain]\nrestitution = 0.2\nrolling_friction = 0.05\n", "")
         if "factor" not in changes:
             text = re.sub(r"\[\[factor\]\].*?\n\n", "", text, flags=re.DOTALL)

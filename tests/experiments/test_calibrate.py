@@ -373,13 +373,12 @@ def test_results_are_plain_finite_json_and_tables() -> None:
         AnalyticHeaps(two_frictions, fails=lambda row: row["stage"] == "climb" and row["run"] == 1),
         on_stage=lambda name, result: stages.append(name),
     )
-    text = json.dumps(campaign.to_dict(), allow_nan=False)
-    assert json.loads(text)["outcome"] == campaign.outcome.value
-    assert json.loads(text)["climb"]["path"][0]["mean"] is None
+    kept = json.loads(json.dumps(campaign.to_dict(), allow_nan=False))
+    assert kept["outcome"] == campaign.outcome.value
+    assert kept["climb"]["path"][0]["mean"] is None
     assert stages == list(STAGES)
     tables = campaign.tables()
-    assert len(tables["cases"]) == len(campaign.cases)
-    assert len(tables["decisions"]) == len(campaign.decisions)
+    assert (len(tables["cases"]), len(tables["decisions"])) == (len(campaign.cases), len(campaign.decisions))
     assert list(tables["surface_anova_full"].iloc[:, 1])[:1] == ["model"]
 
 
