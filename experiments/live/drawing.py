@@ -42,7 +42,7 @@ def heap_spheres(folder: Path, name: str) -> tuple[np.ndarray, str, float]:
     path = inside(folder, f"{JOURNAL}/{GLIMPSES}/{key}.npz" if kind == "glimpse" else f"{CASES}/{key}.npz")
     if kind == "case":
         # the simulator's classes take a second to import
-        from experiments.cases.store import Store
+        from experiments.cases import Store
 
         result = Store(path.parent).load(key)
         return _few(spheres_of(result)), result.status, 1.0
