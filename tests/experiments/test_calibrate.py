@@ -374,8 +374,7 @@ def test_results_are_plain_finite_json_and_tables() -> None:
         on_stage=lambda name, result: stages.append(name),
     )
     kept = json.loads(json.dumps(campaign.to_dict(), allow_nan=False))
-    assert kept["outcome"] == campaign.outcome.value
-    assert kept["climb"]["path"][0]["mean"] is None
+    assert (kept["outcome"], kept["climb"]["path"][0]["mean"]) == (campaign.outcome.value, None)
     assert stages == list(STAGES)
     tables = campaign.tables()
     assert all(len(tables[name]) == len(getattr(campaign, name)) for name in ("cases", "decisions"))
