@@ -19,11 +19,11 @@ from dem_warp.solver import CHUNK
 BULK_FRACTION = 0.55
 """Solid fraction of a poured bed, roughly."""
 
-SLOPE = math.tan(math.radians(25.0))
-"""Slope of a heap, roughly: few grains stand flatter, many rough ones steeper."""
+SLOPE = math.tan(math.radians(35.0))
+"""Slope of a heap while the tube still leads it, roughly: its top is what the tube must clear."""
 
-FALL, CALM = 0.25, 0.1
-"""Time that the last grain of a counted rain takes to lie still, and a bed to be called at rest [s]."""
+FALL, CALM, REST = 0.25, 0.1, 0.25
+"""Time that the last grain of a counted rain takes to lie still, a bed to be at rest, and a heap [s]."""
 
 IDLE_SPHERES = 100.0
 """Spheres that cost as much as a step without any."""
@@ -80,7 +80,7 @@ def _duration(case: Case[Any], grains: int) -> float:
         return max(scene.duration, fill + CALM)
     bulk = min(grains * _grain_volume(case) / BULK_FRACTION, scene.volume)
     height = (3.0 * bulk * SLOPE**2 / math.pi) ** (1.0 / 3.0)
-    lift = max(height / scene.lift_speed, scene.vibration_time) + CALM
+    lift = max(height / scene.lift_speed, scene.vibration_time) + REST
     return fill + CALM + lift
 
 

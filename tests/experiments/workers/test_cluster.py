@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -19,7 +20,7 @@ from dem_warp import Case, CaseResult, Progress
 from experiments.cases import OwnWorkers, Resources, Store, Workers, open_workers, run_cases
 from experiments.cases.contract import command_program
 from experiments.cases.program import ProgramEngine
-from experiments.cases.workers import dask_clusters, dask_task, opening
+from experiments.cases.workers import dask_clusters, dask_task, dask_workers, opening
 from experiments.cases.workers.dask_workers import DaskWorkers
 from experiments.cli import app
 from experiments.errors import InputError
@@ -54,26 +55,36 @@ def test_any_split_gives_the_same_bits_and_every_case_is_told_once(
     assert_same_bits(spread, OwnWorkers("cpu", 2).simulate(cases[::-1])[::-1])
 
 
-def test_a_worker_that_is_killed_loses_no_case_and_none_is_done_twice(
-    write_study: Callable[..., Path], two_workers: Workers, tmp_path: Path, caplog: pytest.LogCaptureFixture
+def test_workers_that_are_killed_lose_no_case_and_none_is_done_twice(
+    write_study: Callable[..., Path],
+    two_workers: Workers,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
 ) -> None:
     study = load_study(write_study(("grain_count = 30", "grain_count = 120")))
     cases = made(study, 6)
     assert isinstance(two_workers, DaskWorkers)
+    client, hear = two_workers._client, dask_workers._Session._hear
     told: Counter[int] = Counter()
-    killed: list[int] = []
+    begun: list[int] = []
+
+    def kill(session: dask_workers._Session, said: bytes) -> None:
+        """Hear what a worker says; as the third batch has just begun, kill all workers."""
+        hear(session, said)
+        message = pickle.loads(said)
+        if message.reply:
+            begun.append(message.number)
+            if len(begun) == 3:
+                for process in client.run(os.getpid).values():
+                    os.kill(process, signal.SIGKILL)
 
     def note(index: int, result: CaseResult) -> None:
         told[index] += 1
 
-    def kill(progress: Progress) -> None:
-        if not killed and progress.phase_counts.get("lift", 0) > 0:
-            [victim, *_] = two_workers._client.run(os.getpid).values()
-            killed.append(victim)
-            os.kill(victim, signal.SIGKILL)
-
-    results = two_workers.simulate(cases, None, note, kill, tmp_path / "unfinished")
-    assert killed
+    monkeypatch.setattr(dask_workers._Session, "_hear", kill)
+    results = two_workers.simulate(cases, None, note, None, tmp_path / "unfinished")
+    assert begun.count(begun[2]) > 1, "it was begun again"
     assert told == Counter(range(6))
     assert "a worker was lost" in caplog.text
     assert_same_bits(results, OwnWorkers("cpu", 2).simulate(cases))
@@ -101,8 +112,6 @@ def test_a_table_is_stored_by_the_client_and_taken_up_by_any_workers(
 def test_workers_of_another_version_are_refused(
     small_study: Study, two_workers: Workers, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from experiments.cases.workers import dask_workers
-
     monkeypatch.setattr(dask_workers, "fingerprint_of", lambda _: "another")
     with pytest.raises(InputError, match="must have the same dem-warp"):
         two_workers.simulate(made(small_study, 1))

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dem_warp import CaseResult, Progress
+from dem_warp import CaseResult
 from experiments.benchmarks.cluster import slurm
 from experiments.cases import OwnWorkers, Resources, open_workers
 from experiments.studyfile import load_study
@@ -41,16 +41,15 @@ def test_jobs_are_workers_and_one_that_is_requeued_loses_nothing(
     requeued: list[str] = []
 
     def note(index: int, result: CaseResult) -> None:
+        """Count, and requeue a job once the first case has ended: another one runs there."""
         told[index] += 1
-
-    def requeue(progress: Progress) -> None:
-        if not requeued and progress.phase_counts.get("lift", 0) > 0:
+        if not requeued:
             jobs = slurm.command(node, "squeue", "--noheader", "--states=R", "--format=%i").split()
             requeued.append(jobs[0])
             slurm.command(node, "scontrol", "requeue", jobs[0])
 
     with open_workers(Resources(cluster=section)) as workers:
-        results = workers.simulate(cases, None, note, requeue, tmp_path / "unfinished")
+        results = workers.simulate(cases, None, note, None, tmp_path / "unfinished")
         assert workers.described == {"device": "2 workers of slurm", "workers": 2}
     assert requeued
     assert told == Counter(range(6))
