@@ -69,6 +69,9 @@ napoleon_use_rtype = False
 PROGRESS = re.compile(r".*: +\d+ %, .*\d+ of \d+ cases.*\n?")
 """A line of progress, as it is written every ten seconds where there is no terminal."""
 
+LANGUAGES = {".toml": "toml", ".py": "python"}
+"""The colouring of files that pages write; others, as tables, have none."""
+
 
 def show_as_typed(app: Any, doctree: nodes.document) -> None:
     """Show a cell that IPython runs by its first line as what it holds: commands, or a file with its name.
@@ -81,7 +84,7 @@ def show_as_typed(app: Any, doctree: nodes.document) -> None:
             shown, language = rest, "bash"
         elif first.startswith("%%writefile "):
             name = first.split()[1]
-            shown, language = f"# {name}\n{rest}", Path(name).suffix.removeprefix(".") or "text"
+            shown, language = f"# {name}\n{rest}", LANGUAGES.get(Path(name).suffix, "text")
         elif PROGRESS.search(block.rawsource):
             shown, language = PROGRESS.sub("", block.rawsource), block.get("language", "text")
         else:
