@@ -11,7 +11,9 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import myst_nb.core.render
 from docutils import nodes
+from nbformat import NotebookNode
 
 ROOT = Path(__file__).parents[1]
 GENERATED = Path(__file__).parent / "generated"
@@ -95,6 +97,27 @@ def show_as_typed(app: Any, doctree: nodes.document) -> None:
             block.parent.remove(block)
 
 
+def join_streams(outputs: list[NotebookNode]) -> list[NotebookNode]:
+    """Join what a cell printed just as it was printed, the errors after the output.
+
+    IPython hands on what bash prints in chunks of 100 bytes. myst-nb would begin a new line after each.
+    """
+    printed = {"stdout": "", "stderr": ""}
+    others = []
+    for output in outputs:
+        if output["output_type"] == "stream":
+            printed[output["name"]] += output["text"]
+        else:
+            others.append(output)
+    streams = [
+        NotebookNode(output_type="stream", name=name, text=text.rstrip() + "\n")
+        for name, text in printed.items()
+        if text.strip()
+    ]
+    return [*streams, *others]
+
+
+myst_nb.core.render.coalesce_streams = join_streams
 write_pages(GENERATED)
 SHOWN.mkdir(exist_ok=True)
 
