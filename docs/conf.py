@@ -11,7 +11,9 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import myst_nb.core.render
 from docutils import nodes
+from nbformat import NotebookNode
 
 ROOT = Path(__file__).parents[1]
 GENERATED = Path(__file__).parent / "generated"
@@ -69,6 +71,9 @@ napoleon_use_rtype = False
 PROGRESS = re.compile(r".*: +\d+ %, .*\d+ of \d+ cases.*\n?")
 """A line of progress, as it is written every ten seconds where there is no terminal."""
 
+LANGUAGES = {".toml": "toml", ".py": "python"}
+"""The colouring of files that pages write; others, as tables, have none."""
+
 
 def show_as_typed(app: Any, doctree: nodes.document) -> None:
     """Show a cell that IPython runs by its first line as what it holds: commands, or a file with its name.
@@ -81,7 +86,7 @@ def show_as_typed(app: Any, doctree: nodes.document) -> None:
             shown, language = rest, "bash"
         elif first.startswith("%%writefile "):
             name = first.split()[1]
-            shown, language = f"# {name}\n{rest}", Path(name).suffix.removeprefix(".") or "text"
+            shown, language = f"# {name}\n{rest}", LANGUAGES.get(Path(name).suffix, "text")
         elif PROGRESS.search(block.rawsource):
             shown, language = PROGRESS.sub("", block.rawsource), block.get("language", "text")
         else:
@@ -92,6 +97,27 @@ def show_as_typed(app: Any, doctree: nodes.document) -> None:
             block.parent.remove(block)
 
 
+def join_streams(outputs: list[NotebookNode]) -> list[NotebookNode]:
+    """Join what a cell printed just as it was printed, the errors after the output.
+
+    IPython hands on what bash prints in chunks of 100 bytes. myst-nb would begin a new line after each.
+    """
+    printed = {"stdout": "", "stderr": ""}
+    others = []
+    for output in outputs:
+        if output["output_type"] == "stream":
+            printed[output["name"]] += output["text"]
+        else:
+            others.append(output)
+    streams = [
+        NotebookNode(output_type="stream", name=name, text=text.rstrip() + "\n")
+        for name, text in printed.items()
+        if text.strip()
+    ]
+    return [*streams, *others]
+
+
+myst_nb.core.render.coalesce_streams = join_streams
 write_pages(GENERATED)
 SHOWN.mkdir(exist_ok=True)
 
