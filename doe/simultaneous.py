@@ -30,7 +30,7 @@ LEVELS = 7
 
 LOWEST, HIGHEST = 0.6, 1.2
 
-LEVEL_TAILS, INTERVAL_TAILS = (0.5, 0.3), (0.35, 0.12)
+LEVEL_TAILS, INTERVAL_TAILS = (0.5, 0.4), (0.35, 0.12)
 """Probabilities of a smaller estimate for the true variances behind an interval: estimates that weigh as well
 as measure must be doubted more than those that only measure."""
 

@@ -32,7 +32,8 @@ def box_behnken(
     """Return the Box-Behnken design of 3 to 7 factors: 12, 24, 40, 48 or 56 runs and the centers.
 
     Own code: pyDOE3 1.6 takes every pair of factors, which with 6 and 7 factors gives 60 and 84 runs instead
-    of the published 48 and 56, and has no blocks.
+    of the published 48 and 56, and has no blocks. process-improve 2.2.0 has the published runs, but
+    splits 3 factors (and any others into any number) into blocks that are not orthogonal, without a word.
 
     Parameters
     ----------

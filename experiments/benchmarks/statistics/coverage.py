@@ -35,6 +35,8 @@ class Figure:
     found: float
     trials: int
     """Independent repetitions; each may hold several draws."""
+    spread: float | None = None
+    """Standard deviation of a trial's share, None where a trial is a yes or no."""
 
     def __post_init__(self) -> None:
         if self.promise not in PROMISES:
@@ -46,7 +48,8 @@ class Figure:
     @property
     def se(self) -> float:
         """Standard error of the share, by the trials."""
-        return math.sqrt(self.found * (1.0 - self.found) / self.trials)
+        spread = math.sqrt(self.found * (1.0 - self.found)) if self.spread is None else self.spread
+        return spread / math.sqrt(self.trials)
 
     @property
     def holds(self) -> bool:
@@ -61,9 +64,10 @@ CHECKED = 20
 """Trials of every case that go through `doe` itself, beside the vectorised computation of all of them."""
 
 
-def require_same(figure: str, found: object, expected: object) -> None:
-    """Raise unless the vectorised computation gives what `doe` gives (to rounding)."""
-    if not np.allclose(np.asarray(found, float), np.asarray(expected, float), rtol=1e-6, atol=1e-9):
+def require_same(figure: str, found: object, expected: object, near: float = 1e-6) -> None:
+    """Raise unless the vectorised computation gives what `doe` gives (to rounding, or a search's end)."""
+    ours, theirs = np.asarray(found, float), np.asarray(expected, float)
+    if not np.allclose(ours, theirs, rtol=near, atol=1e-3 * near):
         raise ValueError(f"{figure}: the record computes {found}, doe gives {expected}")
 
 

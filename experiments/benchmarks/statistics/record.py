@@ -14,10 +14,12 @@ from experiments.benchmarks.statistics.agreements import agreements
 from experiments.benchmarks.statistics.coverage import AT_LEAST, AT_MOST, SLACK, Figure, figures_table
 from experiments.benchmarks.statistics.means import means
 from experiments.benchmarks.statistics.screenings import screenings
-from experiments.benchmarks.statistics.surfaces import surfaces
+from experiments.benchmarks.statistics.surfaces import directions, joint_fits, surfaces
 
 THEMES: dict[str, Callable[[], Iterator[Figure]]] = {
     "surfaces": surfaces,
+    "joint_fits": joint_fits,
+    "directions": directions,
     "means": means,
     "screenings": screenings,
     "agreements": agreements,
@@ -25,7 +27,9 @@ THEMES: dict[str, Callable[[], Iterator[Figure]]] = {
 """Parts of the record, each a file of its own."""
 
 TITLES = {
-    "surfaces": "Surfaces, regions and joint fits",
+    "surfaces": "Surfaces and their regions",
+    "joint_fits": "Joint fits",
+    "directions": "Directions of a joint fit",
     "means": "Comparisons of means",
     "screenings": "Screening",
     "agreements": "Agreement",
@@ -46,7 +50,8 @@ def page(folder: Path = FOLDER) -> str:
         f"`{COMMAND}` repeats the record in some minutes of one core; with `--theme NAME`, one part of it.",
         "*exact*: the stated share within .01 (.94 to .96 for .95, .04 to .06 for .05). *at least*, *at "
         "most*: so the documentation states it, conservative by construction; within .01 on that side. se: "
-        "of the share found, by the trials. A figure holds that lies in its band, or outside by no more than "
+        "of the share found, by the trials (a trial of a joint fit is a probability, and tells more than a "
+        "yes or no). A figure holds that lies in its band, or outside by no more than "
         "two standard errors (`se`). With two measurements (*at least*) no rule is exact: none that is "
         "continuous in the data holds its level for all ratios of two unknown variances (the problem of "
         "Behrens and Fisher; Linnik 1968), and with one degree of freedom the best one found still goes from "

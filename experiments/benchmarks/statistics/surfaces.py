@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import stats
+from scipy import optimize, special, stats
 
 from doe import Design, Factor, Goal, Sample, central_composite, fit_surface, joint_fit
+from doe.joint import PULL
 from doe.quadratic import QuadraticForm
 from doe.simultaneous import Simultaneous
 from doe.two_errors import TwoErrors
@@ -35,7 +36,7 @@ SPREADS = (0.3, 1.0, 3.0)
 FITS, DRAWS = 10_000, 5
 """Fitted surfaces, and measured targets for each."""
 
-JOINT_TRIALS, JOINT_CHECKED = 4_000, 5
+JOINT_TRIALS, JOINT_CHECKED = 1_500, 5
 """Joint fits of each case, and those of them that go through ``joint_fit`` itself."""
 
 SHARED = 0.8
@@ -48,16 +49,24 @@ CURVED = {
 }
 """True slopes, interaction and squares over the standard deviation of a run."""
 
-PAIRS, PAIR_TRIALS = ((2, 2), (2, 6), (3, 2), (3, 3), (5, 2), (10, 6)), 500
+PAIRS, PAIR_TRIALS = ((2, 2), (2, 6), (3, 2), (3, 3), (5, 2), (10, 6)), 1_600
 """Measurements and responses of the directions, and trials of each."""
 
 
 def surfaces() -> Iterator[Figure]:
-    """Yield the coverage of regions of one and more responses, of predictions, and of directions."""
+    """Yield the coverage of regions of one response, and of predictions."""
     for number, name in enumerate(CURVED):
         yield from _reduced(name, number)
+
+
+def joint_fits() -> Iterator[Figure]:
+    """Yield the coverage of regions of several responses."""
     for number, correlation in enumerate((0.0, SHARED)):
         yield from _joint(correlation, 10 + number)
+
+
+def directions() -> Iterator[Figure]:
+    """Yield the coverage of the half widths along the directions of a joint fit."""
     for number, (count, responses) in enumerate(PAIRS):
         yield _direction(count, responses, 20 + number)
 
@@ -69,6 +78,15 @@ def _matrix(coded: NDArray[np.float64]) -> NDArray[np.float64]:
 
 MATRIX = _matrix(DESIGN.points.to_numpy())
 HAT = MATRIX @ np.linalg.pinv(MATRIX)
+
+LEVERAGE = float((_matrix(POINT) @ np.linalg.inv(MATRIX.T @ MATRIX) @ _matrix(POINT).T)[0, 0])
+"""Variance of the fitted mean at the true setting, over that of a run."""
+
+NEAR = 1e-4
+"""Relative difference that two searches for the smallest chi2 may leave."""
+
+QUADRATURE = 24
+"""Nodes for what the errors of the fits share."""
 
 
 @dataclass(frozen=True)
@@ -88,8 +106,7 @@ class _Fits:
         row, df = _matrix(POINT)[0], len(MATRIX) - MATRIX.shape[1]
         coefficients = noise @ np.linalg.pinv(MATRIX).T
         sd = np.sqrt(((noise - noise @ HAT) ** 2).sum(axis=-1) / df)
-        leverage = float(row @ np.linalg.inv(MATRIX.T @ MATRIX) @ row)
-        return cls(coefficients @ row, sd * np.sqrt(leverage), sd, float(df))
+        return cls(coefficients @ row, sd * np.sqrt(LEVERAGE), sd, float(df))
 
 
 def _true_mean(coded: NDArray[np.float64], name: str) -> NDArray[np.float64]:
@@ -151,7 +168,11 @@ def _agreeing(rng: np.random.Generator, fits: _Fits, count: int, spread: float) 
 
 
 def _joint(correlation: float, number: int) -> Iterator[Figure]:
-    """Yield what a joint region covers: responses by run, independent or hanging together."""
+    """Yield what a joint region covers: responses by run, independent or hanging together.
+
+    The estimated errors are drawn; given them, the probability that all responses agree is computed. So a
+    trial is worth many of those that draw the differences too.
+    """
     rng = generator("surfaces", number)
     own = rng.standard_normal((JOINT_TRIALS, max(RESPONSES), len(DESIGN.coded)))
     shared = rng.standard_normal((JOINT_TRIALS, 1, len(DESIGN.coded)))
@@ -162,34 +183,47 @@ def _joint(correlation: float, number: int) -> Iterator[Figure]:
         for count in JOINT_MEASUREMENTS:
             for spread in SPREADS:
                 target, variance = _measured(rng, (JOINT_TRIALS, responses), count, spread)
-                inside = 0
+                reach = np.empty((JOINT_TRIALS, responses))
                 for trial in range(JOINT_TRIALS):
                     part = noise[trial, :responses]
-                    agreed = _together(every, part, trial, target[trial], variance[trial], count)
+                    reach[trial] = _reach(every, part, trial, variance[trial], count)
                     if trial < JOINT_CHECKED:
                         found = _through_joint_fit(part, target[trial], variance[trial], count)
-                        require_same("joint_fit", found, agreed)
-                    inside += agreed
+                        differences = every.error[trial, :responses] - target[trial]
+                        require_same("joint_fit", found, (np.abs(differences) <= reach[trial]).all())
+                shares = all_within(reach, correlation, spread**2 / count)
                 case = f"{responses} responses, {kind}, n = {count}, spread {spread:g}"
-                promise = AT_LEAST if count < 3 else EXACT
-                yield Figure("joint_fit", case, 0.95, promise, inside / JOINT_TRIALS, JOINT_TRIALS)
+                yield _figure("joint_fit", case, count, shares)
 
 
-def _together(
-    every: _Fits,
-    noise: NDArray[np.float64],
-    trial: int,
-    target: NDArray[np.float64],
-    variance: NDArray[np.float64],
-    count: int,
-) -> bool:
-    """Tell if all responses agree at the true setting, by the rule of ``joint_fit`` with its level there."""
-    chosen = slice(len(target))
-    first = every.se[trial, chosen] ** 2
+def _figure(name: str, case: str, count: int, shares: NDArray[np.float64]) -> Figure:
+    """Return a figure of .95 from the shares of its trials; exact from three measurements on."""
+    promise = AT_LEAST if count < 3 else EXACT
+    return Figure(name, case, 0.95, promise, float(shares.mean()), len(shares), float(shares.std()))
+
+
+def all_within(reach: NDArray[np.float64], correlation: float, variance: float) -> NDArray[np.float64]:
+    """Return the probability of each trial that no difference of fit and target is larger than its reach.
+
+    The true errors of the fits have one variance and correlation, the targets' means a variance of their own:
+    given what the fits share, the differences are independent. The mean over it is a quadrature.
+    """
+    nodes, weights = np.polynomial.hermite_e.hermegauss(QUADRATURE if correlation else 1)
+    shift, reach = np.sqrt(correlation * LEVERAGE) * nodes[:, None], reach[:, None]
+    sd = np.sqrt((1.0 - correlation) * LEVERAGE + variance)
+    inside = (special.ndtr((reach - shift) / sd) - special.ndtr((-reach - shift) / sd)).prod(axis=-1)
+    return np.asarray(inside @ weights / weights.sum())
+
+
+def _reach(
+    every: _Fits, noise: NDArray[np.float64], trial: int, variance: NDArray[np.float64], count: int
+) -> NDArray[np.float64]:
+    """Return the largest differences at the true setting that agree, by the rule of ``joint_fit`` there."""
+    first = every.se[trial, : len(variance)] ** 2
     residuals = noise - noise @ HAT
-    rules = [TwoErrors(every.df, count - 1.0)] * len(target)
+    rules = [TwoErrors(every.df, count - 1.0)] * len(variance)
     test = Simultaneous(rules, variance, np.atleast_2d(np.corrcoef(residuals)), first[None], 0.05)
-    return bool(test.accepted((every.error[trial, chosen] - target)[None], first[None]).all())
+    return test.reach(first[None])[0]
 
 
 def _through_joint_fit(
@@ -228,22 +262,52 @@ def _direction(count: int, responses: int, number: int) -> Figure:
     rng = generator("surfaces", number)
     matrix = np.column_stack([np.ones(len(DESIGN.coded)), DESIGN.points.to_numpy()])
     inverse, df = np.linalg.inv(matrix.T @ matrix), len(matrix) - 3.0
-    inside = 0.0
-    for _ in range(PAIR_TRIALS):
-        goals = {}
-        for name in range(responses):
-            angle = np.pi * (name + rng.uniform()) / responses
-            true = 12.0 * np.array([0.0, np.cos(angle), np.sin(angle)])
-            response = matrix @ true + rng.standard_normal(len(matrix))
-            found = inverse @ matrix.T @ response
-            variance = float(((response - matrix @ found) ** 2).sum()) / df
-            target = POINT[0] @ true[1:] + rng.standard_normal(count)
-            goals[str(name)] = Goal(_Plane(found, variance * inverse, df), Sample.of(target))
-        fit = joint_fit(goals, resolution=12)
-        vectors = fit.directions[DESIGN.names].to_numpy()
-        away = np.abs(vectors @ (POINT[0] - fit.coded_point))
-        reach = fit.directions["half_width"].to_numpy()
-        inside += float((away <= reach).mean())
-    case = f"{responses} responses, n = {count}"
-    promise = AT_LEAST if count < 3 else EXACT
-    return Figure("directions.half_width", case, 0.95, promise, inside / PAIR_TRIALS, PAIR_TRIALS)
+    shares = np.empty(PAIR_TRIALS)
+    for trial in range(PAIR_TRIALS):
+        angle = np.pi * (np.arange(responses) + rng.uniform(size=responses)) / responses
+        slopes = 12.0 * np.column_stack([np.cos(angle), np.sin(angle)])
+        noise = rng.standard_normal((responses, len(matrix)))
+        found = noise @ matrix @ inverse
+        variance = ((noise - found @ matrix.T) ** 2).sum(axis=1) / df
+        found[:, 1:] += slopes
+        measured = (slopes @ POINT[0])[:, None] + rng.standard_normal((responses, count))
+        targets = [Sample.of(row) for row in measured]
+        planes = [_Plane(row, part * inverse, df) for row, part in zip(found, variance, strict=True)]
+        point, vectors, reach = _half_widths(planes, targets)
+        if trial < JOINT_CHECKED:
+            pairs = zip(planes, targets, strict=True)
+            fit = joint_fit({str(name): Goal(*pair) for name, pair in enumerate(pairs)}, resolution=12)
+            require_same("directions", np.abs(vectors.T), fit.directions[DESIGN.names].abs(), NEAR)
+            require_same("directions", reach, fit.directions["half_width"], NEAR)
+            require_same("directions", point, fit.coded_point, NEAR)
+        shares[trial] = (np.abs(vectors.T @ (POINT[0] - point)) <= reach).mean()
+    return _figure("directions.half_width", f"{responses} responses, n = {count}", count, shares)
+
+
+def _half_widths(
+    planes: list[_Plane], targets: list[Sample]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return the point of the smallest chi2, the directions there and the half widths along them."""
+    coefficients = np.array([plane.coefficients for plane in planes])
+    covariance = np.array([plane.covariance for plane in planes])
+    goal, second = np.array([(target.mean, target.se**2) for target in targets]).T
+
+    def first(point: NDArray[np.float64]) -> NDArray[np.float64]:
+        row = np.array([1.0, *point])
+        return np.asarray(row @ covariance @ row)
+
+    def chi2(point: NDArray[np.float64]) -> float:
+        gap = coefficients @ np.array([1.0, *point]) - goal
+        return float((gap**2 / (first(point) + second)).sum() + PULL * point @ point)
+
+    start = np.linalg.lstsq(coefficients[:, 1:], goal - coefficients[:, 0], rcond=None)[0]
+    point = optimize.minimize(chi2, start, method="Nelder-Mead", options={"xatol": 1e-7, "fatol": 1e-9}).x
+    error = first(point)
+    slopes = coefficients[:, 1:] / np.sqrt(error + second)[:, None]
+    vectors = np.linalg.eigh(slopes.T @ slopes)[1][:, ::-1]
+    rules = [
+        TwoErrors(plane.residual_df, float(target.df)) for plane, target in zip(planes, targets, strict=True)
+    ]
+    together = Simultaneous(rules, second, np.eye(len(planes)), error[None], 0.05)
+    reach = [together.half_width(coefficients[:, 1:], vector, error) for vector in vectors.T]
+    return point, vectors, np.array(reach)
