@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from doe.compare import Sample
+from doe.sample import Sample
 from doe.errors import RuleError
 
 LEAST_PROFILES = 3
