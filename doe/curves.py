@@ -38,6 +38,8 @@ class CurveEmulator:
     """Unit vectors, shape (components, places)."""
     trends: Array
     """Constant and slopes of each score, shape (components, 1 + settings)."""
+    trend_error: Array
+    """Covariance of constant and slopes for a noise of 1, shape (1 + settings, 1 + settings)."""
     processes: tuple[Any, ...]
     """What the trend misses of each score, a process of scikit-learn each."""
     noises: Array
@@ -83,6 +85,7 @@ class CurveEmulator:
             mean,
             components,
             trends,
+            np.linalg.pinv(basis.T @ basis),
             tuple(process for process, _ in fitted),
             np.array([noise for _, noise in fitted]),
             left.var(axis=0),
@@ -96,11 +99,13 @@ class CurveEmulator:
         mean, variance : (points, components) arrays
         """
         x = np.atleast_2d(np.asarray(settings, dtype=np.float64))
-        means, variances = (_with_constant(x) @ self.trends.T), np.empty((len(x), len(self.processes)))
+        basis = _with_constant(x)
+        means = basis @ self.trends.T
+        variances = np.einsum("ij,jk,ik->i", basis, self.trend_error, basis)[:, None] * self.noises
         for number, process in enumerate(self.processes):
             miss, deviation = process.predict(x, return_std=True)
             means[:, number] += miss
-            variances[:, number] = deviation**2
+            variances[:, number] += deviation**2
         return means, variances
 
     def predict(self, settings: ArrayLike) -> tuple[Array, Array]:
