@@ -85,7 +85,7 @@ class CurveEmulator:
             mean,
             components,
             trends,
-            np.linalg.pinv(basis.T @ basis),
+            np.asarray(np.linalg.pinv(basis.T @ basis), dtype=np.float64),
             tuple(process for process, _ in fitted),
             np.array([noise for _, noise in fitted]),
             left.var(axis=0),

@@ -1,10 +1,12 @@
 """Microcrystalline cellulose in a drum: calibrated on two surfaces, two others predicted.
 
-    python -m experiments.studies.cellulose run --out out/cellulose                 one GPU: a quarter of an hour
-    python -m experiments.studies.cellulose run --scale bench --out out/cellulose   two cores: a coarse slice
-    python -m experiments.studies.cellulose page --out out/cellulose                the page, from what was written
+    python -m experiments.studies.cellulose run --out out/cellulose
+    python -m experiments.studies.cellulose run --scale bench --device cpu --out out/cellulose-bench
+    python -m experiments.studies.cellulose page --out out/cellulose
 
-What is there is not simulated again, so that a stopped run goes on.
+The first needs a GPU and a quarter of an hour on an H200; the second is a coarse slice for two cores; the third
+writes the page of a run. What a folder holds is not simulated again: a run that was
+stopped goes on.
 """
 
 from __future__ import annotations

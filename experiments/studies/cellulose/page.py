@@ -13,7 +13,7 @@ from doe.palette import BLUE, INK, MUTED, VERMILION
 from experiments.files import write_text
 from experiments.report.kit.figure import new_axes, save_figure
 from experiments.report.kit.markdown import facts_list, markdown_table, wall_times_table, write_page
-from experiments.report.kit.table import Column, Table, columns, make_table
+from experiments.report.kit.table import Column, Table, make_table
 from experiments.studies.cellulose.campaign import CURVES, FACTS, PREDICTION
 from experiments.studies.cellulose.fit import (
     LEVEL,
@@ -110,8 +110,7 @@ def _fit_text(calibration: Calibration) -> str:
 
 def _ranges(calibration: Calibration, title: str, fit: Any) -> Table:
     frame = calibration.ranges(fit)
-    shown = columns("factor", "best", "low", "middle", "high", "part of the design", "open")
-    return make_table("ranges", frame.round(3), shown, f"Compatible settings, {title}.")
+    return make_table("ranges", frame.round(3), list(frame), f"Compatible settings, {title}.")
 
 
 def _residuals(residuals: pd.DataFrame) -> Table:
@@ -152,7 +151,7 @@ def _draw_measured(path: Path, rpm: int, speeds: np.ndarray, curves: dict[float,
     edge, x = measured_edge(rpm), 1e3 * places()
     for dark, own in curves.items():
         main = dark == 0.5
-        style = {"linewidth": 1.8 if main else 0.8, "alpha": 1.0 if main else 0.5}
+        style: dict[str, Any] = {"linewidth": 1.8 if main else 0.8, "alpha": 1.0 if main else 0.5}
         name = f"z{100 * dark:.0f}_mm"
         axes.plot(edge["x_mm"], edge[name], color=INK, label="measured" if main else None, **style)
         mean = own[speeds == rpm].mean(axis=0)
