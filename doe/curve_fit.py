@@ -15,25 +15,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
-from scipy.special import logsumexp
-from scipy.stats import qmc
 
+from doe.compatible import compatible_points, even_points
 from doe.curves import CurveEmulator
+from doe.discrepancy.threads import in_one_thread
 from doe.errors import RuleError
 
 Array = NDArray[np.float64]
-
-FIRST_POINTS = 4096
-"""Sobol points that the search for compatible settings begins with; a power of two."""
-
-ROUNDS, POINTS = 4, 2000
-"""Rounds of sampling about the settings found, and points of each."""
-
-WIDER = 1.5
-"""Each round samples this many times as wide as the settings found scatter."""
-
-LEAST_WEIGHED = 100.0
-"""Points that must count in a round: until they do, the likelihood is flattened."""
 
 
 class MeasuredCurve(NamedTuple):
@@ -133,6 +121,7 @@ class CurveFit:
         return Forecast(middle, low, high)
 
 
+@in_one_thread
 def fit_curves(
     emulators: Mapping[str, CurveEmulator],
     places: Array,
@@ -164,26 +153,16 @@ def fit_curves(
         raise RuleError("needs a measured curve", "none", "curves")
     tie = np.eye(_settings_of(emulators)) if free is None else np.asarray(free, dtype=np.float64)
     rng = np.random.default_rng(seed)
-    first = 2.0 * qmc.Sobol(tie.shape[1], rng=rng).random_base2(FIRST_POINTS.bit_length() - 1) - 1.0
+    first = even_points(tie.shape[1], rng)
     trial = CurveFit(emulators, places, tuple(curves), Miss(1.0, 8.0, reading), first, first[0], np.nan)
     miss = trial.miss
     for _ in range(2):
         nearest = _nearest(trial, first @ tie.T, miss)
-        miss = max(_misses(reading, places), key=lambda one: _likelihood(trial, nearest, one))
-    points, logs = first, _log_likelihoods(trial, first @ tie.T, miss)
-    proposal = np.zeros(len(first))  # uniform in the box
-    for _ in range(ROUNDS):
-        weights = _flattened(logs - proposal)
-        center = weights @ points
-        spread = np.cov(points.T, aweights=weights, ddof=0).reshape(len(center), -1)
-        spread = WIDER**2 * spread + 1e-5 * np.eye(len(center))
-        points, proposal = _proposed(center, spread, rng)
-        logs = _log_likelihoods(trial, points @ tie.T, miss)
-    weights = np.exp(logs - proposal - logsumexp(logs - proposal))
-    drawn = points[rng.choice(len(points), size=POINTS, p=weights)] @ tie.T
-    chi2 = _chi2(trial, points @ tie.T, miss)
-    best = int(np.argmin(chi2))
-    return CurveFit(emulators, places, tuple(curves), miss, drawn, points[best] @ tie.T, float(chi2[best]))
+        miss = _likeliest(trial, nearest, _misses(reading, places))
+    found = compatible_points(lambda points: _log_likelihoods(trial, points @ tie.T, miss), first, rng)
+    chi2 = -2.0 * _log_likelihoods(trial, found.points @ tie.T, miss)
+    best = found.points[int(np.argmin(chi2))] @ tie.T
+    return CurveFit(emulators, places, tuple(curves), miss, found.likely @ tie.T, best, float(chi2.min()))
 
 
 def _settings_of(emulators: Mapping[str, CurveEmulator]) -> int:
@@ -221,13 +200,16 @@ def _nearest(fit: CurveFit, settings: Array, miss: Miss) -> Array:
     return np.asarray(settings[int(np.argmin(_chi2(fit, settings, miss)))])
 
 
-def _likelihood(fit: CurveFit, settings: Array, miss: Miss) -> float:
-    """Logarithm of the likelihood of one miss at settings."""
-    where = _where(fit.curves, fit.places)
-    covariance = miss.covariance(where, where) + _unknown(fit, settings)
+def _likeliest(fit: CurveFit, settings: Array, misses: Sequence[Miss]) -> Miss:
+    """Miss of the largest likelihood at settings."""
+    where, unknown = _where(fit.curves, fit.places), _unknown(fit, settings)
     residual = fit.residuals(settings)[0]
-    factor = cho_factor(covariance)
-    return float(-0.5 * residual @ cho_solve(factor, residual) - np.log(np.diag(factor[0])).sum())
+
+    def likelihood(miss: Miss) -> float:
+        factor = cho_factor(miss.covariance(where, where) + unknown)
+        return float(-0.5 * residual @ cho_solve(factor, residual) - np.log(np.diag(factor[0])).sum())
+
+    return max(misses, key=likelihood)
 
 
 def _chi2(fit: CurveFit, settings: Array, miss: Miss) -> Array:
@@ -242,19 +224,3 @@ def _log_likelihoods(fit: CurveFit, settings: Array, miss: Miss) -> Array:
     """Logarithms of the likelihoods of settings; none outside the design."""
     inside = (np.abs(settings) <= 1.0).all(axis=1)
     return np.where(inside, -0.5 * _chi2(fit, settings, miss), -np.inf)
-
-
-def _flattened(logs: Array) -> Array:
-    """Weights of points, of the likelihood to the largest power at which enough of them count."""
-    for power in 0.5 ** np.arange(30):
-        weights = np.exp(power * logs - logsumexp(power * logs))
-        if 1.0 / np.sum(weights**2) >= LEAST_WEIGHED:
-            break
-    return np.asarray(weights)
-
-
-def _proposed(center: Array, spread: Array, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Points of a normal distribution, and the logarithms of their densities."""
-    factor = np.linalg.cholesky(spread)
-    normal = rng.normal(size=(POINTS, len(center)))
-    return center + normal @ factor.T, -0.5 * (normal**2).sum(axis=1)

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from doe.discrepancy.threads import in_one_thread
 from doe.errors import RuleError
 
 Array = NDArray[np.float64]
@@ -48,6 +49,7 @@ class CurveEmulator:
     """Variance that the components leave out, shape (places,)."""
 
     @classmethod
+    @in_one_thread
     def of(cls, settings: ArrayLike, curves: ArrayLike) -> CurveEmulator:
         """Fit an emulator.
 
@@ -137,7 +139,7 @@ def _process(x: Array, values: Array) -> tuple[Any, float]:
     scale = float(np.sqrt(np.mean(values**2))) or 1.0
     smooth = ConstantKernel(0.7, (1e-2, 1e2)) * RBF(np.full(x.shape[1], 1.0), (0.4, 8.0))
     process = GaussianProcessRegressor(
-        smooth + WhiteKernel(0.2, (1e-4, 2.0)), n_restarts_optimizer=2, random_state=0
+        smooth + WhiteKernel(0.2, (1e-4, 2.0)), n_restarts_optimizer=1, random_state=0
     )
     with warnings.catch_warnings():
         # An amplitude or a length at the end of its range is an answer, not a failure.

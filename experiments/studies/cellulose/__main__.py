@@ -4,9 +4,8 @@
     python -m experiments.studies.cellulose run --scale bench --device cpu --out out/cellulose-bench
     python -m experiments.studies.cellulose page --out out/cellulose
 
-The first needs a GPU and a quarter of an hour on an H200; the second is a coarse slice for two cores; the third
-writes the page of a run. What a folder holds is not simulated again: a run that was
-stopped goes on.
+The first needs a GPU, and a quarter of an hour on an H200; the second is a coarse slice for two cores; the
+third writes the page of a run. What a folder holds is not simulated again: a run that was stopped goes on.
 """
 
 from __future__ import annotations

@@ -56,7 +56,7 @@ class Runs:
         return 2 * (self.first + 1) + 4 * (self.second + self.checks)
 
 
-RUNS = {"h200": Runs(17, 12, 1), "bench": Runs(12, 6, 1)}
+RUNS = {"h200": Runs(17, 12, 1), "bench": Runs(12, 8, 1)}
 """By scale of the study."""
 
 

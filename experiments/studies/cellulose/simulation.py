@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from dem_warp import CaseResult, simulate
+from dem_warp import CaseResult
 from dem_warp.checkpoint import case_name
 from experiments.cases import Store
+from experiments.cases.workers.own import OwnWorkers
 from experiments.files import write_text
 from experiments.measurement.drum_edges import EdgeWatch, edge_file, read_edges
 from experiments.studies.cellulose.plan import case_of, places
@@ -49,11 +50,8 @@ def simulate_drums(
         )
 
     if missing:
-        watch = EdgeWatch(edges, places())
-        simulate(
-            [cases[i] for i in missing], device, workers,
-            on_result=keep, checkpoint=store.unfinished, onlooker=watch,
-        )  # fmt: skip
+        machine = OwnWorkers(device, workers, EdgeWatch(edges, places()))
+        machine.simulate([cases[i] for i in missing], on_result=keep, checkpoint=store.unfinished)
     ends = [store.load(key) for key in keys]
     found = table.assign(
         status=[end.status for end in ends],
