@@ -127,11 +127,11 @@ def _residuals(residuals: pd.DataFrame) -> Table:
     layout = [
         Column("simulated", "simulated at the"),
         Column("rpm", "speed", "count", "1/min"),
-        Column("rms_mm", "root mean square", "number", "mm"),
-        Column("mean_mm", "mean", "number", "mm"),
-        Column("largest_mm", "largest", "number", "mm"),
-        Column("area_mm2", "area of disagreement", "number", "mm2"),
-        Column("source's area", "source's best", "number", "mm2"),
+        Column("rms_mm", "root mean square", "ratio", "mm"),
+        Column("mean_mm", "mean", "ratio", "mm"),
+        Column("largest_mm", "largest", "ratio", "mm"),
+        Column("area_mm2", "area of disagreement", "ratio", "mm2"),
+        Column("source's area", "source's best", "ratio", "mm2"),
     ]
     note = (
         f"The area counts inside r2 < 0.6 R2. The published settings are {PUBLISHED}; the source's areas are "
