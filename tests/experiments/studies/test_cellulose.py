@@ -29,7 +29,8 @@ def test_measured_edges_lie_in_the_drum():
         assert (np.hypot(edge["x_mm"], edge["z50_mm"]) < RADIUS_MM - 1.0).all()
         # darker below
         both = edge.dropna()
-        assert (both["z20_mm"] > both["z50_mm"]).all() and (both["z50_mm"] > both["z80_mm"]).all()
+        assert (both["z20_mm"] > both["z50_mm"]).all()
+        assert (both["z50_mm"] > both["z80_mm"]).all()
 
 
 def test_the_published_filling_is_the_published_number_of_grains(study):
@@ -106,7 +107,8 @@ def test_the_whole_study_on_made_up_edges(tmp_path, monkeypatch):
         true = (1 - share) * ends[0] + share * ends[1]
         assert np.mean((inside["low"] < true) & (true < inside["high"])) > 0.9
     page = write_record(tmp_path).read_text(encoding="utf-8")
-    assert "15 revolutions" in page and (tmp_path / "edge-15.png").is_file()
+    assert "15 revolutions" in page
+    assert (tmp_path / "edge-15.png").is_file()
     found = pd.read_csv(tmp_path / "residuals.csv")
     # the model can meet both edges: what is left is the noise of its runs
     assert found.loc[found["stage"] == "check", "rms_mm"].max() < 0.5
@@ -136,6 +138,8 @@ def test_a_drum_is_simulated_once(tmp_path, monkeypatch):
     table = plan.batch(pd.DataFrame([plan.PUBLISHED]), "first", (15,), 1)
     found, seconds = simulate_drums(small, table, tmp_path, "cpu", 1)
     assert list(found["status"]) == ["finished"], found["reason"].iloc[0]
-    assert seconds > 0.0 and (tmp_path / "edges" / f"{found['case'].iloc[0]}.npz").is_file()
+    assert seconds > 0.0
+    assert (tmp_path / "edges" / f"{found['case'].iloc[0]}.npz").is_file()
     again, none = simulate_drums(small, table, tmp_path, "cpu", 1)
-    assert none == 0.0 and again.equals(found)
+    assert none == 0.0
+    assert again.equals(found)
