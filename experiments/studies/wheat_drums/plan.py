@@ -42,7 +42,7 @@ class Runs:
     """Heaps, at settings that the drums are compatible with."""
 
 
-RUNS = {"h200": Runs(22, 16), "bench": Runs(12, 8)}
+RUNS = {"h200": Runs(16, 16), "bench": Runs(9, 6)}
 """By scale of the study."""
 
 

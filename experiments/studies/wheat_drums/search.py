@@ -38,7 +38,8 @@ def write_search(folder: Path, study: Study, fit: WheatFit) -> list[Path]:
     }
     made, measured = folder / "search.toml", folder / "measured.csv"
     write_text(made, toml_text(document))
-    write_text(folder / "clump.txt", (HERE / "clump.txt").read_text(encoding="utf-8"))
+    shape = study.document["grain"]["clump"]
+    write_text(folder / shape, (HERE / shape).read_text(encoding="utf-8"))
     angles = pd.read_csv(HERE / "angles.csv", comment="#")
     columns = {"shell": "condition", "angle_deg": "value"}
     table = angles.rename(columns=columns).assign(observable="dynamic_angle", unit="deg")

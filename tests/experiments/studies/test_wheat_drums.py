@@ -56,8 +56,8 @@ def test_the_data_are_those_of_the_source():
     assert np.sqrt(angles.var().mean()) == pytest.approx(plan.INCLINED_SD, abs=0.2)
 
 
-def test_a_kernel_has_the_stated_size(study):
-    case = study.case({}, 0)
+def test_a_kernel_has_the_stated_size():
+    case = plan.study_at("h200").case({}, 0)
     shape = case.grains.mixture.shapes[0]
     low = (shape.centers - shape.radii[:, None]).min(axis=0)
     high = (shape.centers + shape.radii[:, None]).max(axis=0)
