@@ -14,12 +14,15 @@ PROGRESS = re.compile(r".*: +\d+ %, .*\d+ of \d+ cases.*\n?")
 LANGUAGES = {".toml": "toml", ".py": "python"}
 """The colouring of files that pages write; others, as tables, have none."""
 
+WRITTEN = re.compile(r"(Writing|Overwriting) \S+")
+"""What IPython says of a cell that is a file, whose name stands in the cell."""
+
 STREAMS = ("stderr", "stream")
 """Classes of what a cell printed; the output stands before the errors, so it is put there last."""
 
 
 def join_streams(app: Any, doctree: nodes.document) -> None:
-    """Join what a cell printed, without the lines of progress.
+    """Join what a cell printed, without the lines of progress and what is said of a file.
 
     IPython hands on what bash prints in chunks of 100 bytes, each a block of its own.
     """
@@ -33,7 +36,7 @@ def join_streams(app: Any, doctree: nodes.document) -> None:
             text = PROGRESS.sub("", "".join(chunk.rawsource for chunk in chunks)).rstrip()
             for chunk in chunks:
                 output.remove(chunk)
-            if text:
+            if text and not WRITTEN.fullmatch(text):
                 first = chunks[0]
                 block = nodes.literal_block(text, text, language=first["language"], classes=first["classes"])
                 output.insert(0, block)

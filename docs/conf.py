@@ -50,6 +50,7 @@ html_extra_path = ["generated/shown"]  # reports that pages made, to be opened f
 html_css_files = ["style.css"]
 html_show_sphinx = False
 html_math_renderer = "mathml"
+smartquotes_action = "qe"  # quotes and ellipses; the two dashes of an option stay two
 copybutton_exclude = ".linenos, .gp, .go"
 
 myst_enable_extensions = ["dollarmath", "attrs_inline", "colon_fence"]

@@ -159,7 +159,7 @@ def discover(
     measured: Annotated[
         Path | None,
         typer.Argument(
-            metavar="[MEASURED.csv]", help="Measured heaps; left out: only the library waves are run."
+            metavar="MEASURED.csv", help="Measured heaps; left out: only the library waves are run."
         ),
     ] = None,
     out: Out = None,
