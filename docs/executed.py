@@ -58,9 +58,17 @@ def slow(row: dict[str, str]) -> bool:
     return float(row["seconds"]) > QUICK
 
 
-def leave_out(app: Any, config: Any) -> None:
-    """Have pages built without their execution."""
+def commit_now() -> str:
+    """Return the commit of the tree, marked where the tree is not as committed."""
+    git = ["git", "-C", str(DOCS), "describe", "--always", "--abbrev=12", "--dirty", "--exclude=*"]
+    return subprocess.run(git, check=True, capture_output=True, text=True).stdout.strip()
+
+
+def choose(app: Any, config: Any) -> None:
+    """Have pages built without their execution; note what a run begins with, as that may change."""
     which, known = config.executed_pages, pages()
+    if config.executed_record:
+        app.executed_from = commit_now(), {name: digest(cells_of(file)) for name, file in known.items()}
     if which == "all":
         return
     chosen = set(which.split(","))
@@ -79,23 +87,21 @@ def write_record(app: Any, exception: Exception | None) -> None:
     runs = {name: found["exec_data"] for name, found in app.env.nb_metadata.items() if "exec_data" in found}
     if not all(run["succeeded"] for run in runs.values()):
         return
-    git = ["git", "-C", str(DOCS), "describe", "--always", "--abbrev=12", "--dirty", "--exclude=*"]
-    commit = subprocess.run(git, check=True, capture_output=True, text=True).stdout.strip()
-    known, rows = pages(), recorded()
+    (commit, digests), rows = app.executed_from, recorded()
     for name, run in runs.items():
         date = datetime.fromtimestamp(run["mtime"], UTC).date().isoformat()
-        row = (name, f"{run['runtime']:.1f}", digest(cells_of(known[name])), commit, date)
+        row = (name, f"{run['runtime']:.1f}", digests[name], commit, date)
         rows[name] = dict(zip(COLUMNS, row, strict=True))
     with RECORD.open("w", encoding="utf-8", newline="") as file:
         writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
         writer.writeheader()
-        writer.writerows(rows[name] for name in known if name in rows)
+        writer.writerows(rows[name] for name in digests if name in rows)
 
 
 def setup(app: Any) -> dict[str, bool]:
     """Add the settings."""
     app.add_config_value("executed_pages", "all", "")
     app.add_config_value("executed_record", False, "")
-    app.connect("config-inited", leave_out)
+    app.connect("config-inited", choose)
     app.connect("build-finished", write_record)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -66,9 +66,8 @@ def commands_page() -> str:
     for name in group.list_commands(context):
         command = group.get_command(context, name)
         inner = typer.Context(command, info_name=name, parent=context)
-        usage = re.sub(
-            "[{}]", "", command.get_usage(inner).removeprefix("Usage: ")
-        )  # typer's, of what is required
+        # typer puts what is required into braces
+        usage = re.sub("[{}]", "", command.get_usage(inner).removeprefix("Usage: "))
         parts += [f"## dem-warp {name}", command.help or "", f"`{usage}`"]
         rows = []
         for parameter in command.get_params(inner):
