@@ -59,9 +59,14 @@ def slow(row: dict[str, str]) -> bool:
 
 
 def commit_now() -> str:
-    """Return the commit of the tree, marked where the tree is not as committed."""
-    git = ["git", "-C", str(DOCS), "describe", "--always", "--abbrev=12", "--dirty", "--exclude=*"]
-    return subprocess.run(git, check=True, capture_output=True, text=True).stdout.strip()
+    """Return the commit of the tree, marked where more than the record is not as committed."""
+
+    def git(*words: str) -> str:
+        command = ["git", "-C", str(DOCS), *words]
+        return subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()
+
+    changed = git("status", "--porcelain", "--untracked-files=no", "--", ":/", f":!{RECORD.name}")
+    return git("rev-parse", "--short=12", "HEAD") + ("-dirty" if changed else "")
 
 
 def choose(app: Any, config: Any) -> None:
@@ -84,10 +89,11 @@ def write_record(app: Any, exception: Exception | None) -> None:
     """Write when each page was run, if none that was run had a fault."""
     if not app.config.executed_record or exception is not None:
         return
-    runs = {name: found["exec_data"] for name, found in app.env.nb_metadata.items() if "exec_data" in found}
+    (commit, digests), rows = app.executed_from, recorded()
+    runs = {name: app.env.nb_metadata[name].get("exec_data") for name in digests}
+    runs = {name: run for name, run in runs.items() if run}
     if not all(run["succeeded"] for run in runs.values()):
         return
-    (commit, digests), rows = app.executed_from, recorded()
     for name, run in runs.items():
         date = datetime.fromtimestamp(run["mtime"], UTC).date().isoformat()
         row = (name, f"{run['runtime']:.1f}", digests[name], commit, date)
