@@ -78,7 +78,7 @@ def choose(app: Any, config: Any) -> None:
         return
     chosen = set(which.split(","))
     if which == "quick":
-        chosen = set(known) - {name for name, row in recorded().items() if slow(row)}
+        chosen = {name for name, row in recorded().items() if not slow(row)}
     if not chosen <= set(known):
         raise ValueError(f"executed_pages is all, quick or pages with cells, {', '.join(known)}; got {which}")
     left = [file.relative_to(DOCS).as_posix() for name, file in known.items() if name not in chosen]
