@@ -59,7 +59,7 @@ nb_execution_mode = "force"
 nb_execution_in_temp = True
 nb_execution_raise_on_error = False  # an error is a warning, and -W fails once every page was tried
 nb_execution_show_tb = True
-nb_execution_timeout = 900
+nb_execution_timeout = 3600  # of a cell, on a machine that is busy
 suppress_warnings = [
     "myst-nb.lexer",  # of cells that are shell, see `cells.show_as_typed`
     "ref.python",  # words of a docstring's types, as "mean", that are names of several attributes too
