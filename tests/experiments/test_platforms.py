@@ -29,7 +29,10 @@ ONLY_POSIX = {
     "os.nice", "os.mkfifo", "signal.SIGKILL", "signal.SIGHUP", "signal.SIGALRM", "signal.alarm",
 }  # fmt: skip
 ONLY_POSIX_MODULES = {"fcntl", "grp", "pwd", "resource", "termios", "tty", "pty", "syslog"}
-GUARDED = {"experiments/cases/keeper.py": {"os.killpg", "signal.SIGKILL"}}
+GUARDED = {
+    "experiments/cases/keeper.py": {"os.killpg", "signal.SIGKILL"},
+    "experiments/runs/examination.py": {"os.sched_getaffinity"},
+}
 """What stands behind a question for the system."""
 ASKED = {"experiments/report/kit/machine.py": {"/proc/cpuinfo"}}
 """Places of one system that are looked for, and may be missing."""
