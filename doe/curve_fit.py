@@ -173,7 +173,7 @@ def _misses(reading: float, places: Array) -> list[Miss]:
     """Candidates: sizes in steps of a quarter, lengths from a fortieth of the span of the places on."""
     span = float(np.ptp(places))
     sizes = 0.25 * reading * 1.25 ** np.arange(26)
-    return [Miss(float(sd), span / part, reading) for sd in sizes for part in (40, 20, 10, 5)]
+    return [Miss(float(sd), span / part, reading) for sd in sizes for part in (40, 20, 10, 5, 2.5)]
 
 
 def _where(curves: Sequence[MeasuredCurve], places: Array) -> tuple[Array, Array]:

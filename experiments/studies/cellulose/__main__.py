@@ -15,6 +15,8 @@ from typing import Annotated
 
 import typer
 
+from experiments.commands.console import clear_errors
+
 Out = Annotated[Path, typer.Option(help="Folder of the results.")]
 
 app = typer.Typer(help=__doc__, no_args_is_help=True)
@@ -30,7 +32,8 @@ def run(
     """Simulate, calibrate, predict."""
     from experiments.studies.cellulose.campaign import run_study
 
-    run_study(scale, out, device, workers)
+    with clear_errors("What is stored is not simulated again."):
+        run_study(scale, out, device, workers)
 
 
 @app.command()
@@ -38,7 +41,8 @@ def page(out: Out = Path("out/cellulose")) -> None:
     """Write the page of a finished run."""
     from experiments.studies.cellulose.page import write_record
 
-    print(write_record(out))
+    with clear_errors():
+        print(write_record(out))
 
 
 if __name__ == "__main__":

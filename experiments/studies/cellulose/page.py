@@ -88,8 +88,8 @@ def _parts(
         "## Predicted surfaces",
         f"Nobody has compared them with a measurement yet. The bands hold a measured height with "
         f"{LEVEL:.0%}: compatible settings, error of the emulators, noise of a run, error of reading "
-        f"({miss.reading:g} mm), and what the model misses ({miss.sd:.2f} mm over {miss.length:g} mm, as it "
-        f"does at {' and '.join(map(str, MEASURED))}/min). They are {widths} wide, on average.",
+        f"({miss.reading:g} mm), and what the model misses ({miss.sd:.2f} mm over {miss.length:.0f} mm, as "
+        f"it does at {' and '.join(map(str, MEASURED))}/min). They are {widths} wide, on average.",
         *(f"![Edge predicted at {rpm} revolutions a minute](edge-{rpm}.png)" for rpm in HELD_BACK),
         "## What made the numbers",
         facts_list({key: value for key, value in facts.items() if key != "failed"}),
@@ -103,8 +103,8 @@ def _fit_text(calibration: Calibration) -> str:
     return (
         f"Generalised least squares of {free.count} heights, one in ten: chi2 is {free.chi2:.1f} with free "
         f"walls and {tied.chi2:.1f} with walls that roll as the grains, each weighed by its own miss of the "
-        f"model ({free.miss.sd:.2f} and {tied.miss.sd:.2f} mm, over {free.miss.length:g} and "
-        f"{tied.miss.length:g} mm). Ranges hold {LEVEL:.0%} of the compatible settings."
+        f"model ({free.miss.sd:.2f} and {tied.miss.sd:.2f} mm, over {free.miss.length:.0f} and "
+        f"{tied.miss.length:.0f} mm). Ranges hold {LEVEL:.0%} of the compatible settings."
     )
 
 
@@ -133,9 +133,10 @@ def _residuals(residuals: pd.DataFrame) -> Table:
         Column("area_mm2", "area of disagreement", "ratio", "mm2"),
         Column("source's area", "source's best", "ratio", "mm2"),
     ]
+    settings = f"sliding {PUBLISHED['mu']:g}, rolling {PUBLISHED['mu_r']:g}, fill {PUBLISHED['fill']:g}"
     note = (
-        f"The area counts inside r2 < 0.6 R2. The published settings are {PUBLISHED}; the source's areas are "
-        "those of its own simulations."
+        f"The area counts inside r2 < 0.6 R2. The published settings are {settings}, walls as grains; the "
+        "source's areas are those of its own simulations."
     )
     return make_table("residuals", pd.DataFrame(rows), layout, "Simulated less measured edge.", note)
 
@@ -173,13 +174,17 @@ def _draw_predicted(path: Path, forecast: pd.DataFrame, simulated: np.ndarray, r
         axes.plot(x, curve, color=BLUE, linewidth=0.8, label=label)
     turn = np.linspace(0.0, 2.0 * np.pi, 361)
     axes.plot(1e3 * radius * np.cos(turn), 1e3 * radius * np.sin(turn), color=MUTED, linewidth=0.8)
-    _finish(axes, f"{int(forecast['rpm'].iloc[0])} revolutions a minute, not measured here")
+    # the bed below its surface is empty in the picture
+    _finish(axes, f"{int(forecast['rpm'].iloc[0])} revolutions a minute, not measured here", (0.5, 0.14))
     save_figure(figure, path)
 
 
-def _finish(axes: Any, title: str) -> None:
+def _finish(axes: Any, title: str, legend: tuple[float, float] | None = None) -> None:
     axes.set_aspect("equal")
     axes.set_xlabel("x [mm], to the right")
     axes.set_ylabel("height above the axis [mm]")
     axes.set_title(title)
-    axes.legend(frameon=False)
+    if legend is None:
+        axes.legend(frameon=False)
+    else:
+        axes.legend(frameon=False, fontsize="small", loc="lower center", bbox_to_anchor=legend)

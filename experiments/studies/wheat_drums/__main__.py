@@ -16,6 +16,8 @@ from typing import Annotated
 
 import typer
 
+from experiments.commands.console import clear_errors
+
 Out = Annotated[Path, typer.Option(help="Folder of the results.")]
 
 app = typer.Typer(help=__doc__, no_args_is_help=True)
@@ -31,7 +33,8 @@ def run(
     """Simulate the drums, fit the slopes, simulate heaps."""
     from experiments.studies.wheat_drums.campaign import run_study
 
-    run_study(scale, out, device, workers)
+    with clear_errors("What is stored is not simulated again."):
+        run_study(scale, out, device, workers)
 
 
 @app.command()
@@ -39,7 +42,8 @@ def page(out: Out = Path("out/wheat-drums")) -> None:
     """Write the page of a finished run."""
     from experiments.studies.wheat_drums.page import write_record
 
-    print(write_record(out))
+    with clear_errors():
+        print(write_record(out))
 
 
 @app.command()
@@ -48,8 +52,9 @@ def search(out: Out = Path("out/wheat-drums")) -> None:
     from experiments.studies.wheat_drums.page import fit_of
     from experiments.studies.wheat_drums.search import write_search
 
-    study, fit, _ = fit_of(out)
-    made, measured = write_search(out, study, fit)
+    with clear_errors():
+        study, fit, _ = fit_of(out)
+        made, measured = write_search(out, study, fit)
     print(f"dem-warp discover {made} {measured} --out {out / 'search'}")
 
 
