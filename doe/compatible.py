@@ -1,4 +1,4 @@
-"""Settings that data are compatible with, drawn from a likelihood by adaptive importance sampling."""
+"""Settings that data are compatible with, drawn from a likelihood by importance and Metropolis sampling."""
 
 from __future__ import annotations
 
@@ -15,11 +15,14 @@ Array = NDArray[np.float64]
 FIRST_POINTS = 4096
 """Points that the search begins with; a power of two."""
 
-ROUNDS, POINTS = 6, 2000
+ROUNDS, POINTS = 6, 1000
 """Rounds of sampling about the settings found, and points of each."""
 
 WIDER = 1.5
 """Each round samples this many times as wide as the settings found scatter."""
+
+MOVES = 90
+"""Metropolis steps of each point after the rounds: they mend what importance sampling leaves at a border."""
 
 LEAST_WEIGHED = 100.0
 """Points that must count in a round: until they do, the likelihood is flattened."""
@@ -33,10 +36,8 @@ class Compatible(NamedTuple):
 
     likely: Array
     """As likely as one another, shape (POINTS, settings)."""
-    points: Array
-    """Points of the last round, among them the likeliest, shape (POINTS, settings)."""
-    counted: float
-    """Points of the last round that count."""
+    best: Array
+    """The likeliest of all that were tried, shape (settings,)."""
 
 
 def even_points(count: int, rng: np.random.Generator) -> Array:
@@ -69,9 +70,26 @@ def compatible_points(
         normal = rng.normal(size=(POINTS, len(center)))
         points, proposal = center + normal @ factor.T, -0.5 * (normal**2).sum(axis=1)
         logs = log_likelihood(points)
-    weights = np.exp(logs - proposal - logsumexp(logs - proposal))
-    drawn = points[rng.choice(len(points), size=POINTS, p=weights)]
-    return Compatible(drawn, points, float(1.0 / np.sum(weights**2)))
+    chosen = rng.choice(len(points), size=POINTS, p=_flattened(logs - proposal))
+    return _moved(log_likelihood, points[chosen], logs[chosen], rng)
+
+
+def _moved(
+    log_likelihood: Callable[[Array], Array], points: Array, logs: Array, rng: np.random.Generator
+) -> Compatible:
+    """Let points find their places by Metropolis steps as wide as they scatter, and finer ones in turn."""
+    best, highest = points[int(np.argmax(logs))], float(logs.max())
+    count = points.shape[1]
+    for number in range(MOVES):
+        spread = np.cov(points.T).reshape(count, -1) + NARROWEST**2 * np.eye(count)
+        factor = np.linalg.cholesky(spread) * 2.38 / np.sqrt(count) * (1.0, 0.4, 0.15)[number % 3]
+        tried = points + rng.normal(size=points.shape) @ factor.T
+        found = log_likelihood(tried)
+        taken = np.log(rng.uniform(size=len(tried))) < found - logs
+        points, logs = np.where(taken[:, None], tried, points), np.where(taken, found, logs)
+        if logs.max() > highest:
+            best, highest = points[int(np.argmax(logs))], float(logs.max())
+    return Compatible(points, best)
 
 
 def _flattened(logs: Array) -> Array:

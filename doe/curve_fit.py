@@ -9,7 +9,7 @@ that curves which no setting meets widen the compatible region and the bands of 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -154,15 +154,18 @@ def fit_curves(
     tie = np.eye(_settings_of(emulators)) if free is None else np.asarray(free, dtype=np.float64)
     rng = np.random.default_rng(seed)
     first = even_points(tie.shape[1], rng)
-    trial = CurveFit(emulators, places, tuple(curves), Miss(1.0, 8.0, reading), first, first[0], np.nan)
+    trial = CurveFit(
+        emulators, places, tuple(curves), Miss(1.0, 8.0, reading), first, np.zeros(len(tie)), np.nan
+    )
     miss = trial.miss
     for _ in range(2):
         nearest = _nearest(trial, first @ tie.T, miss)
         miss = _likeliest(trial, nearest, _misses(reading, places))
+        trial = replace(trial, best=nearest)
     found = compatible_points(lambda points: _log_likelihoods(trial, points @ tie.T, miss), first, rng)
-    chi2 = -2.0 * _log_likelihoods(trial, found.points @ tie.T, miss)
-    best = found.points[int(np.argmin(chi2))] @ tie.T
-    return CurveFit(emulators, places, tuple(curves), miss, found.likely @ tie.T, best, float(chi2.min()))
+    best = found.best @ tie.T
+    chi2 = float(_chi2(trial, best[None], miss)[0])
+    return CurveFit(emulators, places, tuple(curves), miss, found.likely @ tie.T, best, chi2)
 
 
 def _settings_of(emulators: Mapping[str, CurveEmulator]) -> int:
@@ -213,9 +216,9 @@ def _likeliest(fit: CurveFit, settings: Array, misses: Sequence[Miss]) -> Miss:
 
 
 def _chi2(fit: CurveFit, settings: Array, miss: Miss) -> Array:
-    """Generalised least squares at settings; the emulators' covariance is that in the middle of them."""
+    """Generalised least squares at settings; the emulators' covariance is that at the best ones so far."""
     where = _where(fit.curves, fit.places)
-    covariance = miss.covariance(where, where) + _unknown(fit, np.median(settings, axis=0))
+    covariance = miss.covariance(where, where) + _unknown(fit, fit.best)
     residuals = fit.residuals(settings)
     return np.asarray(np.einsum("ij,ij->i", residuals, cho_solve(cho_factor(covariance), residuals.T).T))
 

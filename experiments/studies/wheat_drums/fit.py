@@ -125,5 +125,4 @@ def fit_slopes(
 
     rng = np.random.default_rng(seed)
     found = compatible_points(log_likelihood, even_points(len(SETTINGS), rng), rng)
-    best = found.points[int(np.argmax(log_likelihood(found.points)))]
-    return WheatFit(slopes, data, found.likely, best, float(chi2(best[None])[0][0]))
+    return WheatFit(slopes, data, found.likely, found.best, float(chi2(found.best[None])[0][0]))
