@@ -1,4 +1,4 @@
-"""A second reality for the search: trials whose heaps are made by another code, with effects that only it knows.
+"""A second reality for the search: another code makes the heaps, with effects that only it knows.
 
 LIGGGHTS or LAMMPS runs the trial study in an input of its own: its laws, filling, walls, time step and seeds.
 The course of each test, the place of every sphere and the force on the tube come back over time, and the

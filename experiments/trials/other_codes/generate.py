@@ -90,7 +90,7 @@ def in_turn(labels: Sequence[Label]) -> list[Label]:
 def measure_in_time(
     folder: Folder, labels: Sequence[Label], declaration: Declaration, workers: Workers, deadline: float
 ) -> int:
-    """Measure trials one after the other until a deadline on ``time.monotonic`` [s]; return how many are left."""
+    """Measure trials one after the other until a deadline of ``time.monotonic``; count what is left."""
     code, study = code_of(folder), workshop_study(declaration.scale)
     table = OutcomeTable(folder.hidden / "outcomes.sqlite")
     waiting = [label for label in in_turn(labels) if not folder.measured(label.trial).exists()]

@@ -15,18 +15,15 @@ from experiments.export.liggghts import CONVENTIONS, contact_terms, material_ter
 from experiments.export.liggghts_input import grain_template
 from experiments.trials.other_codes.odd_lift import OddLift
 from experiments.trials.other_codes.reading import DRAG, FRAMES
-from experiments.trials.other_codes.surfaces import Bench
+from experiments.trials.other_codes.surfaces import FILL_MARGIN, Bench
 
 INPUT, TUBE, PLATE = "lift.in", "tube.stl", "plate.stl"
 
 GRAIN, ODD = 1, 4
 """Types of LIGGGHTS's atoms."""
 
-_BIN = 2.0
+_BIN = 4.0
 """Side of the bins of neighbours, in reaches of a pair: in smaller ones the empty box costs most."""
-
-FILL_MARGIN = 0.12
-"""Time in which the last grains come in and down [s]."""
 
 _SPARE = 1.2
 """Distance at which LIGGGHTS looks for bridges, over that at which they break."""
@@ -71,7 +68,7 @@ compute square all reduce ave v_square
 compute highest all reduce max z
 variable moving equal "sqrt(c_square) > {rest:.6g} || c_fastest > {calm:.6g}"
 thermo_style custom step atoms c_fastest c_square c_highest
-thermo {look}
+thermo {check}
 thermo_modify lost ignore norm no
 
 run {fill_steps}
@@ -79,12 +76,12 @@ unfix rain
 """
 
 _REST = """
-variable looks loop {limit_looks}
+variable looks loop {limit_checks}
 variable calm equal 0
 label {name}
-run {look}
+run {check}
 if "${{moving}} == 1" then "variable calm equal 0" else "variable calm equal ${{calm}}+1"
-if "${{calm}} >= {calm_looks}" then "jump SELF {name}_done"
+if "${{calm}} >= {calm_checks}" then "jump SELF {name}_done"
 next looks
 jump SELF {name}
 print "ERROR: no rest after {name}"
@@ -105,10 +102,10 @@ dump_modify film sort id format "%d %d %.9g %.9g %.9g %.6g %.6g %.6g %.9g"
 fix balance all ave/time 1 {look} {look} f_tube[3] file {drag}
 variable rise equal 0
 variable clear equal "v_rise > c_highest + {reach:.6g}"
-variable looks loop {lift_looks}
+variable looks loop {lift_checks}
 label lift
-run {look}
-variable rise equal ${{rise}}+{look_rise:.9g}
+run {check}
+variable rise equal ${{rise}}+{check_rise:.9g}
 if "${{clear}} == 1" then "jump SELF lifted"
 next looks
 jump SELF lift
@@ -128,8 +125,7 @@ run {more}
 
 
 _END = """
-run {look}
-run {look}
+run {check}
 """
 
 _PLATE_REST = 0.98
@@ -138,7 +134,7 @@ _PLATE_REST = 0.98
 
 def liggghts_files(bench: Bench) -> dict[str, str]:
     """Files of the input of a case, by name."""
-    scene, end = bench.scene, _END.format(look=bench.look_steps)
+    scene, end = bench.scene, _END.format(check=bench.check_steps)
     side = _PLATE_REST * scene.room(bench.lift.reach)[0]
     plate = side * np.array([[[-1, -1, 0], [1, -1, 0], [1, 1, 0]], [[-1, -1, 0], [1, 1, 0], [-1, 1, 0]]])
     phases = [_setup(bench), _rest(bench, "settle"), _lift(bench), _rest(bench, "rest"), end]
@@ -197,7 +193,7 @@ def _setup(bench: Bench) -> str:
         rain_speed=scene.rain_speed,
         rest=scene.rest_speed,
         calm=lift.calm_speed,
-        look=look,
+        check=bench.check_steps,
         fill_steps=look * math.ceil(fill / look),
     )
 
@@ -297,15 +293,14 @@ def wetting(bridge: CapillaryBridge, radius: float) -> tuple[float, float]:
 
 def _lift(bench: Bench) -> str:
     scene, lift, look = bench.scene, bench.lift, bench.look_steps
-    time_step = lift.case.time_step
+    check_rise = bench.check_steps * lift.case.time_step * scene.lift_speed
     turning = scene.turn_rate > 0.0
     period = 2.0 * math.pi / scene.turn_rate if turning else 0.0
     turn = f"fix turn all move/mesh mesh tube rotate origin 0 0 0 axis 0 0 1 period {period:.9g}"
     amplitude, frequency = scene.vibration_amplitude, scene.vibration_frequency
     shaking = amplitude > 0.0
-    shake = (
-        f"fix shake all move/mesh mesh plate wiggle amplitude 0 0 {amplitude:.9g} period {1.0 / frequency:.9g}"
-    )
+    wiggle = f"amplitude 0 0 {amplitude:.9g} period {1.0 / frequency:.9g}"
+    shake = f"fix shake all move/mesh mesh plate wiggle {wiggle}"
     # motions that are superposed are taken off in reverse order
     still = ("unfix turn\n" if turning else "") + "unfix lift\n"
     steps = lift.steps(scene.vibration_time)
@@ -316,21 +311,22 @@ def _lift(bench: Bench) -> str:
         turn=turn if turning else "",
         shake=shake if shaking else "",
         look=look,
+        check=bench.check_steps,
         frames=FRAMES,
         drag=DRAG,
         reach=lift.reach,
-        lift_looks=math.ceil(GONE * scene.height / (scene.lift_speed * look * time_step)) + 2,
-        look_rise=look * time_step * scene.lift_speed,
+        lift_checks=math.ceil(GONE * scene.height / check_rise) + 1,
+        check_rise=check_rise,
         still=still,
     )
 
 
 def _rest(bench: Bench, name: str) -> str:
-    look_time = bench.look_steps * bench.case.time_step
+    check_time = bench.check_steps * bench.case.time_step
     limit = bench.lift.settle_limit if name == "settle" else bench.lift.rest_limit
     return _REST.format(
         name=name,
-        look=bench.look_steps,
-        calm_looks=math.ceil(bench.scene.rest_time / look_time),
-        limit_looks=math.ceil(limit / look_time),
+        check=bench.check_steps,
+        calm_checks=math.ceil(bench.scene.rest_time / check_time),
+        limit_checks=math.ceil(limit / check_time),
     )

@@ -38,9 +38,9 @@ MADE: Mapping[str, Mapping[str, str]] = {
 
 LAWS: Mapping[str, str] = {
     "liggghts": (
-        "`hertz` with `tangential history`: Coulomb's limit holds for the spring alone, without a dashpot "
-        "while it slides, and takes the size of the normal force; ours holds for the spring with its dashpot, "
-        "and takes the push"
+        "`hertz` with `tangential history`: Coulomb's limit holds for the spring alone, so that spring and "
+        "dashpot of a contact that sticks may pass it together, and takes the size of the normal force; ours "
+        "holds for their sum, and takes the push"
     ),
     "lammps": (
         "`hertz/material` with `tsuji` damping and `mindlin`: Coulomb's limit holds for spring and dashpot "

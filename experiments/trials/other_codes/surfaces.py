@@ -25,6 +25,12 @@ DIRECTIONS = 4096
 DENSEST_RAIN = 0.17
 """Largest solid fraction of the grains that come in at once: in a denser lot some find no place at random."""
 
+CHECKED = 4
+"""Looks from one decision of an input to the next."""
+
+FILL_MARGIN = 0.12
+"""Time in which the last grains come in and down [s]."""
+
 
 @dataclass(frozen=True, eq=False)
 class Bench:
@@ -86,7 +92,9 @@ class Bench:
     @property
     def rain_rate(self) -> float:
         """Grains a second: the scene's, or the most that find a place."""
-        volume = float(np.dot([t.fraction for t in self.templates], [t.mass / t.density for t in self.templates]))
+        volume = float(
+            np.dot([t.fraction for t in self.templates], [t.mass / t.density for t in self.templates])
+        )
         room = math.pi * self.rain_radius**2 * self.lift.rain_height
         return min(self.scene.rain_rate, DENSEST_RAIN * room / (volume * self.rain_period))
 
@@ -103,6 +111,11 @@ class Bench:
     def radius(self) -> float:
         """Mean radius of the spheres of a grain of middle size [m]."""
         return float(np.mean(self.case.grains.mixture.shapes[0].radii)) * self.case.grains.size_mean
+
+    @property
+    def check_steps(self) -> int:
+        """Steps between two decisions of an input, which take more time than looks."""
+        return CHECKED * self.look_steps
 
     @property
     def smallest_radius(self) -> float:
@@ -137,9 +150,9 @@ class Bench:
         case = replace(self.case, mechanisms=(), grain_grain=among, grain_wall=wall)
         heaviest = max(template.mass for template in self.templates)
         with_grain, with_tube = contacts_of(case, self.lift.largest_radius, heaviest)
-        friction = self.scene.contacts(case)[2].static_friction
-        on_plate = replace(with_tube, surface=replace(with_tube.surface, static_friction=friction))
-        return with_grain, with_tube, on_plate
+        plate = self.scene.contacts(case)[2]
+        surface = replace(with_tube.surface, static_friction=plate.static_friction)
+        return with_grain, with_tube, replace(with_tube, surface=surface, coefficients=plate)
 
     @property
     def has_odd(self) -> bool:
@@ -152,4 +165,3 @@ class Bench:
         kinds = [(False, template, (1.0 - share) * template.fraction) for template in self.templates]
         odd_kinds = [(True, template, share * template.fraction) for template in self.templates]
         return kinds + odd_kinds if self.has_odd else kinds
-
