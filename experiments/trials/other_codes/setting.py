@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from dem_warp import PRESETS, Case
+from dem_warp.laws.conventions import Rolling
 from experiments.trials.other_codes.odd_lift import odd
 
 _STREAM = 2
 """Stream of random numbers of a trial's seed; 1 is that of its camera."""
 
-ROLLING = {"liggghts": ("cdt", "epsd2"), "lammps": ("sds",)}
+ROLLING: Mapping[str, tuple[Rolling, ...]] = {"liggghts": ("cdt", "epsd2"), "lammps": ("sds",)}
 """Resistances to rolling of each code."""
 
 
@@ -29,7 +31,7 @@ class Setting:
     """Sides of the prism that stands for the tube."""
     look_time: float
     """Time between two looks of the film [s]."""
-    rolling: str
+    rolling: Rolling
     """Resistance to rolling, where there is one."""
 
     @classmethod
@@ -41,7 +43,7 @@ class Setting:
             rain_rate=float(rng.uniform(500.0, 1000.0)),
             tube_sides=int(rng.integers(40, 97)),
             look_time=float(rng.uniform(2.5e-3, 5e-3)),
-            rolling=str(rng.choice(ROLLING[code])),
+            rolling=ROLLING[code][rng.integers(len(ROLLING[code]))],
         )
 
     def of(self, case: Case[Any], preset: str) -> Case[Any]:
