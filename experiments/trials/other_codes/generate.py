@@ -34,7 +34,8 @@ from experiments.toml_files import read_toml
 from experiments.trials.declaration import Declaration, read_declaration
 from experiments.trials.drawing import Plan
 from experiments.trials.folder import REALITY, Folder, noted_run
-from experiments.trials.generate import STUDY, bank_beside, measure_trials, seal_trials
+from experiments.trials.generate import STUDY, bank_beside, seal_trials
+from experiments.trials.heaps import CLOGGED, cases_of, write_heaps
 from experiments.trials.other_codes.effects import DECLARED, STRANGERS
 from experiments.trials.other_codes.making import LAWS, MADE
 from experiments.trials.other_codes.program import CODES, engine_for
@@ -47,6 +48,9 @@ PLAN = Plan(nulls=40, strong=8, weak=0, unresolved=8, withheld=0, strangers=4, p
 """Numbers of trials, where no other plan is given; mechanisms are those that the code can make."""
 
 SCALE = "bench"
+
+MISSING = 0.1
+"""Largest part of a trial's heaps that may fail; a clogged tube is none of them."""
 
 app = typer.Typer(help="Draw, seal and measure blind trials whose heaps another code makes.")
 
@@ -92,6 +96,7 @@ def measure_in_time(
 ) -> int:
     """Measure trials one after the other until a deadline of ``time.monotonic``; count what is left."""
     code, study = code_of(folder), workshop_study(declaration.scale)
+    conditions = [condition.name for condition in study.conditions]
     table = OutcomeTable(folder.hidden / "outcomes.sqlite")
     waiting = [label for label in in_turn(labels) if not folder.measured(label.trial).exists()]
     for done, label in enumerate(waiting):
@@ -102,8 +107,15 @@ def measure_in_time(
             OtherCodeSimulator(study, code, setting, table, workers) as simulator,
             noted_run(folder, f"heaps, {CODES[code].name}", "cpu", table),
         ):
-            measure_trials(folder, [label], declaration, simulator)
-        print(f"{label.trial} measured, {len(waiting) - done - 1} left", flush=True)
+            wave = cases_of(label, conditions, declaration.plan.replicates)
+            outcomes = simulator(wave)
+        failed = sum(bool(reason) and CLOGGED not in reason for reason in outcomes.reasons)
+        if failed > MISSING * len(wave):
+            rule = f"at most {MISSING:.0%} of a trial's heaps may fail"
+            raise InputError(rule, f"{failed} of {len(wave)}", f"{label.trial}: {max(outcomes.reasons)}")
+        write_heaps(folder.measured(label.trial), label, wave, outcomes)
+        lacking = f", {failed} of {len(wave)} heaps failed" if failed else ""
+        print(f"{label.trial} measured{lacking}; {len(waiting) - done - 1} left", flush=True)
     return 0
 
 

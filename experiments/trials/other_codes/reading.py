@@ -154,6 +154,19 @@ class FilmedLift(LiftController):
         self._measure_fill(view, view.alive)
         self.begin(view, view.alive)
 
+    def finish(self, view: WorldView) -> None:
+        """End where the code has ended, which found the grains at rest at its own looks.
+
+        Raises
+        ------
+        AnswerError
+            When the tube is not clear of the heap.
+        """
+        elapsed = view.time - self.course.phase_start
+        if not self.scene.lift_speed * elapsed > view.highest + self.reach:
+            raise AnswerError("the film ends before the tube is clear of the heap")
+        self._finish(view, elapsed)
+
 
 def filmed_observables(
     case: Case[LiftedCylinder], frames: Iterator[Frame], forces: Mapping[int, float]
@@ -163,7 +176,7 @@ def filmed_observables(
     Raises
     ------
     AnswerError
-        When the film has no start, a look without its force, or no end.
+        When the film has no start, a look without its force, or ends too soon.
     """
     first = next(frames, None)
     if first is None:
@@ -171,16 +184,19 @@ def filmed_observables(
     setup = _world(case, first)
     controller = FilmedLift(case, setup, chunk=1)
     watch = _Watch(case.time_step, first, setup.masses)
-    controller.start(watch.view(first, 0.0))
+    frame, view = first, watch.view(first, 0.0)
+    controller.start(view)
     for frame in frames:
         if frame.step not in forces:
             raise AnswerError(f"step {frame.step}: the balance has no force")
-        decision = controller.look(watch.view(frame, forces[frame.step]))
+        view = watch.view(frame, forces[frame.step])
+        decision = controller.look(view)
         if decision.failure or decision.done:
             return dict(controller.course.observables), watch.kept(frame), decision.failure
         if decision.remove is not None:
             watch.alive[decision.remove] = False
-    raise AnswerError("the film ends before the heap rests")
+    controller.finish(view)
+    return dict(controller.course.observables), watch.kept(frame), ""
 
 
 class _Watch:

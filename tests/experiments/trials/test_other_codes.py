@@ -161,7 +161,7 @@ def test_a_film_without_an_end_and_a_look_without_its_force_are_refused() -> Non
     places = np.column_stack([np.zeros((5, 2)), np.linspace(0.002, 0.02, 5)])
     frames = list(_film(case, places))
     forces = {frame.step: 0.0 for frame in frames}
-    with pytest.raises(AnswerError, match="ends before the heap rests"):
+    with pytest.raises(AnswerError, match="ends before the tube is clear"):
         filmed_observables(case, iter(frames[:20]), forces)
     with pytest.raises(AnswerError, match=f"step {LOOK}: the balance has no force"):
         filmed_observables(case, iter(frames), {})
