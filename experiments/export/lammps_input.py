@@ -137,9 +137,7 @@ def translate_lift(
 
     The contacts are LAMMPS' words for those among grains, with the tube and with the plate.
     """
-    files = (
-        {} if lift.is_of_spheres else {_file(n): molecule_text(t) for n, t in enumerate(lift.templates, 1)}
-    )
+    files = {} if lift.is_of_spheres else {_file(n): _molecule(t) for n, t in enumerate(lift.templates, 1)}
     files = {INPUT: _setup(lift, contacts) + _filling(lift) + _lifting(lift), **files}
     tilted = ("scene tilt: LAMMPS pours along gravity alone; left out",) if lift.scene.tilt else ()
     translated = (*laws, *lift_rows(lift, exact_tube=True), *_rows(lift))
@@ -164,14 +162,14 @@ def _setup(lift: Lift, contacts: Sequence[str]) -> str:
             f"fix plate all wall/gran/region granular {with_plate} region plate"
         )
     spheres, names = lift.is_of_spheres, " ".join(_file(n) for n in range(1, len(templates) + 1))
-    parts = " ".join(shares([template.fraction for template in templates]))
+    shares = " ".join(_shares([template.fraction for template in templates]))
     return _SETUP.format(
         cutoff="" if spheres else f" cutoff {2.0 * lift.reach + lift.skin:.6g}",
         molecules="" if spheres else f"molecule grains {names}\n",
         grains=(_SPHERES if spheres else _CLUMPS).format(gravity=gravity),
         poured="all",
         first_type=1 if spheres else 0,
-        kinds=_diameters(templates) if spheres else f"mol grains rigid bodies molfrac {parts}",
+        kinds=_diameters(templates) if spheres else f"mol grains rigid bodies molfrac {shares}",
         low=-half_width,
         high=half_width,
         bottom=bottom,
@@ -191,7 +189,7 @@ def _setup(lift: Lift, contacts: Sequence[str]) -> str:
         rain_top=rain_top,
         rain_seed=lift.seeds(1)[0],
         rain_speed=scene.rain_speed,
-        vol=volume_fraction(lift, lift.rain_rate * _fall_time(lift, gravity), lift.rain_radius - lift.reach),
+        vol=_volume_fraction(lift, gravity),
         look=lift.steps(LOOK),
         strike=lift.strike,
         slow=0.5 * scene.rain_speed,
@@ -201,13 +199,13 @@ def _setup(lift: Lift, contacts: Sequence[str]) -> str:
 
 
 def _diameters(templates: Sequence[Template]) -> str:
-    parts = shares([template.fraction for template in templates])
-    sizes = " ".join(f"{2.0 * t.radii[0]:.9g} {part}" for t, part in zip(templates, parts, strict=True))
+    shares = _shares([template.fraction for template in templates])
+    sizes = " ".join(f"{2.0 * t.radii[0]:.9g} {part}" for t, part in zip(templates, shares, strict=True))
     density = templates[0].density
     return f"diam poly {len(templates)} {sizes} dens {density:.9g} {density:.9g}"
 
 
-def shares(fractions: Sequence[float]) -> list[str]:
+def _shares(fractions: Sequence[float]) -> list[str]:
     """Write parts that add up to 1 within LAMMPS' tolerance."""
     return [f"{fraction:.15g}" for fraction in (*fractions[:-1], 1.0 - sum(fractions[:-1]))]
 
@@ -218,13 +216,15 @@ def _fall_time(lift: Lift, gravity: float) -> float:
     return (math.sqrt(speed**2 + 2.0 * gravity * lift.rain_height) - speed) / gravity
 
 
-def volume_fraction(lift: Lift, grains: float, radius: float) -> float:
-    """Volume fraction from which LAMMPS comes to so many grains at once, in a space of a radius [m]."""
+def _volume_fraction(lift: Lift, gravity: float) -> float:
+    """Volume fraction from which LAMMPS comes to as many grains an insertion as the rate asks for."""
+    area = math.pi * (lift.rain_radius - lift.reach) ** 2
     if lift.is_of_spheres:
         one = sum(t.fraction * 4.0 / 3.0 * math.pi * t.radii[0] ** 3 for t in lift.templates)
     else:
         one = 4.0 / 3.0 * math.pi * max(_molecule_radius(t) for t in lift.templates) ** 3
-    return (max(math.floor(grains), 1) + 0.5) * one / (math.pi * radius**2 * lift.rain_height)
+    grains = max(math.floor(lift.rain_rate * _fall_time(lift, gravity)), 1)
+    return (grains + 0.5) * one / (area * lift.rain_height)
 
 
 def _molecule_radius(template: Template) -> float:
@@ -233,7 +233,7 @@ def _molecule_radius(template: Template) -> float:
     return float(((away**2).sum(axis=1) ** 0.5 + template.radii).max())
 
 
-def molecule_text(template: Template) -> str:
+def _molecule(template: Template) -> str:
     """Write a template as a molecule file: mass and inertia are the body's."""
     count = template.shape.sphere_count
     xx, yy, zz = template.inertia.tolist()

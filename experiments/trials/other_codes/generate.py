@@ -122,7 +122,7 @@ def measure_in_time(
 @app.command()
 def seal(
     folder: Annotated[Path, typer.Argument(help="Folder of the trials.")],
-    code: Annotated[str, typer.Option(help="Code that makes the heaps: liggghts or lammps.")] = "liggghts",
+    code: Annotated[str, typer.Option(help="Code that makes the heaps.")] = "liggghts",
     bank: Annotated[Path | None, typer.Option(help="Bank of the trial study; left out: its own.")] = None,
     scale: Annotated[str, typer.Option(help="Scale of the trial study.")] = SCALE,
     plan: Annotated[Path | None, typer.Option(help="TOML file with numbers of trials.")] = None,

@@ -23,16 +23,6 @@ MADE: Mapping[str, Mapping[str, str]] = {
         "size_spread": "five classes of size with the moments of the normal spread, at the same mean mass",
         "vibration": "the plate, a mesh, wiggles as ours does, from the lift on for the same time",
     },
-    "lammps": {
-        "contact_adhesion": "`jkr`: the same law, whose damping and friction go by JKR's contact",
-        "plate_tilt": "gravity turned towards +x once the grains are in: LAMMPS pours along the tube alone",
-        "rolling_torque": (
-            "`rolling sds`, a spring and a dashpot against the relative rotation; the coefficient gives the "
-            "same mean torque"
-        ),
-        "size_spread": "five classes of size with the moments of the normal spread, at the same mean mass",
-        "vibration": "the plate, a region, wiggles as ours does, from the lift on for the same time",
-    },
 }
 """For each code, the effects that it can make, and how."""
 
@@ -41,10 +31,6 @@ LAWS: Mapping[str, str] = {
         "`hertz` with `tangential history`: Coulomb's limit holds for the spring alone, so that spring and "
         "dashpot of a contact that sticks may pass it together, and takes the size of the normal force; ours "
         "holds for their sum, and takes the push"
-    ),
-    "lammps": (
-        "`hertz/material` with `tsuji` damping and `mindlin`: Coulomb's limit holds for spring and dashpot "
-        "together, and the restitution comes from a polynomial"
     ),
 }
 """For each code, what its base law has of its own."""

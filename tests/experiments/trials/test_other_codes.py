@@ -27,10 +27,9 @@ from experiments.trials.drawing import Plan
 from experiments.trials.generate import STUDY
 from experiments.trials.other_codes.effects import DECLARED, STRANGERS
 from experiments.trials.other_codes.generate import PLAN, in_turn, plan_for, write_reality
-from experiments.trials.other_codes.lammps_input import lammps_files
 from experiments.trials.other_codes.liggghts_input import energy_density, liggghts_files, wetting
 from experiments.trials.other_codes.making import MADE
-from experiments.trials.other_codes.program import CODES, engine_for
+from experiments.trials.other_codes.program import engine_for
 from experiments.trials.other_codes.reading import (
     Frame,
     Grasp,
@@ -46,7 +45,7 @@ from experiments.trials.truth import Kind, Label
 THETA = {"mu_gg": 0.6, "mu_gw": 0.5, "e_gg": 0.3}
 COUNT = 24
 SMALL = {"scene": {"lifted-cylinder": {"grain_count": COUNT, "height": "25 mm"}}}
-PROGRAMS = {"liggghts": "liggghts", "lammps": "lmp"}
+PROGRAMS = {"liggghts": "liggghts"}
 SETTING = Setting(1.0, 1000.0, 48, 4e-3, "cdt")
 G = 9.81
 
@@ -253,12 +252,6 @@ def test_a_conical_tube_is_right_at_half_its_height() -> None:
     assert math.degrees(math.atan(slope)) == pytest.approx(3.0, rel=1e-6)
 
 
-def test_lammps_refuses_what_it_is_not_asked_for() -> None:
-    case = replace(case_of(), laws=replace(case_of().laws, rolling="sds"))
-    with pytest.raises(InputError, match="one kind of grains"):
-        lammps_files(Bench(STRANGERS["soft_class"].change(case, 4.0)))
-
-
 # ---- the generator -----------------------------------------------------------------------------------------
 
 
@@ -279,9 +272,9 @@ def test_the_plan_holds_at_least_120_trials_of_what_the_code_can_make() -> None:
     singles = plan.strong * len(plan.mechanisms)
     assert (plan.nulls, singles, plan.pairs) == (40, 48, 12)
     assert plan.nulls + singles + plan.pairs + plan.strangers * len(STRANGERS) >= 120
-    with pytest.raises(InputError, match="lammps makes"):
-        plan_for("lammps", Plan(mechanisms=("liquid_bridges",)))
-    with pytest.raises(InputError, match="must be one of liggghts, lammps"):
+    with pytest.raises(InputError, match="liggghts makes"):
+        plan_for("liggghts", Plan(mechanisms=("air_drag",)))
+    with pytest.raises(InputError, match="must be one of liggghts"):
         engine_for("edem")
 
 
@@ -303,10 +296,9 @@ def test_the_reality_says_how_each_effect_is_made(tmp_path: Path) -> None:
 def observed(code: str, tmp_path: Path, *sizes: tuple[str, float], **theta: float) -> dict[str, float]:
     """Observables of one small test that a code runs."""
     study = load_study(STUDY, "bench", SMALL)
-    setting = replace(SETTING, rolling="sds") if code == "lammps" else SETTING
     table = OutcomeTable(tmp_path / "outcomes.sqlite")
     values = tuple((THETA | theta).values())
-    with OtherCodeSimulator(study, code, setting, table, OwnWorkers("cpu", 1)) as simulator:
+    with OtherCodeSimulator(study, code, SETTING, table, OwnWorkers("cpu", 1)) as simulator:
         outcomes = simulator([Point(values, sizes, "base", 11)])
     assert outcomes.reasons == ("",)
     return dict(zip(NAMES, outcomes.values[0], strict=True))
@@ -329,7 +321,6 @@ def test_a_code_makes_a_heap_that_our_functions_read(code: str, tmp_path: Path) 
 
 EFFECTS = {
     "liggghts": (*MADE["liggghts"], *STRANGERS),
-    "lammps": (*MADE["lammps"], "conical_tube", "lognormal_sizes", "slick_plate", "turning_tube"),
 }
 
 
@@ -354,11 +345,3 @@ def _largest(effect: str) -> float:
 
     [mechanism] = [each for each in library_for(load_study(STUDY, "bench")) if each.name == effect]
     return mechanism.maximum
-
-
-@with_programs
-def test_nothing_hangs_on_a_smooth_tube(code: str, tmp_path: Path) -> None:
-    case = CODES[code]
-    assert case.program == PROGRAMS[code]
-    # without friction the tube pushes sideways only, but for the slant of a prism of 48 sides: none
-    assert observed(code, tmp_path, mu_gw=0.0)["wall_drag"] == pytest.approx(0.0, abs=1e-3)
