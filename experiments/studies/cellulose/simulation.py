@@ -10,8 +10,7 @@ import pandas as pd
 
 from dem_warp import CaseResult
 from dem_warp.checkpoint import case_name
-from experiments.cases import Store
-from experiments.cases.workers.own import OwnWorkers
+from experiments.cases import OwnWorkers, Store
 from experiments.files import write_text
 from experiments.measurement.drum_edges import EdgeWatch, edge_file, read_edges
 from experiments.studies.cellulose.plan import case_of, places

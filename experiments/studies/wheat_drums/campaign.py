@@ -13,9 +13,7 @@ import warp as wp
 
 from dem_warp.device import resolve_device
 from dem_warp.provenance import provenance
-from experiments.cases import Store
-from experiments.cases.execute import run_cases
-from experiments.cases.workers.own import OwnWorkers
+from experiments.cases import OwnWorkers, Store, run_cases
 from experiments.errors import InputError
 from experiments.files import write_text
 from experiments.studies.wheat_drums.fit import SETTINGS, Slopes, WheatFit, fit_slopes

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dem_warp import Case, GrainPopulation, LiftedCylinder
-from dem_warp.population import SIZE_VARIANCE, SizeClasses
+from dem_warp import Case, GrainPopulation, LiftedCylinder, SizeClasses
+from dem_warp.population import SIZE_VARIANCE
 from experiments.trials.drawing import Declared
 from experiments.trials.other_codes.odd_lift import odd
 

@@ -6,8 +6,7 @@ import math
 from dataclasses import dataclass, fields
 from typing import Annotated
 
-from dem_warp import LiftedCylinder
-from dem_warp.parameters import Parameter
+from dem_warp import LiftedCylinder, Parameter
 
 
 @dataclass(frozen=True)
