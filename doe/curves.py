@@ -42,7 +42,7 @@ class CurveEmulator:
     trend_error: Array
     """Covariance of constant and slopes for a noise of 1, shape (1 + settings, 1 + settings)."""
     processes: tuple[Any, ...]
-    """What the trend misses of each score, a process of scikit-learn each."""
+    """Rest of each score that the trend misses, a process of scikit-learn each."""
     noises: Array
     """Variance of the noise of one run in each score, shape (components,)."""
     remainder: Array

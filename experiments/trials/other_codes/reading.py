@@ -48,7 +48,7 @@ class Frame:
 
 @dataclass(frozen=True, eq=False)
 class Grasp:
-    """How a grain is known by its spheres."""
+    """Numbers by which a grain is known from its spheres."""
 
     shape: ClumpShape
 
