@@ -81,9 +81,10 @@ def translate(test: ExportedTest) -> Translation:
 EDEM = Exporter(
     "EDEM",
     "Hertz-Mindlin (no slip) with Standard Rolling Friction or Type C",
-    "The formulas are those of its manual; nothing has been run there.",
+    "The formulas are those of its manual.",
     material_terms,
     contact_terms,
     translate,
     CONVENTIONS,
+    "This sheet has not been run in EDEM: names and meanings are those of its manual.",
 )

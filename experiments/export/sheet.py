@@ -40,12 +40,11 @@ def sheet_translation(
     spheres = _spheres(lift)
     scale = lift.case.numerics.modulus_scale
     softened = (
-        "" if scale == 1.0 else f" The grains' modulus is softened by {scale:g}: calibrated so, keep it."
+        "" if scale == 1.0 else f"The grains' modulus is softened by {scale:g}: calibrated so, keep it.\n\n"
     )
     text = (
         f"# {lift.test.name}: values for {code}\n\n"
-        f"This sheet has not been run in {code}: names and meanings are those of its manual.{softened}\n\n"
-        f"## Values\n\n{_markdown(rows)}\n"
+        f"{softened}## Values\n\n{_markdown(rows)}\n"
         f"## Spheres of a grain of size 1 (`{SPHERES}`)\n\n{_markdown(spheres)}\n"
         f"## Protocol\n\n{_protocol(lift)}"
     )
