@@ -91,10 +91,11 @@ def _warnings(test: ExportedTest) -> tuple[str, ...]:
 ROCKY = Exporter(
     "Rocky",
     "Hertzian Spring Dashpot, Mindlin-Deresiewicz, Type C: Linear Spring Rolling Limit",
-    "Mindlin-Deresiewicz softens as a contact is about to slide, ours does not.",
+    "Its tangential spring is another, as said above.",
     material_terms,
     contact_terms,
     translate,
     CONVENTIONS,
-    "This sheet has not been run in Rocky: names and meanings are those of its manual.",
+    "This sheet has not been run in Rocky: names and meanings are those of its manual. Its tangential spring "
+    "(Mindlin-Deresiewicz) softens as a contact is about to slide, ours does not.",
 )
