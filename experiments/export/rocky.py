@@ -22,7 +22,7 @@ CONVENTIONS = LawsOfCode(
         "tangential_history": {"displacement": "Mindlin-Deresiewicz"},
         "sliding": {"spring": ""},
         "friction_load": {"push": ""},
-        "rolling": {"rocky_3": "Type C: Linear Spring Rolling Limit"},
+        "rolling": {"rocky_3": "Type C: Linear Spring Rolling Limit", "own_spin": "Type A: Constant Moment"},
     },
     {},
 )
@@ -90,7 +90,7 @@ def _warnings(test: ExportedTest) -> tuple[str, ...]:
 
 ROCKY = Exporter(
     "Rocky",
-    "Hertzian Spring Dashpot, Mindlin-Deresiewicz, Type C: Linear Spring Rolling Limit",
+    "Hertzian Spring Dashpot, Mindlin-Deresiewicz, rolling resistance of Type C or A",
     "Its tangential spring is another, as said above.",
     material_terms,
     contact_terms,

@@ -174,6 +174,28 @@ def test_sheets_have_the_spheres_and_the_time_step() -> None:
         assert translation.command == ()
 
 
+@pytest.mark.parametrize("laws", ["edem", "edem-rvd", "edem-c", "relative"])
+def test_a_sheet_for_edem_names_its_rolling_friction_with_its_ratio(laws: str) -> None:
+    translation = export_input(exported(laws), "edem")
+    text = translation.files["values.csv"]
+    chosen = PRESETS[laws]
+    words = {
+        "own_spin": "Standard Rolling Friction",
+        "edem_rvd": "RVD Rolling Friction",
+        "elastic_plastic": "Type C",
+    }
+    assert f",Rolling Friction,{words[chosen.rolling]}," in text
+    ratio = f",Rolling Viscous Damping Ratio,{chosen.rolling_damping:g}," in text
+    assert ratio is (chosen.rolling == "elastic_plastic")
+
+
+def test_a_rolling_spring_that_edem_has_no_entry_for_is_told() -> None:
+    test = exported("relative")
+    laws = replace(test.case.laws, rolling_stiffness=1.0)
+    with pytest.raises(InputError, match=r"rolling_stiffness = 1: EDEM's Type C has 2\.25"):
+        export_input(replace(test, case=replace(test.case, laws=laws)), "edem")
+
+
 @pytest.mark.parametrize("name", list(EXPORTERS))
 def test_terms_of_a_case_are_there_for_every_code_and_set_of_laws(name: str) -> None:
     for laws in PRESETS.values():
