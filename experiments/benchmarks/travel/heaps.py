@@ -6,6 +6,7 @@ import hashlib
 import json
 import os
 import shutil
+import signal
 import subprocess
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -178,13 +179,15 @@ def _run_one(folder: Path, programs: Path | None, code: str, card: str, seed: in
     write_export(test, code, translation, place)
     started = time.perf_counter()
     with (place / "screen.log").open("w", encoding="utf-8") as screen:
-        subprocess.run(
+        ended = subprocess.run(
             translation.command,
             cwd=place,
             env=os.environ | {"PATH": path, "OMP_NUM_THREADS": "1"},
             stdout=screen,
             stderr=subprocess.STDOUT,
         )
+    if -ended.returncode in (signal.SIGINT, signal.SIGTERM, signal.SIGKILL):
+        return  # somebody has ended it: nothing is known of the heap
     seconds = time.perf_counter() - started
     made = partial(Heap, code, code, card, seed, seconds=seconds, made_from=made_from)
     if (place / translation.heap).is_file():

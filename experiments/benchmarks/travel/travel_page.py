@@ -135,9 +135,11 @@ def _verdict(cells: pd.DataFrame) -> str:
     """Count the cells by their verdicts, and name the codes that wait for a machine."""
     counts = cells["equivalent"].value_counts()
     of = {name: int(counts.get(name, 0)) for name in (EQUIVALENT, FEW, NOT_RUN)}
-    tested = len(cells) - of[FEW] - of[NOT_RUN]
+    tested, shown = len(cells) - of[FEW] - of[NOT_RUN], cells[cells["equivalent"] == EQUIVALENT]
+    whole = int((shown["n"] >= len(SEEDS)).sum())
     lines = [
-        f"**{of[EQUIVALENT]} of {len(cells)} cells are shown to be equivalent.** Tested are {tested}; "
+        f"**{of[EQUIVALENT]} of {len(cells)} cells are shown to be equivalent**, {whole} of them "
+        f"with all {len(SEEDS)} heaps there. Tested are {tested}; "
         f"{of[FEW]} have too few heaps for a test, and {of[NOT_RUN]} have not been run."
     ]
     for code, why in WAITING.items():

@@ -63,7 +63,8 @@ def test_equal_means_are_equivalent_and_shifted_ones_are_not(tmp_path: Path) -> 
         heap("yade", "yade", "egg-low", 1, 12.0)
     ]
     page = write_page(made, tmp_path).read_text(encoding="utf-8")
-    assert "**1 of 40 cells are shown to be equivalent.** Tested are 2; 1 have too few heaps" in page
+    assert "**1 of 40 cells are shown to be equivalent**, 1 of them with all 5 heaps there." in page
+    assert "Tested are 2; 1 have too few heaps" in page
     assert "37 have not been run" in page
     assert "10 of its 10 cells have not been run" in page
     assert "- lammps sphere-low 9: no heap" in page
@@ -113,3 +114,13 @@ def test_a_run_without_a_heap_has_a_reason(tmp_path: Path) -> None:
     assert "ERROR: lost" in found.reason
     assert replace(found, reason="") != found
     assert travel.heap_file(tmp_path, "lammps", "lammps", "rod-low", 1).is_file()
+
+
+def test_a_run_that_somebody_has_ended_is_no_heap_and_no_failure(tmp_path: Path) -> None:
+    programs = tmp_path / "bin"
+    programs.mkdir()
+    program = programs / "lmp"
+    program.write_text("#!/bin/sh\nkill -TERM $$\n", encoding="utf-8")
+    program.chmod(program.stat().st_mode | stat.S_IXUSR)
+    run_theirs(tmp_path, ["lammps"], ["rod-low"], [1], 1, programs)
+    assert stored_heaps(tmp_path) == []
