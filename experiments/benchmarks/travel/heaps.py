@@ -58,7 +58,7 @@ class Heap:
     height: float
     """Highest sphere centre [m]."""
     seconds: float
-    """Wall time; of ours, the batch's over its heaps."""
+    """Wall time; of ours, that since the start of the batch over its heaps."""
     reason: str = ""
     """Reason that there is none."""
     made_from: str = ""
