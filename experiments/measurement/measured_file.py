@@ -48,7 +48,7 @@ def read_measured(path: Path, study: Study) -> Measured:
         no value is left.
     """
     sizes = {condition.name: size_of_test(study.under(condition.name)) for condition in study.conditions}
-    observables = study.scene.measurable
+    observables = study.measurable
     found = _Found({name: each for each in observables for name in (each.name, each.column)})
     for row in read_rows(path, NEEDED, COLUMNS):
         found.add(row, sizes, study.measurement.fit)

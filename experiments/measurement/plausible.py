@@ -31,6 +31,8 @@ class SizeOfTest:
     def limits(self, observable: Observable) -> tuple[float, float]:
         """Smallest and largest value that an observable can have, in its unit (deg, m, s or 1)."""
         by_unit = {"deg": (0.0, 90.0), "m": (self.grain, self.length), "s": (0.0, self.time)}
+        if observable.part_of:  # beyond its foot a heap has no height
+            return 0.0, self.length
         masses = {"kg": (0.0, math.inf), "kg/s": (0.0, math.inf)}
         return observable.limits or (by_unit | masses).get(observable.unit, (-math.inf, math.inf))
 

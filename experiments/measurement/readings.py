@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from experiments.errors import Problem
-from experiments.measurement.observables import DIMENSIONS, OBSERVABLES, Observable, View
+from experiments.measurement.observables import DIMENSIONS, Observable, View
 from experiments.measurement.pictures import require_same_fit
 from experiments.measurement.plausible import SizeOfTest
 from experiments.rows import Row
@@ -108,7 +108,7 @@ def _seen(row: Row, size: SizeOfTest, fit: str, known: Mapping[str, Observable])
 
     outline = find_outline(read_picture(path), meters_per_pixel=pixel, place=str(path))
     views = [View.of(measure(outline, fit, str(path)))]
-    for observable in OBSERVABLES:
+    for observable in dict.fromkeys(known.values()):
         wanted = observable is known[name] if name else observable.unit != "m" or pixel
         if wanted and observable.by_photograph:
             value = observable.in_pictures(views)

@@ -101,7 +101,7 @@ def _given(study: Study, measured: list[Replicated], note: str) -> Study:
 
 def _table(study: Study, one: Replicated) -> dict[str, Any]:
     """Write one as the table of a response: numbers that read back as the same floats."""
-    units = {name: each.unit for each in study.scene.measurable for name in (each.name, each.column)}
+    units = {name: each.unit for each in study.measurable for name in (each.name, each.column)}
     unit, column = units[one.observable], _column(one)
     numbers: dict[str, Any] = {
         key: value if unit == "1" else f"{value!r} {unit}"

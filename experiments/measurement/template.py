@@ -91,7 +91,7 @@ def _flat(table: Mapping[str, Any], place: str = "") -> Iterator[tuple[str, Any]
 
 def _defined(study: Study) -> Iterator[str]:
     """Every observable of a study's test, with its unit, its instrument and its definition."""
-    for observable in study.scene.measurable:
+    for observable in study.measurable:
         unit = LABORATORY_UNITS.get(observable.unit, observable.unit)
         text = f"{observable.name} [{unit}], {observable.instrument}: {observable.definition}"
         yield textwrap.fill(text, 108, initial_indent=4 * " ", subsequent_indent=8 * " ")
@@ -100,7 +100,7 @@ def _defined(study: Study) -> Iterator[str]:
 def _empty_rows(study: Study) -> Iterator[dict[str, object]]:
     for condition in study.conditions:
         for replicate in range(1, REPLICATES + 1):
-            for observable in study.scene.measurable:
+            for observable in study.measurable:
                 yield {
                     "condition": condition.name,
                     "replicate": replicate,

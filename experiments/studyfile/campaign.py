@@ -194,6 +194,12 @@ class CampaignSettings(Section):
 TARGET_SCENE = "target"
 """Name of the study's own scene."""
 
+SURFACE_PROFILE, OUTLINE_PROFILE = "surface", "outline"
+"""Observables that are functions: the surface of the bed in a drum, the outline of a heap."""
+
+PROFILES = (SURFACE_PROFILE, OUTLINE_PROFILE)
+"""Names of the profiles that responses may ask for."""
+
 
 @dataclass(frozen=True)
 class Response:
@@ -213,6 +219,8 @@ class Response:
     """Takes no part in any fit; only judges the chosen point."""
     weights: tuple[tuple[str, float], ...] = ()
     """Observables that its column is the weighted sum of; empty where an observable is its column."""
+    part_of: str = ""
+    """Profile that it is a height or a direction of; empty where it is a number of its own."""
 
 
 @dataclass(frozen=True)
