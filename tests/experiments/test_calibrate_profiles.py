@@ -41,9 +41,8 @@ def outline(slope: float, bend: float, rng: np.random.Generator) -> tuple[np.nda
     x = np.linspace(-0.03, 0.03, 601)
     away = np.abs(x) / 0.02
     z = 0.01 * slope * np.maximum(1.0 - slope**0.5 * away, 0.0) ** (1.0 + bend)
-    bumps = sum(
-        rng.normal() * np.exp(-0.5 * ((away - place) / 0.15) ** 2) for place in np.arange(0, 1.2, 0.15)
-    )
+    places = np.arange(0.0, 1.2, 0.15)
+    bumps = np.exp(-0.5 * ((away[:, None] - places) / 0.15) ** 2) @ rng.normal(size=len(places))
     return x, np.where(z > 0.0, np.maximum(z + 5e-5 * bumps, 0.0), 0.0)
 
 
@@ -62,9 +61,8 @@ class Heaps:
             heights = heap(row, np.random.default_rng(int(row["seed"])))
             found = dict(zip((each.name for each in OUTLINE), heights, strict=True))
             rows.append(found | {"status": "finished", "reason": "", "angle": 30.0, "angle_se": 0.1})
-        return table.assign(grain_count=100.0, simulated_time=1.0).assign(
-            **pd.DataFrame(rows, index=table.index)
-        )
+        found_all = pd.DataFrame(rows, index=table.index)
+        return table.assign(grain_count=100.0, simulated_time=1.0).assign(**found_all)
 
 
 @pytest.fixture
@@ -87,16 +85,14 @@ def measured(folder: Path, count: int) -> None:
 
 def check(campaign: Campaign) -> None:
     assert campaign.outcome in (Outcome.CALIBRATED, Outcome.NOT_TOLD_APART), campaign.reason
-    assert [response.name for response in campaign.responses] == [
-        "outline_direction_1",
-        "outline_direction_2",
-    ]
+    names = ["outline_direction_1", "outline_direction_2"]
+    assert [response.name for response in campaign.responses] == names
     joint = campaign.optimum.joint
     assert joint.agrees(TRUTH)
     # Two directions of one outline leave neither factor open.
     assert campaign.optimum.unidentified == ()
     assert campaign.optimum.point == pytest.approx(TRUTH, abs=0.03)
-    assert {f"outline_direction_{n}" for n in (1, 2)} <= set(campaign.cases.columns)
+    assert set(names) <= set(campaign.cases.columns)
 
 
 def test_measured_outlines_calibrate_what_an_angle_leaves_open(

@@ -99,8 +99,8 @@ def head(table: pd.DataFrame, command: str) -> str:
         f"{HEAPS} heaps of each of {len(outline)} hidden settings, {REPLICATES} of each run of a composite "
         f"design. The region compatible with the outline is {ratios.min():.2f} to {ratios.max():.2f} of that "
         f"of the angle, {ratios.mean():.2f} in the mean. Part of the explored range that each factor keeps, "
-        f"in the mean: {told}.\n\nShare: of the region that the design explored. Ratio: over the share of the "
-        "angle. Range: part of the explored range of a factor that is compatible."
+        f"in the mean: {told}.\n\nShare: of the region that the design explored. Ratio: over the share of "
+        "the angle. Range: part of the explored range of a factor that is compatible."
     )
 
 
