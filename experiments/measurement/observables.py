@@ -15,10 +15,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dem_warp import LiftedCylinder
+from dem_warp.scenes.drum_surface import STATIONS
 from dem_warp.scenes.scene import Observable as Told
 
 if TYPE_CHECKING:
     from imaging import HeapAngle, HeapShape, ReposeAngle
+
+SURFACE_PROFILE, OUTLINE_PROFILE = "surface", "outline"
+"""Observables that are functions: the surface of the bed in a drum, the outline of a heap."""
 
 ANGLE = "angle"
 """Spelling of the repose angle in study files and tables of cases."""
@@ -198,6 +202,9 @@ OBSERVABLES = (
 )
 """Observables of the lifted cylinder that a laboratory can measure, in the order of every table."""
 
+SURFACE = tuple(f"surface_{number + 1}" for number in range(len(STATIONS)))
+"""Names of the heights of the bed's surface in a drum, its profile."""
+
 OUTLINE_STATIONS = 8
 """Places of a heap's outline, `imaging.profile.STATIONS`."""
 
@@ -213,7 +220,7 @@ OUTLINE = tuple(
         "m",
         f"height of the outline at {0.2 * number:.1f} roots of its area from its middle, mean of both flanks",
         seen=partial(_height_at, number),
-        part_of="outline",
+        part_of=OUTLINE_PROFILE,
     )
     for number in range(OUTLINE_STATIONS)
 )
@@ -227,6 +234,9 @@ PHOTOGRAPHED = tuple(observable.name for observable in OBSERVABLES if observable
 
 BY_NAME = {name: each for each in (*OBSERVABLES, *OUTLINE) for name in (each.name, each.column)}
 """The same by name and by alias."""
+
+PROFILES = {SURFACE_PROFILE: SURFACE, OUTLINE_PROFILE: tuple(each.name for each in OUTLINE)}
+"""Heights of each profile that responses and files may ask for, by its name."""
 
 OF_THE_RUN = ("grain_count", "simulated_time", "grains_lost", "clogged")
 """Observables of a test that tell of its simulation, and of no measurement."""
@@ -266,7 +276,14 @@ def measurable(
     if leaves_a_heap:
         return (*OBSERVABLES, *(OUTLINE if outline else ()))
     return tuple(
-        Observable(name, name.replace("_", " "), unit, meaning, _INSTRUMENTS[unit])
+        Observable(
+            name,
+            name.replace("_", " "),
+            unit,
+            meaning,
+            _INSTRUMENTS[unit],
+            part_of=SURFACE_PROFILE if name in SURFACE else "",
+        )
         for name, (unit, meaning) in told.items()
         if name not in OF_THE_RUN and not any(name.startswith(f"{other}_") for other in told)
     )

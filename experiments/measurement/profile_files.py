@@ -16,7 +16,6 @@ import numpy as np
 from dem_warp.scenes.drum_surface import STATIONS
 from experiments.errors import InputError
 from experiments.rows import Row, read_rows
-from experiments.studyfile.study import MeasurementSection
 from experiments.studyfile.units import Quantity
 from imaging import PictureError
 
@@ -36,6 +35,8 @@ FOOT = 0.1
 class Profiles(NamedTuple):
     """Measured profiles."""
 
+    names: list[str]
+    """Replicate of each."""
     stations: list[int]
     """Numbers of their places, from 0."""
     heights: np.ndarray
@@ -74,11 +75,14 @@ def read_drum_profiles(path: Path, radius: float) -> Profiles:
     if len(kept) < LEAST_STATIONS:
         told = f"{1e3 * low:.4g} to {1e3 * high:.4g} mm, {len(kept)} stations"
         raise InputError(f"all profiles must span {LEAST_STATIONS} stations of the drum", told, str(path))
-    return _profiles(kept, [[_between(view, places[kept]) for view in each] for each in views.values()])
+    heights = {name: [_between(view, places[kept]) for view in each] for name, each in views.items()}
+    return _profiles(kept, heights)
 
 
-def read_heap_profiles(path: Path, settings: MeasurementSection) -> Profiles:
+def read_heap_profiles(path: Path, fit: str) -> Profiles:
     """Read outlines of heaps at the places of `imaging.profile`, from points, pictures and files of spheres.
+
+    Those of spheres have their flanks fitted by a ``fit``, which tells what is no heap.
 
     Raises
     ------
@@ -91,7 +95,7 @@ def read_heap_profiles(path: Path, settings: MeasurementSection) -> Profiles:
         if row["picture"]:
             if row["x"] or row["z"]:
                 raise row.error("a row has a picture or a point, not both", "picture")
-            heaps.setdefault(_label(row), []).extend(_pictured(row, settings))
+            heaps.setdefault(_label(row), []).extend(_pictured(row, fit))
         else:
             _, z = _take_point(row, points)
             if z < 0.0:
@@ -100,13 +104,13 @@ def read_heap_profiles(path: Path, settings: MeasurementSection) -> Profiles:
     for name, views in points.items():
         heaps[name] += [_drawn(view, f"{path}:{view.line}") for view in views.values()]
     stations = list(range(len(next(iter(heaps.values()))[0]))) if heaps else []
-    return _profiles(stations, list(heaps.values()))
+    return _profiles(stations, heaps)
 
 
-def _profiles(stations: list[int], heaps: list[list[np.ndarray]]) -> Profiles:
-    views = [np.array(each) for each in heaps]
+def _profiles(stations: list[int], found: Mapping[str, list[np.ndarray]]) -> Profiles:
+    views = [np.array(each) for each in found.values()]
     means = [each.mean(axis=0) for each in views]
-    return Profiles(stations, np.array(means).reshape(len(means), len(stations)), views)
+    return Profiles(list(found), stations, np.array(means).reshape(len(means), len(stations)), views)
 
 
 def _take_point(row: Row, found: dict[str, dict[str, _Points]]) -> tuple[float, float]:
@@ -149,7 +153,7 @@ def _drawn(view: _Points, place: str) -> np.ndarray:
         raise InputError("a heap's profile has an area", "none", place) from error
 
 
-def _pictured(row: Row, settings: MeasurementSection) -> Iterator[np.ndarray]:
+def _pictured(row: Row, fit: str) -> Iterator[np.ndarray]:
     """Heights of the outlines that a photograph, or a file of spheres from all around, shows."""
     # a file of points needs no pictures
     from experiments.measurement.heap_files import HeapSettings, is_heap_file, measure_heap_file
@@ -161,7 +165,7 @@ def _pictured(row: Row, settings: MeasurementSection) -> Iterator[np.ndarray]:
         raise row.error(rule, "picture")
     try:
         if is_heap_file(path):
-            heap = measure_heap_file(path, settings.fit, HeapSettings())
+            heap = measure_heap_file(path, fit, HeapSettings())
             yield from (heap_profile(view.outline) for view in heap.angle.views)
             return
         if not row["pixel"]:
@@ -169,9 +173,7 @@ def _pictured(row: Row, settings: MeasurementSection) -> Iterator[np.ndarray]:
         pixel = _length(row, "pixel")
         if pixel <= 0.0:
             raise row.error("must be greater than 0", "pixel")
-        seen = measure(
-            find_outline(read_picture(path), meters_per_pixel=pixel, place=str(path)), settings.fit
-        )
+        seen = measure(find_outline(read_picture(path), meters_per_pixel=pixel, place=str(path)), fit)
     except PictureError as error:
         raise InputError("must show a heap that can be measured", str(error), place) from None
     if seen.doubts:

@@ -5,21 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 from dem_warp import Drum
-from dem_warp.scenes.drum_surface import STATIONS
 from doe import ProfileSample, scatter_of_views
 from doe.errors import RuleError
 from experiments.errors import InputError
-from experiments.measurement.observables import OUTLINE
+from experiments.measurement.observables import OUTLINE_PROFILE, PROFILES, SURFACE_PROFILE
 from experiments.measurement.profile_files import Profiles, read_drum_profiles, read_heap_profiles
 from experiments.studyfile import Study
-from experiments.studyfile.campaign import OUTLINE_PROFILE, PROFILES, SURFACE_PROFILE, TARGET_SCENE
-
-HEIGHTS = {
-    SURFACE_PROFILE: tuple(f"surface_{number + 1}" for number in range(len(STATIONS))),
-    OUTLINE_PROFILE: tuple(each.name for each in OUTLINE),
-}
-"""Observables that are the heights of a profile."""
-
+from experiments.studyfile.campaign import TARGET_SCENE
 
 OWN = ("note", "twin")
 """Keys of ``[target]`` that no ``[[response]]`` has."""
@@ -76,12 +68,12 @@ def _made(study: Study, table: dict[str, Any], place: str) -> list[dict[str, Any
         rule = 'profiles are those of a drum, a "surface", or of a heap, an "outline"'
         raise InputError(rule, f"{profile} of {scene.name}", place)
     if twin:
-        return [shared | {"observable": height} for height in HEIGHTS[profile]]
+        return [shared | {"observable": height} for height in PROFILES[profile]]
     path = study.file.parent / table["profiles"]
     if isinstance(scene, Drum):
         found = read_drum_profiles(path, scene.diameter / 2)
     else:
-        found = read_heap_profiles(path, study.measurement)
+        found = read_heap_profiles(path, study.measurement.fit)
     try:
         sample = ProfileSample.of(found.heights, scatter_of_views(found.views))
     except RuleError as error:
@@ -91,7 +83,7 @@ def _made(study: Study, table: dict[str, Any], place: str) -> list[dict[str, Any
 
 def _modes(sample: ProfileSample, found: Profiles, profile: str, title: str) -> list[dict[str, Any]]:
     """Tables of the independent directions of profiles."""
-    names = [HEIGHTS[profile][station] for station in found.stations]
+    names = [PROFILES[profile][station] for station in found.stations]
     return [
         {
             "observable": f"{title}_mode_{number}",

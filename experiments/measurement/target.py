@@ -53,9 +53,19 @@ def with_measurements(study: Study) -> tuple[Study, tuple[str, ...]]:
         if section.observable != ANGLE or section.scene != TARGET_SCENE:
             raise InputError("photographs give the angle of the study's own scene", section.title, place)
         paths = find_pictures(section.pictures, study.file.parent, f"{place}.pictures")
-        sample = Sample.of([angle.mean for angle in measure_pictures(paths, study.measurement.fit)])
-        note = f"{len(paths)} pictures: {', '.join(path.name for path in paths)}"
-        return _given(study, [Replicated(TARGET_SCENE, ANGLE, sample)], note), ()
+        angles = measure_pictures(paths, study.measurement.fit)
+        clear = {path: angle for path, angle in angles.items() if not angle.doubts}
+        notes = tuple(
+            f"{path.name} is doubtful, and left out: {'; '.join(map(str, angle.doubts))}"
+            for path, angle in angles.items()
+            if angle.doubts
+        )
+        if len(clear) < 2:
+            rule = f"needs two pictures of heaps without a doubt ({'; '.join(notes)})"
+            raise InputError(rule, len(clear), f"{place}.pictures")
+        sample = Sample.of([angle.mean for angle in clear.values()])
+        note = f"{len(clear)} pictures: {', '.join(path.name for path in clear)}"
+        return _given(study, [Replicated(TARGET_SCENE, ANGLE, sample)], note), notes
     if section.file is not None:
         measured = read_measured(study.file.parent / section.file, study)
         found, notes = [], list(measured.notes)

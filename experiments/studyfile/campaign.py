@@ -194,12 +194,6 @@ class CampaignSettings(Section):
 TARGET_SCENE = "target"
 """Name of the study's own scene."""
 
-SURFACE_PROFILE, OUTLINE_PROFILE = "surface", "outline"
-"""Observables that are functions: the surface of the bed in a drum, the outline of a heap."""
-
-PROFILES = (SURFACE_PROFILE, OUTLINE_PROFILE)
-"""Names of the profiles that responses may ask for."""
-
 
 @dataclass(frozen=True)
 class Response:

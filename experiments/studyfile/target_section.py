@@ -9,8 +9,8 @@ from pydantic import Field
 
 from doe import Sample
 from experiments.errors import StudyError
-from experiments.measurement.observables import ANGLE, DIMENSIONS, Observable, observables_of
-from experiments.studyfile.campaign import PROFILES, TARGET_SCENE, FactorValues, Response, Target, Twin
+from experiments.measurement.observables import ANGLE, DIMENSIONS, PROFILES, Observable, observables_of
+from experiments.studyfile.campaign import TARGET_SCENE, FactorValues, Response, Target, Twin
 from experiments.studyfile.places import KeyPath, Places
 from experiments.studyfile.scene_sections import SceneSection
 from experiments.studyfile.schema import RawQuantity, Section

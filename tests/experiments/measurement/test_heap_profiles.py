@@ -1,4 +1,4 @@
-"""Outlines of heaps as profiles: alike from points, pictures, spheres and our own states; bad ones refused."""
+"""Outlines of heaps as profiles: alike from points, pictures, spheres and states; bad ones refused."""
 
 from __future__ import annotations
 
@@ -18,8 +18,9 @@ from experiments.measurement.profiles import with_profiles
 from experiments.measurement.states import measure, observe
 from experiments.studyfile import load_study
 from experiments.studyfile.study import MeasurementSection
-from imaging import silhouette
+from imaging import save_picture, silhouette
 from imaging.profile import SPACING, STATIONS, profile_heights
+from imaging.synthetic import Camera, DrawnHeap, draw
 
 SETTINGS = MeasurementSection(azimuths=4, pixels=400, outline=True)
 NAMES = [each.name for each in OUTLINE]
@@ -75,7 +76,7 @@ def test_states_spheres_pictures_and_points_give_one_profile(cone: Cone, tmp_pat
         )
     )
     text = f"1,,,,heap.csv,\n{points}3,a,,,heap.png,{1e3 * drawn.meters_per_pixel} mm\n"
-    found = read_heap_profiles(file(tmp_path, text, "replicate,view,x,z,picture,pixel"), SETTINGS)
+    found = read_heap_profiles(file(tmp_path, text, "replicate,view,x,z,picture,pixel"), "flank")
     assert [len(views) for views in found.views] == [8, 1, 1]
     # The points draw a smooth cone over the spheres, whose radius is 1 mm.
     for heights in found.heights:
@@ -99,7 +100,7 @@ def test_states_spheres_pictures_and_points_give_one_profile(cone: Cone, tmp_pat
 )
 def test_points_that_are_no_heap_are_refused_with_their_row(tmp_path: Path, text: str, message: str) -> None:
     with pytest.raises(InputError, match=message):
-        read_heap_profiles(file(tmp_path, text), SETTINGS)
+        read_heap_profiles(file(tmp_path, text), "flank")
 
 
 @pytest.mark.parametrize(
@@ -119,7 +120,14 @@ def test_a_picture_that_shows_no_side_of_a_heap_is_refused(tmp_path: Path, row: 
     cv2.circle(top, (300, 200), 120, (60, 90, 120), -1)
     cv2.imwrite(str(tmp_path / "top.png"), top)
     with pytest.raises(InputError, match=message):
-        read_heap_profiles(file(tmp_path, row, "replicate,picture,pixel"), SETTINGS)
+        read_heap_profiles(file(tmp_path, row, "replicate,picture,pixel"), "flank")
+
+
+def test_an_outline_in_doubt_is_refused_with_the_doubt(tmp_path: Path) -> None:
+    save_picture(tmp_path / "lean.png", draw(DrawnHeap(24.0, 33.0), Camera(noise=0)))
+    row = file(tmp_path, "1,lean.png,0.1 mm\n", "replicate,picture,pixel")
+    with pytest.raises(InputError, match=r"p.csv:2: picture: .*without a doubt: .*left"):
+        read_heap_profiles(row, "flank")
 
 
 def test_an_outline_needs_profiles_or_a_twin(write_study: Callable[..., Path], tmp_path: Path) -> None:

@@ -27,7 +27,7 @@ def file(folder: Path, text: str) -> Path:
 
 
 def test_a_profile_is_read_at_the_stations_that_it_spans(tmp_path: Path) -> None:
-    kept, heights, _ = read_drum_profiles(file(tmp_path, LINE), 0.03)
+    _, kept, heights, _ = read_drum_profiles(file(tmp_path, LINE), 0.03)
     assert kept == [1, 2, 3, 4, 5, 6, 7]
     places = np.array([-0.8, -0.6, -0.4, -0.2, 0.0, 0.2, 0.4, 0.6, 0.8])[kept] * 0.03
     assert heights[0] == pytest.approx(0.5 * places, abs=1e-12)
