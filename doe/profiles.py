@@ -51,6 +51,8 @@ class ProfileSample:
     """Number of profiles."""
     shrinkage: float
     """Part of the covariance that was taken from its target: the scatter of views, or equal places."""
+    profiles: NDArray[np.float64] | None = None
+    """The profiles themselves, shape (profiles, places), where they are known."""
 
     @classmethod
     def of(cls, profiles: ArrayLike, views: ArrayLike | None = None) -> ProfileSample:
@@ -90,7 +92,7 @@ class ProfileSample:
         rounded = np.linalg.solve(root, away.T).T
         scale = rounded.std()
         covariance, shrinkage = ledoit_wolf(rounded / scale, assume_centered=True)
-        return cls(mean, root @ covariance @ root.T * scale**2, count, float(shrinkage))
+        return cls(mean, root @ covariance @ root.T * scale**2, count, float(shrinkage), rows)
 
     @property
     def modes(self) -> tuple[Mode, ...]:
@@ -106,6 +108,9 @@ class ProfileSample:
 
     def canonical(self, slopes: ArrayLike, count: int) -> tuple[Mode, ...]:
         """Independent directions in which settings move profiles most, over their scatter; the best first.
+
+        Directions that were chosen for their small scatter look quieter than they are. So where the profiles
+        are known, each one's deviation is taken along the direction that the others would have chosen.
 
         Parameters
         ----------
@@ -124,16 +129,29 @@ class ProfileSample:
             rule = f"are finite, a row for each of {len(self.mean)} places"
             raise RuleError(rule, f"shape {changes.shape}", "slopes")
         root = _root(self.covariance, len(self.mean))
-        left, values, _ = np.linalg.svd(np.linalg.solve(root, changes), full_matrices=False)
+        left, values, right = np.linalg.svd(np.linalg.solve(root, changes), full_matrices=False)
         kept = min(count, int(np.count_nonzero(values > LEAST_SPREAD * values[0])))
         if not kept:
             raise RuleError("must move the profiles", "no change at all", "slopes")
         found = []
-        for direction in np.linalg.solve(root.T, left[:, :kept]).T:
+        for direction, setting in zip(np.linalg.solve(root.T, left[:, :kept]).T, right, strict=False):
             weights = direction / np.linalg.norm(direction) * (1.0 if direction.sum() >= 0.0 else -1.0)
-            spread = float(np.sqrt(weights @ self.covariance @ weights))
+            spread = self._spread(weights, changes @ setting)
             found.append(Mode(weights, Sample(float(weights @ self.mean), spread, self.n)))
         return tuple(found)
+
+    def _spread(self, weights: NDArray[np.float64], change: NDArray[np.float64]) -> float:
+        """Standard deviation along a direction that was chosen for a change, cross-validated if possible."""
+        if self.profiles is None or self.n <= LEAST_PROFILES:
+            return float(np.sqrt(weights @ self.covariance @ weights))
+        away = []
+        for number, profile in enumerate(self.profiles):
+            others = ProfileSample.of(np.delete(self.profiles, number, axis=0))
+            own = np.linalg.solve(others.covariance, change)
+            # as strong an answer to the setting as that of all together
+            own *= (weights @ change) / (own @ change)
+            away.append(own @ (profile - others.mean))
+        return float(np.sqrt(np.mean(np.square(away)) * (self.n - 1.0) / self.n))
 
 
 def scatter_of_views(heaps: Sequence[ArrayLike]) -> NDArray[np.float64] | None:

@@ -90,7 +90,8 @@ def _sample(responses: Sequence[Response], hidden: Sequence[pd.DataFrame]) -> Pr
     if not hidden:
         found = [response.measured for response in responses if response.measured is not None]
         mean, spread = np.array([each.mean for each in found]), np.array([each.sd for each in found])
-        return ProfileSample(mean, np.diag(spread**2), found[0].n, 0.0)
+        profiles = np.array([response.measurements for response in responses]).T
+        return ProfileSample(mean, np.diag(spread**2), found[0].n, 0.0, profiles)
     used = measured(hidden[0], responses[0])
     return ProfileSample.of(used[[response.observable for response in responses]].to_numpy())
 

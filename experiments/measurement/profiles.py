@@ -91,6 +91,7 @@ def _modes(sample: ProfileSample, found: Profiles, profile: str, title: str) -> 
             "mean": f"{mode.target.mean!r} m",
             "sd": f"{mode.target.sd!r} m",
             "n": mode.target.n,
+            "measurements": (found.heights @ mode.weights).tolist(),
         }
         for number, mode in enumerate(sample.modes, 1)
     ]

@@ -68,15 +68,15 @@ def with_measurements(study: Study) -> tuple[Study, tuple[str, ...]]:
         return _given(study, [Replicated(TARGET_SCENE, ANGLE, sample)], note), notes
     if section.file is not None:
         measured = read_measured(study.file.parent / section.file, study)
-        found, notes = [], list(measured.notes)
+        found, said = [], list(measured.notes)
         for condition in measured.conditions:
             for name, column in zip(measured.observables, measured.values[condition].T, strict=True):
                 values = column[np.isfinite(column)]
                 if len(values) > 1 and np.ptp(values) > 0.0:
                     found.append(Replicated(condition, name, Sample.of(values)))
                 elif len(values):
-                    notes.append(f"{condition}: {name} shows no scatter, so that it is not to be matched")
-        return _given(study, found, f"file {section.file}"), tuple(notes)
+                    said.append(f"{condition}: {name} shows no scatter, so that it is not to be matched")
+        return _given(study, found, f"file {section.file}"), tuple(said)
     return study, ()
 
 

@@ -215,6 +215,8 @@ class Response:
     """Observables that its column is the weighted sum of; empty where an observable is its column."""
     part_of: str = ""
     """Profile that it is a height or a direction of; empty where it is a number of its own."""
+    measurements: tuple[float, ...] = ()
+    """Single measurements, of a direction of a profile."""
 
 
 @dataclass(frozen=True)

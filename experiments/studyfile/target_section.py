@@ -44,6 +44,8 @@ class ResponseSection(Section):
     """File of measured profiles, instead of numbers: their heights, with the covariance, are matched."""
     part_of: str = ""
     """Profile that it is a height or a direction of; written by the program."""
+    measurements: tuple[float, ...] = ()
+    """Single measurements of a direction of a profile, in SI; written by the program."""
     name: str | None = Field(default=None, pattern=r"^[A-Za-z_]\w*$")
     """Name in tables; left out: as the observable."""
     scene: str = TARGET_SCENE
@@ -79,7 +81,16 @@ class ResponseSection(Section):
                 raise StudyError(rule, self.title, places.of(path))
             sample = Sample(values["mean"], values["sd"], int(self.n or 0))
         weights = tuple((self.weights or {}).items())
-        return Response(self.title, self.observable, unit, self.scene, sample, False, weights, self.part_of)
+        return Response(
+            self.title,
+            self.observable,
+            unit,
+            self.scene,
+            sample,
+            weights=weights,
+            part_of=self.part_of,
+            measurements=self.measurements,
+        )
 
     def _value(self, name: str, unit: str, path: KeyPath, places: Places) -> float:
         """Convert a measurement; NaN where it was left out."""

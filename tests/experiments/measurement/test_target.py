@@ -90,9 +90,7 @@ def test_a_picture_in_doubt_is_left_out_and_told(from_source, photographs: list[
     assert len(notes) == 1
     assert notes[0].startswith("heap-1.png is doubtful, and left out: ")
     save_picture(photographs[0], lean)
-    with pytest.raises(
-        InputError, match=r"target.pictures: .*without a doubt .*received 1"
-    ):
+    with pytest.raises(InputError, match=r"target.pictures: .*without a doubt .*received 1"):
         with_measurements(from_source('pictures = "photos"'))
 
 
