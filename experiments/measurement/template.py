@@ -34,7 +34,9 @@ condition: how the test was done, a condition of the study.
 replicate: one heap, a label. Five or more of each condition show small effects; a copy of a heap shows none.
 
 observable: what was measured, or {clogged} (without a value) where the grains got stuck: no result.
-{observables}"""
+{observables}
+
+profile: instead of a value, a file of profiles, columns replicate, x, z, with one of the same replicate."""
 
 _PICTURES = """
 

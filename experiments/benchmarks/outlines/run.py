@@ -16,8 +16,19 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from doe import Design, Goal, JointFit, ProfileSample, Sample, central_composite, fit_surface, joint_fit
-from doe.factors import Factor
+from doe import (
+    Design,
+    Factor,
+    Goal,
+    JointFit,
+    ProfileSample,
+    Sample,
+    Surface,
+    central_composite,
+    fit_surface,
+    joint_fit,
+    scatter_of_views,
+)
 from experiments.benchmarks.results import write_results
 from experiments.cases import OwnWorkers, Store, run_cases
 from experiments.measurement.observables import ANGLE, OUTLINE
@@ -50,24 +61,54 @@ def plan(study: Study, design: Design) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def regions(design: Design, cases: pd.DataFrame) -> pd.DataFrame:
+class Surfaces:
+    """Angles and outlines of the design's heaps, and surfaces of the second degree over them."""
+
+    def __init__(self, design: Design, cases: pd.DataFrame) -> None:
+        runs = cases[(cases["stage"] == "design") & (cases["status"] == "finished") & cases[ANGLE].notna()]
+        self.runs, self.names = runs, design.names
+        self.design = design.select(runs["run"].tolist())
+        self.heights = runs[HEIGHTS].to_numpy()
+        self.slopes = np.array([self.change_of(column) for column in self.heights.T])
+
+    def fit(self, values: np.ndarray) -> Surface:
+        """Fit one number of every heap."""
+        return fit_surface(self.design, values)
+
+    def change_of(self, values: np.ndarray) -> np.ndarray:
+        """Change of a number with every factor, from the middle of its range to an end."""
+        return self.fit(values).coded_coefficients[self.names].to_numpy()
+
+
+def strengths(found: Surfaces) -> pd.DataFrame:
+    """How far each factor moves the angle and the outline's directions, over the scatter of one heap."""
+    groups = [rows for _, rows in found.runs.groupby("run")]
+    scatter = np.sqrt(np.mean([rows[ANGLE].var() for rows in groups]))
+    rows = [dict(zip(found.names, found.change_of(found.runs[ANGLE].to_numpy()) / scatter, strict=True))]
+    covariance = scatter_of_views([group[HEIGHTS].to_numpy() for group in groups])
+    if covariance is not None:
+        whole = ProfileSample(found.heights.mean(axis=0), covariance, len(found.heights), 0.0)
+        for mode in whole.canonical(found.slopes, len(found.names)):
+            moved = mode.weights @ found.slopes / mode.target.sd
+            rows.append(dict(zip(found.names, moved, strict=True)))
+    names = ["angle", *(f"outline, direction {number}" for number in range(1, len(rows)))]
+    return pd.DataFrame(rows, index=pd.Index(names, name="measured")).reset_index()
+
+
+def regions(found: Surfaces, cases: pd.DataFrame, factors: tuple[Factor, ...]) -> pd.DataFrame:
     """Compatible regions of every hidden setting, by angle and by outline; a row each."""
-    runs = cases[(cases["stage"] == "design") & (cases["status"] == "finished") & cases[ANGLE].notna()]
-    used = design.select(runs["run"].tolist())
-    heights = runs[HEIGHTS].to_numpy()
-    slopes = [fit_surface(used, column).coded_coefficients[design.names].to_numpy() for column in heights.T]
     rows = []
     for number, twin in cases[cases["stage"] == "hidden"].groupby("run"):
         measured = twin[(twin["status"] == "finished") & twin[ANGLE].notna()]
-        truth = measured[design.names].iloc[0].to_dict()
-        angle = Goal(fit_surface(used, runs[ANGLE].to_numpy()), Sample.of(measured[ANGLE].to_numpy()))
+        truth = measured[found.names].iloc[0].to_dict()
+        angle = Goal(found.fit(found.runs[ANGLE].to_numpy()), Sample.of(measured[ANGLE].to_numpy()))
         sample = ProfileSample.of(measured[HEIGHTS].to_numpy())
         outline = {
-            f"direction {place}": Goal(fit_surface(used, heights @ mode.weights), mode.target)
-            for place, mode in enumerate(sample.canonical(np.array(slopes), len(design.names)), 1)
+            f"direction {place}": Goal(found.fit(found.heights @ mode.weights), mode.target)
+            for place, mode in enumerate(sample.canonical(found.slopes, len(found.names)), 1)
         }
-        for name, found in (("angle", joint_fit({"angle": angle})), ("outline", joint_fit(outline))):
-            rows.append({"hidden": number, "by": name, **_row(found, truth, design.factors)})
+        for name, fitted in (("angle", joint_fit({"angle": angle})), ("outline", joint_fit(outline))):
+            rows.append({"hidden": number, "by": name, **_row(fitted, truth, factors)})
     table = pd.DataFrame(rows)
     alone = table[table["by"] == "angle"].set_index("hidden")["share"]
     return table.assign(ratio=table["share"] / table["hidden"].map(alone))
@@ -84,24 +125,33 @@ def _row(found: JointFit, truth: Mapping[str, float], factors: tuple[Factor, ...
     return {"share": found.share(), "holds the truth": found.agrees(truth), **widths}
 
 
-def head(table: pd.DataFrame, command: str) -> str:
-    """Sentences above the table."""
-    outline = table[table["by"] == "outline"]
-    ratios = outline["ratio"]
+def write(folder: Path, study: Study, design: Design, cases: pd.DataFrame) -> Path:
+    """Write the page and its tables."""
+    found = Surfaces(design, cases)
+    table = regions(found, cases, study.factors)
+    ratios = table[table["by"] == "outline"]["ratio"]
     spans = table.groupby("by")[[name for name in table if name.startswith("range of ")]].mean()
     told = "; ".join(
         f"{name.removeprefix('range of ')} {spans.loc['angle', name]:.0%} by angle, "
         f"{spans.loc['outline', name]:.0%} by outline"
         for name in spans
     )
-    return (
-        f"# Outlines and angles of the same heaps\n\n    {command}\n\n"
-        f"{HEAPS} heaps of each of {len(outline)} hidden settings, {REPLICATES} of each run of a composite "
-        f"design. The region compatible with the outline is {ratios.min():.2f} to {ratios.max():.2f} of that "
-        f"of the angle, {ratios.mean():.2f} in the mean. Part of the explored range that each factor keeps, "
-        f"in the mean: {told}.\n\nShare: of the region that the design explored. Ratio: over the share of "
-        "the angle. Range: part of the explored range of a factor that is compatible."
+    lost = int(((cases["status"] != "finished") | cases[ANGLE].isna()).sum())
+    said = (
+        "# Outlines and angles of the same heaps\n\n"
+        "    python -m experiments.benchmarks.outlines.run --out OUT\n\n"
+        f"{study.note} {HEAPS} heaps of each of {len(ratios)} hidden settings, {REPLICATES} of each run of a "
+        f"composite design; {lost} of {len(cases)} heaps were lost. The region compatible with the outline "
+        f"is {ratios.min():.2f} to {ratios.max():.2f} of the angle's, {ratios.mean():.2f} on average.\n\n"
+        f"Part of the explored range that each factor keeps, in the mean: {told}.\n\nShare: of the region "
+        "that the design explored. Ratio: over the share of the angle. Range: part of the explored range of "
+        "a factor that is compatible."
     )
+    moved = (
+        "What moves: the change from the middle of a factor's range to an end, over the scatter of one heap. "
+        "The directions of the outline scatter independently; each pins what moves it."
+    )
+    return write_results(folder, "README", [("regions", said, table), ("strengths", moved, strengths(found))])
 
 
 def main() -> None:
@@ -116,11 +166,7 @@ def main() -> None:
     design = central_composite(study.factors, "face", CENTER_POINTS)
     workers = OwnWorkers(chosen.device, chosen.workers)
     cases = run_cases(study, plan(study, design), Store(chosen.out / "cases"), workers)
-    table = regions(design, cases)
-    lost = cases[(cases["status"] != "finished") | cases[ANGLE].isna()]
-    command = "python -m experiments.benchmarks.outlines.run --out OUT"
-    said = head(table, command) + (f" {len(lost)} of {len(cases)} heaps were lost." if len(lost) else "")
-    print(write_results(chosen.out, "README", [("regions", said, table)]))
+    print(write(chosen.out, study, design, cases))
 
 
 if __name__ == "__main__":
