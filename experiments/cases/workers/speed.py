@@ -7,7 +7,7 @@ import math
 import os
 import platform
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -29,6 +29,9 @@ from experiments.cases.engine import Engine
 from experiments.cases.workers.batches import FULL_GRAINS, WORLDS
 from experiments.cases.workers.workers import Workers
 from experiments.files import read_file, write_text
+
+Clock = Callable[[], float]
+"""Tells a time [s]."""
 
 SPEEDS = "speeds.json"
 """File of the measured speeds in the user's folder."""
@@ -121,20 +124,20 @@ def cpu_name(workers: int) -> str:
 # ---- measurement -------------------------------------------------------------------------------------------
 
 
-def measure_speed(workers: Workers) -> Speed:
+def measure_speed(workers: Workers, clock: Clock = time.perf_counter) -> Speed:
     """Measure workers by three waves of reference cases, as many as there are workers or fill them.
 
     A few spheres for short and for long give the start of a wave and the step; a wave of many spheres gives
-    what a sphere costs.
+    what a sphere costs. Another clock than that of the wall gives times of its own.
     """
     count = workers.count
     few, long, many = few_spheres(), _reference(30, 1, duration=12.0), _reference(250, 4)
     copies = math.ceil(FULL_GRAINS / 250) if workers.on_gpu else 1
     workers.simulate([few])  # compiles what the next one would
-    short_seconds, short_steps = _timed(workers, [few] * count)
-    long_seconds, long_steps = _timed(workers, [long] * count)
+    short_seconds, short_steps = _timed(workers, [few] * count, clock)
+    long_seconds, long_steps = _timed(workers, [long] * count, clock)
     workers.simulate([many])
-    many_seconds, many_steps = _timed(workers, [many] * (count * copies))
+    many_seconds, many_steps = _timed(workers, [many] * (count * copies), clock)
     step = max((long_seconds - short_seconds) / max(long_steps - short_steps, 1), 1e-7)
     start = max(short_seconds - short_steps * step, 0.0)
     spheres = 1000 * copies
@@ -143,11 +146,11 @@ def measure_speed(workers: Workers) -> Speed:
     return Speed(step, sphere_step, start, f"{day}, {count} {'worker' if count == 1 else 'workers'}")
 
 
-def _timed(workers: Workers, cases: Sequence[Case]) -> tuple[float, int]:
-    """Wall time of a wave [s], and steps of a case."""
-    started = time.perf_counter()
+def _timed(workers: Workers, cases: Sequence[Case], clock: Clock) -> tuple[float, int]:
+    """Time of a wave [s], and steps of a case."""
+    started = clock()
     results = workers.simulate(cases)
-    return time.perf_counter() - started, _steps(results[0])
+    return clock() - started, _steps(results[0])
 
 
 def _steps(result: CaseResult) -> int:
