@@ -12,6 +12,7 @@ from __future__ import annotations
 import os
 import random
 import shutil
+import signal
 import sys
 import time
 from collections.abc import Mapping
@@ -178,6 +179,7 @@ def main(
     seed: Annotated[int, typer.Option(help="Seed of the moments.")] = 1,
 ) -> None:
     """Requeue jobs of small campaigns, and write what came of it: requeue.md and requeue.csv."""
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     load_libraries()
     out = out.resolve()
