@@ -12,8 +12,9 @@ from __future__ import annotations
 
 import os
 import time
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import pandas as pd
 import typer
@@ -37,6 +38,9 @@ WITHIN = 1.5
 RADIUS = 3.0e-3
 """Radius of the balls of the sketches [m]."""
 
+OUTLETS: dict[str, dict[str, Any]] = {"hopper": {"outlet": 0.036}, "draw-down": {"slot": 0.048}}
+"""Outlets that such balls do not clog [m]."""
+
 
 def waves(each: int) -> dict[str, list[Case]]:
     """Cases of studies that differ in test, grains and size; so many of each, more of the small ones."""
@@ -58,7 +62,8 @@ def waves(each: int) -> dict[str, list[Case]]:
         "dem-warp new": [new.case({}, seed) for seed in range(each)],
     }
     for name, sketch in SKETCHES.items():
-        found[f"balls of 3 mm, {name}"] = [sketch_case(sketch, RADIUS)] * each
+        wide = sketch._replace(scene=replace(sketch.scene, **OUTLETS.get(name, {})))
+        found[f"balls of 3 mm, {name}"] = [sketch_case(wide, RADIUS)] * each
     return found
 
 
@@ -101,7 +106,8 @@ def main(
     of = "wall time" if wall else "time of the processor"
     text = (
         f"# Times told and taken\n\n{machine('cpu')}, {count}, {of}. Measured: {1e6 * speed.step:.3g} us "
-        f"a step, {1e9 * speed.sphere_step:.3g} ns a sphere, {speed.start:.3g} s to start. {good} of "
+        f"a step, {1e9 * speed.grain_step:.3g} ns a grain, {1e9 * speed.sphere_step:.3g} ns a sphere, "
+        f"{speed.start:.3g} s to start. {good} of "
         f"{len(table)} within a factor of {WITHIN}."
     )
     print(write_results(out, "prediction", [("prediction", text, table)]).read_text(encoding="utf-8"))
