@@ -133,7 +133,7 @@ def main(
     """Run each case with and without checkpoints, and write the table."""
     rows = [row(name, *found, pairs) for name, found in cases().items()]
     text = (
-        f"# Cost of checkpoints\n\n{machine('cpu')}, load {os.getloadavg()[0]:.1f} at the end. A run "
+        f"{machine('cpu')}, load {os.getloadavg()[0]:.1f} at the end. A run "
         f"writes one every {CHECKPOINT_EVERY:.0f} s of wall time (the last column); a shorter case writes "
         f"none. Here one was written in every {EVERY:g} s of the processor's time. Ends are the same in "
         "every bit."

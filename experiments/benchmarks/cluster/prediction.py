@@ -27,7 +27,8 @@ from experiments.cases import OwnWorkers
 from experiments.cases.cost import cost_of
 from experiments.cases.workers.speed import measure_speed, wave_seconds
 from experiments.report.kit.machine import machine
-from experiments.studyfile import load_study
+from experiments.studyfile import Study, load_study
+from experiments.studyfile.campaign import TARGET_SCENE
 
 HERE = Path(__file__).parent
 STUDIES, BENCHMARKS = HERE.parents[1] / "studies", HERE.parent
@@ -46,25 +47,27 @@ def waves(each: int) -> dict[str, list[Case]]:
     """Cases of studies that differ in test, grains and size; so many of each, more of the small ones."""
     trial, bench = load_study(STUDIES / "trial" / "study.toml", "bench"), load_study(None, "bench")
     few = load_study(None, "bench", {"scene": {"lifted-cylinder": {"grain_count": 200}}})
-    fuzz, new = (
-        load_study(BENCHMARKS / "fuzz" / "corpus" / "study.toml"),
-        load_study(STUDIES / "template.toml"),
-    )
+    fuzz = load_study(BENCHMARKS / "fuzz" / "corpus" / "study.toml")
     balls, clumps = (load_study(BENCHMARKS / "bridge" / f"{name}.toml") for name in ("sphere", "elongated"))
     found = {
-        "trial, bench": [trial.case({}, seed) for seed in range(4 * each)],
-        "trial, bench, lifted fast": [trial.case({}, seed, "fast") for seed in range(4 * each)],
-        "buckwheat, bench": [bench.case({}, seed) for seed in range(each)],
-        "buckwheat, bench, 200 grains": [few.case({}, seed) for seed in range(each)],
-        "fuzz corpus: cohesion, tilted plate": [fuzz.case({}, seed) for seed in range(each)],
-        "bridge: balls": [balls.case({}, seed) for seed in range(2 * each)],
-        "bridge: elongated clumps": [clumps.case({}, seed) for seed in range(2 * each)],
-        "dem-warp new": [new.case({}, seed) for seed in range(each)],
+        "trial, bench": _middle(trial, 4 * each),
+        "trial, bench, lifted fast": _middle(trial, 4 * each, "fast"),
+        "buckwheat, bench": _middle(bench, each),
+        "buckwheat, bench, 200 grains": _middle(few, each),
+        "fuzz corpus: cohesion, tilted plate": _middle(fuzz, each),
+        "bridge: balls": _middle(balls, 2 * each),
+        "bridge: elongated clumps": _middle(clumps, 2 * each),
+        "dem-warp new": _middle(load_study(STUDIES / "template.toml"), each),
     }
     for name, sketch in SKETCHES.items():
         wide = sketch._replace(scene=replace(sketch.scene, **OUTLETS.get(name, {})))
         found[f"balls of 3 mm, {name}"] = [sketch_case(wide, RADIUS)] * each
     return found
+
+
+def _middle(study: Study, count: int, scene: str = TARGET_SCENE) -> list[Case]:
+    """So many cases in the middle of all factors."""
+    return [study.case({}, seed, scene) for seed in range(1, count + 1)]
 
 
 def main(
@@ -86,6 +89,7 @@ def main(
         results = workers.simulate(cases)
         took = clock() - started
         steps = sum(phase["steps"] for result in results for phase in result.phases) / len(results)
+        ended = ", ".join(sorted({result.status for result in results}))
         told = wave_seconds(costs, speed, workers.count, on_gpu=False)
         rows.append(
             {
@@ -96,6 +100,7 @@ def main(
                 "told s": told,
                 "taken s": took,
                 "told / taken": told / took,
+                "ended": ended,
                 "load": os.getloadavg()[0],
             }
         )
@@ -105,7 +110,7 @@ def main(
     count = f"{workers.count} {'worker' if workers.count == 1 else 'workers'}"
     of = "wall time" if wall else "time of the processor"
     text = (
-        f"# Times told and taken\n\n{machine('cpu')}, {count}, {of}. Measured: {1e6 * speed.step:.3g} us "
+        f"{machine('cpu')}, {count}, {of}. Measured: {1e6 * speed.step:.3g} us "
         f"a step, {1e9 * speed.grain_step:.3g} ns a grain, {1e9 * speed.sphere_step:.3g} ns a sphere, "
         f"{speed.start:.3g} s to start. {good} of "
         f"{len(table)} within a factor of {WITHIN}."
