@@ -188,6 +188,8 @@ def finished_cases(folder: Path) -> dict[str, tuple[int, int]]:
     """Stored cases, each with its inode and the time of its last change: a case done twice has others."""
     found = {}
     for path in (folder / "cases").glob("*.npz"):
+        if has_temporary_name(path):  # half a case of a run that was killed
+            continue
         facts = path.stat()
         found[path.name] = (facts.st_ino, facts.st_mtime_ns)
     return found
