@@ -124,7 +124,7 @@ def page(given: Assumptions, cases: Sequence[int] = CASES, gpus: Sequence[int] =
     return markdown_page(
         "# 10,000 and 1,000,000 cases",
         f"Time, cores and disk for heaps of the paper's study ({heaps}), computed from the speed of "
-        "one H200; no machine of 8 was run. `python -m experiments.benchmarks.cluster.plan` makes this "
+        "one H200; nothing of this size was run. `python -m experiments.benchmarks.cluster.plan` makes this "
         "page, and each assumption below is an option of it.",
         markdown_table(table(given, cases, gpus)),
         "## What it rests on",
