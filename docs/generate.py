@@ -19,7 +19,7 @@ from dem_warp import SCENES
 from experiments.benchmarks.cluster import plan
 from experiments.cli import app
 from experiments.discover.library import FILES
-from experiments.measurement.observables import OBSERVABLES
+from experiments.measurement.observables import OBSERVABLES, OUTLINE
 from experiments.studyfile.reference import study_reference
 
 
@@ -89,7 +89,7 @@ def observables_page() -> str:
             each.instrument.value if each.instrument else "",
             each.definition,
         )
-        for each in OBSERVABLES
+        for each in (*OBSERVABLES, *OUTLINE)
     ]
     parts = [
         "# List of observables",

@@ -11,9 +11,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from experiments.errors import Problem
-from experiments.measurement.observables import DIMENSIONS, OBSERVABLES, Observable, View
+from experiments.measurement.observables import (
+    DIMENSIONS,
+    OUTLINE_PROFILE,
+    PROFILES,
+    SURFACE_PROFILE,
+    Observable,
+    View,
+)
 from experiments.measurement.pictures import require_same_fit
 from experiments.measurement.plausible import SizeOfTest
+from experiments.measurement.profile_files import read_drum_profiles, read_heap_profiles
 from experiments.rows import Row
 from experiments.studyfile.units import Quantity
 from experiments.texts import nearest_name
@@ -88,7 +96,9 @@ def readings_of(
         When the picture shows no heap that can be measured.
     """
     name = row["observable"]
-    if name == CLOGGED_ROW:
+    if row["profile"]:
+        yield from _profiled(row, size, fit, known)
+    elif name == CLOGGED_ROW:
         if row["value"] or row["picture"]:
             raise row.error("stands without a value and a picture: there is no heap", "observable")
         yield Reading(row, CLOGGED_ROW, np.nan)
@@ -103,6 +113,30 @@ def readings_of(
         yield _written(row, known[name], size)
     elif row["picture"]:
         yield from _seen(row, size, fit, known, outlines)
+
+
+def _profiled(row: Row, size: SizeOfTest, fit: str, known: Mapping[str, Observable]) -> Iterator[Reading]:
+    """Heights of the profile that a row's file has of its replicate."""
+    profile = SURFACE_PROFILE if size.radius is not None else OUTLINE_PROFILE
+    heights = PROFILES[profile]
+    if row["observable"] not in ("", profile) or row["value"] or row["picture"]:
+        raise row.error(f"stands alone, or with the observable {profile}", "profile")
+    if heights[0] not in known:
+        rule = "needs a drum, or outlines that the study asks for (outline = true in [measurement])"
+        raise row.error(rule, "profile")
+    path = row.file.parent / row["profile"]
+    if size.radius is not None:
+        found = read_drum_profiles(path, size.radius)
+    else:
+        found = read_heap_profiles(path, fit)
+    name = row["replicate"]
+    if name not in found.names:
+        rule = f"the file {path} has a profile of each replicate, {nearest_name(name, found.names)}"
+        raise row.error(rule, "replicate")
+    own = map(float, found.heights[found.names.index(name)])
+    for station, value in zip(found.stations, own, strict=True):
+        observable = known[heights[station]]
+        yield Reading(row, observable.name, value, doubt=_doubt(row, observable, value, size))
 
 
 def _written(row: Row, observable: Observable, size: SizeOfTest) -> Reading:
@@ -142,10 +176,15 @@ def _seen(
     pixel = _pixel(row)
     if name and pixel is None and known[name].unit == "m":
         raise row.error("a length in a picture needs the size of its pixels, as 0.1 mm", "pixel")
-    from imaging import measure
+    # a file of numbers needs no pictures
+    from imaging import PictureError, measure
 
-    views = [View.of(measure(outlines.find(path, pixel), fit, str(path)))]
-    for observable in OBSERVABLES:
+    angle = measure(outlines.find(path, pixel), fit, str(path))
+    if angle.doubts:
+        told = "; ".join(map(str, angle.doubts))
+        raise PictureError("a picture counts where nothing about it is in doubt", told, str(path))
+    views = [View.of(angle)]
+    for observable in dict.fromkeys(known.values()):
         wanted = observable is known[name] if name else observable.unit != "m" or pixel
         if wanted and observable.by_photograph:
             value = observable.in_pictures(views)
@@ -176,4 +215,4 @@ def _doubt(row: Row, observable: Observable, value: float, size: SizeOfTest) -> 
 
 
 def _place(row: Row) -> str:
-    return f"{row.file}:{row.line}: {'value' if row['value'] else 'picture'}"
+    return f"{row.file}:{row.line}: {next((key for key in ('value', 'picture') if row[key]), 'profile')}"

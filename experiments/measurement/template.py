@@ -34,7 +34,9 @@ condition: how the test was done, a condition of the study.
 replicate: one heap, a label. Five or more of each condition show small effects; a copy of a heap shows none.
 
 observable: what was measured, or {clogged} (without a value) where the grains got stuck: no result.
-{observables}"""
+{observables}
+
+profile: instead of a value, a file of profiles, columns replicate, x, z, with one of the same replicate."""
 
 _PICTURES = """
 
@@ -91,7 +93,7 @@ def _flat(table: Mapping[str, Any], place: str = "") -> Iterator[tuple[str, Any]
 
 def _defined(study: Study) -> Iterator[str]:
     """Every observable of a study's test, with its unit, its instrument and its definition."""
-    for observable in study.scene.measurable:
+    for observable in study.measurable:
         unit = LABORATORY_UNITS.get(observable.unit, observable.unit)
         text = f"{observable.name} [{unit}], {observable.instrument}: {observable.definition}"
         yield textwrap.fill(text, 108, initial_indent=4 * " ", subsequent_indent=8 * " ")
@@ -100,7 +102,7 @@ def _defined(study: Study) -> Iterator[str]:
 def _empty_rows(study: Study) -> Iterator[dict[str, object]]:
     for condition in study.conditions:
         for replicate in range(1, REPLICATES + 1):
-            for observable in study.scene.measurable:
+            for observable in study.measurable:
                 yield {
                     "condition": condition.name,
                     "replicate": replicate,
