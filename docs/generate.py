@@ -1,4 +1,4 @@
-"""Reference pages, made from the program itself: study file, command line, Python, observables, effects."""
+"""Pages made from the program itself: study file, commands, Python, observables, effects, large campaigns."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ import typer
 from typer.main import get_command
 
 from dem_warp import SCENES
+from experiments.benchmarks.cluster import plan
 from experiments.cli import app
 from experiments.discover.library import FILES
 from experiments.measurement.observables import OBSERVABLES, OUTLINE
@@ -174,6 +175,7 @@ def write_pages(folder: Path) -> None:
         "commands": commands_page(),
         "observables": observables_page(),
         "effects": effects_page(),
+        "planning": plan.page(plan.Assumptions()),
     }
     pages |= {name.replace(".", "-"): python_page(name, about) for name, about in PACKAGES.items()}
     for name, text in pages.items():

@@ -45,8 +45,13 @@ def replacing(path: Path) -> Iterator[Path]:
 def remove_leftovers(folder: Path) -> None:
     """Remove what a killed run had half written by `replacing` in a folder, which no other run may use."""
     for path in folder.rglob(".*"):
-        if _TEMPORARY.fullmatch(path.name) and path.is_file() and not path.is_symlink():
+        if has_temporary_name(path) and path.is_file() and not path.is_symlink():
             path.unlink()
+
+
+def has_temporary_name(path: Path) -> bool:
+    """Tell that a file has a name that `replacing` gives while it is written."""
+    return _TEMPORARY.fullmatch(path.name) is not None
 
 
 def check_file(path: Path, largest: int) -> None:

@@ -23,7 +23,7 @@ BULK_FRACTION = 0.55
 SLOPE = math.tan(math.radians(35.0))
 """Slope of a heap while the tube still leads it, roughly: its top is what the tube must clear."""
 
-FALL, CALM, REST = 0.25, 0.1, 0.25
+FALL, CALM, REST = 0.25, 0.1, 0.35
 """Time that the last grain of a counted rain takes to lie still, a bed to be at rest, and a heap [s]."""
 
 IDLE_SPHERES = 100.0

@@ -27,7 +27,7 @@ from experiments.errors import InputError, Problem
 from experiments.measurement.notes import data_notes
 from experiments.measurement.observables import Observable
 from experiments.measurement.plausible import SizeOfTest, inversions, size_of_test
-from experiments.measurement.readings import CLOGGED, CLOGGED_ROW, Reading, readings_of
+from experiments.measurement.readings import CLOGGED, CLOGGED_ROW, Outlines, Reading, readings_of
 from experiments.rows import Row, read_rows
 from experiments.studyfile import Condition, Study
 from experiments.texts import nearest_name
@@ -73,12 +73,13 @@ class _Found:
     """Rows that cannot be read."""
     notes: list[str] = field(default_factory=list)
     empty: int = 0
+    outlines: Outlines = field(default_factory=Outlines)
 
     def add(self, row: Row, sizes: Mapping[str, SizeOfTest], fit: str) -> None:
         """Read a row."""
         try:
             heap = self.heaps.setdefault(_heap_of(row, sizes), [])
-            readings = list(readings_of(row, sizes[row["condition"]], fit, self.known))
+            readings = list(readings_of(row, sizes[row["condition"]], fit, self.known, self.outlines))
         except InputError as error:
             self.problems += [(row.line, problem) for problem in error.problems]
         except PictureError as error:

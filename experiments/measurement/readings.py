@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,6 +25,9 @@ from experiments.measurement.profile_files import read_drum_profiles, read_heap_
 from experiments.rows import Row
 from experiments.studyfile.units import Quantity
 from experiments.texts import nearest_name
+
+if TYPE_CHECKING:
+    from imaging import Outline, PictureError
 
 CLOGGED = "the tube clogged"
 """Reason of a replicate that left no heap because the grains stayed in the tube."""
@@ -46,10 +51,42 @@ class Reading:
     """Reason that its unit, or the size of the picture's pixels, cannot be right."""
 
 
-def readings_of(row: Row, size: SizeOfTest, fit: str, known: Mapping[str, Observable]) -> Iterator[Reading]:
+class Outlines:
+    """Outlines of the pictures of one file: each picture is looked at once, however many rows name it."""
+
+    def __init__(self) -> None:
+        self._found: dict[tuple[Path, float | None], Outline | PictureError] = {}
+
+    def find(self, path: Path, pixel: float | None) -> Outline:
+        """Find the outline in a picture with pixels of a size [m].
+
+        Raises
+        ------
+        imaging.PictureError
+            When the picture shows no heap.
+        """
+        # a file of numbers needs no pictures
+        from imaging import PictureError, find_outline, read_picture
+
+        if (path, pixel) not in self._found:
+            try:
+                found = find_outline(read_picture(path), meters_per_pixel=pixel, place=str(path))
+            except PictureError as error:
+                self._found[path, pixel] = error
+            else:
+                self._found[path, pixel] = found
+        known = self._found[path, pixel]
+        if isinstance(known, PictureError):
+            raise known
+        return known
+
+
+def readings_of(
+    row: Row, size: SizeOfTest, fit: str, known: Mapping[str, Observable], outlines: Outlines
+) -> Iterator[Reading]:
     """Read everything that a row says of its heap, in a test of a size; pictures by a fit of the flanks.
 
-    What the test yields is ``known`` by name and by alias.
+    What the test yields is ``known`` by name and by alias. ``outlines`` are those of the file.
 
     Raises
     ------
@@ -75,7 +112,7 @@ def readings_of(row: Row, size: SizeOfTest, fit: str, known: Mapping[str, Observ
             require_same_fit(row["fit"], fit, f"{row.file}:{row.line}: fit")
         yield _written(row, known[name], size)
     elif row["picture"]:
-        yield from _seen(row, size, fit, known)
+        yield from _seen(row, size, fit, known, outlines)
 
 
 def _profiled(row: Row, size: SizeOfTest, fit: str, known: Mapping[str, Observable]) -> Iterator[Reading]:
@@ -125,7 +162,9 @@ def _quantity(row: Row) -> Quantity:
         raise row.error(str(error), "value") from None
 
 
-def _seen(row: Row, size: SizeOfTest, fit: str, known: Mapping[str, Observable]) -> Iterator[Reading]:
+def _seen(
+    row: Row, size: SizeOfTest, fit: str, known: Mapping[str, Observable], outlines: Outlines
+) -> Iterator[Reading]:
     """Values of a row's picture: the observable that it names, or all of them."""
     path, name = row.file.parent / row["picture"], row["observable"]
     if name and not known[name].by_photograph:
@@ -138,10 +177,9 @@ def _seen(row: Row, size: SizeOfTest, fit: str, known: Mapping[str, Observable])
     if name and pixel is None and known[name].unit == "m":
         raise row.error("a length in a picture needs the size of its pixels, as 0.1 mm", "pixel")
     # a file of numbers needs no pictures
-    from imaging import PictureError, find_outline, measure, read_picture
+    from imaging import PictureError, measure
 
-    outline = find_outline(read_picture(path), meters_per_pixel=pixel, place=str(path))
-    angle = measure(outline, fit, str(path))
+    angle = measure(outlines.find(path, pixel), fit, str(path))
     if angle.doubts:
         told = "; ".join(map(str, angle.doubts))
         raise PictureError("a picture counts where nothing about it is in doubt", told, str(path))

@@ -17,6 +17,9 @@ DEFAULT_UNIT = "mm"
 GRAIN_SIZES = (1e-4, 0.1)
 """Sizes [m] between which a grain's length lies unless a person names the unit: metres taken for millimetres,
 or the reverse, end far outside."""
+COMPUTABLE = (1e3, 1e-9)
+"""Farthest place or largest radius, and least radius of a sphere [m], whatever its unit: far from the ends of
+floats when cubed and squared."""
 GAP = 1e-3
 """Gap between spheres that touch, over the smaller radius: text files hold six digits."""
 MOST_SPHERES = 1000
@@ -79,6 +82,7 @@ def read_clump(path: Path, unit: str | None = None) -> ClumpFile:
     if len(file.spheres) > MOST_SPHERES:
         raise InputError(f"a clump has at most {MOST_SPHERES} spheres", f"{len(file.spheres)}", place)
     spheres = file.spheres * size
+    check_computable(spheres, place)
     check_one_body(spheres, place)
     if unit is None and file.unit is None:
         length = float(np.max(np.ptp(spheres[:, :3], axis=0) + 2.0 * spheres[:, 3].max()))
@@ -100,6 +104,21 @@ def _unit(named: float | None, given: str | None, place: str) -> tuple[float, st
 
 def _named(size: float) -> str:
     return next((name for name, each in UNITS["length"].items() if each == size), f"{size:g} m")
+
+
+def check_computable(spheres: np.ndarray, place: str) -> None:
+    """Refuse spheres (n, 4) [m] whose volume and moments may be beyond floats.
+
+    Raises
+    ------
+    InputError
+        When one lies too far out, or is too large or too small.
+    """
+    largest, smallest = COMPUTABLE
+    if np.abs(spheres).max() > largest or spheres[:, 3].min() < smallest:
+        rule = f"a sphere lies within {largest:g} m, and its radius is at least {smallest:g} m"
+        found = f"{np.abs(spheres).max():.4g} m and {spheres[:, 3].min():.4g} m"
+        raise InputError(rule, found, place)
 
 
 def check_grain_size(length: float, place: str, read_as: str) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from dem_warp import Case, CaseResult, Progress, simulate, simulation
+from dem_warp import Case, CaseResult, Progress, simulation
 from experiments.cases import OwnWorkers, Store, run_cases
 from experiments.cases.workers import own
 from experiments.studyfile import Study
@@ -132,7 +131,7 @@ def test_checkpoints_outlive_an_interruption_and_no_more(
 def test_an_interrupted_case_goes_on_in_the_middle(
     small_study: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(own, "simulate", partial(simulate, checkpoint_every=0.0))
+    monkeypatch.setattr(own, "CHECKPOINT_EVERY", 0.0)
     monkeypatch.setattr(simulation, "REPORT_EVERY", 0.0)
 
     def run(folder: str, progress: Callable[[Progress], None] | None = None) -> pd.DataFrame:

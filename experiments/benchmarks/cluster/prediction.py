@@ -1,67 +1,122 @@
-"""Times that a dry run tells against those that waves then take, on studies of different size.
+"""Times that a dry run tells against those that waves then take, on studies and tests of every kind.
 
     python -m experiments.benchmarks.cluster.prediction
 
-The machine is measured first. Each study's wave then runs on all cores; a prediction is good where the ratio
-lies between 1 / 1.5 and 1.5.
+The machine is measured first, by the waves of `dem-warp doctor --measure`; then each wave runs. A prediction
+is good where the ratio lies between 1 / 1.5 and 1.5. On a machine of its own, `--wall` times waves on all
+cores. On one that others use, wall time is theirs too: so the default is one worker, this process, and its
+time of the processor, in the measurement and in the waves. Neither counts the start of other processes then.
 """
 
 from __future__ import annotations
 
 import os
 import time
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import pandas as pd
 import typer
 
 from dem_warp import Case
+from dem_warp.batch import Batch
 from experiments.benchmarks.results import write_results
+from experiments.benchmarks.scenes import SKETCHES, sketch_case
 from experiments.cases import OwnWorkers
 from experiments.cases.cost import cost_of
 from experiments.cases.workers.speed import measure_speed, wave_seconds
-from experiments.studyfile import load_study
+from experiments.report.kit.machine import machine
+from experiments.studyfile import Study, load_study
+from experiments.studyfile.campaign import TARGET_SCENE
 
-TRIAL = Path(__file__).parents[2] / "studies" / "trial" / "study.toml"
+HERE = Path(__file__).parent
+STUDIES, BENCHMARKS = HERE.parents[1] / "studies", HERE.parent
+
+WITHIN = 1.5
+"""Factor within which a prediction is good."""
+
+RADIUS = 3.0e-3
+"""Radius of the balls of the sketches [m]."""
+
+OUTLETS: dict[str, dict[str, Any]] = {"hopper": {"outlet": 0.036}, "draw-down": {"slot": 0.048}}
+"""Outlets that such balls do not clog [m]."""
 
 
 def waves(each: int) -> dict[str, list[Case]]:
-    """Cases of three studies: a hundred grains of three spheres, four hundred of nine, and half of these."""
-    trial, bench = load_study(TRIAL, "bench"), load_study(None, "bench")
+    """Cases of studies that differ in test, grains and size; so many of each, more of the small ones."""
+    trial, bench = load_study(STUDIES / "trial" / "study.toml", "bench"), load_study(None, "bench")
     few = load_study(None, "bench", {"scene": {"lifted-cylinder": {"grain_count": 200}}})
-    return {
-        "trial, bench": [trial.case({}, seed) for seed in range(4 * each)],
-        "buckwheat, bench, 200 grains": [few.case({}, seed) for seed in range(each)],
-        "buckwheat, bench": [bench.case({}, seed) for seed in range(each)],
+    fuzz = load_study(BENCHMARKS / "fuzz" / "corpus" / "study.toml")
+    balls, clumps = (load_study(BENCHMARKS / "bridge" / f"{name}.toml") for name in ("sphere", "elongated"))
+    found = {
+        "trial, bench": _middle(trial, 4 * each),
+        "trial, bench, lifted fast": _middle(trial, 4 * each, "fast"),
+        "buckwheat, bench": _middle(bench, each),
+        "buckwheat, bench, 200 grains": _middle(few, each),
+        "fuzz corpus: cohesion, tilted plate": _middle(fuzz, each),
+        "bridge: balls": _middle(balls, 2 * each),
+        "bridge: elongated clumps": _middle(clumps, 2 * each),
+        "dem-warp new": _middle(load_study(STUDIES / "template.toml"), each),
     }
+    for name, sketch in SKETCHES.items():
+        wide = sketch._replace(scene=replace(sketch.scene, **OUTLETS.get(name, {})))
+        found[f"balls of 3 mm, {name}"] = [sketch_case(wide, RADIUS)] * each
+    return found
+
+
+def _middle(study: Study, count: int, scene: str = TARGET_SCENE) -> list[Case]:
+    """So many cases in the middle of all factors."""
+    return [study.case({}, seed, scene) for seed in range(1, count + 1)]
 
 
 def main(
-    each: Annotated[int, typer.Option(help="Cases of the larger studies.")] = 4,
+    each: Annotated[int, typer.Option(min=1, help="Cases of the larger studies.")] = 1,
+    wall: Annotated[
+        bool, typer.Option("--wall", help="Wall time on all cores, the machine being free.")
+    ] = False,
     out: Annotated[Path, typer.Option(help="Folder of the table.")] = Path("out/prediction"),
 ) -> None:
     """Measure the machine, predict, run and compare."""
-    workers = OwnWorkers("cpu")
-    speed = measure_speed(workers)
+    workers = OwnWorkers("cpu", None if wall else 1)
+    clock = time.perf_counter if wall else time.process_time
+    speed = measure_speed(workers, clock)
     rows = []
     for name, cases in waves(each).items():
         costs = [cost_of(case) for case in cases]
-        workers.simulate(cases[:1])  # compiles what the wave would
-        started = time.perf_counter()
+        Batch(cases[:1], "cpu").advance()  # compiles
+        started = clock()
         results = workers.simulate(cases)
-        took = time.perf_counter() - started
+        took = clock() - started
         steps = sum(phase["steps"] for result in results for phase in result.phases) / len(results)
+        ended = ", ".join(sorted({result.status for result in results}))
         told = wave_seconds(costs, speed, workers.count, on_gpu=False)
-        ratio, load = told / took, os.getloadavg()[0]
-        rows.append((name, len(cases), costs[0].spheres, costs[0].steps / steps, told, took, ratio, load))
-    columns = ["study", "cases", "spheres", "steps told / taken", "told s", "taken s", "told / taken", "load"]
-    found = (
-        f"{1e6 * speed.step:.3g} us a step, {1e9 * speed.sphere_step:.3g} ns a sphere, {speed.start:.3g} s"
+        rows.append(
+            {
+                "study": name,
+                "cases": len(cases),
+                "spheres": costs[0].spheres,
+                "steps told / taken": costs[0].steps / steps,
+                "told s": told,
+                "taken s": took,
+                "told / taken": told / took,
+                "ended": ended,
+                "load": os.getloadavg()[0],
+            }
+        )
+        print(rows[-1], flush=True)
+    table = pd.DataFrame(rows)
+    good = int(table["told / taken"].between(1.0 / WITHIN, WITHIN).sum())
+    count = f"{workers.count} {'worker' if workers.count == 1 else 'workers'}"
+    of = "wall time" if wall else "time of the processor"
+    text = (
+        f"{machine('cpu')}, {count}, {of}. Measured: {1e6 * speed.step:.3g} us "
+        f"a step, {1e9 * speed.grain_step:.3g} ns a grain, {1e9 * speed.sphere_step:.3g} ns a sphere, "
+        f"{speed.start:.3g} s to start. {good} of "
+        f"{len(table)} within a factor of {WITHIN}."
     )
-    text = f"{os.cpu_count()} cores; {found}, {speed.start:.3g} s to start."
-    table = pd.DataFrame(rows, columns=columns)
     print(write_results(out, "prediction", [("prediction", text, table)]).read_text(encoding="utf-8"))
+    raise typer.Exit(int(good < len(table)))
 
 
 if __name__ == "__main__":

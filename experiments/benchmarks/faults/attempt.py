@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
+import ctypes
 import hashlib
 import json
 import os
 import signal
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+
+from experiments.files import has_temporary_name
 
 STUDY = Path(__file__).with_name("study.toml")
 """A campaign of 20 cases of 60 balls: three waves, every table of the report."""
 
 OF_THE_RUN = ("files.json", "report.html", "wall_times.csv", ".lock")
 """Files of a folder that tell of the run itself, its day and its duration."""
+
+TOLD = ".live"
+"""Folder of what a run tells while it works; it stays, and is no result."""
 
 
 @dataclass(frozen=True)
@@ -36,29 +42,30 @@ class Ending:
         return "Traceback" not in self.said and self.code != -signal.SIGSEGV
 
 
-class Attempt:
-    """A command that runs in a fork of this process, which has the libraries loaded already.
+class Command:
+    """A command that runs in another process.
 
     Parameters
     ----------
-    arguments
-        Those of ``dem-warp``.
+    process
+        The process.
     said
         File of its messages.
     """
 
-    def __init__(self, arguments: Sequence[str], said: Path) -> None:
-        self._said, self._started = said, time.monotonic()
+    def __init__(self, process: int, said: Path) -> None:
+        self.process, self._said = process, said
+        self._started = time.monotonic()
         self._code: int | None = None
-        self.process = os.fork()
-        if self.process == 0:
-            _become(["dem-warp", *arguments], said)
+
+    def _look(self) -> int | None:
+        """Exit code of the command; None while it runs."""
+        raise NotImplementedError
 
     def has_ended(self) -> bool:
         """Tell that the command has ended by itself, or was ended."""
         if self._code is None:
-            process, status = os.waitpid(self.process, os.WNOHANG)
-            self._code = os.waitstatus_to_exitcode(status) if process else None
+            self._code = self._look()
         return self._code is not None
 
     def wait(self, seconds: float = 600.0) -> bool:
@@ -88,17 +95,49 @@ class Attempt:
         return Ending(int(self._code or 0), said, time.monotonic() - self._started)
 
 
-def _become(words: list[str], said: Path) -> None:
-    """Run a command in this process, which ends with it."""
+class Attempt(Command):
+    """A command that runs in a fork of this process, which has the libraries loaded already.
+
+    Parameters
+    ----------
+    arguments
+        Those of the command.
+    said
+        File of its messages.
+    command : callable, optional
+        What runs with these as its `sys.argv`; None: ``dem-warp``.
+    """
+
+    def __init__(
+        self, arguments: Sequence[str], said: Path, command: Callable[[], object] | None = None
+    ) -> None:
+        process = os.fork()
+        if process == 0:
+            end_with_starter()
+            os._exit(exit_code(arguments, said, command))
+        super().__init__(process, said)
+
+    def _look(self) -> int | None:
+        process, status = os.waitpid(self.process, os.WNOHANG)
+        return os.waitstatus_to_exitcode(status) if process else None
+
+
+def end_with_starter() -> None:
+    """Let Linux kill this process when the one that began it is gone."""
+    death_signal = 1  # PR_SET_PDEATHSIG of <sys/prctl.h>
+    ctypes.CDLL(None).prctl(death_signal, signal.SIGKILL)
+
+
+def exit_code(arguments: Sequence[str], said: Path, command: Callable[[], object] | None = None) -> int:
+    """Run a command in this process, its messages to a file; return the code that it exits with."""
     code = 70
     try:
         stream = os.open(said, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
         os.dup2(stream, 1)
         os.dup2(stream, 2)
-        sys.argv = words
-        from experiments.cli import main
-
-        main()
+        os.close(stream)
+        sys.argv = ["dem-warp", *arguments]
+        (command or _dem_warp)()
     except SystemExit as end:
         code = end.code if isinstance(end.code, int) else int(end.code is not None)
     except BaseException:
@@ -108,7 +147,13 @@ def _become(words: list[str], said: Path) -> None:
     finally:
         sys.stdout.flush()
         sys.stderr.flush()
-        os._exit(code)
+    return code
+
+
+def _dem_warp() -> None:
+    from experiments.cli import main
+
+    main()
 
 
 def _children(process: int) -> list[int]:
@@ -127,9 +172,10 @@ def _command_line(process: int) -> bytes:
         return b""
 
 
-def calibrate(folder: Path, workers: int, resume: bool = False, study: Path = STUDY) -> list[str]:
-    """Arguments of a campaign in a folder."""
-    words = ["calibrate", str(study), "--out", str(folder), "--device", "cpu", "--workers", str(workers)]
+def calibrate(folder: Path, where: int | str, resume: bool = False) -> list[str]:
+    """Arguments of a campaign in a folder, on so many processes or on the workers of a scheduler."""
+    workers = ["--workers", str(where)] if isinstance(where, int) else ["--scheduler", where]
+    words = ["calibrate", str(STUDY), "--out", str(folder), "--device", "cpu", *workers]
     return [*words, "--resume"] if resume else words
 
 
@@ -142,6 +188,8 @@ def finished_cases(folder: Path) -> dict[str, tuple[int, int]]:
     """Stored cases, each with its inode and the time of its last change: a case done twice has others."""
     found = {}
     for path in (folder / "cases").glob("*.npz"):
+        if has_temporary_name(path):  # half a case of a run that was killed
+            continue
         facts = path.stat()
         found[path.name] = (facts.st_ino, facts.st_mtime_ns)
     return found
@@ -151,6 +199,8 @@ def content(folder: Path) -> dict[str, str]:
     """Hashes of all that a finished run left, but for what tells of the run itself."""
     hashes = {}
     for path in sorted(path for path in folder.rglob("*") if path.is_file() and path.name not in OF_THE_RUN):
+        if path.relative_to(folder).parts[0] == TOLD and not has_temporary_name(path):
+            continue
         data = path.read_bytes()
         if path.name == "results.json":
             told = json.loads(data)

@@ -17,6 +17,10 @@ KINDS = ("parent", "parent", "parent", "worker")
 """Processes that are killed: the command itself, or, less often as it takes longer, one of its workers."""
 
 
+NAMED = 3
+"""Files that a fault names; the others are counted."""
+
+
 @dataclass(frozen=True)
 class Kill:
     """One kill, and what came of it."""
@@ -88,4 +92,5 @@ def lost(before: Mapping[str, tuple[int, int]], now: Mapping[str, tuple[int, int
 def differing(expected: Mapping[str, str], found: Mapping[str, str]) -> str:
     """Name the files that a run without faults left otherwise; empty: none."""
     names = sorted(name for name in expected.keys() | found.keys() if expected.get(name) != found.get(name))
-    return f"other than without faults: {', '.join(names)}" if names else ""
+    shown = ", ".join(names[:NAMED]) + (f" and {len(names) - NAMED} more" if len(names) > NAMED else "")
+    return f"other than without faults: {shown}" if names else ""

@@ -36,7 +36,7 @@ CASES = 250
 
 def load_libraries() -> None:
     """Import what a campaign does, so that its forks need not; the simulator itself is not begun."""
-    for name in ("experiments.api", "experiments.cli", "experiments.report.writer"):
+    for name in ("distributed", "experiments.api", "experiments.cli", "experiments.report.writer"):
         importlib.import_module(name)
 
 

@@ -100,7 +100,9 @@ def measured(folder: Path) -> Reader:
     (folder / "study.toml").write_bytes((CORPUS / "study.toml").read_bytes())
     (folder / "heap.png").write_bytes(_picture(".png"))
     study = load_study(folder / "study.toml")
-    return Reader(_corpus("measured.csv"), lambda path: read_measured(path, study))
+    return Reader(
+        _corpus("measured.csv", "numbers.csv", "quoted.csv"), lambda path: read_measured(path, study)
+    )
 
 
 def profiles(folder: Path) -> Reader:

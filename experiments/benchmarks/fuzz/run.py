@@ -1,7 +1,8 @@
 """Fuzzing of every reader: `python -m experiments.benchmarks.fuzz.run out/fuzz --inputs 100000`.
 
-Every input is determined by the seed, the reader and its number, so that a failure can be had again:
-`--reader NAME --first NUMBER --inputs 1`.
+The readers take turns, `--turn` inputs each. A run that was stopped goes on in its folder where it was. Every
+input is determined by the seed, the reader and its number, so that a failure can be had again, in another
+folder: `--reader NAME --first NUMBER --inputs 1`.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from experiments.benchmarks.fuzz.worker import (
     work,
 )
 from experiments.benchmarks.results import write_results
+from experiments.errors import InputError
 from experiments.report.kit.machine import machine
 
 PATIENCE = 60.0
@@ -42,8 +44,11 @@ RULE = (
 CHUNK = 10_000
 """Inputs of one process."""
 
+Row = dict[str, Any]
+"""Row of the record."""
 
-def fuzz(name: str, seed: int, first: int, inputs: int, failures: Path) -> dict[str, Any]:
+
+def fuzz(name: str, seed: int, first: int, inputs: int, failures: Path) -> Row:
     """Give mutated files to a reader; return a row of the record.
 
     A process that dies or hangs is a failure of the input that it was at; the next one goes on behind it.
@@ -100,24 +105,57 @@ def _wait(process: Any, note: Any) -> str:
     return f"exit code {process.exitcode}"
 
 
+def added(row: Row | None, more: Row) -> Row:
+    """Add the row of further inputs to a reader's."""
+    if row is None:
+        return more
+    sums = {name: row[name] + more[name] for name in ("inputs", "read", "refused", "wall s")}
+    most = {name: max(row[name], more[name]) for name in ("slowest s", "memory MB")}
+    # the file of the failures holds all of them
+    return more | sums | most
+
+
+def rows_of(out: Path, seed: int, first: int) -> dict[str, Row]:
+    """Rows that an earlier run of the same inputs left in a folder, by reader.
+
+    Raises
+    ------
+    InputError
+        When they are of other inputs.
+    """
+    path = out / "readers.csv"
+    if not path.is_file():
+        return {}
+    rows = pd.read_csv(path).to_dict("records")
+    for row in rows:
+        if (row["seed"], row["first"]) != (seed, first):
+            raise InputError(
+                "one folder holds inputs of one seed from one number on", (seed, first), str(out)
+            )
+    return {str(row["reader"]): {str(name): value for name, value in row.items()} for row in rows}
+
+
 def main(
     out: Annotated[Path, typer.Argument(help="Folder of the results.")],
     inputs: Annotated[int, typer.Option(min=1, help="Mutated files for each reader.")] = 100_000,
     reader: Annotated[list[str] | None, typer.Option(help="Only this reader; may be given again.")] = None,
     seed: Annotated[int, typer.Option(help="Seed of the mutations.")] = 1,
     first: Annotated[int, typer.Option(min=0, help="Number of the first input.")] = 0,
+    turn: Annotated[int, typer.Option(min=1, help="Inputs of a reader before the next one's turn.")] = CHUNK,
 ) -> None:
     """Give mutated files to every reader, and write what happened: fuzz.md, readers.csv, failures.jsonl."""
     failures = out / "failures.jsonl"
     out.mkdir(parents=True, exist_ok=True)
-    failures.unlink(missing_ok=True)
-    rows = []
-    for name in reader or READERS:
-        rows.append(fuzz(name, seed, first, inputs, failures))
-        print(rows[-1], flush=True)
-        head = f"# Mutated files\n\n{machine('cpu')}. {RULE}"
-        write_results(out, "fuzz", [("readers", head, pd.DataFrame(rows))])
-    raise typer.Exit(int(any(row["failures"] for row in rows)))
+    rows = rows_of(out, seed, first)
+    head = f"# Mutated files\n\n{machine('cpu')}. {RULE}"
+    while left := [name for name in reader or READERS if name not in rows or rows[name]["inputs"] < inputs]:
+        for name in left:
+            done = int(rows[name]["inputs"]) if name in rows else 0
+            row = fuzz(name, seed, first + done, min(turn, inputs - done), failures)
+            rows[name] = added(rows.get(name), row | {"seed": seed, "first": first})
+            print(rows[name], flush=True)
+            write_results(out, "fuzz", [("readers", head, pd.DataFrame(list(rows.values())))])
+    raise typer.Exit(int(any(row["failures"] for row in rows.values())))
 
 
 if __name__ == "__main__":

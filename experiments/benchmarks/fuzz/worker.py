@@ -15,6 +15,7 @@ import warnings
 from pathlib import Path
 from typing import Any
 
+from dem_warp.processes import end_with_parent
 from experiments.benchmarks.fuzz.mutations import mutated
 from experiments.benchmarks.fuzz.readers import READERS, Reader, accepted_change
 
@@ -35,6 +36,7 @@ def content_of(reader: Reader, name: str, seed: int, number: int) -> tuple[str, 
 
 def work(name: str, seed: int, numbers: range, note: Any, failures: str) -> None:
     """Read inputs in a process of its own, without a word of the libraries."""
+    end_with_parent()
     logging.disable(logging.CRITICAL)
     warnings.simplefilter("ignore")
     # native code writes there too

@@ -6,7 +6,8 @@ import logging
 import os
 import pickle
 import uuid
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -36,7 +37,21 @@ LISTEN = 0.5
 AHEAD = 4
 """Batches a worker that the scheduler holds at once; the others wait here and take none of its memory."""
 
+GONE = "the connection to the scheduler was lost: see to it that it runs on."
+"""Message where a scheduler does not answer any more."""
+
 _log = logging.getLogger(__name__)
+
+
+@contextmanager
+def _in_words() -> Iterator[None]:
+    """Say in words that a scheduler is gone, which Dask tells as an error of the system."""
+    from distributed.comm import CommClosedError
+
+    try:
+        yield
+    except CommClosedError as error:
+        raise WorkersLostError(GONE) from error
 
 
 class DaskWorkers:
@@ -63,7 +78,7 @@ class DaskWorkers:
     @property
     def count(self) -> int:
         """Workers that are asked for, or there."""
-        return self._expected or max(len(self._addresses()), 1)
+        return self._expected or max(len(self._there()), 1)
 
     @property
     def on_gpu(self) -> bool:
@@ -85,6 +100,7 @@ class DaskWorkers:
         """Kind, place and number of the workers."""
         return self._described | {"workers": self.count}
 
+    @_in_words()
     def simulate(
         self,
         cases: Sequence[Case],
@@ -113,15 +129,19 @@ class DaskWorkers:
             session.close()
         return wave.in_order()
 
-    def _addresses(self) -> list[str]:
-        return list(self._client.scheduler_info(n_workers=-1)["workers"])
+    def _there(self) -> dict[str, Any]:
+        """Facts about the workers that are there, by their addresses."""
+        found = self._client.scheduler_info(n_workers=-1)
+        if "workers" not in found:
+            raise WorkersLostError(GONE)
+        return dict(found["workers"])
 
     def _await_workers(self) -> None:
         """Wait for the first worker, and see to it that each has one thread."""
-        if not self._addresses():
+        if not self._there():
             _log.warning("waiting for the first worker of the cluster")
             self._client.wait_for_workers(1)
-        for address, facts in self._client.scheduler_info(n_workers=-1)["workers"].items():
+        for address, facts in self._there().items():
             if facts["nthreads"] != 1:
                 rule = "each worker must have one thread: dask worker --nthreads 1 --nworkers N"
                 raise InputError(rule, f"{facts['nthreads']} threads of {address}", "the cluster")

@@ -51,7 +51,8 @@ def open_workers(resources: Resources) -> Iterator[Workers]:
 
     with ExitStack() as stack, dask.config.set(SETTINGS), warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        logging.getLogger(distributed.__name__).setLevel(logging.CRITICAL)
+        for name in (distributed.__name__, distributed.client.__name__):  # each has a level of its own
+            logging.getLogger(name).setLevel(logging.CRITICAL)
         yield _opened(resources, stack)
 
 

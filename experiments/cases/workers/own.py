@@ -13,6 +13,7 @@ import warp as wp
 
 from dem_warp import Case, CaseResult, simulate
 from dem_warp.batch import Onlooker
+from dem_warp.checkpoint import CHECKPOINT_EVERY
 from dem_warp.device import resolve_device
 from dem_warp.result import OnProgress, OnResult
 from experiments.cases.engine import Engine
@@ -21,6 +22,10 @@ from experiments.cases.workers.division import run_divided
 from experiments.cases.workers.speed import cpu_name, expected_seconds
 from experiments.cases.workers.wave import Wave
 from experiments.cases.workers.workers import Workers
+
+CHEAP_WORLDS = 30
+"""Worlds of 2,500 clumps whose checkpoints take 2 % of a minute where the disk is slow
+(`experiments/benchmarks/README.md`, cost of checkpoints)."""
 
 
 @dataclass(frozen=True)
@@ -83,9 +88,9 @@ class OwnWorkers:
         """
         wave = Wave(cases, on_result, on_progress, expected_seconds(cases, self, engine))
 
-        simulator = engine or partial(simulate, onlooker=self.onlooker)
-
         def run(batch: int, members: list[int]) -> None:
+            every = checkpoint_interval(len(members) if self.on_gpu else 1)
+            simulator = engine or partial(simulate, onlooker=self.onlooker, checkpoint_every=every)
             simulator(
                 [cases[index] for index in members],
                 device=self.name,
@@ -106,6 +111,11 @@ class OwnWorkers:
         if self.on_gpu and engine is None:
             return plan_batches(cases, wave.costs, memory=wp.get_device(self.name).free_memory)
         return [[index for batch in plan_batches(cases, wave.costs) for index in batch]]
+
+
+def checkpoint_interval(worlds: int) -> float:
+    """Wall time between two checkpoints of a launch, which stands still while each world's is written [s]."""
+    return CHECKPOINT_EVERY * max(1.0, worlds / CHEAP_WORLDS)
 
 
 def watched_by(workers: Workers, onlooker: Onlooker) -> Workers:

@@ -6,12 +6,15 @@ import json
 import random
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 from experiments.benchmarks.fuzz.mutations import mutated
 from experiments.benchmarks.fuzz.readers import CORPUS, READERS, Reader, accepted_change
-from experiments.benchmarks.fuzz.run import fuzz
+from experiments.benchmarks.fuzz.run import added, fuzz, rows_of
 from experiments.benchmarks.fuzz.worker import AT, FIELDS, READ, REFUSED, content_of, read_inputs
+from experiments.benchmarks.results import write_results
+from experiments.errors import InputError
 
 INPUTS = 60
 """Of each reader: seconds."""
@@ -75,6 +78,24 @@ def test_a_process_that_dies_is_a_failure_of_its_input(tmp_path: Path) -> None:
     assert row["failures"] == 2
     lines = failures.read_text(encoding="utf-8").splitlines()
     assert [json.loads(line)["number"] for line in lines] == [5, 6]
+
+
+def test_a_run_goes_on_where_it_was(tmp_path: Path) -> None:
+    earlier = {"reader": "clump", "inputs": 10, "read": 4, "refused": 6, "failures": 1, "slowest s": 0.2}
+    more = {"reader": "clump", "inputs": 5, "read": 5, "refused": 0, "failures": 2, "slowest s": 0.1}
+    sizes = {"memory MB": 1.0, "wall s": 3, "seed": 1, "first": 0}
+    row = added(earlier | sizes, more | sizes)
+    assert (row["inputs"], row["read"], row["failures"], row["slowest s"], row["wall s"]) == (
+        15,
+        9,
+        2,
+        0.2,
+        6,
+    )
+    write_results(tmp_path, "fuzz", [("readers", "", pd.DataFrame([row]))])
+    assert rows_of(tmp_path, 1, 0) == {"clump": row}
+    with pytest.raises(InputError, match="one seed"):
+        rows_of(tmp_path, 2, 0)
 
 
 @pytest.mark.parametrize("path", sorted((CORPUS / "found").iterdir()), ids=lambda path: path.stem)

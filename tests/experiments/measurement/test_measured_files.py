@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+import imaging
 from doe.discrepancy import Measured
 from experiments.cli import app
 from experiments.errors import InputError
@@ -113,6 +114,20 @@ def test_pictures_are_measured_as_heaps_are(read, tmp_path: Path) -> None:
     width = DrawnHeap(27.0, 31.0).width * 0.1e-3
     assert base["r50"] == pytest.approx(width / 4.0, rel=0.03)
     assert data.pictures["base"] == (tmp_path / "heap.png", tmp_path / "turned.png")
+
+
+def test_a_picture_is_looked_at_once(read, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    save_picture(tmp_path / "heap.png", draw(DrawnHeap(27.0, 31.0), PLAIN))
+    looks, find = [], imaging.find_outline
+
+    def note(*arguments: object, **options: object) -> imaging.Outline:
+        looks.append(options["meters_per_pixel"])
+        return find(*arguments, **options)
+
+    monkeypatch.setattr(imaging, "find_outline", note)
+    row = "base,{},flank_angle,,,heap.png,{}\n"
+    read("".join(row.format(number, "0.1 mm") for number in range(1, 6)) + row.format(6, ""))
+    assert looks == [pytest.approx(1e-4), None]
 
 
 def test_a_picture_without_a_heap_is_noted_and_the_rest_stays(read, tmp_path: Path) -> None:

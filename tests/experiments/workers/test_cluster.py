@@ -22,6 +22,7 @@ from experiments.cases.contract import command_program
 from experiments.cases.program import ProgramEngine
 from experiments.cases.workers import dask_clusters, dask_task, dask_workers, opening
 from experiments.cases.workers.dask_workers import DaskWorkers
+from experiments.cases.workers.workers import WorkersLostError
 from experiments.cli import app
 from experiments.errors import InputError
 from experiments.studyfile import Study, load_study
@@ -117,10 +118,13 @@ def test_workers_of_another_version_are_refused(
         two_workers.simulate(made(small_study, 1))
 
 
-def test_the_workers_of_a_scheduler_are_used_by_its_address(small_study: Study) -> None:
+def test_the_workers_of_a_scheduler_are_used_by_its_address_until_it_is_gone(
+    small_study: Study, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A scheduler of one's own, as `dask scheduler` and `dask worker` start them."""
     from distributed import LocalCluster
 
+    monkeypatch.setattr(opening, "ANSWER", 1.0)
     with LocalCluster(
         n_workers=1, threads_per_worker=1, dashboard_address=None, silence_logs=50, host="127.0.0.1"
     ) as cluster:
@@ -128,6 +132,9 @@ def test_the_workers_of_a_scheduler_are_used_by_its_address(small_study: Study) 
         with open_workers(asked) as workers:
             results = workers.simulate(made(small_study, 1))
             assert workers.described["device"] == f"the workers of {cluster.scheduler_address}"
+            cluster.close()
+            with pytest.raises(WorkersLostError, match="connection to the scheduler was lost"):
+                workers.simulate(made(small_study, 1))
     assert_same_bits(results, OwnWorkers("cpu", 1).simulate(made(small_study, 1)))
 
 

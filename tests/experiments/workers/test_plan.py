@@ -14,7 +14,14 @@ from dem_warp import Progress
 from experiments import api
 from experiments.cases import OwnWorkers
 from experiments.cases.cost import Cost
-from experiments.cases.workers.speed import Speed, store_speed, stored_speed, user_folder, wave_seconds
+from experiments.cases.workers.speed import (
+    Speed,
+    split_costs,
+    store_speed,
+    stored_speed,
+    user_folder,
+    wave_seconds,
+)
 from experiments.cases.workers.wave import WaveProgress
 from experiments.commands.console import describe_progress
 
@@ -44,6 +51,19 @@ def test_a_wave_takes_what_its_workers_share_and_no_less_than_its_longest_case()
     # On a GPU all worlds of a launch take their steps together.
     assert wave_seconds([small] * 8, SPEED, 1, on_gpu=True) == pytest.approx(2.0 + 1000.0 * 9.0e-4)
     assert wave_seconds([], SPEED, 1, on_gpu=True) == 0.0
+
+
+def test_the_cost_of_a_step_is_split_into_what_it_was_made_of() -> None:
+    step, grain, sphere = 1.6e-5, 2.7e-7, 5.0e-8
+    least = step + 30 * (grain + sphere)
+    for copies in (1, 1024):
+        balls = (copies, step + 250 * copies * (grain + sphere))
+        clumps = (copies, step + 100 * copies * (grain + 9 * sphere))
+        assert split_costs(least, balls, clumps) == pytest.approx((step, grain, sphere))
+    # noise makes no cost negative
+    assert min(split_costs(least, (1, 0.5 * least), (1, 0.1 * least))) >= 0.0
+    case = Speed(step, sphere, 2.0, grain_step=grain).seconds(Cost(250, 250, 10.0))
+    assert case == pytest.approx(10.0 * (step + 250 * (grain + sphere)))
 
 
 def test_speeds_are_stored_for_each_machine_and_a_damaged_file_is_none() -> None:
