@@ -40,6 +40,7 @@ from doe.discrepancy.verdict.records import (
     data_record,
     drift_records,
     fit_record,
+    scatter_notes,
 )
 
 Analysis = Generator[list[Point], Outcomes, Discovery]
@@ -233,7 +234,7 @@ class _Parts:
             reason=conclusion.reason,
             named=conclusion.named,
             factors=self.emulator.space.factors,
-            data=data_record(self.emulator, self.evidence),
+            data=data_record(self.emulator, self.evidence, base.fitted),
             base=fit_record(base.fitted, base.gap, self.evidence),
             chosen=None if chosen is None else fit_record(chosen.fitted, chosen.gap, self.evidence),
             gap=Gap(drop.found, drop.drop, drop.drop_limit, drop.mechanism),
@@ -245,7 +246,7 @@ class _Parts:
             confounding=Confounding(base.seen.names, base.seen.correlations),
             before_after=tuple(before_after),
             next_experiment=self._next(base, conclusion, assessments),
-            notes=(*self.evidence.notes, *self.emulator.notes, *notes),
+            notes=(*self.evidence.notes, *scatter_notes(base.fitted), *self.emulator.notes, *notes),
             effort=Effort(self.seed, self.settings.sha256, self.emulator.cases, self.laboratory.cases),
         )
 

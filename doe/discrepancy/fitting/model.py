@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,6 +11,7 @@ from scipy.linalg import block_diag
 from doe.discrepancy.emulation.correction import Correction
 from doe.discrepancy.emulation.emulator import Emulator
 from doe.discrepancy.fitting.evidence import Block
+from doe.discrepancy.fitting.scatter import Excess, Scatter
 
 STEP = 0.02
 """Half the step of derivatives, in coded units."""
@@ -62,15 +63,29 @@ class Model:
             values = values + self.corrections[condition].mean(x)
         return values
 
-    def noise(self, x: np.ndarray, block: Block) -> np.ndarray:
-        """Covariance of the noise of the means of a block, at one row of coded parameters, (k, k)."""
-        surfaces = self.emulator.surfaces[block.condition]
-        covariance = surfaces.noise_covariance(x, self.mechanisms)
-        if block.condition in self.corrections:
-            ratio = self.corrections[block.condition].noise_ratio
+    def run_covariance(self, x: np.ndarray, condition: str) -> np.ndarray:
+        """Covariance of one run at one row of coded parameters, (observables, observables)."""
+        covariance = self.emulator.surfaces[condition].noise_covariance(x, self.mechanisms)
+        if condition in self.corrections:
+            ratio = self.corrections[condition].noise_ratio
             covariance = ratio[:, None] * covariance * ratio
-        covariance = block.scatter(covariance[np.ix_(block.columns, block.columns)])
-        return covariance * surfaces.noise.inverse_bias(len(block.columns))
+        return np.asarray(covariance)
+
+    def excess(self, x: np.ndarray, scatter: Scatter) -> Excess:
+        """Estimate what replicates scatter more than its runs do at one row of coded parameters."""
+        surfaces = self.emulator.surfaces
+        runs = {name: self.run_covariance(x, name) for name in scatter.products}
+        known = sum(surfaces[name].noise.degrees_of_freedom for name in runs)
+        return scatter.excess(runs, known, len(self.emulator.observables))
+
+    def noise(self, x: np.ndarray, block: Block, excess: Excess | None = None) -> np.ndarray:
+        """Covariance of the noise of the means of a block, at one row of coded parameters, (k, k).
+
+        What its replicates scatter beyond the model is that at these parameters, unless it is given.
+        """
+        excess = self.excess(x, block.scatter) if excess is None else excess
+        covariance = block.noise(self.run_covariance(x, block.condition), excess)
+        return covariance * self.emulator.surfaces[block.condition].noise.inverse_bias(len(block.columns))
 
     def error(self, x: np.ndarray, block: Block) -> np.ndarray:
         """Covariance of the error of the prediction of a block, with what is systematic, (k, k)."""
@@ -110,12 +125,14 @@ class Stack:
 
     def covariance(self, x: np.ndarray) -> np.ndarray:
         """Covariance of measured less predicted means at one row of coded parameters, (means, means)."""
-        return _blocks(self.model.noise(x, block) + self.model.error(x, block) for block in self.blocks)
+        return self.noise(x) + _blocks(self.model.error(x, block) for block in self.blocks)
 
     def noise(self, x: np.ndarray) -> np.ndarray:
         """Covariance of the measured means alone, (means, means)."""
-        return _blocks(self.model.noise(x, block) for block in self.blocks)
+        # all blocks are means of the same replicates, or of as few
+        excess = self.model.excess(x, self.blocks[0].scatter)
+        return _blocks(self.model.noise(x, block, excess) for block in self.blocks)
 
 
-def _blocks(parts: Sequence[np.ndarray] | object) -> np.ndarray:
-    return np.asarray(block_diag(*parts))  # type: ignore[misc]
+def _blocks(parts: Iterable[np.ndarray]) -> np.ndarray:
+    return np.asarray(block_diag(*parts))

@@ -100,10 +100,7 @@ def _expected(chosen: Fitted, blocks: tuple[Block, ...]) -> int:
 def _mean(runs: Runs, block: Block, model: Model, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Mean of the runs of a block, and the covariance of its error."""
     here = runs.values[runs.conditions == block.condition][:, block.columns]
-    size = here.shape[1]
-    own = Block(
-        block.condition, block.columns, block.mean, np.full((size, size), 1.0 / len(here)), np.ones(size)
-    )
+    own = Block.of_runs(block.condition, block.columns, len(here))
     return here.mean(axis=0), model.noise(x, own)
 
 

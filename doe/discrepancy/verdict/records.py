@@ -11,22 +11,26 @@ from doe.discrepancy.contest.signatures import Signatures, projector
 from doe.discrepancy.emulation.emulator import Emulator
 from doe.discrepancy.fitting.evidence import Block, Evidence
 from doe.discrepancy.fitting.fit import AT_BOUND, Fitted, Interval, coded_size_interval
+from doe.discrepancy.fitting.model import Model
 from doe.discrepancy.problem.settings import Settings
 from doe.discrepancy.verdict.conclusion import Assessment, objections
 from doe.discrepancy.verdict.discovery import Candidate, Data, Drift, Fit
 
+TOLD = 1.5
+"""Variance of replicates over that of the model from which on the reader is told."""
 
-def data_record(emulator: Emulator, evidence: Evidence) -> Data:
-    """The measured means, a row a condition of the emulator."""
+
+def data_record(emulator: Emulator, evidence: Evidence, base: Fitted | None = None) -> Data:
+    """The measured means, a row a condition of the emulator; their errors as the calibrated base has them."""
     conditions, observables = emulator.space.conditions, emulator.observables
     shape = (len(conditions), len(observables))
     means, errors, replicates = np.full(shape, np.nan), np.full(shape, np.nan), np.zeros(shape, dtype=int)
-    centre = np.zeros(len(emulator.space.factors))
+    model = Model(emulator, (), 0.0) if base is None else base.model
+    x = model.start if base is None else base.x
     for block in (*evidence.training, *evidence.held_out):
         row = conditions.index(block.condition)
-        noise = emulator.surfaces[block.condition].noise.covariance(centre)
         means[row, block.columns] = block.mean
-        own = block.scatter(noise[np.ix_(block.columns, block.columns)])
+        own = block.noise(model.run_covariance(x, block.condition), model.excess(x, block.scatter))
         errors[row, block.columns] = np.sqrt(np.diag(own))
         replicates[row, block.columns] = block.replicates
     return Data(conditions, observables, emulator.space.held_out, means, errors, replicates)
@@ -72,14 +76,29 @@ def size_intervals(fitted: Fitted) -> tuple[Interval, ...]:
     return tuple(out)
 
 
+def scatter_notes(fitted: Fitted) -> tuple[str, ...]:
+    """Say what replicates scatter more than the model at its optimum, and count so."""
+    stack = fitted.stack
+    excess = fitted.model.excess(fitted.x, stack.blocks[0].scatter)
+    notes = []
+    if excess.heaps > TOLD:
+        notes.append(f"heaps scatter {excess.heaps**0.5:.1f} times as much as the model's, and count so")
+    notes += [
+        f"readings of {name} scatter {reading**0.5:.1f} times as much as the model's heaps do, each by itself,"
+        " and count so"
+        for name, reading in zip(fitted.model.emulator.observables, excess.reading, strict=True)
+        if reading > TOLD - 1.0
+    ]
+    return tuple(notes)
+
+
 def _predictions(fitted: Fitted) -> tuple[np.ndarray, np.ndarray]:
     """Every observable of every condition, and its standard error from the fit and the emulator."""
     emulator = fitted.model.emulator
     count = len(emulator.observables)
     values, errors = [], []
     for condition in emulator.space.conditions:
-        whole = Block(condition, np.arange(count), np.zeros(count), np.ones((count, count)), np.ones(count))
-        told = forecast(fitted, (whole,))
+        told = forecast(fitted, (Block.of_runs(condition, np.arange(count), 1),))
         values.append(told.predicted)
         errors.append(np.sqrt(np.maximum(np.diag(told.covariance - told.noise), 0.0)))
     return np.array(values), np.array(errors)

@@ -1,0 +1,111 @@
+"""Heaps that did not come out of our own engine, on the shipped bank: their scatter, their optimum.
+
+The truth is the emulator of the bank, so that nothing is simulated; what an emulator misses is no part of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from doe.discrepancy import Emulator, Measured, fit_emulator
+from doe.discrepancy.contest.gap import OF_THE_BASE, find_gap
+from doe.discrepancy.contest.signatures import signatures
+from doe.discrepancy.fitting.evidence import gather
+from doe.discrepancy.fitting.fit import fit, weigh
+from doe.discrepancy.fitting.model import Model, Stack
+from experiments.discover.search import Search
+from experiments.studyfile import load_study
+from experiments.trials.emulated_simulator import EmulatedSimulator, emulated_heaps
+
+TRIAL = Path(__file__).parents[3] / "experiments" / "studies" / "trial" / "study.toml"
+SYSTEMATIC = 0.2
+"""As in the trial study at this scale."""
+REPLICATES = 8
+
+
+@cache
+def search() -> Search:
+    return Search.of(load_study(TRIAL, "bench"))
+
+
+@cache
+def known() -> Emulator:
+    return fit_emulator(search().read_bank(TRIAL.with_name("bank-bench.npz")))
+
+
+def theta(seed: int) -> np.ndarray:
+    return np.random.default_rng([seed, 7]).uniform(-0.9, 0.9, len(known().space.factors))
+
+
+def heaps(coded: Mapping[str, float], seed: int) -> Measured:
+    space = known().space
+    sizes = {name: space.natural_size(name, size) for name, size in coded.items()}
+    simulator = EmulatedSimulator(known())
+    return emulated_heaps(simulator, tuple(space.natural_theta(theta(seed))), sizes, REPLICATES, seed)
+
+
+def with_reading_errors(measured: Measured, deviations: float, seed: int) -> Measured:
+    """Add to each value by itself so many standard deviations of one run."""
+    rng = np.random.default_rng([seed, 8])
+    values = {}
+    for condition, rows in measured.values.items():
+        sd = np.sqrt(known().surfaces[condition].noise.variance(theta(seed)))
+        values[condition] = rows + deviations * sd * rng.standard_normal(rows.shape)
+    return Measured(measured.conditions, measured.observables, values)
+
+
+def base_p(measured: Measured) -> float:
+    """P value of the gap of the calibrated base, as an analysis begins with it."""
+    evidence = gather(measured, known())
+    base = fit(Stack(Model(known(), (), SYSTEMATIC), evidence.training))
+    whole = weigh(Stack(base.model, (*evidence.training, *evidence.held_out)), base.x)
+    return find_gap(whole, signatures(whole), 0.025, 1000, 1, OF_THE_BASE).p
+
+
+@pytest.mark.parametrize("deviations", [1.0, 2.0])
+def test_errors_of_reading_raise_no_alarm(deviations: float) -> None:
+    data = [with_reading_errors(heaps({}, seed), deviations, seed) for seed in range(12)]
+    alarms = sum(base_p(measured) < 0.025 for measured in data)
+    # All that a rate of 2.5 % gives but for a probability of 1 in 1000.
+    assert alarms <= stats.binom.isf(1e-3, len(data), 0.025)
+
+
+def test_what_heaps_scatter_together_is_told_from_what_is_read_by_itself() -> None:
+    found = []
+    for seed in range(6):
+        quiet = heaps({}, seed)
+        centred = {name: rows - quiet.mean(name) for name, rows in quiet.values.items()}
+        wide = {name: quiet.mean(name) + 2.0 * rows for name, rows in centred.items()}
+        for measured, errors in ((Measured(quiet.conditions, quiet.observables, wide), 0.0), (quiet, 2.0)):
+            evidence = gather(with_reading_errors(measured, errors, seed), known())
+            model = Model(known(), (), SYSTEMATIC)
+            excess = model.excess(theta(seed), evidence.training[0].scatter)
+            found.append((excess.heaps, float(excess.reading.mean())))
+    spread, read = np.mean(found[0::2], axis=0), np.mean(found[1::2], axis=0)
+    # A variance of 6 x 35 deviations has a relative error of sqrt(2 / 210) = 0.1, its parts some more: three.
+    assert spread[0] == pytest.approx(4.0, rel=0.3)
+    assert spread[1] == pytest.approx(0.0, abs=0.3 * 4.0)
+    assert read[0] == pytest.approx(1.0, abs=0.3 * 2.0)
+    assert read[1] == pytest.approx(4.0, rel=0.3)
+
+
+def test_scatter_that_an_effect_widens_is_charged_once() -> None:
+    # Under the largest rolling torque the angle scatters nearly twice as much.
+    charged = []
+    for seed in range(6):
+        evidence = gather(heaps({"rolling_torque": 1.0}, seed), known())
+        x = np.append(theta(seed), 1.0)
+        model = Model(known(), ("rolling_torque",), SYSTEMATIC)
+        for block in evidence.training:
+            surfaces = known().surfaces[block.condition]
+            true = np.diag(surfaces.noise_covariance(x, model.mechanisms))[block.columns] / REPLICATES
+            bias = surfaces.noise.inverse_bias(len(block.columns))
+            charged.append(np.diag(model.noise(x, block)) / bias / true)
+    # Of what 35 replicates scatter by chance, what is above the model's counts: some 0.1 of a variance.
+    assert np.mean(charged) == pytest.approx(1.0, abs=0.2)
