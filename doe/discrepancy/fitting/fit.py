@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,12 +10,21 @@ from scipy import stats
 from scipy.linalg import cholesky, solve_triangular
 
 from doe.discrepancy.emulation.bank import sobol_points
-from doe.discrepancy.fitting.model import Model, Stack
+from doe.discrepancy.fitting.model import STEP, Model, Stack
 
 ITERATIONS = 40
 SCOUTING = 6
 """Steps after which only the best starts go on."""
 FINALISTS = 3
+"""Starts that go on, each with the weights of where it is."""
+LEADERS = 3
+"""Of these, so many go down to the least score."""
+APART = 0.1
+"""Starts that have come nearer to each other than this, in coded units, are one."""
+DESCENTS = 12
+"""Most steps down the score."""
+ARRIVED = 0.01
+"""Fall of the score that a last step brings: its noise is a hundred times as large."""
 CONVERGED = 1e-4
 """Longest step of a fit that has arrived, in coded units."""
 AT_BOUND = 1e-3
@@ -112,7 +122,7 @@ def minimise(
     Parameters
     ----------
     stack : Stack
-    whitening : (means, means) array
+    whitening : (means, means) or (n, means, means) array
     target : (means,) or (n, means) array
         Of all, or of each.
     starts : (n, parameters) array
@@ -128,10 +138,10 @@ def minimise(
     """
     x = np.clip(starts, lower, upper)
     damping = np.full(len(x), 1e-2)
-    residual = (target - stack.predict(x)) @ whitening.T
+    residual = _whitened(whitening, target - stack.predict(x))
     q = (residual**2).sum(axis=1)
     for _ in range(iterations):
-        slopes = np.einsum("ij,njk->nik", whitening, stack.jacobian(x))
+        slopes = whitening @ stack.jacobian(x)
         descent = np.einsum("nik,ni->nk", slopes, residual)
         frozen = ((x <= lower) & (descent < 0.0)) | ((x >= upper) & (descent > 0.0))
         slopes = np.where(frozen[:, None, :], 0.0, slopes)
@@ -142,7 +152,7 @@ def minimise(
             normal + scale[:, :, None] * np.eye(x.shape[1]), np.where(frozen, 0.0, descent)[:, :, None]
         )
         proposed = np.clip(x + step[:, :, 0], lower, upper)
-        trial = (target - stack.predict(proposed)) @ whitening.T
+        trial = _whitened(whitening, target - stack.predict(proposed))
         better = (trial**2).sum(axis=1) <= q
         moved = np.abs(proposed - x).max(axis=1)
         x = np.where(better[:, None], proposed, x)
@@ -154,8 +164,16 @@ def minimise(
     return x, q
 
 
+def _whitened(whitening: np.ndarray, residuals: np.ndarray) -> np.ndarray:
+    """Whiten residuals (n, means), all alike or each by its own, (n, means)."""
+    return np.asarray((whitening @ residuals[:, :, None])[:, :, 0])
+
+
 def fit(stack: Stack, starts: np.ndarray | None = None, count: int = 8) -> Fitted:
-    """Calibrate a model: the least sum of squares over several starts, weighted at its optimum.
+    """Calibrate a model: the least score, from several starts.
+
+    The weights change with the parameters, so that sums of squares of different places do not compare, and
+    under the weights of one place every other is behind.
 
     Parameters
     ----------
@@ -169,11 +187,61 @@ def fit(stack: Stack, starts: np.ndarray | None = None, count: int = 8) -> Fitte
     lower, upper = model.lower, model.upper
     tried = [model.start[None], lower + sobol_points(count, len(lower), 0) * (upper - lower)]
     x = np.concatenate(tried if starts is None else [np.atleast_2d(starts), *tried])
-    for iterations in (SCOUTING, ITERATIONS, ITERATIONS):
-        whitening = whiten(stack.covariance(x[0]))
-        x, q = minimise(stack, whitening, stack.target, x, lower, upper, iterations)
-        x = x[np.argsort(q)[:FINALISTS]]
-    return weigh(stack, x[0])
+    near, _ = minimise(stack, whiten(stack.covariance(x[0])), stack.target, x, lower, upper, SCOUTING)
+    # also where they start: the weights of one place lead away from others
+    seen = _best_apart([weigh(stack, each) for each in (*near, *x)])
+    weights = np.array([each.whitening for each in seen])
+    x, _ = minimise(stack, weights, stack.target, np.array([each.x for each in seen]), lower, upper)
+    seen = _best_apart([*seen, *(weigh(stack, each) for each in x)])
+    return min((_descend(each) for each in seen[:LEADERS]), key=lambda each: each.score)
+
+
+def _best_apart(tried: Sequence[Fitted]) -> list[Fitted]:
+    """Pick those of the best scores that are not near a better one."""
+    chosen: list[Fitted] = []
+    for one in sorted(tried, key=lambda each: each.score):
+        if all(np.abs(one.x - other.x).max() > APART for other in chosen):
+            chosen.append(one)
+    return chosen[:FINALISTS]
+
+
+def _descend(fitted: Fitted) -> Fitted:
+    """Go down the score by steps of Fisher's scoring within bounds, the covariance changing with the point."""
+    stack, lower, upper = fitted.stack, fitted.model.lower, fitted.model.upper
+    for _ in range(DESCENTS):
+        slope, information = _score_slope(fitted)
+        free = ~(((fitted.x <= lower) & (slope > 0.0)) | ((fitted.x >= upper) & (slope < 0.0)))
+        step = np.zeros(len(slope))
+        step[free] = -np.linalg.solve(information[np.ix_(free, free)], slope[free])
+        for share in (1.0, 0.3, 0.1, 0.03):
+            tried = weigh(stack, np.clip(fitted.x + share * step, lower, upper))
+            if tried.score < fitted.score:
+                break
+        fall = fitted.score - tried.score
+        fitted = tried if fall > 0.0 else fitted
+        if fall < ARRIVED:
+            break
+    return fitted
+
+
+def _score_slope(fitted: Fitted) -> tuple[np.ndarray, np.ndarray]:
+    """Derivatives of half the score by the parameters, and their information, (p,), (p, p).
+
+    Of a normal law with mean m(x) and covariance C(x): -m' C^-1 r + tr(C^-1 C') / 2 - r' C^-1 C' C^-1 r / 2, and
+    m' C^-1 m' + tr(C^-1 C' C^-1 C') / 2.
+    """
+    stack, whitening, residual = fitted.stack, fitted.whitening, fitted.residuals
+    slopes = whitening @ stack.jacobian(fitted.x[None])[0]
+    turns = []
+    for number in range(len(fitted.x)):
+        inward = -1.0 if fitted.x[number] > fitted.model.start[number] else 1.0
+        moved = fitted.x + inward * STEP * (np.arange(len(fitted.x)) == number)
+        change = (stack.covariance(moved) - fitted.covariance) / (inward * STEP)
+        turns.append(whitening @ change @ whitening.T)
+    turned = np.array(turns)
+    slope = -slopes.T @ residual + 0.5 * np.einsum("pii->p", turned) - 0.5 * turned @ residual @ residual
+    information = slopes.T @ slopes + 0.5 * np.einsum("pij,qij->pq", turned, turned)
+    return slope, information + np.diag(model_width(stack.model) ** -2)
 
 
 def weigh(stack: Stack, x: np.ndarray) -> Fitted:
@@ -203,7 +271,9 @@ def whiten(covariance: np.ndarray) -> np.ndarray:
 def coded_size_interval(fitted: Fitted, number: int, coverage: float = 0.9) -> tuple[float, float]:
     """Profile-likelihood interval of a coded size.
 
-    It ends where q, with all else refitted, has risen by the point of chi2 for the coverage.
+    It ends where q, with all else refitted, has risen by the point of chi2 for the coverage. The weights stay
+    those of the optimum; what they contribute to the score's slope there is taken out of the residuals, so that
+    q is least at the optimum, too.
 
     Parameters
     ----------
@@ -221,7 +291,10 @@ def coded_size_interval(fitted: Fitted, number: int, coverage: float = 0.9) -> t
     lower = np.repeat(fitted.model.lower[None], len(grid), axis=0)
     upper = np.repeat(fitted.model.upper[None], len(grid), axis=0)
     lower[:, column] = upper[:, column] = grid
-    _, q = minimise(fitted.stack, fitted.whitening, fitted.stack.target, starts, lower, upper)
+    slopes = fitted.sensitivities
+    left = fitted.residuals - slopes @ (np.linalg.pinv(slopes) @ fitted.residuals)
+    target = fitted.stack.predict(fitted.x[None])[0] + np.linalg.solve(fitted.whitening, left)
+    _, q = minimise(fitted.stack, fitted.whitening, target, starts, lower, upper)
     shifted = (fitted.errors[column] ** 2) / fitted.spread[column, column]
     rise = q - q.min() - stats.chi2.ppf(coverage, 1) * shifted
     inside = np.flatnonzero(rise <= 0.0)

@@ -16,6 +16,7 @@ from scipy import stats
 from doe.discrepancy import Emulator, Measured, fit_emulator
 from doe.discrepancy.contest.gap import OF_THE_BASE, find_gap
 from doe.discrepancy.contest.signatures import signatures
+from doe.discrepancy.emulation.bank import sobol_points
 from doe.discrepancy.fitting.evidence import gather
 from doe.discrepancy.fitting.fit import fit, weigh
 from doe.discrepancy.fitting.model import Model, Stack
@@ -109,3 +110,24 @@ def test_scatter_that_an_effect_widens_is_charged_once() -> None:
             charged.append(np.diag(model.noise(x, block)) / bias / true)
     # Of what 35 replicates scatter by chance, what is above the model's counts: some 0.1 of a variance.
     assert np.mean(charged) == pytest.approx(1.0, abs=0.2)
+
+
+@pytest.mark.parametrize(
+    "hidden",
+    [
+        {"liquid_bridges": 0.68, "vibration": 0.95},
+        {"plate_tilt": 0.39, "rolling_torque": 0.77},
+        {"plate_tilt": 0.78, "vibration": 0.76},
+    ],
+)
+def test_a_fit_ends_no_higher_than_the_truth_or_any_other_place(hidden: dict[str, float]) -> None:
+    names = tuple(sorted(hidden))
+    for seed in range(2):
+        evidence = gather(heaps(hidden, seed), known())
+        for mechanisms in (names, names[:1]):
+            stack = Stack(Model(known(), mechanisms, SYSTEMATIC), evidence.training)
+            low, high = stack.model.lower, stack.model.upper
+            places = list(low + sobol_points(64, len(low), 3) * (high - low))
+            places.append(np.append(theta(seed), [hidden[name] for name in mechanisms]))
+            # The descent ends where a step brings 0.01 or less.
+            assert fit(stack).score <= min(weigh(stack, x).score for x in places) + 0.01
