@@ -6,12 +6,23 @@ from .contest.power import Power
 from .emulation.bank import Bank, bank_points, load_bank, make_bank
 from .emulation.emulator import Emulator, fit_emulator
 from .fitting.fit import Interval
-from .problem.measured import Measured
+from .problem.measured import Calibration, Measured
 from .problem.settings import Settings, settings_of
 from .problem.simulator import Outcomes, Point, Simulator
 from .problem.space import MechanismRange, SearchSpace
 from .verdict.before_after import BeforeAfter
-from .verdict.discovery import Candidate, Confounding, Data, Discovery, Drift, Effort, Fit, Gap, Verdict
+from .verdict.discovery import (
+    CalibrationUse,
+    Candidate,
+    Confounding,
+    Data,
+    Discovery,
+    Drift,
+    Effort,
+    Fit,
+    Gap,
+    Verdict,
+)
 from .verdict.next_experiment import NextExperiment
 
 __all__ = [
@@ -19,6 +30,8 @@ __all__ = [
     "Answer",
     "Bank",
     "BeforeAfter",
+    "Calibration",
+    "CalibrationUse",
     "Candidate",
     "Confounding",
     "Data",

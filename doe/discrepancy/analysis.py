@@ -26,7 +26,7 @@ from doe.discrepancy.problem.settings import Settings
 from doe.discrepancy.problem.simulator import Outcomes, Point
 from doe.discrepancy.threads import steps_in_one_thread
 from doe.discrepancy.verdict.before_after import BeforeAfter, compare
-from doe.discrepancy.verdict.conclusion import Assessment, Conclusion, conclude, explained_share
+from doe.discrepancy.verdict.conclusion import Assessment, Conclusion, conclude, explained_share, withdrawn
 from doe.discrepancy.verdict.discovery import (
     Confounding,
     Discovery,
@@ -133,7 +133,8 @@ def _search(parts: _Parts, base: _Base) -> Analysis:
         compared.append(
             compare(base.fitted, chosen, direct[0], direct[1], blocks, held_out, settings.draws, parts.seed)
         )
-    return parts.discovery(base, conclusion, assessments, [one for one in compared if one is not None])
+    shown = [one for one in compared if one is not None]
+    return parts.discovery(base, withdrawn(conclusion, shown), assessments, shown)
 
 
 def drive(analysis: Analysis, simulator: Callable[[Sequence[Point]], Outcomes]) -> Discovery:
@@ -225,7 +226,10 @@ class _Parts:
         before_after: Sequence[BeforeAfter] = (),
     ) -> Discovery:
         """The record of all that was found."""
+        best = min(assessments, key=lambda one: one.score, default=None)
         chosen = None if conclusion.chosen is None else assessments[conclusion.chosen]
+        shown = best if chosen is None else chosen
+        fit = None if shown is None else fit_record(shown.fitted, shown.gap, self.evidence)
         failures = self.laboratory.failures
         notes = [f"{failures} of {self.laboratory.cases} fresh runs failed"] if failures else []
         drop = base.gap
@@ -236,7 +240,8 @@ class _Parts:
             factors=self.emulator.space.factors,
             data=data_record(self.emulator, self.evidence, base.fitted),
             base=fit_record(base.fitted, base.gap, self.evidence),
-            chosen=None if chosen is None else fit_record(chosen.fitted, chosen.gap, self.evidence),
+            chosen=None if chosen is None else fit,
+            closest=fit if chosen is None else None,
             gap=Gap(drop.found, drop.drop, drop.drop_limit, drop.mechanism),
             drifts=drift_records(base.fitted),
             candidates=tuple(

@@ -34,7 +34,12 @@ condition: how the test was done, a condition of the study.
 replicate: one heap, a label. Five or more of each condition show small effects; a copy of a heap shows none.
 
 observable: what was measured, or {clogged} (without a value) where the grains got stuck: no result.
-{observables}"""
+{observables}
+
+calibration: in the place of a condition, what an instrument may be off by in all conditions alike, a standard
+deviation: "offset" or "scale" for the replicate (scale: a share, as 0.2 %), or "none" where nothing is off.
+What is not stated is as usual for the instrument: a film of 60 frames a second, a ruler's millimetre, a
+levelled camera."""
 
 _PICTURES = """
 

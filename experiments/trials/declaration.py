@@ -126,7 +126,9 @@ def perfect_means(emulator: Emulator, theta: np.ndarray, replicates: int) -> tup
     count = len(emulator.observables)
     numbers, weights = np.arange(count), np.full((count, count), 1.0 / replicates)
     return tuple(
-        Block(condition, numbers, surfaces.predict(theta[None], ())[0], weights, NOTHING)
+        Block(
+            condition, numbers, surfaces.predict(theta[None], ())[0], weights, NOTHING, np.zeros((2, count))
+        )
         for condition, surfaces in emulator.surfaces.items()
         if not emulator.space.is_held_out(condition)
     )

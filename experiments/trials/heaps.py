@@ -10,6 +10,7 @@ import numpy as np
 
 from doe.discrepancy import Outcomes, Point
 from experiments.files import replacing
+from experiments.measurement.calibration import CALIBRATION, NONE
 from experiments.measurement.observables import OBSERVABLES
 from experiments.trials.camera import Camera
 from experiments.trials.truth import Label
@@ -39,6 +40,8 @@ def write_heaps(path: Path, label: Label, points: Sequence[Point], outcomes: Out
     with replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(("condition", "replicate", "observable", "value", "unit"))
+        # the cameras' errors are those that the rules' `systematic` stands for
+        writer.writerow((CALIBRATION, NONE, "", "", ""))
         for point, row, reason in zip(points, values, outcomes.reasons, strict=True):
             replicate = replicates[point.condition] = replicates.get(point.condition, 0) + 1
             if not reason:

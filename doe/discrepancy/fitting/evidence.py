@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from doe.discrepancy.emulation.emulator import Emulator
 from doe.discrepancy.fitting.scatter import NOTHING, Excess, Scatter
-from doe.discrepancy.problem.measured import Measured
+from doe.discrepancy.problem.measured import Calibration, Measured
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,12 +25,15 @@ class Block:
     """Covariance of the means over that of one replicate: 1 / n where all have n replicates, (k, k)."""
     scatter: Scatter
     """Of the replicates of all conditions."""
+    common: np.ndarray
+    """Change of each mean by a standard deviation of the offset, and of the scale, of its observable, which all
+    conditions share, (2, k)."""
 
     @classmethod
     def of_runs(cls, condition: str, columns: np.ndarray, count: int) -> Block:
         """Means of so many runs of a model, which scatter as the model does; they are nowhere needed."""
         share = np.full((len(columns), len(columns)), 1.0 / count)
-        return cls(condition, columns, np.zeros(len(columns)), share, NOTHING)
+        return cls(condition, columns, np.zeros(len(columns)), share, NOTHING, np.zeros((2, len(columns))))
 
     @property
     def replicates(self) -> np.ndarray:
@@ -48,6 +52,8 @@ class Evidence:
     training: tuple[Block, ...]
     held_out: tuple[Block, ...]
     notes: tuple[str, ...]
+    calibration: Mapping[str, Calibration]
+    """By observable, what its instrument may be off by."""
 
     @property
     def count(self) -> int:
@@ -76,7 +82,7 @@ def gather(measured: Measured, emulator: Emulator) -> Evidence:
     training = tuple(block for block in blocks if not emulator.space.is_held_out(block.condition))
     present = {block.condition for block in blocks}
     notes += [f"condition {c} was not measured" for c in emulator.space.conditions if c not in present]
-    return Evidence(training, held_out, tuple(dict.fromkeys(notes)))
+    return Evidence(training, held_out, tuple(dict.fromkeys(notes)), measured.calibration)
 
 
 def _block(measured: Measured, emulator: Emulator, condition: str, scatter: Scatter) -> Block:
@@ -93,5 +99,10 @@ def _block(measured: Measured, emulator: Emulator, condition: str, scatter: Scat
     present = np.isfinite(rows[:, [names.index(emulator.observables[c]) for c in columns]]).astype(float)
     counts = present.sum(axis=0)
     mean = measured.mean(condition)[[names.index(emulator.observables[c]) for c in columns]]
-    return Block(condition, columns, mean, present.T @ present / np.outer(counts, counts), scatter)
-
+    share = present.T @ present / np.outer(counts, counts)
+    known = [measured.calibration.get(emulator.observables[c], Calibration()) for c in columns]
+    common = np.array([[one.offset for one in known], [one.scale for one in known]]) * [
+        np.ones(len(mean)),
+        mean,
+    ]
+    return Block(condition, columns, mean, share, scatter, common)

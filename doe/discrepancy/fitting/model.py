@@ -125,7 +125,19 @@ class Stack:
 
     def covariance(self, x: np.ndarray) -> np.ndarray:
         """Covariance of measured less predicted means at one row of coded parameters, (means, means)."""
-        return self.noise(x) + _blocks(self.model.error(x, block) for block in self.blocks)
+        own = self.noise(x) + _blocks(self.model.error(x, block) for block in self.blocks)
+        return own + self.common.T @ self.common
+
+    @property
+    def common(self) -> np.ndarray:
+        """Change of the means by a standard deviation of each calibration error, (2 observables, means).
+
+        Offsets of all observables, then their scales.
+        """
+        numbers = np.arange(len(self.model.emulator.observables))
+        columns = np.concatenate([block.columns for block in self.blocks])
+        moved = np.concatenate([block.common for block in self.blocks], axis=1)
+        return np.concatenate([np.where(columns == numbers[:, None], each, 0.0) for each in moved])
 
     def noise(self, x: np.ndarray) -> np.ndarray:
         """Covariance of the measured means alone, (means, means)."""

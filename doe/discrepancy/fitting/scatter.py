@@ -1,7 +1,7 @@
-"""Scatter of measured replicates beside that of the model: of the heaps themselves, and of their readings.
+"""Scatter of measured replicates beside that of the model: of the runs themselves, and of their readings.
 
-Heaps scatter together: one that is higher is steeper. Readings err each by itself. So of what replicates scatter
-beyond the model, the part that keeps the model's correlations is the heaps', and the rest is the readings'.
+Observables of one run scatter together, as the model's do. Readings err each by itself. So of what replicates
+scatter beyond the model, the part that keeps its correlations is the runs', and the rest is the readings'.
 """
 
 from __future__ import annotations
@@ -75,27 +75,27 @@ class Scatter:
         part = np.ix_(seen, seen)
         weight = np.maximum(freedom[part], 1.0)
         reading = np.zeros(size)
-        heaps, reading[seen] = _parted(moments[part] / weight, likeness[part] / weight, freedom[part], known)
-        return Excess(heaps, reading)
+        runs, reading[seen] = _parted(moments[part] / weight, likeness[part] / weight, freedom[part], known)
+        return Excess(runs, reading)
 
 
 @dataclass(frozen=True, eq=False)
 class Excess:
     """Scatter of replicates in variances of one run of a model."""
 
-    heaps: float
-    """Of the heaps, with the model's correlations; 1: as the model's."""
+    runs: float
+    """Of the runs, with the model's correlations; 1: as the model's."""
     reading: np.ndarray
     """Of the readings, each by itself; 0: none, (observables,)."""
 
     @property
     def ratio(self) -> np.ndarray:
         """Standard deviation of one replicate in that of one run, (observables,)."""
-        return np.asarray(np.sqrt(self.heaps + self.reading))
+        return np.asarray(np.sqrt(self.runs + self.reading))
 
     def added_to(self, covariance: np.ndarray) -> np.ndarray:
         """Covariance of one replicate, of that of one run, (observables, observables)."""
-        return self.heaps * covariance + np.diag(self.reading * np.diag(covariance))
+        return self.runs * covariance + np.diag(self.reading * np.diag(covariance))
 
 
 NOTHING = Scatter({}, {})
@@ -109,7 +109,7 @@ def _parted(
     error = 1.0 / np.maximum(freedom, 1.0) + 1.0 / known
     others = correlation * (1.0 - np.eye(len(moments))) * freedom
     length = float(np.sum(others * correlation))
-    heaps = 1.0
+    runs = 1.0
     if length > 0.0:
         others = others / length
         found = float(np.sum(others * moments)) - 1.0
@@ -117,13 +117,13 @@ def _parted(
         np.fill_diagonal(whole, np.diag(moments))
         # The variance of tr(A M), M being Wishart's of mean W, is 2 tr(A W A W) over its degrees of freedom.
         turned = others @ whole
-        heaps += _drawn(found, 2.0 * float(np.sum(turned * turned.T)) * float(np.diag(error).mean()))
-    raw, errors = np.diag(moments) - heaps, 2.0 * np.diag(moments) ** 2 * np.diag(error)
+        runs += _drawn(found, 2.0 * float(np.sum(turned * turned.T)) * float(np.diag(error).mean()))
+    raw, errors = np.diag(moments) - runs, 2.0 * np.diag(moments) ** 2 * np.diag(error)
     mean = float(raw.mean())
     total = float(np.sum(moments**2 * error)) * 2.0 / len(raw) ** 2
     between = max(float(np.mean((raw - mean) ** 2 - errors)), 0.0)
     own = between / (between + errors)
-    return heaps, np.maximum(_drawn(mean, total) + own * (raw - mean), 0.0)
+    return runs, np.maximum(_drawn(mean, total) + own * (raw - mean), 0.0)
 
 
 def _drawn(value: float, variance: float) -> float:

@@ -10,11 +10,11 @@ from doe.discrepancy.contest.held_out import forecast
 from doe.discrepancy.contest.signatures import Signatures, projector
 from doe.discrepancy.emulation.emulator import Emulator
 from doe.discrepancy.fitting.evidence import Block, Evidence
-from doe.discrepancy.fitting.fit import AT_BOUND, Fitted, Interval, coded_size_interval
-from doe.discrepancy.fitting.model import Model
+from doe.discrepancy.fitting.fit import AT_BOUND, Fitted, Interval, coded_size_interval, weigh
+from doe.discrepancy.fitting.model import Model, Stack
 from doe.discrepancy.problem.settings import Settings
 from doe.discrepancy.verdict.conclusion import Assessment, objections
-from doe.discrepancy.verdict.discovery import Candidate, Data, Drift, Fit
+from doe.discrepancy.verdict.discovery import CalibrationUse, Candidate, Data, Drift, Fit
 
 TOLD = 1.5
 """Variance of replicates over that of the model from which on the reader is told."""
@@ -63,7 +63,24 @@ def fit_record(fitted: Fitted, gap: GapTest, evidence: Evidence) -> Fit:
         predicted_se=predicted_se,
         residuals=residuals,
         adjusted_p=adjusted,
+        calibration=calibration_uses(fitted, evidence),
     )
+
+
+def calibration_uses(fitted: Fitted, evidence: Evidence) -> tuple[CalibrationUse, ...]:
+    """Calibration errors that were allowed, each with its expected value given all residuals of a model."""
+    whole = weigh(Stack(fitted.model, (*evidence.training, *evidence.held_out)), fitted.x)
+    common = whole.stack.common
+    asked = (common @ whole.whitening.T @ whole.residuals).reshape(2, -1)
+    uses = []
+    for column, observable in enumerate(fitted.model.emulator.observables):
+        if not common.reshape(2, len(asked[0]), -1)[:, column].any():
+            continue
+        one = evidence.calibration[observable]
+        z = asked[:, column]
+        length = float(np.hypot(*z))
+        uses.append(CalibrationUse(observable, one.offset, one.scale, *(z * [one.offset, one.scale]), length))
+    return tuple(uses)
 
 
 def size_intervals(fitted: Fitted) -> tuple[Interval, ...]:
@@ -81,10 +98,10 @@ def scatter_notes(fitted: Fitted) -> tuple[str, ...]:
     stack = fitted.stack
     excess = fitted.model.excess(fitted.x, stack.blocks[0].scatter)
     notes = []
-    if excess.heaps > TOLD:
-        notes.append(f"heaps scatter {excess.heaps**0.5:.1f} times as much as the model's, and count so")
+    if excess.runs > TOLD:
+        notes.append(f"replicates scatter {excess.runs**0.5:.1f} times as much as the model's, and count so")
     notes += [
-        f"readings of {name} scatter {reading**0.5:.1f} times as much as the model's heaps do, each by itself,"
+        f"readings of {name} scatter {reading**0.5:.1f} times as much as the model's runs do, each by itself,"
         " and count so"
         for name, reading in zip(fitted.model.emulator.observables, excess.reading, strict=True)
         if reading > TOLD - 1.0

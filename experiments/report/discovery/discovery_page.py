@@ -166,6 +166,8 @@ def _gap(found: Discovery, terms: Terms) -> Chapter | None:
     if found.base is None:
         return None
     shown = {"parameters": tables.parameters_table(found, terms)}
+    if (calibration := tables.calibration_table(found, terms)) is not None:
+        shown["calibration"] = calibration
     if found.drifts:
         shown["drifts"] = tables.drifts_table(found, terms)
     return _chapter("gap", shown, {"maps": charts.residual_maps(found, terms)})

@@ -6,6 +6,7 @@ The truth is the emulator of the bank, so that nothing is simulated; what an emu
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -13,14 +14,19 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from doe.discrepancy import Emulator, Measured, fit_emulator
+from doe.discrepancy import BeforeAfter, Calibration, Emulator, Interval, Measured, Verdict, fit_emulator
 from doe.discrepancy.contest.gap import OF_THE_BASE, find_gap
+from doe.discrepancy.contest.held_out import forecast
 from doe.discrepancy.contest.signatures import signatures
 from doe.discrepancy.emulation.bank import sobol_points
 from doe.discrepancy.fitting.evidence import gather
 from doe.discrepancy.fitting.fit import fit, weigh
 from doe.discrepancy.fitting.model import Model, Stack
+from doe.discrepancy.verdict.conclusion import Conclusion, withdrawn
+from doe.discrepancy.verdict.records import calibration_uses
 from experiments.discover.search import Search
+from experiments.measurement.calibration import usual_calibration
+from experiments.measurement.observables import BY_NAME
 from experiments.studyfile import load_study
 from experiments.trials.emulated_simulator import EmulatedSimulator, emulated_heaps
 
@@ -87,7 +93,7 @@ def test_what_heaps_scatter_together_is_told_from_what_is_read_by_itself() -> No
             evidence = gather(with_reading_errors(measured, errors, seed), known())
             model = Model(known(), (), SYSTEMATIC)
             excess = model.excess(theta(seed), evidence.training[0].scatter)
-            found.append((excess.heaps, float(excess.reading.mean())))
+            found.append((excess.runs, float(excess.reading.mean())))
     spread, read = np.mean(found[0::2], axis=0), np.mean(found[1::2], axis=0)
     # A variance of 6 x 35 deviations has a relative error of sqrt(2 / 210) = 0.1, its parts some more: three.
     assert spread[0] == pytest.approx(4.0, rel=0.3)
@@ -131,3 +137,58 @@ def test_a_fit_ends_no_higher_than_the_truth_or_any_other_place(hidden: dict[str
             places.append(np.append(theta(seed), [hidden[name] for name in mechanisms]))
             # The descent ends where a step brings 0.01 or less.
             assert fit(stack).score <= min(weigh(stack, x).score for x in places) + 0.01
+
+
+def shifted(measured: Measured, observable: str, offset: float) -> Measured:
+    """Move all values of an observable alike."""
+    moved = offset * (np.array(measured.observables) == observable)
+    return replace(measured, values={name: rows + moved for name, rows in measured.values.items()})
+
+
+def test_what_is_off_alike_everywhere_is_allowed_where_the_file_states_it() -> None:
+    late = 0.03  # a clock; 3 to 5 standard deviations of one run, which the factors take up in part
+    alarms = {False: 0, True: 0}
+    for seed in range(6):
+        measured = shifted(heaps({}, seed), "t55", late)
+        for stated in alarms:
+            calibration = {"t55": Calibration(late)} if stated else {}
+            alarms[stated] += base_p(replace(measured, calibration=calibration)) < 0.025
+    assert alarms[True] <= stats.binom.isf(1e-3, 6, 0.025)
+    assert alarms[False] >= 4
+
+
+def test_a_calibration_error_hides_no_effect_that_looks_otherwise() -> None:
+    calibration = {name: usual_calibration(BY_NAME[name]) for name in known().observables}
+    seen = [base_p(replace(heaps({"plate_tilt": 0.8}, seed), calibration=calibration)) for seed in range(4)]
+    # a tilt of five degrees leans by several standard deviations of the mean in every condition
+    assert max(seen) < 0.025
+
+
+def test_the_record_says_how_much_of_an_allowance_a_model_uses() -> None:
+    late = 0.02
+    measured = replace(shifted(heaps({}, 1), "t55", late), calibration={"t55": Calibration(late)})
+    evidence = gather(measured, known())
+    [used] = calibration_uses(fit(Stack(Model(known(), (), SYSTEMATIC), evidence.training)), evidence)
+    assert (used.observable, used.offset, used.scale) == ("t55", late, 0.0)
+    # Its error is that of five means of eight, of 11 ms a run, and what the prior draws: some 2 ms and 1.
+    assert used.used_offset == pytest.approx(late, abs=3 * 0.003)
+    assert used.deviations == pytest.approx(abs(used.used_offset) / late)
+
+
+def test_a_forecast_takes_over_what_the_fit_shows_to_be_off() -> None:
+    measured = shifted(heaps({}, 2), "t55", 0.03)
+    missed = []
+    for calibration in ({}, {"t55": Calibration(0.03)}):
+        evidence = gather(replace(measured, calibration=calibration), known())
+        told = forecast(fit(Stack(Model(known(), (), SYSTEMATIC), evidence.training)), evidence.held_out)
+        column = list(evidence.held_out[0].columns).index(known().observables.index("t55"))
+        missed.append(abs(told.measured - told.predicted)[column])
+    assert missed[1] < 0.01 < missed[0]
+
+
+def test_fresh_runs_that_come_out_worse_withdraw_a_name() -> None:
+    named = Conclusion(Verdict.NAMED, ("plate_tilt",), "", 0)
+    for worse, verdict in ((3.0, Verdict.NAMED), (5.0, Verdict.UNKNOWN)):
+        before, after = Interval(8.0, 10.0, 12.0), Interval(8.0, 10.0 + worse, 18.0)
+        compared = BeforeAfter(True, 12, before, after, Interval(-1.0, -0.5, 0.0), 8)
+        assert withdrawn(named, [compared]).verdict is verdict
