@@ -90,7 +90,8 @@ def analyse(measured: Measured, emulator: Emulator, settings: Settings, seed: in
         return _empty(emulator, evidence, settings, seed, conclusion)
     laboratory = Laboratory(emulator, emulator.space.conditions, seed)
     parts = _Parts(emulator, evidence, settings, seed, laboratory)
-    base = parts.base(fit(Stack(Model(emulator, (), settings.systematic), evidence.training)))
+    model = Model(emulator, (), settings.systematic, views=evidence.views)
+    base = parts.base(fit(Stack(model, evidence.training)))
     factors = len(emulator.space.factors)
     if evidence.count - factors < LEAST_FREEDOM:
         reason = (
@@ -188,7 +189,9 @@ class _Parts:
         """Fit models on the emulator."""
         blocks = self.evidence.training
         systematic = self.settings.systematic
-        return {m: Contender(fit(Stack(Model(self.emulator, m, systematic), blocks))) for m in models}
+        views = self.evidence.views
+        of = {m: Model(self.emulator, m, systematic, views=views) for m in models}
+        return {m: Contender(fit(Stack(model, blocks))) for m, model in of.items()}
 
     def base(self, fitted: Fitted) -> _Base:
         """Look at the calibrated base."""

@@ -63,7 +63,9 @@ def read_measured(path: Path, study: Study) -> Measured:
     notes += [f"{found.empty} rows are empty: not measured"] if found.empty else []
     heaps = {key: heap for key, heap in found.heaps.items() if heap}
     measured = _gather(path, heaps, study.conditions, [each.name for each in observables], notes)
-    return replace(measured, calibration=stated_calibration(stated, found.known, measured.observables))
+    calibration = stated_calibration(stated, found.known, measured.observables)
+    views = {condition.name: condition.camera for condition in study.conditions if condition.camera}
+    return replace(measured, calibration=calibration, views=views)
 
 
 @dataclass

@@ -66,6 +66,12 @@ class Polynomial:
         return out
 
 
+    def silenced(self, silent: np.ndarray) -> Polynomial:
+        """Return the same without what symmetry forbids."""
+        kriging = {column: one for column, one in self.kriging.items() if not silent[column]}
+        return Polynomial(self.coefficients * ~silent, self.misfit * ~silent, kriging)
+
+
 @dataclass(frozen=True, eq=False)
 class Addition:
     """A mechanism's addition to the base, with how its error hangs on that of the base."""
@@ -85,6 +91,8 @@ class Addition:
     """Of one run, mean over the mechanism's runs, (observables,)."""
     correlation: np.ndarray
     """Of one run at the largest size, (observables, observables)."""
+    silent: np.ndarray
+    """True where symmetry forbids that it acts, (observables,)."""
 
     def predict(self, theta: np.ndarray, size: np.ndarray) -> np.ndarray:
         """Predict what is added at coded factors (n, factors) and sizes (n,), (n, observables)."""
@@ -95,8 +103,8 @@ class Addition:
 
     @property
     def covariance(self) -> np.ndarray:
-        """Covariance of one run, mean over the mechanism's runs, (observables, observables)."""
-        sd = np.sqrt(self.variance)
+        """Covariance of one run, mean over the mechanism's runs, where it may act, (observables, observables)."""
+        sd = np.sqrt(self.variance) * ~self.silent
         return np.asarray(sd[:, None] * self.correlation * sd)
 
 
@@ -111,6 +119,8 @@ class Surfaces:
     """Of one run near the base."""
     additions: Mapping[str, Addition]
     """By mechanism."""
+    silent: np.ndarray
+    """True where symmetry forbids that the base is anything but noise, (observables,)."""
 
     def predict(self, x: np.ndarray, mechanisms: tuple[str, ...]) -> np.ndarray:
         """Expected observables at coded parameters (n, factors + mechanisms), (n, observables).
@@ -153,7 +163,8 @@ class Surfaces:
             terms = added(theta[None], np.array([size]))[0]
             base = base - part.base_terms.T @ terms
             own += (terms @ part.gram_inverse @ terms) * part.covariance
-        return np.asarray((base @ self.gram_inverse @ base) * self.noise.covariance(theta) + own)
+        noise = self.noise.covariance(theta) * np.outer(~self.silent, ~self.silent)
+        return np.asarray((base @ self.gram_inverse @ base) * noise + own)
 
     def coefficient_errors(self, theta: np.ndarray, mechanisms: tuple[str, ...]) -> np.ndarray:
         """Covariances of errors of all coefficients, of noise as at some factors (observables, terms, terms).
@@ -162,13 +173,17 @@ class Surfaces:
         """
         parts = [self.additions[name] for name in mechanisms]
         shared = np.concatenate([np.eye(len(self.gram_inverse)), *(-part.base_terms for part in parts)])
-        variance = self.noise.variance(theta)[:, None, None]
+        variance = (self.noise.variance(theta) * ~self.silent)[:, None, None]
         errors = variance * (shared @ self.gram_inverse @ shared.T)
         end = len(self.gram_inverse)
         for part in parts:
             start, end = end, end + len(part.gram_inverse)
-            errors[:, start:end, start:end] += part.variance[:, None, None] * part.gram_inverse
+            errors[:, start:end, start:end] += (part.variance * ~part.silent)[:, None, None] * part.gram_inverse
         return np.asarray(errors)
+
+    def moved(self, mechanisms: tuple[str, ...]) -> np.ndarray:
+        """True where a model with some mechanisms is more than noise, (observables,)."""
+        return ~np.logical_and.reduce([self.silent, *(self.additions[name].silent for name in mechanisms)])
 
     def misfit_variance(self, x: np.ndarray, mechanisms: tuple[str, ...]) -> np.ndarray:
         """Variance of what no coefficient follows at one row of coded parameters, (observables,)."""

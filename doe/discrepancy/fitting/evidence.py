@@ -54,6 +54,8 @@ class Evidence:
     notes: tuple[str, ...]
     calibration: Mapping[str, Calibration]
     """By observable, what its instrument may be off by."""
+    views: Mapping[str, float]
+    """By condition, the azimuth that it was seen from [deg]."""
 
     @property
     def count(self) -> int:
@@ -82,7 +84,7 @@ def gather(measured: Measured, emulator: Emulator) -> Evidence:
     training = tuple(block for block in blocks if not emulator.space.is_held_out(block.condition))
     present = {block.condition for block in blocks}
     notes += [f"condition {c} was not measured" for c in emulator.space.conditions if c not in present]
-    return Evidence(training, held_out, tuple(dict.fromkeys(notes)), measured.calibration)
+    return Evidence(training, held_out, tuple(dict.fromkeys(notes)), measured.calibration, measured.views)
 
 
 def _block(measured: Measured, emulator: Emulator, condition: str, scatter: Scatter) -> Block:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
@@ -39,6 +40,21 @@ class Model:
     """By how much the emulator's parameters are off; None for the emulator alone."""
     corrections: Mapping[str, Correction] = field(default_factory=dict)
     """By condition, what it misses besides; empty for the emulator alone."""
+    heading: float = 0.0
+    """Azimuth of its directed mechanisms [deg]."""
+    views: Mapping[str, float] = field(default_factory=dict)
+    """By condition, the azimuth that it is seen from [deg]; left out: 0."""
+
+    @property
+    def is_directed(self) -> bool:
+        """True if it looks different from another azimuth."""
+        space = self.emulator.space
+        return bool(space.odd) and any(space.mechanism(name).directed for name in self.mechanisms)
+
+    def turn(self, condition: str) -> np.ndarray:
+        """Share of each observable that is seen from the azimuth of a condition, (observables,)."""
+        seen = math.cos(math.radians(self.heading - self.views.get(condition, 0.0)))
+        return np.where(np.isin(self.emulator.observables, self.emulator.space.odd), seen, 1.0)
 
     @property
     def lower(self) -> np.ndarray:
@@ -61,7 +77,7 @@ class Model:
         values = self.emulator.surfaces[condition].predict(shifted, self.mechanisms)
         if condition in self.corrections:
             values = values + self.corrections[condition].mean(x)
-        return values
+        return values * self.turn(condition)
 
     def run_covariance(self, x: np.ndarray, condition: str) -> np.ndarray:
         """Covariance of one run at one row of coded parameters, (observables, observables)."""
@@ -69,7 +85,10 @@ class Model:
         if condition in self.corrections:
             ratio = self.corrections[condition].noise_ratio
             covariance = ratio[:, None] * covariance * ratio
-        return np.asarray(covariance)
+        # from any side odd observables scatter alike, with the others as much as they are turned towards it
+        turn = self.turn(condition)
+        odd = np.isin(self.emulator.observables, self.emulator.space.odd)
+        return np.where(odd[:, None] & odd, covariance, covariance * np.outer(turn, turn))
 
     def excess(self, x: np.ndarray, scatter: Scatter) -> Excess:
         """Estimate what replicates scatter more than its runs do at one row of coded parameters."""
@@ -94,6 +113,8 @@ class Model:
             error = self.corrections[block.condition].error(x)
         else:
             error = surfaces.error(x, self.mechanisms)
+        turn = self.turn(block.condition)
+        error = error * np.outer(turn, turn)
         theta = x[: len(self.emulator.space.factors)]
         own = self.systematic**2 * surfaces.noise.variance(theta)
         return np.asarray((error + np.diag(own))[np.ix_(block.columns, block.columns)])

@@ -45,6 +45,8 @@ class Measured:
     """By condition: pictures that came with the data."""
     calibration: Mapping[str, Calibration] = field(default_factory=dict)
     """By observable, what its instrument may be off by in all conditions; left out: nothing."""
+    views: Mapping[str, float] = field(default_factory=dict)
+    """By condition: azimuth that it was seen from [deg]; left out: 0, as the simulator is."""
     notes: tuple[str, ...] = ()
     """Remarks that a reader must know: too few replicates, values that contradict one another, ..."""
 

@@ -103,7 +103,7 @@ def _means(runs: Runs, blocks: Sequence[Block], model: Model, x: np.ndarray) -> 
     means, errors = [], []
     for block in blocks:
         here = runs.values[runs.conditions == block.condition][:, block.columns]
-        means.append(here.mean(axis=0))
+        means.append(here.mean(axis=0) * model.turn(block.condition)[block.columns])
         errors.append(model.noise(x, Block.of_runs(block.condition, block.columns, len(here))))
     return np.concatenate(means), block_diag(*errors)
 

@@ -96,6 +96,8 @@ class Fit:
     (conditions, observables)."""
     calibration: tuple[CalibrationUse, ...] = ()
     """Calibration errors that were allowed, and how much of each it uses."""
+    heading: float | None = None
+    """Azimuth of its directed mechanisms [deg]; None without one."""
 
     @property
     def excess(self) -> float:
@@ -157,6 +159,8 @@ class Candidate:
     """True if it passes every rule."""
     objection: str
     """The first rule that it fails, as a sentence; empty if admitted."""
+    heading: float | None = None
+    """As in ``Fit``."""
 
 
 @dataclass(frozen=True, eq=False)

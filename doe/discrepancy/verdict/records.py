@@ -64,6 +64,7 @@ def fit_record(fitted: Fitted, gap: GapTest, evidence: Evidence) -> Fit:
         residuals=residuals,
         adjusted_p=adjusted,
         calibration=calibration_uses(fitted, evidence),
+        heading=_heading(fitted),
     )
 
 
@@ -188,4 +189,9 @@ def candidate_record(
         simulated=assessment.simulated,
         admitted=not found,
         objection=found[0] if found else "",
+        heading=_heading(fitted),
     )
+
+
+def _heading(fitted: Fitted) -> float | None:
+    return fitted.model.heading if fitted.model.is_directed else None

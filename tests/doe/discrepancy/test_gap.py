@@ -183,7 +183,7 @@ def test_what_an_effect_shows_is_the_q_that_a_calibration_leaves_of_it() -> None
     for name in ("beta", "delta"):
         added = (
             fitted.whitening
-            @ secants(fitted.model.emulator, fitted.stack.blocks, fitted.x, name, CODED_SIZES[19:20])[0]
+            @ secants(fitted.model, fitted.stack.blocks, fitted.x, name, CODED_SIZES[19:20])[0]
         )
         moved = _without_noise(fitted, added)
         # The fit weighs by the covariance where it ends, some per cent from that where the effect was drawn.

@@ -125,7 +125,7 @@ def test_an_older_study_and_its_bank_may_call_a_mechanism_as_it_was(tmp_path: Pa
     kept = load_bank(TRIAL.with_name("bank-bench.npz"))
     kept.renamed(older).save(tmp_path / "older.npz")
     assert "contact_cohesion" in load_bank(tmp_path / "older.npz").space.names
-    assert search.read_bank(tmp_path / "older.npz").space == kept.space
+    assert search.read_bank(tmp_path / "older.npz").space.names == kept.space.names
     names = [older.get(name, name) for name in search.space.names]
     assert Search.of(trial(discover={"mechanisms": names})).space == search.space
 
