@@ -3,6 +3,7 @@
 from .analysis import Analysis, analyse, drive
 from .contest.gap import Answer, Question
 from .contest.power import Power
+from .contest.slips import Slip
 from .emulation.bank import Bank, bank_points, load_bank, make_bank
 from .emulation.emulator import Emulator, fit_emulator
 from .fitting.fit import Interval
@@ -52,6 +53,7 @@ __all__ = [
     "SearchSpace",
     "Settings",
     "Simulator",
+    "Slip",
     "Verdict",
     "analyse",
     "bank_points",

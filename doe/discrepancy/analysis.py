@@ -7,7 +7,7 @@ run with any simulator, and hundreds side by side with all their waves in one ba
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from doe.discrepancy.contest.laboratory import Laboratory, Request
 from doe.discrepancy.contest.power import Effects, Power, alike, powers
 from doe.discrepancy.contest.rounds import Contender, Contenders, simulate_again
 from doe.discrepancy.contest.signatures import Signatures, signatures
+from doe.discrepancy.contest.slips import find_slips, without
 from doe.discrepancy.emulation.emulator import Emulator
 from doe.discrepancy.fitting.evidence import Evidence, gather
 from doe.discrepancy.fitting.fit import Fitted, fit, weigh
@@ -24,7 +25,7 @@ from doe.discrepancy.fitting.model import Model, Stack
 from doe.discrepancy.problem.measured import Measured
 from doe.discrepancy.problem.settings import Settings
 from doe.discrepancy.problem.simulator import Outcomes, Point
-from doe.discrepancy.threads import steps_in_one_thread
+from doe.discrepancy.threads import in_one_thread, steps_in_one_thread
 from doe.discrepancy.verdict.before_after import BeforeAfter, compare
 from doe.discrepancy.verdict.conclusion import Assessment, Conclusion, conclude, explained_share, withdrawn
 from doe.discrepancy.verdict.discovery import (
@@ -60,9 +61,8 @@ class _Base:
     power: tuple[Power, ...]
 
 
-@steps_in_one_thread
 def analyse(measured: Measured, emulator: Emulator, settings: Settings, seed: int) -> Analysis:
-    """Analyse measured data.
+    """Analyse measured data; where there is a likely slip, without its values, too.
 
     Parameters
     ----------
@@ -82,6 +82,17 @@ def analyse(measured: Measured, emulator: Emulator, settings: Settings, seed: in
     -------
     Discovery
     """
+    slips = in_one_thread(find_slips)(measured, emulator, settings)
+    found = yield from _analyse(measured, emulator, settings, seed)
+    if not slips:
+        return found
+    rest = yield from _analyse(without(measured, slips), emulator, settings, seed + 1)
+    return replace(found, slips=slips, without_slips=rest)
+
+
+@steps_in_one_thread
+def _analyse(measured: Measured, emulator: Emulator, settings: Settings, seed: int) -> Analysis:
+    """Analyse measured data as they are."""
     evidence = gather(measured, emulator)
     if not evidence.training:
         conclusion = Conclusion(

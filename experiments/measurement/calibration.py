@@ -1,9 +1,9 @@
 """Errors of calibration: what an instrument may be off by in every condition alike.
 
-A file of measured heaps states them in rows of their own: ``calibration`` stands for the condition, ``offset``
-or ``scale`` for the replicate, and the value is a standard deviation, in the observable's unit or as a share of
-the value (``0.002`` or ``0.2 %``). A row with ``none`` for the replicate says that nothing is off. What is not
-stated is as usual for the instrument.
+A file of measured heaps states them in rows of their own: ``calibration`` stands for the condition,
+``offset`` or ``scale`` for the replicate, and the value is a standard deviation, in the observable's unit or
+as a share of the value (``0.002`` or ``0.2 %``). A row with ``none`` for the replicate says that nothing is
+off. What is not stated is as usual for the instrument.
 """
 
 from __future__ import annotations

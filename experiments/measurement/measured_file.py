@@ -65,7 +65,9 @@ def read_measured(path: Path, study: Study) -> Measured:
     measured = _gather(path, heaps, study.conditions, [each.name for each in observables], notes)
     calibration = stated_calibration(stated, found.known, measured.observables)
     views = {condition.name: condition.camera for condition in study.conditions if condition.camera}
-    return replace(measured, calibration=calibration, views=views)
+    units = {found.known[name].unit for name in measured.observables} - {"1"}
+    kinds = [tuple(n for n in measured.observables if found.known[n].unit == unit) for unit in sorted(units)]
+    return replace(measured, calibration=calibration, views=views, kinds=tuple(kinds))
 
 
 @dataclass

@@ -23,8 +23,8 @@ class Condition(Section):
     held_out: bool = False
     """It takes no part in any fit, and only judges."""
     camera: Angle = 0.0
-    """Azimuth that the heaps are seen from [deg], about the tube: 0 with x of the study to the right, 180 from
-    behind."""
+    """Azimuth that the heaps are seen from, about the tube: 0 with x of the study to the right, 180 degrees
+    from behind."""
     grain: dict[str, Any] | None = None
     """Values of the grains that differ, as their size."""
     wall: dict[str, Any] | None = None

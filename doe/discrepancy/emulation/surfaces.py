@@ -65,7 +65,6 @@ class Polynomial:
             out[column] = kriging.variance(x[None])[0]
         return out
 
-
     def silenced(self, silent: np.ndarray) -> Polynomial:
         """Return the same without what symmetry forbids."""
         kriging = {column: one for column, one in self.kriging.items() if not silent[column]}
@@ -103,7 +102,7 @@ class Addition:
 
     @property
     def covariance(self) -> np.ndarray:
-        """Covariance of one run, mean over the mechanism's runs, where it may act, (observables, observables)."""
+        """Covariance of one run where it may act, mean over its runs, (observables, observables)."""
         sd = np.sqrt(self.variance) * ~self.silent
         return np.asarray(sd[:, None] * self.correlation * sd)
 
@@ -178,7 +177,8 @@ class Surfaces:
         end = len(self.gram_inverse)
         for part in parts:
             start, end = end, end + len(part.gram_inverse)
-            errors[:, start:end, start:end] += (part.variance * ~part.silent)[:, None, None] * part.gram_inverse
+            own = part.variance * ~part.silent
+            errors[:, start:end, start:end] += own[:, None, None] * part.gram_inverse
         return np.asarray(errors)
 
     def moved(self, mechanisms: tuple[str, ...]) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Mirror symmetry of an emulator: what a mirror turns over is noise, but for the effects that have a direction.
+"""Mirror symmetry of an emulator: what a mirror turns over is noise, but for effects with a direction.
 
 Without it an emulator takes the noise of its bank for a small effect, which other mechanisms then buy.
 """

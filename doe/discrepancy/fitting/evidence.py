@@ -26,8 +26,8 @@ class Block:
     scatter: Scatter
     """Of the replicates of all conditions."""
     common: np.ndarray
-    """Change of each mean by a standard deviation of the offset, and of the scale, of its observable, which all
-    conditions share, (2, k)."""
+    """Change of each mean by a standard deviation of the offset, and of the scale, of its observable, which
+    all conditions share, (2, k)."""
 
     @classmethod
     def of_runs(cls, condition: str, columns: np.ndarray, count: int) -> Block:
@@ -64,7 +64,7 @@ class Evidence:
 
 
 def gather(measured: Measured, emulator: Emulator) -> Evidence:
-    """Cut measured data to the emulator's conditions and observables; what is left out is said in the notes."""
+    """Cut measured data to the emulator's conditions and observables; the notes say what is left out."""
     notes = list(measured.notes)
     strange = [name for name in measured.observables if name not in emulator.observables]
     notes += [f"{name} is not among the simulated observables: left out" for name in strange]

@@ -228,7 +228,7 @@ def _best_apart(tried: Sequence[Fitted]) -> list[Fitted]:
 
 
 def _descend(fitted: Fitted) -> Fitted:
-    """Go down the score by steps of Fisher's scoring within bounds, the covariance changing with the point."""
+    """Go down the score by Fisher's scoring within bounds, the covariance changing with the point."""
     stack, lower, upper = fitted.stack, fitted.model.lower, fitted.model.upper
     for _ in range(DESCENTS):
         slope, information = _score_slope(fitted)
@@ -249,8 +249,8 @@ def _descend(fitted: Fitted) -> Fitted:
 def _score_slope(fitted: Fitted) -> tuple[np.ndarray, np.ndarray]:
     """Derivatives of half the score by the parameters, and their information, (p,), (p, p).
 
-    Of a normal law with mean m(x) and covariance C(x): -m' C^-1 r + tr(C^-1 C') / 2 - r' C^-1 C' C^-1 r / 2, and
-    m' C^-1 m' + tr(C^-1 C' C^-1 C') / 2.
+    Of a normal law with mean m(x) and covariance C(x): -m' C^-1 r + tr(C^-1 C') / 2 - r' C^-1 C' C^-1 r / 2,
+    and m' C^-1 m' + tr(C^-1 C' C^-1 C') / 2.
     """
     stack, whitening, residual = fitted.stack, fitted.whitening, fitted.residuals
     slopes = whitening @ stack.jacobian(fitted.x[None])[0]
@@ -294,8 +294,8 @@ def coded_size_interval(fitted: Fitted, number: int, coverage: float = 0.9) -> t
     """Profile-likelihood interval of a coded size.
 
     It ends where q, with all else refitted, has risen by the point of chi2 for the coverage. The weights stay
-    those of the optimum; what they contribute to the score's slope there is taken out of the residuals, so that
-    q is least at the optimum, too.
+    those of the optimum; what they contribute to the score's slope there is taken out of the residuals, so
+    that q is least at the optimum, too.
 
     Parameters
     ----------

@@ -50,8 +50,8 @@ class Scatter:
 
         R being the model's correlation: h comes from the products of different observables, r from what it
         leaves of the squares. Each is as much nearer to nothing as its standard error makes it (James and
-        Stein 1961, positive part), each r nearer to the mean of all (Efron and Morris 1973). Less scatter than
-        the model's is chance.
+        Stein 1961, positive part), each r nearer to the mean of all (Efron and Morris 1973). Less scatter
+        than the model's is chance.
 
         Parameters
         ----------

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -47,6 +46,8 @@ class Measured:
     """By observable, what its instrument may be off by in all conditions; left out: nothing."""
     views: Mapping[str, float] = field(default_factory=dict)
     """By condition: azimuth that it was seen from [deg]; left out: 0, as the simulator is."""
+    kinds: tuple[tuple[str, ...], ...] = ()
+    """Observables that are measured in one unit, which a slip of units takes all together."""
     notes: tuple[str, ...] = ()
     """Remarks that a reader must know: too few replicates, values that contradict one another, ..."""
 
@@ -125,5 +126,6 @@ class Measured:
             self,
             observables=names,
             values={name: rows[:, kept] for name, rows in self.values.items()},
+            kinds=tuple(tuple(name for name in kind if name in names) for kind in self.kinds),
             calibration={name: one for name, one in self.calibration.items() if name in names},
         )

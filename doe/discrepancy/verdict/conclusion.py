@@ -17,7 +17,7 @@ CHANCE = 1.645
 """Standard deviations that a normal number passes upwards in one case of twenty."""
 
 WORSE = 4.0
-"""Rise of the held-out Q of fresh runs with which a name is withdrawn: two standard deviations of one number."""
+"""Rise of the held-out Q of fresh runs with which a name is withdrawn: two standard deviations, squared."""
 
 LIKELIHOOD = "minus twice the log-likelihood, held-out conditions included"
 """Name of a score, in reasons."""
@@ -160,10 +160,10 @@ def conclude(assessments: Sequence[Assessment], settings: Settings) -> Conclusio
 
 
 def withdrawn(conclusion: Conclusion, compared: Sequence[BeforeAfter]) -> Conclusion:
-    """Withdraw a name or a tie with which fresh runs predict the held-out conditions worse than the base's do.
+    """Withdraw a name or a tie with which fresh runs predict held-out conditions worse than the base's do.
 
-    Of 203 right names of the sixth blind trials the fresh runs of one came out worse by 2.7, and no other's by
-    as much; with a tie that was none, by 14.
+    Of the 203 right names of the sixth blind trials the fresh runs of none came out worse by more than 3.1;
+    with the one tie where nothing was hidden, by 14.
     """
     for one in compared:
         if one.held_out and (worse := one.after.value - one.before.value) > WORSE:

@@ -13,6 +13,7 @@ import numpy as np
 
 from doe.discrepancy.contest.gap import Answer
 from doe.discrepancy.contest.power import Power
+from doe.discrepancy.contest.slips import Slip
 from doe.discrepancy.fitting.fit import Interval
 from doe.discrepancy.verdict.before_after import BeforeAfter
 from doe.discrepancy.verdict.next_experiment import NextExperiment
@@ -213,6 +214,10 @@ class Discovery:
     effort: Effort
     closest: Fit | None = None
     """The candidate of the best score, where none was chosen."""
+    slips: tuple[Slip, ...] = ()
+    """Likely slips, which this verdict was given with."""
+    without_slips: Discovery | None = None
+    """The same analysis without their values; None without slips."""
 
     def __post_init__(self) -> None:
         shape = (len(self.data.conditions), len(self.data.observables))

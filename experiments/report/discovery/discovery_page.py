@@ -9,6 +9,7 @@ from typing import Any
 from doe.discrepancy import Discovery, Settings, Verdict
 from experiments.report.cautions import Caution, study_cautions
 from experiments.report.discovery import charts, tables
+from experiments.report.discovery.disagreement import conventions, misses
 from experiments.report.discovery.paper_text import search_pastes
 from experiments.report.discovery.terms import Terms, percent
 from experiments.report.discovery.verdict import (
@@ -92,7 +93,9 @@ def render_discovery(
         "headline": headline(found, terms),
         "sentence": verdict_sentence(found, terms),
         "reason": reason_sentence(found),
-        "settled": found.verdict in SETTLED,
+        "settled": found.verdict in SETTLED and not found.slips,
+        "misses": misses(found, terms) if found.verdict is Verdict.UNKNOWN else [],
+        "conventions": conventions(found, terms) if found.verdict is Verdict.UNKNOWN else [],
         "cards": _cards(found, terms),
         "explained": found.named,
         "next_step": next_step(found, terms),

@@ -17,6 +17,12 @@ from doe.discrepancy import (
     Settings,
     Verdict,
 )
+from experiments.report.discovery.disagreement import (
+    heading_phrase,
+    misses,
+    slip_sentences,
+    with_and_without,
+)
 from experiments.report.discovery.terms import Terms, percent, spaced
 from experiments.report.kit.numbers import capital, fixed, p_clause, trimmed
 
@@ -30,18 +36,21 @@ SHOWN_RIVALS = 2
 def headline(found: Discovery, terms: Terms) -> str:
     """Say the verdict in a few words."""
     named = terms.titles(found.named)
+    if found.slips:
+        return "A likely slip in the data"
     return {
         Verdict.NONE: "Nothing is missing that these data could show",
         Verdict.NAMED: f"Missing: {named}",
         Verdict.TIE: f"A tie: {terms.titles(found.named, 'or')}",
-        Verdict.UNKNOWN: "Something is missing, and nothing in the library explains it",
+        Verdict.UNKNOWN: "Something is missing, and no effect of the library is sure to be it",
         Verdict.NOT_IDENTIFIABLE: "These data cannot tell",
     }[found.verdict]
 
 
 def verdict_sentence(found: Discovery, terms: Terms) -> str:
     """Say what was found, with its numbers, in one sentence or two."""
-    return _SENTENCES[found.verdict](found, terms)
+    told = _SENTENCES[found.verdict](found, terms)
+    return " ".join([*slip_sentences(found), with_and_without(found), told]).strip() if found.slips else told
 
 
 def reason_sentence(found: Discovery) -> str:
@@ -98,7 +107,7 @@ def _added(found: Discovery, terms: Terms) -> str:
     if found.chosen is None:
         return reason_sentence(found)
     sizes = terms.sizes(found.chosen.mechanisms, found.chosen.sizes)
-    text = f"Adding {terms.titles(found.chosen.mechanisms)} at {sizes}"
+    text = f"Adding {terms.titles(found.chosen.mechanisms)} at {sizes}{heading_phrase(found.chosen)}"
     training, held_out = _set(found, held_out=False), _set(found, held_out=True)
     if training:
         text += f" removed {_share(training.removed)} of the excess"
@@ -107,7 +116,8 @@ def _added(found: Discovery, terms: Terms) -> str:
     if held_out:
         fell = "fell" if held_out.after.value < held_out.before.value else "rose"
         text += f"; held out, Q {fell} from {_q(held_out.before)} to {_q(held_out.after)}"
-    return text + "."
+    confirm = [terms.mechanisms[name].confirm for name in found.named if name in terms.mechanisms]
+    return " ".join([f"{text}.", *(f"Do this next: {one}" for one in confirm[:1])])
 
 
 def _tie(found: Discovery, terms: Terms) -> str:
@@ -127,14 +137,16 @@ def _unknown(found: Discovery, terms: Terms) -> str:
     text = (
         f"The model disagrees with the data (Q = {trimmed(found.base.q, 3)} at"
         f" {fixed(found.base.degrees_of_freedom, 0)} degrees of freedom, p"
-        f" {p_clause(found.base.p_value)}){how}, and nothing in the library explains it"
+        f" {p_clause(found.base.p_value)}){how}"
     )
-    if found.candidates:
-        best = found.candidates[0]
-        share = f"removes {percent(best.explained)} of the excess"
-        does = share if found.base.excess else f"leaves Q = {trimmed(best.q, 3)}"
-        text += f"; the best, {terms.titles(best.mechanisms)}, {does}"
-    return text + "."
+    if not found.candidates:
+        return f"{text}, and the library has nothing to explain it with."
+    best = found.candidates[0]
+    share = f"it removes {percent(min(max(best.explained, 0.0), 1.0))} of the excess"
+    does = share if found.base.excess else f"it leaves Q = {trimmed(best.q, 3)}"
+    why = f", but {best.objection.rstrip('.')}" if best.objection else ", but it does not stand out"
+    text += f". {capital(terms.titles(best.mechanisms))} comes closest ({does}){why}."
+    return " ".join([text, *(capital(one) for one in misses(found, terms)[:1])])
 
 
 def _beyond(answer: Answer, terms: Terms) -> str:

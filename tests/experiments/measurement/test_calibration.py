@@ -27,7 +27,7 @@ def read(tmp_path: Path, *rows: str) -> Measured:
 def test_what_is_not_stated_is_as_usual_for_the_instrument(tmp_path: Path) -> None:
     found = read(tmp_path).calibration
     assert found == {name: usual_calibration(BY_NAME[name]) for name in ("height", "t55", "asymmetry")}
-    # Begin and end of a time are each read to half a frame: evenly within 1/60 s, so 1/60 s / sqrt(12), twice.
+    # Begin and end of a time are each read to half a frame: evenly within 1/60 s, twice.
     assert found["t55"].offset == pytest.approx((2.0 / 12.0) ** 0.5 / 60.0)
 
 
