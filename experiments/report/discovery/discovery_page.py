@@ -92,7 +92,7 @@ def render_discovery(
         "terms": terms,
         "headline": headline(found, terms),
         "sentence": verdict_sentence(found, terms),
-        "reason": reason_sentence(found),
+        "reason": reason_sentence(found, terms),
         "settled": found.verdict in SETTLED and not found.slips,
         "misses": misses(found, terms) if found.verdict is Verdict.UNKNOWN else [],
         "conventions": conventions(found, terms) if found.verdict is Verdict.UNKNOWN else [],

@@ -233,7 +233,8 @@ def seen_from(measured: Measured, cosine: float) -> Measured:
     lean = measured.observables.index("asymmetry")
     values = {name: rows.copy() for name, rows in measured.values.items()}
     for name, rows in values.items():
-        rows[:, lean] += (cosine - 1.0) * measured.mean(name)[lean]
+        mean = measured.mean(name)[lean]
+        rows[:, lean] = cosine * mean + (1.0 if cosine >= 0.0 else -1.0) * (rows[:, lean] - mean)
     return replace(measured, values=values)
 
 
@@ -258,13 +259,14 @@ def test_a_tilt_along_the_line_of_sight_is_fitted_though_nothing_leans() -> None
 def test_conditions_seen_from_different_sides_are_one_tilt() -> None:
     whole = heaps({"plate_tilt": 0.7}, 2)
     behind = seen_from(whole, -1.0)
-    mixed = replace(whole, values={**whole.values, "fast": behind.values["fast"]})
-    fitted = {}
-    for views in ({}, {"fast": 180.0}):
-        evidence = gather(replace(mixed, views=views), known())
+    mixed = replace(whole, values={**whole.values, "fast": behind.values["fast"]}, views={"fast": 180.0})
+    scores = []
+    for measured in (whole, mixed):
+        evidence = gather(measured, known())
         model = Model(known(), ("plate_tilt",), SYSTEMATIC, views=evidence.views)
-        fitted[bool(views)] = fit(Stack(model, evidence.training))
-    assert fitted[True].score < fitted[False].score - 10.0
+        scores.append(fit(Stack(model, evidence.training)).score)
+    # The same numbers with other signs: two descents end within a last step of each other.
+    assert scores[1] == pytest.approx(scores[0], abs=0.01)
 
 
 def test_the_same_heaps_from_behind_are_named_with_their_direction() -> None:
