@@ -49,7 +49,8 @@ def test_a_named_effect_is_told_with_its_size_and_what_it_removed(
     sentence = verdict_sentence(discovered(Verdict.NAMED), terms).replace("\u00a0", " ")
     assert sentence == (
         "Adding contact adhesion at 0.052 J/m² (90 % interval 0.041 to 0.064) removed 98 % (94 to 100 %) of"
-        " the excess; held out, Q fell from 121 (98 to 143) to 11 (7.1 to 16)."
+        " the excess; held out, Q fell from 121 (98 to 143) to 11 (7.1 to 16). Do this next: Measure contact"
+        " adhesion by itself."
     )
 
 
