@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
-from scipy import stats
 
 from doe.discrepancy.emulation.emulator import Emulator
 from doe.discrepancy.fitting.evidence import gather
@@ -20,16 +19,16 @@ from doe.discrepancy.fitting.model import Model, Stack
 from doe.discrepancy.problem.measured import Measured
 from doe.discrepancy.problem.settings import Settings
 
-GROSS = 10.0
-"""Mean square of a misfit, in its variance, that is looked into: three standard deviations of every mean."""
+GROSS = 3.0
+"""Q over its degrees of freedom that is looked into."""
+FITS = 2.0
+"""Q over its degrees of freedom up to which a model may be right, as little as an emulator knows."""
 OUTLYING = 8.0
 """Standard deviations by which one value is an outlier that scatter never makes."""
 FACTORS = (1000.0, 100.0, 60.0, 25.4, 10.0, 3.0, 2.0, -1.0)
 """Factors of slips: of units, of an inch, of a digit, of a sign; their inverses as well."""
 NEAR = 0.15
 """Relative distance from such a factor that is still it."""
-LEVEL = 1e-3
-"""P value of Q from which on the rest agrees."""
 
 
 @dataclass(frozen=True)
@@ -66,10 +65,10 @@ def find_slips(measured: Measured, emulator: Emulator, settings: Settings) -> tu
     found = list(_outliers(measured, emulator))
     rest = without(measured, found)
     whole = _fitted(rest, emulator, settings)
-    if whole is None or _agrees(whole) or whole.q < GROSS * whole.freedom:
+    if whole is None or whole.q < GROSS * whole.freedom:
         return tuple(found)
     singles = (_fitted(rest, emulator, settings, (name,)) for name in emulator.space.names)
-    if any(one is not None and one.q < GROSS * one.freedom for one in singles):
+    if any(one is not None and one.q < FITS * one.freedom for one in singles):
         return tuple(found)  # a mechanism may explain it
     others = [*_exchanges(rest, emulator, settings, whole), *_left_out(rest, emulator, settings, whole)]
     return (*found, *sorted(others, key=lambda slip: slip.q_without)[:1])
@@ -85,10 +84,6 @@ def _fitted(
     if not blocks or sum(len(block.mean) for block in blocks) <= len(model.lower):
         return None
     return fit(Stack(model, blocks), count=2)
-
-
-def _agrees(fitted: Fitted) -> bool:
-    return bool(stats.chi2.sf(fitted.q, fitted.freedom) > LEVEL)
 
 
 def _outliers(measured: Measured, emulator: Emulator) -> Iterator[Slip]:
@@ -125,20 +120,21 @@ def _exchanges(measured: Measured, emulator: Emulator, settings: Settings, whole
         swapped = dict(measured.values) | {first: measured.values[second], second: measured.values[first]}
         reasons = dict(measured.reasons) | {first: measured.reasons[second], second: measured.reasons[first]}
         fitted = _fitted(replace(measured, values=swapped, reasons=reasons), emulator, settings)
-        if fitted is not None and fitted.q < GROSS * fitted.freedom and fitted.q < whole.q / GROSS:
+        if fitted is not None and fitted.q < FITS * fitted.freedom:
             yield Slip(measured.observables, (first, second), None, None, True, whole.q, fitted.q)
 
 
 def _left_out(measured: Measured, emulator: Emulator, settings: Settings, whole: Fitted) -> Iterator[Slip]:
     """Yield observables, kinds of them and conditions without which the rest agrees with the base."""
     known = [name for name in measured.observables if name in emulator.observables]
-    groups = [((name,), measured.conditions) for name in known]
+    everywhere = measured.conditions
+    groups: list[tuple[tuple[str, ...], tuple[str, ...]]] = [((name,), everywhere) for name in known]
     groups += [(kind, measured.conditions) for kind in measured.kinds if len(kind) > 1]
     groups += [(tuple(known), (condition,)) for condition in measured.conditions]
     for observables, conditions in groups:
         slip = Slip(observables, conditions, None, None, False, whole.q, 0.0)
         fitted = _fitted(without(measured, [slip]), emulator, settings)
-        if fitted is not None and fitted.q < GROSS * fitted.freedom and fitted.q < whole.q / GROSS:
+        if fitted is not None and fitted.q < FITS * fitted.freedom:
             factor = _factor(measured, fitted, slip)
             yield replace(slip, factor=factor, q_without=fitted.q)
 

@@ -79,8 +79,9 @@ def calibration_uses(fitted: Fitted, evidence: Evidence) -> tuple[CalibrationUse
             continue
         one = evidence.calibration[observable]
         z = asked[:, column]
+        offset, scale = (float(each) for each in z * [one.offset, one.scale])
         length = float(np.hypot(*z))
-        uses.append(CalibrationUse(observable, one.offset, one.scale, *(z * [one.offset, one.scale]), length))
+        uses.append(CalibrationUse(observable, one.offset, one.scale, offset, scale, length))
     return tuple(uses)
 
 
