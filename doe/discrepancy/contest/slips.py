@@ -71,7 +71,12 @@ def find_slips(measured: Measured, emulator: Emulator, settings: Settings) -> tu
     if any(one is not None and one.q < FITS * one.freedom for one in singles):
         return tuple(found)  # a mechanism may explain it
     others = [*_exchanges(rest, emulator, settings, whole), *_left_out(rest, emulator, settings, whole)]
-    return (*found, *sorted(others, key=lambda slip: slip.q_without)[:1])
+    return (*found, *sorted(others, key=_cost)[:1])
+
+
+def _cost(slip: Slip) -> tuple[int, float]:
+    """Sort slips by what they ask to be wrong: an exchange is one error, then the fewest observables."""
+    return 0 if slip.exchanged else len(slip.observables) * len(slip.conditions), slip.q_without
 
 
 def _fitted(
