@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import inspect
+import re
 import tomllib
 from collections.abc import Iterable
 from importlib import import_module
@@ -22,8 +23,10 @@ from experiments.studyfile.reference import study_reference
 
 
 def escaped(text: str) -> str:
-    """Text that may stand in a cell."""
-    return text.replace("|", "\\|").replace("<", "&lt;").replace("\n", " ")
+    """Text that may stand in a cell; what is between backticks is shown as it is."""
+    parts = text.replace("|", "\\|").replace("\n", " ").split("`")
+    parts[::2] = [part.replace("<", "&lt;") for part in parts[::2]]
+    return "`".join(parts)
 
 
 def markdown_table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
@@ -63,11 +66,9 @@ def commands_page() -> str:
     for name in group.list_commands(context):
         command = group.get_command(context, name)
         inner = typer.Context(command, info_name=name, parent=context)
-        parts += [
-            f"## dem-warp {name}",
-            command.help or "",
-            f"`{command.get_usage(inner).removeprefix('Usage: ')}`",
-        ]
+        # typer puts what is required into braces
+        usage = re.sub("[{}]", "", command.get_usage(inner).removeprefix("Usage: "))
+        parts += [f"## dem-warp {name}", command.help or "", f"`{usage}`"]
         rows = []
         for parameter in command.get_params(inner):
             record = parameter.get_help_record(inner)

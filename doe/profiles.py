@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from doe.compare import Sample
 from doe.errors import RuleError
+from doe.sample import Sample
 
 LEAST_PROFILES = 3
 """Profiles from which a scatter can be told."""

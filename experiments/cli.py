@@ -116,12 +116,14 @@ def calibrate(
         resources = chosen_resources(**asked)
         chosen = chosen_study(study, scale, resources)
         folder = out or default_folder(chosen)
+        published = paper_replicates if follow_paper or only_paper else 0
         if dry_run:
-            show_calibration(chosen, resources_for(chosen, resources), as_json)
+            resources = resources_for(chosen, resources)
+            show_calibration(chosen, resources, published, not only_paper, as_json)
     go_on = Attempt.of(
         "calibrate", study, out=folder, scale=chosen.scale, **asked, engine=engine,
         follow_paper=follow_paper, only_paper=only_paper, live=live,
-        paper_replicates=paper_replicates if follow_paper or only_paper else None, json=as_json,
+        paper_replicates=published or None, json=as_json,
     )  # fmt: skip
     with clear_errors(go_on), live_page(folder, live, messages.print):
         print_study(chosen, resources_for(chosen, resources))
@@ -131,7 +133,7 @@ def calibrate(
             **asked,
             engine=engine,
             resume=resume,
-            published_replicates=paper_replicates if follow_paper or only_paper else 0,
+            published_replicates=published,
             campaign=not only_paper,
             watch=CaseProgress,
             on_stage=show_stage,
@@ -159,7 +161,7 @@ def discover(
     measured: Annotated[
         Path | None,
         typer.Argument(
-            metavar="[MEASURED.csv]", help="Measured heaps; left out: only the library waves are run."
+            metavar="MEASURED.csv", help="Measured heaps; left out: only the library waves are run."
         ),
     ] = None,
     out: Out = None,

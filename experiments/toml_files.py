@@ -15,6 +15,9 @@ from experiments.texts import read_text
 DEEPEST = 20
 """Levels of tables and lists in each other that a file may have."""
 
+MOST_DOTS = 100
+"""Dots in a row of a line's parts: the time that keys of many levels take grows with the square of these."""
+
 LONGEST_SHOWN = 200
 """Characters of a wrong line that are shown."""
 
@@ -29,6 +32,7 @@ def read_toml(path: Path, what: str = "the study") -> tuple[str, dict[str, Any]]
     """
     try:
         text = read_text(path).replace("\r\n", "\n")
+        _check_keys(text)
         document = tomllib.loads(text)
         _check(document)
         return text, document
@@ -45,6 +49,12 @@ def read_toml(path: Path, what: str = "the study") -> tuple[str, dict[str, Any]]
     except ValueError as error:
         # an integer of thousands of digits, for one
         raise StudyError("must be valid TOML", str(error), str(path)) from None
+
+
+def _check_keys(text: str) -> None:
+    """Refuse keys of very many levels before they are read."""
+    if any(part.count(".") > MOST_DOTS for part in re.split(r"[\n,=\[\]{}]", text)):
+        raise RecursionError
 
 
 def _check(document: Mapping[str, Any]) -> None:

@@ -35,7 +35,8 @@ def _source(kind: str, lines: list[str]) -> str:
 def notebook_of(script: str) -> nbformat.NotebookNode:
     """Return the notebook of a script, not executed; figures that a cell ends with are shown."""
     make = {"code": nbformat.v4.new_code_cell, "markdown": nbformat.v4.new_markdown_cell}
-    cells = [nbformat.v4.new_code_cell("%matplotlib inline", id="inline")]
+    unseen = {"tags": ["remove-cell"]}  # by the site
+    cells = [nbformat.v4.new_code_cell("%matplotlib inline", id="inline", metadata=unseen)]
     for number, (kind, source) in enumerate(cells_of(script)):
         shown = f"{source}\nfigure" if source.startswith("figure = ") else source
         cells.append(make[kind](shown, id=f"cell-{number}"))

@@ -134,6 +134,7 @@ def _require_usable(folder: Path, resume: bool) -> None:
         raise StoreError(f"a folder to resume must hold a {MANIFEST}", "a file", str(folder))
     else:
         _require_no_links(folder)
+        read_manifest(folder)
 
 
 def _require_no_links(folder: Path) -> None:

@@ -107,19 +107,29 @@ def simulate_heap(
         When frames are asked of another engine than dem-warp's own.
     """
     case, film = study.case(settings, seed, scene), None
-    engine = engine_of(study)
     if frames is None:
-        [result] = workers.simulate([case], engine, on_progress=progress)
-    elif engine is not None:
-        other = study.engine and (study.engine.name or study.engine.command)
-        raise InputError("must run on dem-warp's own engine", other, "--frames")
-    elif not isinstance(workers, OwnWorkers):
-        raise InputError("must run on this machine", workers.machine, "--frames")
+        [result] = workers.simulate([case], engine_of(study), on_progress=progress)
     else:
-        result, film = simulate_frames(case, frames, workers.name, progress)
+        result, film = simulate_frames(case, frames, filmed_by(study, workers).name, progress)
     values = {factor.name: settings.get(factor.name, factor.center) for factor in study.factors}
     observed = observe(study.measurement, result, study.scenes[scene].leaves_a_heap)
     return Heap(study, values, seed, result, observed, scene, film)
+
+
+def filmed_by(study: Study, workers: Workers) -> OwnWorkers:
+    """Return the workers, which must be of this machine and have dem-warp's own engine to keep frames.
+
+    Raises
+    ------
+    InputError
+        When they do not.
+    """
+    if engine_of(study) is not None:
+        other = study.engine and (study.engine.name or study.engine.command)
+        raise InputError("must run on dem-warp's own engine", other, "--frames")
+    if not isinstance(workers, OwnWorkers):
+        raise InputError("must run on this machine", workers.machine, "--frames")
+    return workers
 
 
 def heap_snapshot(study: Study, result: CaseResult, angle: HeapAngle | None, view: int = 0) -> Snapshot:

@@ -18,7 +18,7 @@ def export(
     source: Annotated[
         Path | None,
         typer.Argument(
-            metavar="[CARD|STUDY]", help="Material card or study file; left out: the paper's buckwheat."
+            metavar="CARD|STUDY", help="Material card or study file; left out: the paper's buckwheat."
         ),
     ] = None,
     to: Annotated[str, typer.Option(metavar="NAME", help="Code that it leaves for, as liggghts.")] = "",

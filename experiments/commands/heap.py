@@ -74,6 +74,7 @@ def heap(
     with clear_errors():
         check_study_file(study, scale, engine)
         from experiments.cases import open_workers, require_unused, simulate_heap, with_engine, write_heap
+        from experiments.cases.heap import filmed_by
         from experiments.cases.movie import MOVIES, require_movie
         from experiments.cases.workers.own import watched_by
         from experiments.live.trail.journal import Journal
@@ -92,15 +93,16 @@ def heap(
             show_heap(chosen, resources, case, as_json)
         require_unused(folder)
         print_narrowness(chosen)
-        with (
-            live_page(folder, live, messages.print),
-            open_workers(resources) as crew,
-            Journal(folder, "heap", chosen, device=str(crew.described.get("device", ""))) as notes,
-            watching(scene or "heap", CaseProgress, notes) as progress,
-        ):
-            crew = watched_by(crew, notes.glimpses)
-            simulated = simulate_heap(chosen, values, seed, crew, progress, place, frames)
-            write_heap(simulated, folder, movie or MOVIES[0])
+        with live_page(folder, live, messages.print), open_workers(resources) as crew:
+            if frames is not None:
+                filmed_by(chosen, crew)
+            with (
+                Journal(folder, "heap", chosen, device=str(crew.described.get("device", ""))) as notes,
+                watching(scene or "heap", CaseProgress, notes) as progress,
+            ):
+                crew = watched_by(crew, notes.glimpses)
+                simulated = simulate_heap(chosen, values, seed, crew, progress, place, frames)
+                write_heap(simulated, folder, movie or MOVIES[0])
     if as_json:
         typer.echo(json.dumps(simulated.to_dict(), allow_nan=False))
     messages.print(f"Files: {folder}")

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 StudyFile = Annotated[
-    Path | None, typer.Argument(metavar="[STUDY.toml]", help="Study file; left out: the paper's buckwheat.")
+    Path | None, typer.Argument(metavar="STUDY.toml", help="Study file; left out: the paper's buckwheat.")
 ]
 Scale = Annotated[
     str | None,

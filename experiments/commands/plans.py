@@ -23,12 +23,18 @@ if TYPE_CHECKING:
     from experiments.studyfile import Study
 
 
-def show_calibration(study: Study, resources: Resources, as_json: bool) -> NoReturn:
-    """Show the plan of a calibration, and end the command."""
+def show_calibration(
+    study: Study, resources: Resources, published_replicates: int, campaign: bool, as_json: bool
+) -> NoReturn:
+    """Show the plan of a calibration, of published runs or of both, and end the command."""
     from experiments.runs.campaign import check_runs
     from experiments.runs.plan import plan_calibration
 
-    show_plan(resources, partial(plan_calibration, check_runs(study), resources), as_json)
+    study = check_runs(study, campaign, published_replicates > 0)
+    planned = partial(
+        plan_calibration, study, resources, published_replicates=published_replicates, campaign=campaign
+    )
+    show_plan(resources, planned, as_json)
     raise typer.Exit
 
 

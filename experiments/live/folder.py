@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import csv
 import json
+import math
 import stat
 from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
@@ -64,6 +66,30 @@ def read_lines(folder: Path, name: str, most: int = LONGEST) -> Iterator[dict[st
             continue
         if isinstance(found, dict):
             yield found
+
+
+def read_table(folder: Path, name: str, most: int = LONGEST) -> list[dict[str, str | int | float]]:
+    """Read the last rows of a table that a run has written, each without its empty cells.
+
+    There are none where the file is missing or damaged.
+    """
+    try:
+        rows = list(csv.DictReader(_read(folder, name).splitlines(), restval=""))[-most:]
+    except (OSError, ValueError, csv.Error):
+        return []
+    found = ({key: _value(text) for key, text in row.items() if key is not None} for row in rows)
+    return [{key: value for key, value in row.items() if value is not None} for row in found]
+
+
+def _value(text: str) -> str | int | float | None:
+    """Number that a cell holds, or its text; None for an empty one."""
+    for kind in (int, float):
+        try:
+            number: int | float = kind(text)
+        except ValueError:
+            continue
+        return number if math.isfinite(number) else None
+    return text or None
 
 
 def _read(folder: Path, name: str) -> str:

@@ -10,8 +10,9 @@ from typing import Any
 
 from experiments.cases.folder import CASES as STORE
 from experiments.cases.folder import JOURNAL
-from experiments.live.folder import inside, read_json, read_lines
+from experiments.live.folder import inside, read_json, read_lines, read_table
 from experiments.live.notes import (
+    DecisionNote,
     LogNote,
     ProgressNote,
     RunNote,
@@ -58,7 +59,7 @@ class RunState:
             _progress(folder, noted(ProgressNote, read_json(folder, f"{JOURNAL}/{PROGRESS}"))),
             all_noted(LogNote, read_lines(folder, f"{JOURNAL}/{LOG}", LOG_SHOWN)),
             cases,
-            all_noted(StageNote, read_lines(folder, f"{JOURNAL}/{STAGES}")),
+            all_noted(StageNote, read_lines(folder, f"{JOURNAL}/{STAGES}")) or _stages_of_tables(folder),
             _heaps(folder, cases),
         )
 
@@ -124,15 +125,29 @@ def _changed(path: Path) -> float:
 
 
 def _cases(folder: Path) -> dict[str, dict[str, Value]]:
-    """Cases of the journal by their key."""
+    """Cases of the journal by their key; without one, those of the tables that an ended run has left."""
     cases: dict[str, dict[str, Value]] = {}
-    for line in map(values_of, read_lines(folder, f"{JOURNAL}/{CASES}", CASES_SHOWN)):
+    lines = [*read_lines(folder, f"{JOURNAL}/{CASES}", CASES_SHOWN)] or _cases_of_tables(folder)
+    for line in map(values_of, lines):
         key = str(line.get("case_key") or line.get("name") or len(cases))
         if "status" in line:  # the last to end stands last
             cases[key] = cases.pop(key, {}) | line
         else:
             cases.setdefault(key, {}).update(line)
     return cases
+
+
+def _cases_of_tables(folder: Path) -> list[dict[str, Any]]:
+    return [row for row in read_table(folder, "tables/cases.csv", CASES_SHOWN) if row.get("status")]
+
+
+def _stages_of_tables(folder: Path) -> list[StageNote]:
+    """Stages by the table of their decisions."""
+    stages: dict[str, list[DecisionNote]] = {}
+    for row in read_table(folder, "tables/decisions.csv"):
+        if (decision := noted(DecisionNote, row)) is not None:
+            stages.setdefault(str(row.get("stage")), []).append(decision)
+    return [StageNote(name=name, decisions=decisions) for name, decisions in stages.items()]
 
 
 def _heaps(folder: Path, cases: Mapping[str, Mapping[str, Value]]) -> list[dict[str, Value]]:

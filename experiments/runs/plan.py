@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
+import pandas as pd
 
 from dem_warp import Case
 from doe import central_composite
@@ -23,6 +24,7 @@ from experiments.discover.fresh_cases import search_cases
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.search import Search
 from experiments.errors import InputError, StudyError
+from experiments.report.companion import companion_of
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import TARGET_SCENE, scenes_of
 
@@ -34,6 +36,9 @@ PROCESS_BYTES = 450e6
 
 OUTCOME_BYTES = 500
 """Bytes of a row of measured outcomes."""
+
+_Wave: TypeAlias = tuple[str, Sequence[Case], int, int]
+"""Name of a wave, some of its cases, how many are expected, and how many there are at the most."""
 
 
 @dataclass(frozen=True)
@@ -123,32 +128,41 @@ def measure_and_store(resources: Resources) -> Speed:
     return speed
 
 
-def plan_calibration(study: Study, resources: Resources, speed: Speed) -> Plan:
-    """Plan a calibration; which factors are kept, and how far the climb goes, is taken as usual."""
+def plan_calibration(
+    study: Study, resources: Resources, speed: Speed, *, published_replicates: int = 0, campaign: bool = True
+) -> Plan:
+    """Plan a calibration; which factors are kept, and how far the climb goes, is taken as usual.
+
+    The runs that were published for the study go before, with so many replicates.
+    """
+    published = companion_of(study).planned_runs(published_replicates) if published_replicates else {}
+    waves: list[_Wave] = []
+    for title, table in published.items():
+        waves.append((title, _sampled(study, table), len(table), len(table)))
+    if campaign:
+        waves.extend(_campaign_waves(study))
+    stored = 3000.0 + 90.0 * max(cost_of(case).grains for _, some, *_ in waves for case in some)
+    return _plan(study, resources, speed, waves, stored)
+
+
+def _campaign_waves(study: Study) -> list[_Wave]:
+    """Waves of a campaign."""
     settings, target = study.campaign, study.target
     design = screening_design(study.factors, settings.screening)
     opening = plan_opening(study, design)
-    rows = opening.sample(min(SAMPLE, len(opening)), random_state=0) if len(opening) > SAMPLE else opening
-    names = [factor.name for factor in study.factors]
-    first = [
-        _built(study, {name: row[name] for name in names}, row["seed"], row["scene"])
-        for row in rows.to_dict("records")
-    ]
     scenes = scenes_of(target.fitted)
     middle = [_built(study, {}, 1, scene) for scene in scenes]
     leading = [_built(study, {}, 1, target.leading.scene)]
     steps = settings.climb.steps * settings.climb.replicates
-    kept = len(settings.selection.keep or ()) or min(settings.selection.at_most, len(names))
+    kept = len(settings.selection.keep or ()) or min(settings.selection.at_most, len(study.factors))
     surface = _surface_cases(study, kept) * len(scenes)
     fresh = settings.verification.replicates * len(scenes_of(target.responses))
-    waves = [
-        ("target, noise floor, screening", first, len(opening), len(opening)),
+    return [
+        ("target, noise floor, screening", _sampled(study, opening), len(opening), len(opening)),
         ("climb", leading, steps, steps * (1 + settings.climb.extensions)),
         ("surface", middle, surface, surface),
         ("verification", middle, fresh, fresh),
     ]
-    stored = 3000.0 + 90.0 * max(cost.grains for cost in _costs(first))
-    return _plan(study, resources, speed, waves, stored)
 
 
 def plan_search(study: Study, resources: Resources, speed: Speed, *, has_bank: bool, analysed: bool) -> Plan:
@@ -175,6 +189,16 @@ def plan_heap(study: Study, resources: Resources, speed: Speed, *, case: Case) -
     return _plan(study, resources, speed, [("heap", [case], 1, 1)], 90.0 * cost_of(case).grains)
 
 
+def _sampled(study: Study, table: pd.DataFrame) -> list[Case]:
+    """Cases of a table's rows, of some where there are many."""
+    rows = table.sample(min(SAMPLE, len(table)), random_state=0) if len(table) > SAMPLE else table
+    names = [factor.name for factor in study.factors]
+    return [
+        _built(study, {name: row[name] for name in names}, row["seed"], row.get("scene", TARGET_SCENE))
+        for row in rows.to_dict("records")
+    ]
+
+
 def _built(study: Study, settings: dict[str, float], seed: int, scene: str = TARGET_SCENE) -> Case:
     return study.case({str(name): float(value) for name, value in settings.items()}, int(seed), scene)
 
@@ -194,7 +218,7 @@ def _plan(
     study: Study,
     resources: Resources,
     speed: Speed,
-    waves: Sequence[tuple[str, Sequence[Case], int, int]],
+    waves: Sequence[_Wave],
     stored: float,
 ) -> Plan:
     on_gpu = resources.on_gpu

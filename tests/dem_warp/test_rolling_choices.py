@@ -196,7 +196,7 @@ def spinning_pair(laws: ContactLaws) -> tuple[np.ndarray, np.ndarray, Record]:
     return masses, radii, record(solve(world(bodies, contact, step, shapes=(BALL,), laws=laws)), 400)
 
 
-@pytest.mark.parametrize("choice", [name for name, one in ROLLING.items() if one.on_partner == "opposite"])
+@pytest.mark.parametrize("choice", [c for c in ROLLING if rolling(c).forms.partner_turning == "opposite"])
 def test_torques_on_two_balls_are_equal_and_opposite(choice):
     seen = spinning_pair(rolling(choice))
     momentum = moment_of_momentum(*seen)

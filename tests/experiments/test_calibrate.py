@@ -13,8 +13,7 @@ from experiments.calibrate import ClimbEnd, Outcome, calibrate
 from experiments.calibrate.results import STAGES
 from experiments.studyfile.campaign import CampaignSettings, Response, Target, Twin
 
-NOISE = 0.3
-"""Standard deviation of one analytic heap [deg]."""
+NOISE = 0.3  # standard deviation of one analytic heap [deg]
 
 FACTORS = (
     Factor("A", 0.16, 0.42),

@@ -144,7 +144,7 @@ def test_a_drums_angle_may_be_the_only_target(write_study: Callable[..., Path], 
     # The stand-in engine turns 15 + 50 x friction: the target lies at 0.5, known to a fifth of a degree.
     assert found.optimum.point["E"] == pytest.approx(0.5, abs=0.05)
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
-    assert "dynamic_angle 40.000°" in page
+    assert "dynamic angle of 40.00°" in page
 
 
 def test_an_interrupted_campaign_of_two_scenes_goes_on_to_the_same_end(

@@ -99,7 +99,7 @@ def test_a_table_is_simulated_each_row_in_its_scene(
     simulated = []
 
     def engine(cases, *, on_result, **_) -> None:
-        simulated.append([type(case.scene) for case in cases])
+        simulated.append({case.seed: type(case.scene) for case in cases})
         for index, _ in enumerate(cases):
             on_result(index, cone())
 
@@ -112,7 +112,8 @@ def test_a_table_is_simulated_each_row_in_its_scene(
     study = load_study(write_study(add=RESPONSES))
     table = pd.DataFrame({"seed": [1, 2, 3], "scene": ["target", "bin", "short"]})
     found = run_cases(study, table, Store(tmp_path))
-    assert simulated == [[LiftedCylinder, Hopper, LiftedCylinder]]  # one call for all
+    # one call for all, the costly ones first
+    assert simulated == [{1: LiftedCylinder, 2: Hopper, 3: LiftedCylinder}]
     # A bin leaves no heap, and is none that failed to be measured.
     assert found["angle"].notna().tolist() == [True, False, True]
     assert found["reason"].eq("").all()

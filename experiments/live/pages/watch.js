@@ -168,6 +168,7 @@ function renderCases() {
 }
 
 function renderLog() {
+  show("log-section", state.log.length > 0);
   const place = byId("log").parentElement;
   const following = place.scrollTop + place.clientHeight >= place.scrollHeight - 8;
   byId("log").replaceChildren(...state.log.map((line) => {

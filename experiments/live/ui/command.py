@@ -16,7 +16,7 @@ UI_EXAMPLE = "Example: [bold]dem-warp ui mygrains[/]"
 def ui(
     folder: Annotated[
         Path | None,
-        typer.Argument(metavar="[DIR]", help="Folder of the files and the runs. Left out: the current one."),
+        typer.Argument(metavar="DIR", help="Folder of the files and the runs. Left out: the current one."),
     ] = None,
     port: Port = 0,
     no_browser: NoBrowser = False,

@@ -71,7 +71,16 @@ def test_heaps_that_lack_nothing_raise_no_alarm_with_a_balance_or_photographs_on
     code, said, err = discover(DATA / "nothing-missing.csv", "--out", out)
     assert (code, said) == (0, "")
     assert "Nothing is missing that these data could show. " in err
-    files = [".lock", "files.json", "report.html", "results.json", "settings.json", "study.json", "tables"]
+    files = [
+        ".live",
+        ".lock",
+        "files.json",
+        "report.html",
+        "results.json",
+        "settings.json",
+        "study.json",
+        "tables",
+    ]
     assert sorted(path.name for path in out.iterdir() if path.name != OUTCOMES) == files
     code, said, _ = discover(
         DATA / "nothing-missing.csv", "--out", out, "--resume", "--photographs-only", "--json"

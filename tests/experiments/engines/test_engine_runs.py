@@ -63,15 +63,15 @@ def test_a_killed_campaign_goes_on_without_losing_or_repeating_a_case(
     order = [sys.executable, "-c", f"from experiments.cli import app; app({words!r})"]
     first = subprocess.Popen(order, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     stored, deadline = out / "cases", time.monotonic() + 120.0
-    while len(list(stored.glob("*.npz"))) < 3 and first.poll() is None and time.monotonic() < deadline:
+    while len(list(stored.glob("[!.]*.npz"))) < 3 and first.poll() is None and time.monotonic() < deadline:
         time.sleep(0.01)
     os.kill(first.pid, signal.SIGKILL)
     first.wait()
-    kept = {path.name for path in stored.glob("*.npz")}
+    kept = {path.name for path in stored.glob("[!.]*.npz")}
     assert len(kept) >= 3
     ended = api.calibrate(study, out, device="cpu", resume=True)
     assert ended.campaign is not None
-    assert kept <= {path.name for path in stored.glob("*.npz")}
+    assert kept <= {path.name for path in stored.glob("[!.]*.npz")}
     counts = runs(stored)
     # Those that ran when the campaign was killed, two at the most, began twice.
     assert sum(count - 1 for count in counts.values()) <= 2

@@ -92,7 +92,38 @@ def test_folders_of_older_versions_show_what_they_hold(
     assert state.progress.state == "interrupted"
     assert [heap["id"] for heap in state.heaps] == [f"case/{KEY}"]
     (folder / "results.json").write_text("{}", encoding="utf-8")
-    assert RunState.read(folder).progress.state == "finished"
+    tables = folder / "tables"
+    tables.mkdir()
+    head, *rows = (
+        "stage,run,status,angle,case_key",
+        f"screening,2,finished,,{KEY}",
+        "climb,1,finished,30.5,other",
+    )
+    (tables / "cases.csv").write_text("\n".join([head, *rows]), encoding="utf-8")
+    decisions = 'stage,rule,outcome\nscreening,the rule,"E, F are kept"\nscreening,,more\nclimb,,over\n'
+    (tables / "decisions.csv").write_text(decisions, encoding="utf-8")
+    state = RunState.read(folder)
+    assert state.progress.state == "finished"
+    assert [(heap["id"], heap["title"], heap["angle"]) for heap in state.heaps] == [
+        ("case/other", "climb, run 1", 30.5),
+        (f"case/{KEY}", "screening, run 2", None),
+    ]
+    assert [(s.name, [d.outcome for d in s.decisions]) for s in state.stages] == [
+        ("screening", ["E, F are kept", "more"]),
+        ("climb", ["over"]),
+    ]
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"status\n\xff\n", b'a,"', b"status,angle\nfinished,nan,3\n", b"\0\n\0"]
+)
+def test_a_damaged_table_of_an_older_version_is_passed_over(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "tables").mkdir()
+    for name in ("cases.csv", "decisions.csv"):
+        (tmp_path / "tables" / name).write_bytes(content)
+    state = RunState.read(tmp_path)
+    assert state.stages == []
+    assert all(case.get("angle") is None for case in state.cases.values())
 
 
 def test_progress_tells_the_time_left(run_folder: Path, small_study: Study) -> None:

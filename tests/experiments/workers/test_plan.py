@@ -93,6 +93,22 @@ def test_a_calibration_is_planned_and_nothing_is_written(write_study: Write, tmp
     assert plan["disk"] > 0
 
 
+def test_published_runs_are_planned_before_the_campaign_or_alone() -> None:
+    runs = {
+        "screening": 12,
+        "climb": 6,
+        "composite": 13,
+        "verification": 3,
+    }  # Tables 3, 5 and 6, and the heaps beside
+    words = ("calibrate", "--scale", "bench", "--paper-replicates", 2)
+    alone = planned(*words, "--only-paper")
+    both = planned(*words, "--follow-paper")
+    cases = {wave["name"]: wave["cases"] for wave in alone["waves"]}
+    assert cases == {f"paper, {stage}": 2 * count for stage, count in runs.items()}
+    assert both["cases"] == alone["cases"] + planned("calibrate", "--scale", "bench")["cases"]
+    assert both["seconds"] > alone["seconds"] > 0
+
+
 def test_a_plan_reads_well(write_study: Write, tmp_path: Path) -> None:
     code, out, _ = dem_warp("calibrate", write_study(), "--device", "cpu", "--workers", 2, "--dry-run")
     assert code == 0
