@@ -27,7 +27,7 @@ class ContactForces:
     forces: np.ndarray
     """[N], shape (n, 3)."""
     points: np.ndarray
-    """Where the two surfaces meet [m], shape (n, 3)."""
+    """Place where the two surfaces meet [m], shape (n, 3)."""
     normals: np.ndarray
     """Unit vectors from the partner to the grain, shape (n, 3)."""
 

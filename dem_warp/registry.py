@@ -72,7 +72,7 @@ class Registry(Mapping[str, T], Generic[T]):
 
     @cached_property
     def _outside(self) -> dict[str, T]:
-        """What packages from outside announce."""
+        """Entries that packages from outside announce."""
         outside: dict[str, T] = {}
         known = ChainMap(outside, self._built_in)  # type: ignore[arg-type]
         for entry in sorted(entry_points(group=self._group), key=lambda entry: entry.name):

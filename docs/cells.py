@@ -15,7 +15,7 @@ LANGUAGES = {".toml": "toml", ".py": "python"}
 """The colouring of files that pages write; others, as tables, have none."""
 
 WRITTEN = re.compile(r"(Writing|Overwriting) \S+")
-"""What IPython says of a cell that is a file, whose name stands in the cell."""
+"""Words of IPython on a cell that is a file, whose name stands in the cell."""
 
 STREAMS = ("stderr", "stream")
 """Classes of what a cell printed; the output stands before the errors, so it is put there last."""

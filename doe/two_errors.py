@@ -30,7 +30,7 @@ MOST = 1.15
 """Largest level over alpha: the coverage for .95 is nowhere below .9425."""
 
 STRAY = 0.125
-"""How far a level may stray from alpha, over alpha, without a search for better: .944 to .956 for .95."""
+"""Share by which a level may stray from alpha without a search for better: .944 to .956 for .95."""
 
 LEVELS = (1e-6, 1e-4, 1e-3, 0.003, 0.05 / 6, 0.0125, 0.05 / 3, 0.025, 0.05, 0.1, 0.2, 0.5, 1.0)
 """Levels for which a rule is looked for, among them .05 shared by 1 to 6; interpolated in the log."""

@@ -35,7 +35,7 @@ WRONG: dict[str, tuple[str, str]] = {
     ),
     "a decision on no factor": ("at_most = 3", 'at_most = 3\nkeep = ["Z"]'),
 }
-"""What is wrong with a study: the template's text, and what stands there instead."""
+"""Mistakes of a study: the template's text, and what stands there instead."""
 
 
 def wrong_study(folder: Path, kind: str) -> Path:

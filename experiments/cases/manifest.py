@@ -1,4 +1,4 @@
-"""What a folder of results says of its study: ``study.json``, its hash, and the differences from another."""
+"""The study of a folder of results: ``study.json``, its hash, and the differences from another."""
 
 from __future__ import annotations
 

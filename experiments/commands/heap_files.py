@@ -27,7 +27,7 @@ BELOW = 0.5
 
 @dataclass(frozen=True)
 class HeapSettings:
-    """What is known of the files of heaps beforehand."""
+    """Facts known of the files of heaps beforehand."""
 
     unit: float | None = None
     """Unit of length [m]; None: the one that a file names, or metres."""

@@ -30,7 +30,7 @@ LARGEST_VOLUME_ERROR = 0.1
 
 @dataclass(frozen=True)
 class ClumpRequest:
-    """What a person asks of a clump."""
+    """Options that a person gives for a clump."""
 
     source: str
     """A file of spheres, a mesh, or a solid by its dimensions in mm (``tri-pyramid:5.90x3.93``)."""

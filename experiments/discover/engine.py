@@ -9,7 +9,7 @@ import numpy as np
 
 from dem_warp import Case, CaseResult, Progress
 from doe.discrepancy import Outcomes, Point
-from experiments.cases import Workers, engine_of
+from experiments.cases import Engine, Workers, engine_of
 from experiments.cases.key import case_key
 from experiments.cases.workers.own import THIS_MACHINE
 from experiments.discover.library import Mechanism, with_mechanisms
@@ -38,6 +38,8 @@ class EngineSimulator:
         Where outcomes are kept; what is there already is not simulated again.
     workers, progress
         As of `WaveRunner`, a wave being all points of a call that are not kept yet.
+    engine
+        Simulates in the place of the study's engine.
 
     Raises
     ------
@@ -52,8 +54,9 @@ class EngineSimulator:
         table: OutcomeTable,
         workers: Workers = THIS_MACHINE,
         progress: Callable[[Progress], None] | None = None,
+        engine: Engine | None = None,
     ) -> None:
-        self.study, self.table, self.engine = study, table, engine_of(study)
+        self.study, self.table, self.engine = study, table, engine or engine_of(study)
         names = [each.name for each in study.scene.measurable]
         told = getattr(self.engine, "observables", names)
         self.observables = tuple(name for name in names if name in (*PHOTOGRAPHED, *told))

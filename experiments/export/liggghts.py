@@ -34,7 +34,7 @@ LAWS = "hertz tangential history rolling_friction cdt"
 _HERTZ = "LIGGGHTS(R)-PUBLIC 3.8, gran model hertz"
 _ROLLING = "LIGGGHTS(R)-PUBLIC 3.8, gran model rolling_friction"
 
-_ORDER = ("normal", "tangential_history", "rolling", "tangential_damping", "attraction")
+_ORDER = ("normal", "tangential_history", "cohesion", "rolling", "tangential_damping", "attraction")
 """Order in which LIGGGHTS wants the words of its model."""
 
 
@@ -58,7 +58,7 @@ def contact_terms(contact: Contact) -> tuple[Term, ...]:
 
 def model_words(words: Mapping[str, str]) -> str:
     """LIGGGHTS' words after ``model``, from those for each law."""
-    return " ".join(words[law] for law in _ORDER if words[law])
+    return " ".join(words[law] for law in _ORDER if words.get(law))
 
 
 def translate(test: ExportedTest) -> Translation:

@@ -152,7 +152,7 @@ def _setup(lift: Lift, model: str, properties: Mapping[str, str], walls: str) ->
     sizes_seed, rain_seed, *seeds = lift.seeds(2 + len(templates))
     gravity = sum(part**2 for part in scene.gravity) ** 0.5
     words = [
-        _template(number, template, seed)
+        grain_template(number, template, seed)
         for number, (template, seed) in enumerate(zip(templates, seeds, strict=True), 1)
     ]
     return _SETUP.format(
@@ -191,8 +191,9 @@ def _setup(lift: Lift, model: str, properties: Mapping[str, str], walls: str) ->
     )
 
 
-def _template(number: int, template: Template, seed: int) -> str:
-    material = f"atom_type 1 density constant {template.density:.9g}"
+def grain_template(number: int, template: Template, seed: int, atom_type: int = 1) -> str:
+    """Write a template as LIGGGHTS' fix ``grain{number}``; the seed is a prime."""
+    material = f"atom_type {atom_type} density constant {template.density:.9g}"
     if template.shape.sphere_count == 1:
         radius = float(template.radii[0])
         return f"fix grain{number} all particletemplate/sphere {seed} {material} radius constant {radius:.9g}"

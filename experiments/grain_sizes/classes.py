@@ -35,7 +35,7 @@ class Classes:
 
     @property
     def told(self) -> str:
-        """What a reader must know of them."""
+        """Cautions that a reader must know."""
         low, high = 1e3 * self.diameters[0], 1e3 * self.diameters[-1]
         return (
             f"{len(self.diameters)} classes from {low:.4g} to {high:.4g} mm; {100.0 * self.mass_lost:.3g} % "

@@ -8,7 +8,7 @@ from typing import Any, Literal, TypeVar
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 Value = str | int | float | bool | None
-"""What a note may hold."""
+"""Values that a note may hold."""
 
 
 class Note(BaseModel):
@@ -28,7 +28,7 @@ class FactorNote(Note):
 
 
 class SampleNote(Note):
-    """What was measured, or simulated for a twin."""
+    """Mean and scatter of what was measured, or simulated for a twin."""
 
     mean: float
     sd: float
@@ -55,7 +55,7 @@ class RunNote(Note):
 
 
 class ProgressNote(Note):
-    """How far the run is, and its batch."""
+    """Progress of the run, and of its batch."""
 
     state: Literal["waiting", "running", "finished", "failed", "interrupted"]
     message: str = ""

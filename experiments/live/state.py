@@ -84,7 +84,7 @@ def _is_file(state: RunState, name: str) -> bool:
 
 
 def _run_of_files(folder: Path) -> dict[str, Any]:
-    """What a folder without a journal tells of its run."""
+    """Facts that a folder without a journal tells of its run."""
     if heap := read_json(folder, "angle.json"):
         return {"command": "heap", "study": heap.get("study"), "scale": heap.get("scale")}
     if not (manifest := read_json(folder, "study.json")):

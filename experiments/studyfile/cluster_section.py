@@ -20,7 +20,7 @@ class ClusterSection(Section):
     """``[cluster]``: workers of Dask, on this machine or as jobs of a scheduler; one a GPU, or one a core."""
 
     kind: Literal["local", "slurm", "pbs", "lsf", "sge", "oar", "htcondor"] = "local"
-    """Where they run: processes of this machine, or jobs of a scheduler."""
+    """Place where they run: processes of this machine, or jobs of a scheduler."""
     workers: int | None = Field(default=None, ge=1)
     """Workers in all; left out: of this machine one a GPU or else one a core, of a scheduler one."""
     gpu: bool | None = None

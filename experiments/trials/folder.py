@@ -14,7 +14,9 @@ from experiments.report.kit.machine import machine
 
 DECLARED, SEALED, LABELS = "declared.json", "sealed.csv", "labels.json"
 FINDINGS, RUNS, NOTES, PAGE = "findings.csv", "runs.csv", "notes.md", "README.md"
-"""Files of a record; labels are there when all is found, notes where something is to be said beside."""
+REALITY = "reality.json"
+"""Files of a record; labels are there when all is found, notes where something is to be said beside, and the
+reality where another code made the heaps."""
 
 
 class Folder:

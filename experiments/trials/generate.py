@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import secrets
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -65,10 +66,12 @@ def generators_study(scale: str) -> Study:
     return load_study(STUDY, scale or None, changes)
 
 
-def seal_trials(folder: Folder, search: Search, bank: Bank, plan: Plan, seed: int) -> None:
+def seal_trials(
+    folder: Folder, search: Search, bank: Bank, plan: Plan, seed: int, strangers: Sequence[Declared]
+) -> None:
     """Declare what the trials should show, draw the truths, and write seals and labels.
 
-    The seed of the drawing must not be known to whoever knows the plan.
+    The seed of the drawing must not be known to whoever knows the plan; the library never has the strangers.
 
     Raises
     ------
@@ -80,11 +83,11 @@ def seal_trials(folder: Folder, search: Search, bank: Bank, plan: Plan, seed: in
         raise InputError(rule, "sealed trials", str(folder.sealed))
     study = search.study
     library = declared_effects(fit_emulator(bank), search.settings, plan.replicates)
-    strangers = tuple(Declared(m.name, m.null, m.maximum) for m in library_for(study, STRANGERS))
     today, settings = time.strftime("%Y-%m-%d"), with_names(search.settings, library)
-    declaration = Declaration(study.name, study.scale or "", today, plan, settings, library, strangers)
+    scale, foreign = study.scale or "", tuple(strangers)
+    declaration = Declaration(study.name, scale, today, plan, settings, library, foreign)
     rng = np.random.default_rng(seed)
-    trials = draw(plan, study.factors, library, strangers, rng, lambda: rng.bytes(16).hex())
+    trials = draw(plan, study.factors, library, foreign, rng, lambda: rng.bytes(16).hex())
     declaration.write(folder.declared)
     write_sealed(folder.sealed, [sealed for _, sealed in trials])
     write_labels(folder.hidden_labels, [label for label, _ in trials])
@@ -116,7 +119,8 @@ def seal(
         numbers = Plan(**read_toml(plan, "a plan of trials")[1]) if plan else Plan()
         place, search = Folder(folder), Search.of(load_study(STUDY, scale or None))
         waves = search.read_bank(bank or bank_beside(scale))
-        seal_trials(place, search, waves, numbers, secrets.randbits(63) if seed is None else seed)
+        strangers = [Declared(m.name, m.null, m.maximum) for m in library_for(search.study, STRANGERS)]
+        seal_trials(place, search, waves, numbers, secrets.randbits(63) if seed is None else seed, strangers)
         print(f"{len(read_sealed(place.sealed))} trials sealed: {place.sealed}")
 
 

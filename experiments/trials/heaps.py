@@ -15,7 +15,8 @@ from experiments.measurement.observables import OBSERVABLES
 from experiments.trials.camera import Camera
 from experiments.trials.truth import Label
 
-_CLOGGED = "clogged"
+CLOGGED = "clogged"
+"""Word of the reason that a tube held its grains, and of its row in a file of measured heaps."""
 
 
 def cases_of(label: Label, conditions: Sequence[str], replicates: int) -> list[Point]:
@@ -48,5 +49,5 @@ def write_heaps(path: Path, label: Label, points: Sequence[Point], outcomes: Out
                 for observable, value in zip(OBSERVABLES, row, strict=True):
                     unit = "" if observable.unit == "1" else observable.unit
                     writer.writerow((point.condition, replicate, observable.name, f"{value:.8g}", unit))
-            elif _CLOGGED in reason:
-                writer.writerow((point.condition, replicate, _CLOGGED, "", ""))
+            elif CLOGGED in reason:
+                writer.writerow((point.condition, replicate, CLOGGED, "", ""))

@@ -17,7 +17,7 @@ import typer
 from experiments.commands.console import clear_errors
 from experiments.errors import InputError
 from experiments.files import copy_file
-from experiments.trials.folder import DECLARED, FINDINGS, LABELS, RUNS, SEALED, Folder
+from experiments.trials.folder import DECLARED, FINDINGS, LABELS, REALITY, RUNS, SEALED, Folder
 from experiments.trials.trials_page import write_trials_page
 
 
@@ -30,6 +30,8 @@ def gather(folder: Folder, record: Path) -> None:
         When one is missing.
     """
     files = [*(folder.record / name for name in (DECLARED, SEALED, FINDINGS, RUNS)), folder.hidden / LABELS]
+    if (reality := folder.record / REALITY).is_file():
+        files.append(reality)
     for source in files:
         if not source.is_file():
             raise InputError("trials that are revealed have run", "no such file", str(source))

@@ -3,9 +3,10 @@
     python -m experiments.trials.run out/trials --part alone --device cuda --seconds 480
     python -m experiments.trials.run out/trials --plan-only
 
-It sees the measured heaps and the seals, never the labels. After ``--seconds`` it stops between two batches;
-called again, it goes on: analyses that have ended are not begun again, and the others take what was simulated
-from the table of outcomes. The exit code is 3 while some have not ended.
+It sees the measured heaps and the seals, never the labels; a trial without heaps waits for them. After
+``--seconds`` it stops between two batches; called again, it goes on: analyses that have ended are not begun
+again, and the others take what was simulated from the table of outcomes. The exit code is 3 while some have
+not ended.
 """
 
 from __future__ import annotations
@@ -123,7 +124,9 @@ def main(
         if plan_only:
             print(plan_page(place, bank))
             return
-        trials = chosen(read_sealed(place.sealed), part, every)
+        sealed = chosen(read_sealed(place.sealed), part, every)
+        # heaps may be made in chunks: what has none yet waits
+        trials = [trial for trial in sealed if place.measured(trial.trial).exists()]
         try:
             run_trials(place, trials, bank, views, device, workers, seconds)
         except OutOfTime:

@@ -1,4 +1,4 @@
-"""What Windows, macOS and a bare C locale ask of the CPU's path, as far as one machine shows it."""
+"""Demands on the CPU's path of Windows, macOS and a bare C locale, as far as one machine shows it."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ GUARDED = {
     "experiments/cases/keeper.py": {"os.killpg", "signal.SIGKILL"},
     "experiments/runs/examination.py": {"os.sched_getaffinity"},
 }
-"""What stands behind a question for the system."""
+"""Calls that stand behind a question for the system."""
 ASKED = {"experiments/report/kit/machine.py": {"/proc/cpuinfo"}}
 """Places of one system that are looked for, and may be missing."""
 

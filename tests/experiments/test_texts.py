@@ -1,4 +1,4 @@
-"""What people's programs write: marks, encodings, commas, units, brackets."""
+"""Texts as people's programs write them: marks, encodings, commas, units, brackets."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a person asks for, against what there is: devices, number of workers, name of the machine."""
+"""Resources as asked for, against what there is: devices, number of workers, name of the machine."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""What a run leaves in its folder while it works, so that anyone who can read the folder can watch it."""
+"""The trail that a run leaves in its folder while it works: whoever can read it can watch the run."""

@@ -1,4 +1,4 @@
-"""What the page to start from can do in its folder, each by the function that a command calls."""
+"""Actions of the page to start from in its folder, each by the function that a command calls."""
 
 from __future__ import annotations
 
@@ -248,7 +248,7 @@ class Workshop:
 
 
 def problems_of(error: InputError) -> dict[str, Any]:
-    """What an input breaks, in the command line's own words, and rule, value and place of each."""
+    """Rules that an input breaks, in the command line's own words, and rule, value and place of each."""
     rows = [{"rule": each.rule, "value": each.value, "place": each.place} for each in error.problems]
     return {"error": str(error), "problems": rows}
 

@@ -32,7 +32,7 @@ SIGNS: Mapping[str, str] = MappingProxyType(
         "\u202f": r"\,",
     }
 )
-"""What LaTeX has for a sign."""
+"""Signs, as LaTeX writes them."""
 
 _SIGN = re.compile("|".join(re.escape(sign) for sign in SIGNS))
 

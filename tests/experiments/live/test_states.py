@@ -1,4 +1,4 @@
-"""What a folder tells of its run: waiting, running, finished, failed, interrupted, of an older version."""
+"""States of a run by its folder: waiting, running, finished, failed, interrupted, of an older version."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is said before anything runs: ``--dry-run``, the time left, and ``dem-warp doctor``."""
+"""Plans and times told before anything runs: ``--dry-run``, the time left, and ``dem-warp doctor``."""
 
 from __future__ import annotations
 

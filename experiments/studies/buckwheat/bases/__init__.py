@@ -1,1 +1,1 @@
-"""What may stand as the study's base: law, clump and plate together, and how the heaps are read."""
+"""Candidates for the study's base: law, clump and plate together, and how the heaps are read."""

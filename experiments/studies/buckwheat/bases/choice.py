@@ -35,7 +35,7 @@ SEED = 1
 """Of the bootstrap."""
 
 AXES = ("law", "clump", "plate", "estimator")
-"""What a candidate is made of."""
+"""Parts that a candidate is made of."""
 
 SEEN = tuple(seen for size in (2, 1) for seen in combinations(DESIGNS, size))
 """Tables that choose: any two, any one."""

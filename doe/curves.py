@@ -1,0 +1,152 @@
+"""Emulators of curves: a simulated function of a place, as a smooth function of the settings of a model.
+
+The curves of a design are taken apart into their principal components, and the scores of each are kriged over
+the coded settings, with a linear trend and a noise that is found with them. What the components leave out
+and what kriging does not know are the emulator's own covariance.
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from doe.discrepancy.threads import in_one_thread
+from doe.errors import RuleError
+
+Array = NDArray[np.float64]
+
+LEAST_CURVES = 3
+"""Curves beyond the terms of a linear trend that an emulator is fitted to."""
+
+KEPT_VARIANCE = 0.999
+"""Part of the curves' variance that the components hold."""
+
+MOST_COMPONENTS = 6
+"""Components at the most."""
+
+
+@dataclass(frozen=True, eq=False)
+class CurveEmulator:
+    """Curves at the same places, as a function of coded settings."""
+
+    mean: Array
+    """Mean curve of the design, shape (places,)."""
+    components: Array
+    """Unit vectors, shape (components, places)."""
+    trends: Array
+    """Constant and slopes of each score, shape (components, 1 + settings)."""
+    trend_error: Array
+    """Covariance of constant and slopes for a noise of 1, shape (1 + settings, 1 + settings)."""
+    processes: tuple[Any, ...]
+    """Rest of each score that the trend misses, a process of scikit-learn each."""
+    noises: Array
+    """Variance of the noise of one run in each score, shape (components,)."""
+    remainder: Array
+    """Variance that the components leave out, shape (places,)."""
+
+    @classmethod
+    @in_one_thread
+    def of(cls, settings: ArrayLike, curves: ArrayLike) -> CurveEmulator:
+        """Fit an emulator.
+
+        Parameters
+        ----------
+        settings
+            Coded settings of the runs, about -1 to +1, shape (runs, settings).
+        curves
+            A row a run, shape (runs, places).
+
+        Raises
+        ------
+        RuleError
+            When there are too few runs, or a value is not finite.
+        """
+        x, rows = np.array(settings, dtype=np.float64), np.array(curves, dtype=np.float64)
+        if x.ndim != 2 or rows.ndim != 2 or len(x) != len(rows):
+            raise RuleError("has a row a run", f"shapes {x.shape} and {rows.shape}", "curves")
+        least = x.shape[1] + 1 + LEAST_CURVES
+        if len(x) < least:
+            raise RuleError(f"needs {least} runs or more", len(x), "curves")
+        if not (np.isfinite(x).all() and np.isfinite(rows).all()):
+            raise RuleError("must be finite", "another number", "curves")
+        mean = rows.mean(axis=0)
+        _, sizes, directions = np.linalg.svd(rows - mean, full_matrices=False)
+        share = np.cumsum(sizes**2) / max(float(np.sum(sizes**2)), np.finfo(float).tiny)
+        count = min(int(np.searchsorted(share, KEPT_VARIANCE)) + 1, MOST_COMPONENTS, len(sizes))
+        components = directions[:count]
+        scores = (rows - mean) @ components.T
+        left = rows - mean - scores @ components
+        basis = _with_constant(x)
+        trends = np.linalg.lstsq(basis, scores, rcond=None)[0].T
+        fitted = [_process(x, miss) for miss in (scores - basis @ trends.T).T]
+        return cls(
+            mean,
+            components,
+            trends,
+            np.asarray(np.linalg.pinv(basis.T @ basis), dtype=np.float64),
+            tuple(process for process, _ in fitted),
+            np.array([noise for _, noise in fitted]),
+            left.var(axis=0),
+        )
+
+    def scores(self, settings: ArrayLike) -> tuple[Array, Array]:
+        """Expected scores at coded settings, and the variances of what is not known of them.
+
+        Returns
+        -------
+        mean, variance : (points, components) arrays
+        """
+        x = np.atleast_2d(np.asarray(settings, dtype=np.float64))
+        basis = _with_constant(x)
+        means = basis @ self.trends.T
+        variances = np.einsum("ij,jk,ik->i", basis, self.trend_error, basis)[:, None] * self.noises
+        for number, process in enumerate(self.processes):
+            miss, deviation = process.predict(x, return_std=True)
+            means[:, number] += miss
+            variances[:, number] += deviation**2
+        return means, variances
+
+    def predict(self, settings: ArrayLike) -> tuple[Array, Array]:
+        """Expected curves at coded settings, and their variances without the noise of a run.
+
+        Returns
+        -------
+        mean, variance : (points, places) arrays
+        """
+        scores, variances = self.scores(settings)
+        return self.mean + scores @ self.components, variances @ self.components**2 + self.remainder
+
+    def covariance(self, variances: Array, places: ArrayLike) -> Array:
+        """Covariance of the emulator at some places, given as numbers, for variances of the scores."""
+        own = self.components[:, np.asarray(places)]
+        return np.asarray(own.T * variances @ own + np.diag(self.remainder[np.asarray(places)]))
+
+
+def _with_constant(x: Array) -> Array:
+    return np.column_stack([np.ones(len(x)), x])
+
+
+def _process(x: Array, values: Array) -> tuple[Any, float]:
+    """Krige values whose noise is found with the rest; the process predicts without the noise."""
+    from sklearn.exceptions import ConvergenceWarning
+    from sklearn.gaussian_process import GaussianProcessRegressor
+    from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
+
+    scale = float(np.sqrt(np.mean(values**2))) or 1.0
+    smooth = ConstantKernel(0.7, (1e-2, 1e2)) * RBF(np.full(x.shape[1], 1.0), (0.4, 8.0))
+    process = GaussianProcessRegressor(
+        smooth + WhiteKernel(0.2, (1e-4, 2.0)), n_restarts_optimizer=1, random_state=0
+    )
+    with warnings.catch_warnings():
+        # An amplitude or a length at the end of its range is an answer, not a failure.
+        warnings.simplefilter("ignore", ConvergenceWarning)
+        process.fit(x, values / scale)
+    noise = float(process.kernel_.k2.noise_level)
+    known = GaussianProcessRegressor(
+        ConstantKernel(scale**2, "fixed") * process.kernel_.k1, alpha=noise * scale**2, optimizer=None
+    )
+    return known.fit(x, values), noise * scale**2

@@ -1,0 +1,163 @@
+"""The generator of the second reality: truths are drawn and sealed, and another code makes their heaps.
+
+    python -m experiments.trials.other_codes.generate seal out/liggghts --code liggghts
+    python -m experiments.trials.other_codes.generate measure out/liggghts --seconds 3000
+    python -m experiments.trials.run out/liggghts --view everything --device cpu
+    python -m experiments.trials.record out/liggghts --out experiments/trials/record/liggghts
+
+Folders are those of `experiments.trials.generate`, so that analysis, score and record are the same. What
+hides nothing is measured first. After ``--seconds`` no trial is begun; called again, it goes on where it was:
+a heap that was measured is kept. The exit code is 3 while some trials have not been measured.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import secrets
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from experiments.cases import Resources, Workers, open_workers
+from experiments.commands.console import clear_errors
+from experiments.discover.outcome_table import OutcomeTable
+from experiments.discover.search import Search
+from experiments.errors import InputError
+from experiments.files import write_text
+from experiments.studyfile import load_study
+from experiments.toml_files import read_toml
+from experiments.trials.declaration import Declaration, read_declaration
+from experiments.trials.drawing import Plan
+from experiments.trials.folder import REALITY, Folder, noted_run
+from experiments.trials.generate import STUDY, bank_beside, seal_trials
+from experiments.trials.heaps import CLOGGED, cases_of, write_heaps
+from experiments.trials.other_codes.effects import DECLARED, STRANGERS
+from experiments.trials.other_codes.making import LAWS, MADE
+from experiments.trials.other_codes.program import CODES, engine_for
+from experiments.trials.other_codes.setting import Setting
+from experiments.trials.other_codes.simulator import OtherCodeSimulator, workshop_study
+from experiments.trials.run import UNFINISHED
+from experiments.trials.truth import Kind, Label, read_labels, read_sealed, revealed
+
+PLAN = Plan(nulls=40, strong=8, weak=0, unresolved=8, withheld=0, strangers=4, pairs=12, replicates=8)
+"""Numbers of trials, where no other plan is given; mechanisms are those that the code can make."""
+
+SCALE = "bench"
+
+MISSING = 0.1
+"""Largest part of a trial's heaps that may fail; a clogged tube is none of them."""
+
+app = typer.Typer(help="Draw, seal and measure blind trials whose heaps another code makes.")
+
+
+def plan_for(code: str, plan: Plan) -> Plan:
+    """Plan whose mechanisms a code can make: all of them, where it names none.
+
+    Raises
+    ------
+    InputError
+        When it names one that the code cannot make.
+    """
+    known = MADE[code]
+    if strange := sorted(set(plan.mechanisms) - set(known)):
+        raise InputError(f"{code} makes {', '.join(known)}", strange, "Plan.mechanisms")
+    return replace(plan, mechanisms=plan.mechanisms or tuple(known))
+
+
+def write_reality(path: Path, code: str) -> None:
+    """Write down which code makes the heaps, and how it makes each effect."""
+    told = {
+        "code": code,
+        "name": CODES[code].name,
+        "laws": LAWS[code],
+        "library": dict(MADE[code]),
+        "strangers": {name: each.sentence for name, each in STRANGERS.items()},
+    }
+    write_text(path, json.dumps(told, indent=1) + "\n")
+
+
+def code_of(folder: Folder) -> str:
+    """Name of the code that makes the heaps of a folder."""
+    return str(json.loads((folder.record / REALITY).read_text(encoding="utf-8"))["code"])
+
+
+def in_turn(labels: Sequence[Label]) -> list[Label]:
+    """Labels in the order in which they are measured: nothing hidden first."""
+    return sorted(labels, key=lambda label: (label.kind is not Kind.NULL, label.trial))
+
+
+def measure_in_time(
+    folder: Folder, labels: Sequence[Label], declaration: Declaration, workers: Workers, deadline: float
+) -> int:
+    """Measure trials one after the other until a deadline of ``time.monotonic``; count what is left."""
+    code, study = code_of(folder), workshop_study(declaration.scale)
+    conditions = [condition.name for condition in study.conditions]
+    table = OutcomeTable(folder.hidden / "outcomes.sqlite")
+    waiting = [label for label in in_turn(labels) if not folder.measured(label.trial).exists()]
+    for done, label in enumerate(waiting):
+        if time.monotonic() > deadline:
+            return len(waiting) - done
+        setting = Setting.drawn(code, label.seed)
+        with (
+            OtherCodeSimulator(study, code, setting, table, workers) as simulator,
+            noted_run(folder, f"heaps, {CODES[code].name}", "cpu", table),
+        ):
+            wave = cases_of(label, conditions, declaration.plan.replicates)
+            outcomes = simulator(wave)
+        failed = sum(bool(reason) and CLOGGED not in reason for reason in outcomes.reasons)
+        if failed > MISSING * len(wave):
+            rule = f"at most {MISSING:.0%} of a trial's heaps may fail"
+            raise InputError(rule, f"{failed} of {len(wave)}", f"{label.trial}: {max(outcomes.reasons)}")
+        write_heaps(folder.measured(label.trial), label, wave, outcomes)
+        lacking = f", {failed} of {len(wave)} heaps failed" if failed else ""
+        print(f"{label.trial} measured{lacking}; {len(waiting) - done - 1} left", flush=True)
+    return 0
+
+
+@app.command()
+def seal(
+    folder: Annotated[Path, typer.Argument(help="Folder of the trials.")],
+    code: Annotated[str, typer.Option(help="Code that makes the heaps.")] = "liggghts",
+    bank: Annotated[Path | None, typer.Option(help="Bank of the trial study; left out: its own.")] = None,
+    scale: Annotated[str, typer.Option(help="Scale of the trial study.")] = SCALE,
+    plan: Annotated[Path | None, typer.Option(help="TOML file with numbers of trials.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of the drawing; left out: a secret one.")] = None,
+) -> None:
+    """Draw the truths; write their seals, to be published, and their labels, to be kept."""
+    with clear_errors():
+        engine_for(code)
+        numbers = plan_for(code, Plan(**read_toml(plan, "a plan of trials")[1]) if plan else PLAN)
+        place, search = Folder(folder), Search.of(load_study(STUDY, scale or None))
+        waves = search.read_bank(bank or bank_beside(scale))
+        drawn = secrets.randbits(63) if seed is None else seed
+        seal_trials(place, search, waves, numbers, drawn, DECLARED)
+        write_reality(place.record / REALITY, code)
+        print(f"{len(read_sealed(place.sealed))} trials sealed: {place.sealed}")
+
+
+@app.command()
+def measure(
+    folder: Annotated[Path, typer.Argument(help="Folder of the trials.")],
+    workers: Annotated[int | None, typer.Option(help="Heaps at once; left out: one a core.")] = None,
+    seconds: Annotated[float, typer.Option(help="Begin no trial after this time.")] = math.inf,
+) -> None:
+    """Let the code make the heaps of the trials, and measure them."""
+    deadline = time.monotonic() + seconds
+    with clear_errors("Resume with the same command."):
+        place = Folder(folder)
+        declaration = read_declaration(place.declared)
+        labels = list(revealed(read_labels(place.hidden_labels), read_sealed(place.sealed)).values())
+        with open_workers(Resources("cpu", workers)) as simulators:
+            left = measure_in_time(place, labels, declaration, simulators, deadline)
+    if left:
+        print(f"time is up; {left} trials have not been measured: run it again")
+        raise typer.Exit(UNFINISHED)
+
+
+if __name__ == "__main__":
+    app()
