@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from itertools import combinations_with_replacement
 
 import numpy as np
@@ -16,22 +17,27 @@ from doe.discrepancy.emulation.kriging import Kriging
 from doe.discrepancy.emulation.noise import Noise
 
 
+@cache
+def _products(size: int, degree: int) -> np.ndarray:
+    """Numbers of the factors in each product of a degree, (degree, products)."""
+    return np.array([*combinations_with_replacement(range(size), degree)], dtype=int).reshape(-1, degree).T
+
+
 def quadratic(theta: np.ndarray) -> np.ndarray:
     """Terms of a full quadratic: 1, factors, squares and products, (n, terms)."""
-    pairs = combinations_with_replacement(range(theta.shape[1]), 2)
-    products = [theta[:, i] * theta[:, j] for i, j in pairs]
-    return np.column_stack([np.ones(len(theta)), theta, *products])
+    i, j = _products(theta.shape[1], 2)
+    return np.concatenate([np.ones((len(theta), 1)), theta, theta[:, i] * theta[:, j]], axis=1)
 
 
 def cubic(theta: np.ndarray) -> np.ndarray:
     """Terms of a full cubic: those of the quadratic, then products of three factors, (n, terms)."""
-    triples = combinations_with_replacement(range(theta.shape[1]), 3)
-    return np.column_stack([quadratic(theta), *(theta[:, list(triple)].prod(axis=1) for triple in triples)])
+    i, j, k = _products(theta.shape[1], 3)
+    return np.concatenate([quadratic(theta), theta[:, i] * theta[:, j] * theta[:, k]], axis=1)
 
 
 def added(theta: np.ndarray, size: np.ndarray) -> np.ndarray:
     """Terms of what a mechanism adds: its size times a full quadratic of size and factors, (n, terms)."""
-    return np.asarray(size[:, None] * quadratic(np.column_stack([size, theta])))
+    return np.asarray(size[:, None] * quadratic(np.concatenate([size[:, None], theta], axis=1)))
 
 
 def all_terms(x: np.ndarray, factors: int) -> np.ndarray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy import stats
@@ -17,8 +18,8 @@ SCOUTING = 6
 """Steps after which only the best starts go on."""
 FINALISTS = 3
 """Starts that go on, each with the weights of where it is."""
-LEADERS = 3
-"""Of these, so many go down to the least score."""
+DEEPEST = 10.0
+"""Fall of the score that a descent may bring: the best goes down to the least, others if they may pass it."""
 APART = 0.1
 """Starts that have come nearer to each other than this, in coded units, are one."""
 DESCENTS = 12
@@ -60,8 +61,20 @@ class Fitted:
     """Sum of squares of the whitened residuals."""
     score: float
     """q plus the logarithm of the determinant: minus twice the log-likelihood, but for a constant."""
-    spread: np.ndarray
-    """Covariance of the parameters, but for the error of the model's shift, (parameters, parameters)."""
+
+    @cached_property
+    def slopes(self) -> np.ndarray:
+        """Whitened derivatives by the parameters, (means, parameters)."""
+        return np.asarray(self.whitening @ self.stack.jacobian(self.x[None])[0])
+
+    @cached_property
+    def spread(self) -> np.ndarray:
+        """Covariance of the parameters, but for the error of the model's shift, (parameters, parameters).
+
+        The ranges are what is known of a parameter that the data say nothing of.
+        """
+        information = self.slopes.T @ self.slopes + np.diag(model_width(self.model) ** -2)
+        return np.asarray(np.linalg.inv(information))
 
     @property
     def model(self) -> Model:
@@ -109,7 +122,7 @@ class Fitted:
     def sensitivities(self) -> np.ndarray:
         """Whitened derivatives by the parameters that are not at an end of their range, (means, free)."""
         free = (self.x > self.model.lower + AT_BOUND) & (self.x < self.model.upper - AT_BOUND)
-        return np.asarray(self.whitening @ self.stack.jacobian(self.x[None])[0][:, free])
+        return self.slopes[:, free]
 
 
 def minimise(
@@ -174,28 +187,11 @@ def _whitened(whitening: np.ndarray, residuals: np.ndarray) -> np.ndarray:
 
 
 def fit(stack: Stack, starts: np.ndarray | None = None, count: int = 8) -> Fitted:
-    """Calibrate a model: `fit_ahead`, and where it has a direction, in that too.
-
-    It is looked for at azimuth 0 and from behind, and at others where that lowers the score by `TURNED`.
-    """
-    if not stack.model.is_directed:
-        return fit_ahead(stack, starts, count)
-    sides = [fit_ahead(_facing(stack, heading), starts, count) for heading in (0.0, 180.0)]
-    best = min(sides, key=lambda each: each.score)
-    others = [_descend(weigh(_facing(stack, best.model.heading + turn), best.x)) for turn in TURNS]
-    other = min(others, key=lambda each: each.score)
-    return other if other.score < best.score - TURNED else best
-
-
-def _facing(stack: Stack, heading: float) -> Stack:
-    return Stack(replace(stack.model, heading=heading % 360.0), stack.blocks)
-
-
-def fit_ahead(stack: Stack, starts: np.ndarray | None = None, count: int = 8) -> Fitted:
     """Calibrate a model: the least score, from several starts.
 
     The weights change with the parameters, so that sums of squares of different places do not compare, and
-    under the weights of one place every other is behind.
+    under the weights of one place every other is behind. A direction is looked for at azimuth 0 and from
+    behind, and at others where that lowers the score by `TURNED`.
 
     Parameters
     ----------
@@ -205,24 +201,62 @@ def fit_ahead(stack: Stack, starts: np.ndarray | None = None, count: int = 8) ->
     count : int
         Sobol points to start from.
     """
-    model = stack.model
-    lower, upper = model.lower, model.upper
-    tried = [model.start[None], lower + sobol_points(count, len(lower), 0) * (upper - lower)]
+    lower, upper = stack.model.lower, stack.model.upper
+    tried = [stack.model.start[None], lower + sobol_points(count, len(lower), 0) * (upper - lower)]
     x = np.concatenate(tried if starts is None else [np.atleast_2d(starts), *tried])
-    near, _ = minimise(stack, whiten(stack.covariance(x[0])), stack.target, x, lower, upper, SCOUTING)
-    # also where they start: the weights of one place lead away from others
-    seen = _best_apart([weigh(stack, each) for each in (*near, *x)])
-    weights = np.array([each.whitening for each in seen])
-    x, _ = minimise(stack, weights, stack.target, np.array([each.x for each in seen]), lower, upper)
-    seen = _best_apart([*seen, *(weigh(stack, each) for each in x)])
-    return min((_descend(each) for each in seen[:LEADERS]), key=lambda each: each.score)
+    if not stack.model.is_directed:
+        return _least([stack], x)
+    best = _least([_facing(stack, heading) for heading in (0.0, 180.0)], x)
+    return _turned(best)
+
+
+def _facing(stack: Stack, heading: float) -> Stack:
+    return Stack(replace(stack.model, heading=heading % 360.0), stack.blocks)
+
+
+def _least(stacks: Sequence[Stack], starts: np.ndarray) -> Fitted:
+    """Find the least score of several models of the same parameters, from the same starts."""
+    scouted = []
+    for stack in stacks:
+        lower, upper = stack.model.lower, stack.model.upper
+        first = whiten(stack.covariance(starts[0]))
+        near, _ = minimise(stack, first, stack.target, starts, lower, upper, SCOUTING)
+        # also where they start: the weights of one place lead away from others
+        scouted += [weigh(stack, each) for each in (*near, *starts)]
+    seen = _best_apart(scouted)
+    for stack in stacks:
+        own = [each for each in seen if each.stack is stack]
+        if own:
+            lower, upper = stack.model.lower, stack.model.upper
+            weights, x = np.array([each.whitening for each in own]), np.array([each.x for each in own])
+            x, _ = minimise(stack, weights, stack.target, x, lower, upper)
+            seen = [*seen, *(weigh(stack, each) for each in x)]
+    leader, *others = _best_apart(seen)
+    best = _descend(leader)
+    near_it = [each for each in others if each.score < best.score + DEEPEST]
+    return min([best, *map(_descend, near_it)], key=lambda each: each.score)
+
+
+def _turned(best: Fitted) -> Fitted:
+    """Turn a directed model to another azimuth where that is better by more than chance."""
+    stacks = [_facing(best.stack, best.model.heading + turn) for turn in TURNS]
+    lower, upper = best.model.lower, best.model.upper
+    steps = [
+        minimise(each, best.whitening, each.target, best.x[None], lower, upper, SCOUTING) for each in stacks
+    ]
+    turn = int(np.argmin([q[0] for _, q in steps]))
+    x, q = steps[turn]
+    if q[0] >= best.q:
+        return best
+    other = _descend(weigh(stacks[turn], x[0]))
+    return other if other.score < best.score - TURNED else best
 
 
 def _best_apart(tried: Sequence[Fitted]) -> list[Fitted]:
     """Pick those of the best scores that are not near a better one."""
     chosen: list[Fitted] = []
     for one in sorted(tried, key=lambda each: each.score):
-        if all(np.abs(one.x - other.x).max() > APART for other in chosen):
+        if all(one.stack is not each.stack or np.abs(one.x - each.x).max() > APART for each in chosen):
             chosen.append(one)
     return chosen[:FINALISTS]
 
@@ -252,8 +286,7 @@ def _score_slope(fitted: Fitted) -> tuple[np.ndarray, np.ndarray]:
     Of a normal law with mean m(x) and covariance C(x): -m' C^-1 r + tr(C^-1 C') / 2 - r' C^-1 C' C^-1 r / 2,
     and m' C^-1 m' + tr(C^-1 C' C^-1 C') / 2.
     """
-    stack, whitening, residual = fitted.stack, fitted.whitening, fitted.residuals
-    slopes = whitening @ stack.jacobian(fitted.x[None])[0]
+    stack, whitening, residual, slopes = fitted.stack, fitted.whitening, fitted.residuals, fitted.slopes
     turns = []
     for number in range(len(fitted.x)):
         inward = -1.0 if fitted.x[number] > fitted.model.start[number] else 1.0
@@ -267,16 +300,13 @@ def _score_slope(fitted: Fitted) -> tuple[np.ndarray, np.ndarray]:
 
 
 def weigh(stack: Stack, x: np.ndarray) -> Fitted:
-    """Sums of squares and covariances of a model at given coded parameters."""
+    """Weigh a model at given coded parameters by its covariance there."""
     covariance = stack.covariance(x)
     whitening = whiten(covariance)
     residual = whitening @ (stack.target - stack.predict(x[None])[0])
     q = float(residual @ residual)
     score = q - 2.0 * float(np.log(np.diag(whitening)).sum())
-    slopes = whitening @ stack.jacobian(x[None])[0]
-    # The ranges are what is known of a parameter that the data say nothing of.
-    spread = np.linalg.inv(slopes.T @ slopes + np.diag((model_width(stack.model)) ** -2))
-    return Fitted(stack, x, covariance, whitening, q, score, spread)
+    return Fitted(stack, x, covariance, whitening, q, score)
 
 
 def model_width(model: Model) -> np.ndarray:

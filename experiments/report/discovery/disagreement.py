@@ -103,7 +103,9 @@ def heading_phrase(fit: Fit) -> str:
     if fit.heading is None:
         return ""
     towards = {0.0: "to the right of the pictures (+x)", 180.0: "to the left of the pictures (-x)"}
-    other = f"at an azimuth of {fit.heading:.0f} degrees from the right of the pictures"
+    # pictures from one side do not tell if it is towards the camera or away from it
+    off = min(fit.heading, 360.0 - fit.heading)
+    other = f"some {off:.0f} degrees off the right of the pictures, towards the camera or away from it"
     return f", down {towards.get(fit.heading, other)}"
 
 
