@@ -126,9 +126,8 @@ def test_a_tilt_seen_from_behind_is_written_as_the_study_has_it(
     lean = found.data.observables.index("asymmetry")
     for heading, share in ((0.0, 1.0), (180.0, -1.0), (60.0, 0.5), (90.0, None)):
         chosen = replace(found.chosen, heading=heading, **tilted)
-        write_discovery(
-            replace(found, chosen=chosen), trial, trial_terms, Settings(), tmp_path / f"{heading}"
-        )
+        folder = tmp_path / f"{heading}"
+        write_discovery(replace(found, chosen=chosen), trial, trial_terms, Settings(), folder)
         study = load_study(folder / "study-with-plate_tilt.toml")
         matched = [one for one in study.target.responses if one.observable == BY_NAME["asymmetry"].column]
         if share is None:
