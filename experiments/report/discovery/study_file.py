@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,6 @@ from doe.discrepancy import Candidate, Data, Discovery, Fit, Interval, Verdict
 from experiments.cases.manifest import study_hash
 from experiments.discover.library import Mechanism, with_mechanisms
 from experiments.files import write_text
-from experiments.measurement.observables import BY_NAME
 from experiments.measurement.target import Replicated, target_tables
 from experiments.report.clump_files import gather_clumps
 from experiments.report.discovery.terms import Terms
@@ -67,7 +66,8 @@ def extended_document(
     ranges = {mechanism.name: _range(mechanism, size) for mechanism, size in added.items()}
     document = with_mechanisms(study, list(added), ranges).document
     seen = {one.name: math.cos(math.radians((heading or 0.0) - one.camera)) for one in study.conditions}
-    if tables := target_tables(study, _replicated(data, seen)):
+    directed = [each.name for each in study.measurable if each.directed]
+    if tables := target_tables(study, _replicated(data, directed, seen)):
         document = {key: value for key, value in document.items() if key != "response"} | tables
     return document
 
@@ -87,7 +87,7 @@ def _range(mechanism: Mechanism, size: Interval) -> tuple[float, float]:
     return (low, high) if low < high else (mechanism.null, mechanism.maximum)
 
 
-def _replicated(data: Data, seen: Mapping[str, float]) -> Iterator[Replicated]:
+def _replicated(data: Data, directed: Sequence[str], seen: Mapping[str, float]) -> Iterator[Replicated]:
     """Every mean of more than one measurement, with the scatter that the analysis gave it.
 
     By condition, so much is seen of what has a direction; less than `LEAST_SEEN` of it is left out.
@@ -96,7 +96,7 @@ def _replicated(data: Data, seen: Mapping[str, float]) -> Iterator[Replicated]:
         for column, observable in enumerate(data.observables):
             read = (data.means, data.standard_errors, data.replicates)
             mean, se, count = (table[row, column] for table in read)
-            share = seen.get(condition, 1.0) if BY_NAME[observable].directed else 1.0
+            share = seen.get(condition, 1.0) if observable in directed else 1.0
             if count >= 2 and np.isfinite(se) and se > 0.0 and abs(share) >= LEAST_SEEN:
                 mean, se = mean / share, se / abs(share)
                 mean, sd = (float(f"{value:.6g}") for value in (mean, se * np.sqrt(count)))
