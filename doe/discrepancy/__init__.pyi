@@ -3,15 +3,27 @@
 from .analysis import Analysis, analyse, drive
 from .contest.gap import Answer, Question
 from .contest.power import Power
+from .contest.slips import Slip
 from .emulation.bank import Bank, bank_points, load_bank, make_bank
 from .emulation.emulator import Emulator, fit_emulator
 from .fitting.fit import Interval
-from .problem.measured import Measured
+from .problem.measured import Calibration, Measured
 from .problem.settings import Settings, settings_of
 from .problem.simulator import Outcomes, Point, Simulator
 from .problem.space import MechanismRange, SearchSpace
 from .verdict.before_after import BeforeAfter
-from .verdict.discovery import Candidate, Confounding, Data, Discovery, Drift, Effort, Fit, Gap, Verdict
+from .verdict.discovery import (
+    CalibrationUse,
+    Candidate,
+    Confounding,
+    Data,
+    Discovery,
+    Drift,
+    Effort,
+    Fit,
+    Gap,
+    Verdict,
+)
 from .verdict.next_experiment import NextExperiment
 
 __all__ = [
@@ -19,6 +31,8 @@ __all__ = [
     "Answer",
     "Bank",
     "BeforeAfter",
+    "Calibration",
+    "CalibrationUse",
     "Candidate",
     "Confounding",
     "Data",
@@ -39,6 +53,7 @@ __all__ = [
     "SearchSpace",
     "Settings",
     "Simulator",
+    "Slip",
     "Verdict",
     "analyse",
     "bank_points",

@@ -7,7 +7,7 @@ run with any simulator, and hundreds side by side with all their waves in one ba
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from doe.discrepancy.contest.laboratory import Laboratory, Request
 from doe.discrepancy.contest.power import Effects, Power, alike, powers
 from doe.discrepancy.contest.rounds import Contender, Contenders, simulate_again
 from doe.discrepancy.contest.signatures import Signatures, signatures
+from doe.discrepancy.contest.slips import find_slips, without
 from doe.discrepancy.emulation.emulator import Emulator
 from doe.discrepancy.fitting.evidence import Evidence, gather
 from doe.discrepancy.fitting.fit import Fitted, fit, weigh
@@ -24,9 +25,9 @@ from doe.discrepancy.fitting.model import Model, Stack
 from doe.discrepancy.problem.measured import Measured
 from doe.discrepancy.problem.settings import Settings
 from doe.discrepancy.problem.simulator import Outcomes, Point
-from doe.discrepancy.threads import steps_in_one_thread
+from doe.discrepancy.threads import in_one_thread, steps_in_one_thread
 from doe.discrepancy.verdict.before_after import BeforeAfter, compare
-from doe.discrepancy.verdict.conclusion import Assessment, Conclusion, conclude, explained_share
+from doe.discrepancy.verdict.conclusion import Assessment, Conclusion, conclude, explained_share, withdrawn
 from doe.discrepancy.verdict.discovery import (
     Confounding,
     Discovery,
@@ -40,6 +41,7 @@ from doe.discrepancy.verdict.records import (
     data_record,
     drift_records,
     fit_record,
+    scatter_notes,
 )
 
 Analysis = Generator[list[Point], Outcomes, Discovery]
@@ -59,9 +61,8 @@ class _Base:
     power: tuple[Power, ...]
 
 
-@steps_in_one_thread
 def analyse(measured: Measured, emulator: Emulator, settings: Settings, seed: int) -> Analysis:
-    """Analyse measured data.
+    """Analyse measured data; where there is a likely slip, without its values, too.
 
     Parameters
     ----------
@@ -81,6 +82,17 @@ def analyse(measured: Measured, emulator: Emulator, settings: Settings, seed: in
     -------
     Discovery
     """
+    slips = in_one_thread(find_slips)(measured, emulator, settings)
+    found = yield from _analyse(measured, emulator, settings, seed)
+    if not slips:
+        return found
+    rest = yield from _analyse(without(measured, slips), emulator, settings, seed + 1)
+    return replace(found, slips=slips, without_slips=rest)
+
+
+@steps_in_one_thread
+def _analyse(measured: Measured, emulator: Emulator, settings: Settings, seed: int) -> Analysis:
+    """Analyse measured data as they are."""
     evidence = gather(measured, emulator)
     if not evidence.training:
         conclusion = Conclusion(
@@ -89,7 +101,8 @@ def analyse(measured: Measured, emulator: Emulator, settings: Settings, seed: in
         return _empty(emulator, evidence, settings, seed, conclusion)
     laboratory = Laboratory(emulator, emulator.space.conditions, seed)
     parts = _Parts(emulator, evidence, settings, seed, laboratory)
-    base = parts.base(fit(Stack(Model(emulator, (), settings.systematic), evidence.training)))
+    model = Model(emulator, (), settings.systematic, views=evidence.views)
+    base = parts.base(fit(Stack(model, evidence.training)))
     factors = len(emulator.space.factors)
     if evidence.count - factors < LEAST_FREEDOM:
         reason = (
@@ -132,7 +145,8 @@ def _search(parts: _Parts, base: _Base) -> Analysis:
         compared.append(
             compare(base.fitted, chosen, direct[0], direct[1], blocks, held_out, settings.draws, parts.seed)
         )
-    return parts.discovery(base, conclusion, assessments, [one for one in compared if one is not None])
+    shown = [one for one in compared if one is not None]
+    return parts.discovery(base, withdrawn(conclusion, shown), assessments, shown)
 
 
 def drive(analysis: Analysis, simulator: Callable[[Sequence[Point]], Outcomes]) -> Discovery:
@@ -186,7 +200,9 @@ class _Parts:
         """Fit models on the emulator."""
         blocks = self.evidence.training
         systematic = self.settings.systematic
-        return {m: Contender(fit(Stack(Model(self.emulator, m, systematic), blocks))) for m in models}
+        views = self.evidence.views
+        of = {m: Model(self.emulator, m, systematic, views=views) for m in models}
+        return {m: Contender(fit(Stack(model, blocks))) for m, model in of.items()}
 
     def base(self, fitted: Fitted) -> _Base:
         """Look at the calibrated base."""
@@ -224,7 +240,10 @@ class _Parts:
         before_after: Sequence[BeforeAfter] = (),
     ) -> Discovery:
         """The record of all that was found."""
+        best = min(assessments, key=lambda one: one.score, default=None)
         chosen = None if conclusion.chosen is None else assessments[conclusion.chosen]
+        shown = best if chosen is None else chosen
+        fit = None if shown is None else fit_record(shown.fitted, shown.gap, self.evidence)
         failures = self.laboratory.failures
         notes = [f"{failures} of {self.laboratory.cases} fresh runs failed"] if failures else []
         drop = base.gap
@@ -233,9 +252,10 @@ class _Parts:
             reason=conclusion.reason,
             named=conclusion.named,
             factors=self.emulator.space.factors,
-            data=data_record(self.emulator, self.evidence),
+            data=data_record(self.emulator, self.evidence, base.fitted),
             base=fit_record(base.fitted, base.gap, self.evidence),
-            chosen=None if chosen is None else fit_record(chosen.fitted, chosen.gap, self.evidence),
+            chosen=None if chosen is None else fit,
+            closest=fit if chosen is None else None,
             gap=Gap(drop.found, drop.drop, drop.drop_limit, drop.mechanism),
             drifts=drift_records(base.fitted),
             candidates=tuple(
@@ -245,7 +265,7 @@ class _Parts:
             confounding=Confounding(base.seen.names, base.seen.correlations),
             before_after=tuple(before_after),
             next_experiment=self._next(base, conclusion, assessments),
-            notes=(*self.evidence.notes, *self.emulator.notes, *notes),
+            notes=(*self.evidence.notes, *scatter_notes(base.fitted), *self.emulator.notes, *notes),
             effort=Effort(self.seed, self.settings.sha256, self.emulator.cases, self.laboratory.cases),
         )
 

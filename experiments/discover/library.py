@@ -68,6 +68,8 @@ class MechanismFile(Section):
     """Source of law and range."""
     confirm: str
     """The further experiment that would show it."""
+    directed: bool = False
+    """It has a direction: the test has it along x, a laboratory anywhere."""
     companions: dict[str, Scaled | float | str] = Field(default_factory=dict)
     """Further settings that it needs in a study, by place; without effect while it is at its null."""
 
@@ -108,6 +110,8 @@ class Mechanism:
     source: str
     confirm: str
     """Source of law and range, and the further experiment that would show it."""
+    directed: bool = False
+    """It has a direction, which the study has along x."""
     companions: tuple[tuple[str, float | str], ...] = ()
     """Further settings that it needs in the study, by place."""
 
@@ -181,7 +185,8 @@ def _mechanism(name: str, path: Path, study: Study, scales: Mapping[str, float])
     if null is None or any(other != null for other in others) or null >= maximum:
         return None
     companions = tuple((place, _number(value, scales)) for place, value in file.companions.items())
-    shared = file.model_dump(include={"title", "sentence", "kind", "parameters", "unit", "source", "confirm"})
+    told = {"title", "sentence", "kind", "parameters", "unit", "source", "confirm", "directed"}
+    shared = file.model_dump(include=told)
     return Mechanism(name, **shared, null=null, maximum=maximum, companions=companions)
 
 

@@ -29,6 +29,7 @@ from experiments.cases.key import engine_identity
 from experiments.cases.manifest import describe
 from experiments.discover.library import FORMER_NAMES, Mechanism, library_for
 from experiments.discover.maker import notes_on
+from experiments.discover.mirror import odd_observables
 from experiments.errors import InputError, StudyError
 from experiments.studyfile import Study
 from experiments.texts import nearest_name
@@ -76,7 +77,8 @@ class Search:
             tuple(factor.high for factor in factors),
             tuple(condition.name for condition in conditions),
             tuple(condition.held_out for condition in conditions),
-            tuple(MechanismRange(one.name, one.null, one.maximum) for one in self.library),
+            tuple(MechanismRange(one.name, one.null, one.maximum, one.directed) for one in self.library),
+            odd_observables(self.study),
         )
 
     @property
@@ -84,6 +86,9 @@ class Search:
         """Hash of all of the study that determines a heap at given factors."""
         described = describe(self.study)
         document = {key: value for key, value in described["study"].items() if key not in WITHOUT_EFFECT}
+        if "condition" in document:  # from where heaps are looked at changes none
+            told = document["condition"].items()
+            document["condition"] = {n: {k: v for k, v in each.items() if k != "camera"} for n, each in told}
         if self.study.solver.laws == EDEM:
             document.pop("solver", None)  # as from before laws had names
         engine = engine_of(self.study)
@@ -105,8 +110,8 @@ class Search:
         InputError
             When the file is no bank, or that of another study.
         """
-        bank = load_bank(path).renamed(FORMER_NAMES)
-        mine, its = self.space, bank.space
+        bank, mine = _symmetric(load_bank(path).renamed(FORMER_NAMES), self.space), self.space
+        its = bank.space
         if bank.study not in ("", self.fingerprint) or its.without(*its.names) != mine.without(*mine.names):
             rule = (
                 "must be the bank of this study, at this scale: the same grain, test, factors and conditions"
@@ -126,6 +131,14 @@ class Search:
         notes += notes_on(bank.maker, engine_of(self.study))
         emulator = replace(emulator.without(*foreign), notes=(*emulator.notes, *notes))
         return analyse(measured, emulator, self.settings, seed)
+
+
+def _symmetric(bank: Bank, space: SearchSpace) -> Bank:
+    """Return a bank, which older ones do not say, with what a mirror turns over."""
+    directed = {one.name for one in space.mechanisms if one.directed}
+    mechanisms = tuple(replace(one, directed=one.name in directed) for one in bank.space.mechanisms)
+    odd = tuple(name for name in space.odd if name in bank.observables)
+    return replace(bank, space=replace(bank.space, mechanisms=mechanisms, odd=odd))
 
 
 def _wanted(study: Study) -> tuple[Mechanism, ...]:

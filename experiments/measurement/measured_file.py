@@ -7,7 +7,8 @@ Columns, in any order: ``condition`` (of the study), ``replicate`` (a label; one
 angle was fitted to, where it is written). A row with a picture and no value is
 measured on the picture; without an observable, all that the picture shows. Several pictures of one heap are
 views of it: their mean counts. The observable ``clogged`` says that the tube held its grains, so that there
-is no heap. A row without value and picture says that nothing was measured.
+is no heap. A row without value and picture says that nothing was measured. Rows of the condition
+``calibration`` state what instruments may be off by (`calibration`).
 
 A value that the test cannot give, of a wrong unit most often, is set aside and noted; what cannot be read at
 all is an error.
@@ -24,6 +25,7 @@ import numpy as np
 
 from doe.discrepancy import Measured
 from experiments.errors import InputError, Problem
+from experiments.measurement.calibration import CALIBRATION, stated_calibration
 from experiments.measurement.notes import data_notes
 from experiments.measurement.observables import Observable
 from experiments.measurement.plausible import SizeOfTest, inversions, size_of_test
@@ -51,13 +53,22 @@ def read_measured(path: Path, study: Study) -> Measured:
     sizes = {condition.name: size_of_test(study.under(condition.name)) for condition in study.conditions}
     observables = study.measurable
     found = _Found({name: each for each in observables for name in (each.name, each.column)})
+    stated = []
     for row in read_rows(path, NEEDED, COLUMNS):
-        found.add(row, sizes, study.measurement.fit)
+        if row["condition"] == CALIBRATION and CALIBRATION not in sizes:
+            stated.append(row)
+        else:
+            found.add(row, sizes, study.measurement.fit)
     found.require_sound()
     notes = [*found.notes, *_set_aside(found.doubts)]
     notes += [f"{found.empty} rows are empty: not measured"] if found.empty else []
     heaps = {key: heap for key, heap in found.heaps.items() if heap}
-    return _gather(path, heaps, study.conditions, [each.name for each in observables], notes)
+    measured = _gather(path, heaps, study.conditions, [each.name for each in observables], notes)
+    calibration = stated_calibration(stated, found.known, measured.observables)
+    views = {condition.name: condition.camera for condition in study.conditions if condition.camera}
+    units = {found.known[name].unit for name in measured.observables} - {"1"}
+    kinds = [tuple(n for n in measured.observables if found.known[n].unit == unit) for unit in sorted(units)]
+    return replace(measured, calibration=calibration, views=views, kinds=tuple(kinds))
 
 
 @dataclass

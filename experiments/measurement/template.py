@@ -36,7 +36,12 @@ replicate: one heap, a label. Five or more of each condition show small effects;
 observable: what was measured, or {clogged} (without a value) where the grains got stuck: no result.
 {observables}
 
-profile: instead of a value, a file of profiles, columns replicate, x, z, with one of the same replicate."""
+profile: instead of a value, a file of profiles, columns replicate, x, z, with one of the same replicate.
+
+calibration: in the place of a condition, what an instrument may be off by in all conditions alike, a standard
+deviation: "offset" or "scale" for the replicate (scale: a share, as 0.2 %), or "none" where nothing is off.
+What is not stated is as usual for the instrument: a film of 60 frames a second, a ruler's millimetre, a
+levelled camera."""
 
 _PICTURES = """
 

@@ -28,7 +28,7 @@ from experiments.measurement.observables import Instrument
 from experiments.report import HeapPicture, SolidHeap
 from experiments.report.companion import Companion, companion_of
 from experiments.report.discovery import Terms, write_discovery
-from experiments.report.discovery.pictures import photograph, simulated_heaps
+from experiments.report.discovery.pictures import photograph, simulated_heaps, turned
 from experiments.runs.campaign import Watch, watching
 from experiments.studyfile import Study
 
@@ -173,6 +173,12 @@ def heaps_side_by_side(
     if found.chosen is not None:
         models[f"With {terms.titles(found.chosen.mechanisms)}"] = found.chosen
     results = engine.heaps([_point(fit, condition, job.seed) for fit in models.values()])
+    # simulated mechanisms have the azimuth 0: the heaps are shown as the camera sees them
+    side = measured.views.get(condition, 0.0)
+    results = [
+        turned(result, 0.0 if fit.heading is None else fit.heading - side)
+        for fit, result in zip(models.values(), results, strict=True)
+    ]
     photographs = measured.pictures.get(condition, ())[:1]
     taken = [photograph(path, condition, job.study.measurement.fit) for path in photographs]
     drawn = simulated_heaps(dict(zip(models, results, strict=True)), condition, job.study.under(condition))

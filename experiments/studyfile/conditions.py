@@ -14,7 +14,7 @@ from pydantic import AfterValidator, PrivateAttr
 
 from experiments.studyfile.factor_section import merge
 from experiments.studyfile.places import value_at
-from experiments.studyfile.schema import Section
+from experiments.studyfile.schema import Angle, Section
 
 
 class Condition(Section):
@@ -22,6 +22,9 @@ class Condition(Section):
 
     held_out: bool = False
     """It takes no part in any fit, and only judges."""
+    camera: Angle = 0.0
+    """Azimuth that the heaps are seen from, about the tube: 0 with x of the study to the right, 180 degrees
+    from behind."""
     grain: dict[str, Any] | None = None
     """Values of the grains that differ, as their size."""
     wall: dict[str, Any] | None = None
@@ -45,7 +48,7 @@ class Condition(Section):
     @property
     def changes(self) -> dict[str, Any]:
         """Sections of the study that differ under it, as written; none: the study as it is."""
-        return self.model_dump(exclude={"held_out"}, exclude_none=True)
+        return self.model_dump(exclude={"held_out", "camera"}, exclude_none=True)
 
 
 BASE = Condition()

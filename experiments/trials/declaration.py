@@ -18,6 +18,7 @@ from doe.discrepancy.emulation.bank import sobol_points
 from doe.discrepancy.fitting.evidence import Block
 from doe.discrepancy.fitting.fit import weigh
 from doe.discrepancy.fitting.model import Model, Stack
+from doe.discrepancy.fitting.scatter import NOTHING
 from experiments.errors import InputError
 from experiments.files import write_text
 from experiments.trials.drawing import Declared, Plan
@@ -123,9 +124,11 @@ def with_names(settings: Settings, library: Sequence[Declared]) -> Settings:
 def perfect_means(emulator: Emulator, theta: np.ndarray, replicates: int) -> tuple[Block, ...]:
     """Means of so many replicates in every training condition that are exactly the model's at coded theta."""
     count = len(emulator.observables)
-    numbers, weights, ones = np.arange(count), np.full((count, count), 1.0 / replicates), np.ones(count)
+    numbers, weights = np.arange(count), np.full((count, count), 1.0 / replicates)
     return tuple(
-        Block(condition, numbers, surfaces.predict(theta[None], ())[0], weights, ones)
+        Block(
+            condition, numbers, surfaces.predict(theta[None], ())[0], weights, NOTHING, np.zeros((2, count))
+        )
         for condition, surfaces in emulator.surfaces.items()
         if not emulator.space.is_held_out(condition)
     )

@@ -61,14 +61,16 @@ class EmulatedSimulator:
         return np.asarray(surfaces.predict(x[None], names)[0] + self._bent(theta, point) + scatter)
 
     def _bent(self, theta: np.ndarray, point: Point) -> np.ndarray:
-        space, noise = self.emulator.space, self.emulator.surfaces[point.condition].noise
-        bent = _waves(point.condition, "", theta, self.emulator.observables)
+        space = self.emulator.space
+        surfaces = self.emulator.surfaces[point.condition]
+        bent = _waves(point.condition, "", theta, self.emulator.observables) * ~surfaces.silent
         for name, size in point.sizes:
             coded = space.coded_size(name, size)
             # Sizes run from 0 to 1, factors from -1 to 1.
             at = np.append(theta, 2.0 * coded - 1.0)
-            bent = bent + coded * _waves(point.condition, name, at, self.emulator.observables)
-        return np.asarray(self.bend * np.sqrt(noise.variance(np.zeros_like(theta))) * bent)
+            waves = _waves(point.condition, name, at, self.emulator.observables)
+            bent = bent + coded * waves * ~surfaces.additions[name].silent
+        return np.asarray(self.bend * np.sqrt(surfaces.noise.variance(np.zeros_like(theta))) * bent)
 
 
 def _waves(condition: str, mechanism: str, at: np.ndarray, observables: tuple[str, ...]) -> np.ndarray:

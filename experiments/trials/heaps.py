@@ -10,6 +10,7 @@ import numpy as np
 
 from doe.discrepancy import Outcomes, Point
 from experiments.files import replacing
+from experiments.measurement.calibration import CALIBRATION, NONE
 from experiments.measurement.observables import OBSERVABLES
 from experiments.trials.camera import Camera
 from experiments.trials.truth import Label
@@ -28,11 +29,14 @@ def cases_of(label: Label, conditions: Sequence[str], replicates: int) -> list[P
     ]
 
 
-def write_heaps(path: Path, label: Label, points: Sequence[Point], outcomes: Outcomes) -> None:
+def write_heaps(
+    path: Path, label: Label, points: Sequence[Point], outcomes: Outcomes, calibrated: bool = True
+) -> None:
     """Photograph and measure the heaps of a trial, and write them as a file of measured heaps.
 
     A tube that held its grains is written down as clogged; a case that failed in another way leaves no row,
-    as a test that went wrong in a laboratory. The label's seed draws the camera.
+    as a test that went wrong in a laboratory. The label's seed draws the camera. The file says that nothing
+    is off in all conditions alike, or, of what is not `calibrated`, nothing of it, as most files do.
     """
     rng = np.random.default_rng([label.seed, 1])
     values = Camera.drawn(rng).read(outcomes.values, rng)
@@ -40,6 +44,9 @@ def write_heaps(path: Path, label: Label, points: Sequence[Point], outcomes: Out
     with replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(("condition", "replicate", "observable", "value", "unit"))
+        if calibrated:
+            # the cameras' errors are those that the rules' `systematic` stands for
+            writer.writerow((CALIBRATION, NONE, "", "", ""))
         for point, row, reason in zip(points, values, outcomes.reasons, strict=True):
             replicate = replicates[point.condition] = replicates.get(point.condition, 0) + 1
             if not reason:

@@ -24,6 +24,7 @@ from doe.discrepancy import (
     Question,
     Verdict,
 )
+from experiments.measurement.observables import BY_NAME
 from experiments.report.discovery import Terms
 from experiments.studyfile import Study
 
@@ -78,6 +79,7 @@ def made_terms(study: Study) -> Terms:
             title=name.replace("_", " "),
             unit=unit,
             definition=f"what is called {name.replace('_', ' ')} of a heap",
+            instrument=BY_NAME[name].instrument if name in BY_NAME else None,
         )
         for name, (unit, _, _) in OBSERVABLES.items()
     ]

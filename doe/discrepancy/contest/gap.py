@@ -114,13 +114,15 @@ def find_gap(
     noise = np.random.default_rng(seed).standard_normal((draws, len(project))) @ project
     left = project @ fitted.residuals
     common = _common_directions(fitted, project)
-    drawn, found = (_statistics(each, seen.directions, common) for each in (noise, left))
+    directions = np.concatenate([seen.directions, seen.turned_directions.reshape(-1, len(project))])
+    drawn, found = (_statistics(each, directions, len(seen.names), common) for each in (noise, left))
     limits = {of: float(np.quantile(values, 1.0 - level)) for of, values in drawn.items()}
     p_values = {of: _exceeded(drawn[of], float(found[of])) for of in questions}
     smallest = np.min([_own_p(drawn[of]) for of in questions], axis=0)
     scores = seen.directions @ left
     clearest = min(p_values, key=p_values.__getitem__)
-    mechanism = seen.names[int(np.argmax(scores))] if seen.names else ""
+    names = (*seen.names, *seen.turned_names)
+    mechanism = names[int(np.argmax(directions @ left))] if names else ""
     return GapTest(
         q=float(found[Question.SIZE]),
         freedom=round(float(np.trace(project))),
@@ -153,14 +155,17 @@ def _common_directions(fitted: Fitted, project: np.ndarray) -> np.ndarray:
 
 
 def _statistics(
-    residuals: np.ndarray, signatures: np.ndarray, common: np.ndarray
+    residuals: np.ndarray, signatures: np.ndarray, count: int, common: np.ndarray
 ) -> dict[Question, np.ndarray]:
-    """Compute the statistic of each question, of residuals (..., n)."""
+    """Compute the statistic of each question, of residuals (..., n).
+
+    So many signatures are of different mechanisms, the others of some of these from behind.
+    """
     scores = residuals @ signatures.T
     return {
         Question.SIZE: (residuals**2).sum(axis=-1),
         Question.FALL: (np.maximum(scores, 0.0) ** 2).max(axis=-1, initial=0.0),
-        Question.SCORES: (scores**2).sum(axis=-1),
+        Question.SCORES: (scores[..., :count] ** 2).sum(axis=-1),
         Question.COMMON: ((residuals @ common.T) ** 2).sum(axis=-1),
     }
 

@@ -31,11 +31,14 @@ class Forecast:
 
 
 def forecast(fitted: Fitted, blocks: tuple[Block, ...]) -> Forecast:
-    """Predict conditions from a fit to others."""
-    stack = Stack(fitted.model, blocks)
+    """Predict conditions from a fit to others; what the fit shows to be off alike, is off there, too."""
+    seen, stack = fitted.stack, Stack(fitted.model, blocks)
+    shared = stack.common.T @ seen.common @ fitted.whitening.T
     slopes = stack.jacobian(fitted.x[None])[0]
-    covariance = stack.covariance(fitted.x) + slopes @ fitted.spread @ slopes.T
-    return Forecast(stack.target, stack.predict(fitted.x[None])[0], covariance, stack.noise(fitted.x))
+    slopes = slopes - shared @ fitted.whitening @ seen.jacobian(fitted.x[None])[0]
+    covariance = stack.covariance(fitted.x) - shared @ shared.T + slopes @ fitted.spread @ slopes.T
+    predicted = stack.predict(fitted.x[None])[0] + shared @ fitted.residuals
+    return Forecast(stack.target, predicted, covariance, stack.noise(fitted.x))
 
 
 def held_out_gain(

@@ -55,7 +55,7 @@ class Effects:
             none = np.empty((0, len(CODED_SIZES)))
             return cls((), np.empty((*none.shape, shape[-1])), none, none, seen.correlations)
         extra = np.reshape(
-            [secants(stack.model.emulator, stack.blocks, theta, name, KNOTS) for name in seen.names], shape
+            [secants(stack.model, stack.blocks, theta, name, KNOTS) for name in seen.names], shape
         )
         targets = extra.reshape(-1, shape[-1]) + stack.predict(fitted.x[None])
         starts = np.repeat(fitted.x[None], len(targets), axis=0)

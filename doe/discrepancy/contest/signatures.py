@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from doe.discrepancy.emulation.emulator import Emulator
 from doe.discrepancy.fitting.evidence import Block
 from doe.discrepancy.fitting.fit import Fitted
+from doe.discrepancy.fitting.model import Model
 
 SECANT = 0.5
 """Coded size at which a signature is taken: an effect a unit of size."""
@@ -17,20 +17,28 @@ LEAST_LENGTH = 1e-6
 """A signature that is shorter (whitened) is not seen at all."""
 
 
-def signature(emulator: Emulator, blocks: Sequence[Block], theta: np.ndarray, name: str) -> np.ndarray:
+def signature(
+    model: Model, blocks: Sequence[Block], theta: np.ndarray, name: str, heading: float = 0.0
+) -> np.ndarray:
     """Compute what a mechanism adds to the means of conditions for a unit of its coded size, (means,)."""
-    return secants(emulator, blocks, theta, name, np.array([SECANT]))[0] / SECANT
+    return secants(model, blocks, theta, name, np.array([SECANT]), heading)[0] / SECANT
 
 
 def secants(
-    emulator: Emulator, blocks: Sequence[Block], theta: np.ndarray, name: str, sizes: np.ndarray
+    model: Model,
+    blocks: Sequence[Block],
+    theta: np.ndarray,
+    name: str,
+    sizes: np.ndarray,
+    heading: float = 0.0,
 ) -> np.ndarray:
-    """Compute what a mechanism adds to the means at coded sizes (n,), (n, means)."""
+    """Compute what a mechanism adds, as emulated, to the means at coded sizes (n,), (n, means)."""
     x = np.column_stack([np.repeat(theta[None], len(sizes), axis=0), sizes])
     parts = []
     for block in blocks:
-        surfaces = emulator.surfaces[block.condition]
+        surfaces = model.emulator.surfaces[block.condition]
         difference = surfaces.predict(x, (name,)) - surfaces.predict(theta[None], ())
+        difference = difference * replace(model, heading=heading).turn(block.condition)
         parts.append(difference[:, block.columns])
     return np.concatenate(parts, axis=1)
 
@@ -49,14 +57,19 @@ class Signatures:
     """Effect of a unit of coded size, (mechanisms, means)."""
     visible: np.ndarray
     """Part that a refit leaves of it, (mechanisms, means)."""
+    turned_names: tuple[str, ...] = ()
+    turned: np.ndarray = field(default_factory=lambda: np.empty((0, 0)))
+    """Mechanisms with a direction, and that part of them from behind, (directed mechanisms, means)."""
 
     @property
     def directions(self) -> np.ndarray:
         """Visible signatures of length one; zeros where nothing is visible, (mechanisms, means)."""
-        length = np.linalg.norm(self.visible, axis=1, keepdims=True)
-        return np.asarray(
-            np.where(length > LEAST_LENGTH, self.visible / np.maximum(length, LEAST_LENGTH), 0.0)
-        )
+        return _of_length_one(self.visible)
+
+    @property
+    def turned_directions(self) -> np.ndarray:
+        """The same from behind, (directed mechanisms, means)."""
+        return _of_length_one(self.turned)
 
     @property
     def shares(self) -> np.ndarray:
@@ -73,12 +86,20 @@ class Signatures:
         return np.asarray(np.clip(self.directions @ self.directions.T, -1.0, 1.0))
 
 
+def _of_length_one(visible: np.ndarray) -> np.ndarray:
+    length = np.linalg.norm(visible, axis=1, keepdims=True)
+    return np.asarray(np.where(length > LEAST_LENGTH, visible / np.maximum(length, LEAST_LENGTH), 0.0))
+
+
 def signatures(fitted: Fitted) -> Signatures:
     """Signatures of the mechanisms that are not in a fitted model."""
     emulator, blocks = fitted.model.emulator, fitted.stack.blocks
     names = tuple(name for name in emulator.space.names if name not in fitted.mechanisms)
     theta = fitted.x[: len(emulator.space.factors)]
-    size = (len(names), len(fitted.covariance))
-    natural = np.array([signature(emulator, blocks, theta, name) for name in names]).reshape(size)
-    whole = natural @ fitted.whitening.T
-    return Signatures(names, whole, whole @ projector(fitted.sensitivities))
+    turned = tuple(name for name in names if emulator.space.odd and emulator.space.mechanism(name).directed)
+    seen = [signature(fitted.model, blocks, theta, name) for name in names]
+    seen += [signature(fitted.model, blocks, theta, name, 180.0) for name in turned]
+    whole = np.array(seen).reshape(len(seen), len(fitted.covariance)) @ fitted.whitening.T
+    visible = whole @ projector(fitted.sensitivities)
+    count = len(names)
+    return Signatures(names, whole[:count], visible[:count], turned, visible[count:])

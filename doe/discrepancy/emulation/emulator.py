@@ -17,6 +17,7 @@ from doe.discrepancy.emulation.surface_fits import (
     repeats_noise,
 )
 from doe.discrepancy.emulation.surfaces import Addition, Surfaces
+from doe.discrepancy.emulation.symmetry import symmetric_addition, symmetric_base
 from doe.discrepancy.problem.space import SearchSpace
 from doe.discrepancy.threads import in_one_thread
 from doe.errors import RuleError
@@ -70,7 +71,8 @@ def fit_emulator(bank: Bank) -> Emulator:
         notes.append(f"{failed} of {len(bank.reasons)} cases of the bank failed")
     thin = _too_few(bank)
     notes += [f"{name} has too few finished cases in the bank: left out of the library" for name in thin]
-    bases = _bases(bank, columns, RESOLUTION * spread[columns])
+    odd = np.array([bank.observables[column] in bank.space.odd for column in columns])
+    bases = [symmetric_base(base, odd) for base in _bases(bank, columns, RESOLUTION * spread[columns])]
     additions: list[dict[str, Addition]] = [{} for _ in bases]
     for index, name in enumerate(bank.space.names):
         if name in thin:
@@ -80,8 +82,9 @@ def fit_emulator(bank: Bank) -> Emulator:
             rows = bank.rows(number, index)
             values = bank.values[np.ix_(rows, columns)]
             runs.append(AddedRuns(base, bank.theta[rows], bank.coded_size[rows], values))
+        silent = odd & (not bank.space.mechanism(name).directed)
         for own, addition in zip(additions, fit_additions(runs), strict=True):
-            own[name] = addition
+            own[name] = symmetric_addition(addition, odd, silent)
     surfaces = {
         condition: replace(base, additions=own)
         for condition, base, own in zip(bank.space.conditions, bases, additions, strict=True)

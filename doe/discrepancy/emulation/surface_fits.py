@@ -154,7 +154,7 @@ def _fit_base(runs: BaseRuns, scales: np.ndarray) -> Surfaces:
         if np.mean(smooth.leave_one_out**2) < BETTER * np.mean(missed[:, column] ** 2):
             kriging[int(column)] = smooth
     base = Polynomial(fitted.coefficients, misfit, kriging)
-    return Surfaces(base, fitted.gram_inverse, runs.noise, {})
+    return Surfaces(base, fitted.gram_inverse, runs.noise, {}, np.zeros(len(misfit), dtype=bool))
 
 
 @dataclass(frozen=True, eq=False)
@@ -264,6 +264,7 @@ def _fit_addition(runs: AddedRuns, scales: np.ndarray) -> Addition:
         growth,
         _mean_variance(runs, growth),
         runs.base.noise.correlation,
+        np.zeros(len(growth), dtype=bool),
     )
 
 

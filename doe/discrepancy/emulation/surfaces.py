@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from itertools import combinations_with_replacement
 
 import numpy as np
@@ -16,22 +17,27 @@ from doe.discrepancy.emulation.kriging import Kriging
 from doe.discrepancy.emulation.noise import Noise
 
 
+@cache
+def _products(size: int, degree: int) -> np.ndarray:
+    """Numbers of the factors in each product of a degree, (degree, products)."""
+    return np.array([*combinations_with_replacement(range(size), degree)], dtype=int).reshape(-1, degree).T
+
+
 def quadratic(theta: np.ndarray) -> np.ndarray:
     """Terms of a full quadratic: 1, factors, squares and products, (n, terms)."""
-    pairs = combinations_with_replacement(range(theta.shape[1]), 2)
-    products = [theta[:, i] * theta[:, j] for i, j in pairs]
-    return np.column_stack([np.ones(len(theta)), theta, *products])
+    i, j = _products(theta.shape[1], 2)
+    return np.concatenate([np.ones((len(theta), 1)), theta, theta[:, i] * theta[:, j]], axis=1)
 
 
 def cubic(theta: np.ndarray) -> np.ndarray:
     """Terms of a full cubic: those of the quadratic, then products of three factors, (n, terms)."""
-    triples = combinations_with_replacement(range(theta.shape[1]), 3)
-    return np.column_stack([quadratic(theta), *(theta[:, list(triple)].prod(axis=1) for triple in triples)])
+    i, j, k = _products(theta.shape[1], 3)
+    return np.concatenate([quadratic(theta), theta[:, i] * theta[:, j] * theta[:, k]], axis=1)
 
 
 def added(theta: np.ndarray, size: np.ndarray) -> np.ndarray:
     """Terms of what a mechanism adds: its size times a full quadratic of size and factors, (n, terms)."""
-    return np.asarray(size[:, None] * quadratic(np.column_stack([size, theta])))
+    return np.asarray(size[:, None] * quadratic(np.concatenate([size[:, None], theta], axis=1)))
 
 
 def all_terms(x: np.ndarray, factors: int) -> np.ndarray:
@@ -65,6 +71,11 @@ class Polynomial:
             out[column] = kriging.variance(x[None])[0]
         return out
 
+    def silenced(self, silent: np.ndarray) -> Polynomial:
+        """Return the same without what symmetry forbids."""
+        kriging = {column: one for column, one in self.kriging.items() if not silent[column]}
+        return Polynomial(self.coefficients * ~silent, self.misfit * ~silent, kriging)
+
 
 @dataclass(frozen=True, eq=False)
 class Addition:
@@ -85,6 +96,8 @@ class Addition:
     """Of one run, mean over the mechanism's runs, (observables,)."""
     correlation: np.ndarray
     """Of one run at the largest size, (observables, observables)."""
+    silent: np.ndarray
+    """True where symmetry forbids that it acts, (observables,)."""
 
     def predict(self, theta: np.ndarray, size: np.ndarray) -> np.ndarray:
         """Predict what is added at coded factors (n, factors) and sizes (n,), (n, observables)."""
@@ -95,8 +108,8 @@ class Addition:
 
     @property
     def covariance(self) -> np.ndarray:
-        """Covariance of one run, mean over the mechanism's runs, (observables, observables)."""
-        sd = np.sqrt(self.variance)
+        """Covariance of one run where it may act, mean over its runs, (observables, observables)."""
+        sd = np.sqrt(self.variance) * ~self.silent
         return np.asarray(sd[:, None] * self.correlation * sd)
 
 
@@ -111,6 +124,8 @@ class Surfaces:
     """Of one run near the base."""
     additions: Mapping[str, Addition]
     """By mechanism."""
+    silent: np.ndarray
+    """True where symmetry forbids that the base is anything but noise, (observables,)."""
 
     def predict(self, x: np.ndarray, mechanisms: tuple[str, ...]) -> np.ndarray:
         """Expected observables at coded parameters (n, factors + mechanisms), (n, observables).
@@ -153,7 +168,8 @@ class Surfaces:
             terms = added(theta[None], np.array([size]))[0]
             base = base - part.base_terms.T @ terms
             own += (terms @ part.gram_inverse @ terms) * part.covariance
-        return np.asarray((base @ self.gram_inverse @ base) * self.noise.covariance(theta) + own)
+        noise = self.noise.covariance(theta) * np.outer(~self.silent, ~self.silent)
+        return np.asarray((base @ self.gram_inverse @ base) * noise + own)
 
     def coefficient_errors(self, theta: np.ndarray, mechanisms: tuple[str, ...]) -> np.ndarray:
         """Covariances of errors of all coefficients, of noise as at some factors (observables, terms, terms).
@@ -162,13 +178,18 @@ class Surfaces:
         """
         parts = [self.additions[name] for name in mechanisms]
         shared = np.concatenate([np.eye(len(self.gram_inverse)), *(-part.base_terms for part in parts)])
-        variance = self.noise.variance(theta)[:, None, None]
+        variance = (self.noise.variance(theta) * ~self.silent)[:, None, None]
         errors = variance * (shared @ self.gram_inverse @ shared.T)
         end = len(self.gram_inverse)
         for part in parts:
             start, end = end, end + len(part.gram_inverse)
-            errors[:, start:end, start:end] += part.variance[:, None, None] * part.gram_inverse
+            own = part.variance * ~part.silent
+            errors[:, start:end, start:end] += own[:, None, None] * part.gram_inverse
         return np.asarray(errors)
+
+    def moved(self, mechanisms: tuple[str, ...]) -> np.ndarray:
+        """True where a model with some mechanisms is more than noise, (observables,)."""
+        return ~np.logical_and.reduce([self.silent, *(self.additions[name].silent for name in mechanisms)])
 
     def misfit_variance(self, x: np.ndarray, mechanisms: tuple[str, ...]) -> np.ndarray:
         """Variance of what no coefficient follows at one row of coded parameters, (observables,)."""

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
 
 from doe.discrepancy.emulation.emulator import Emulator
-from doe.discrepancy.problem.measured import Measured
-
-SCATTER_LEVEL = 0.01
-"""Replicates that scatter more than the model's with this probability or less count by their own scatter."""
+from doe.discrepancy.fitting.scatter import NOTHING, Excess, Scatter
+from doe.discrepancy.problem.measured import Calibration, Measured
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,17 +23,26 @@ class Block:
     """(k,)."""
     share: np.ndarray
     """Covariance of the means over that of one replicate: 1 / n where all have n replicates, (k, k)."""
-    inflation: np.ndarray
-    """Standard deviations of the measured replicates over the model's, (k,)."""
+    scatter: Scatter
+    """Of the replicates of all conditions."""
+    common: np.ndarray
+    """Change of each mean by a standard deviation of the offset, and of the scale, of its observable, which
+    all conditions share, (2, k)."""
+
+    @classmethod
+    def of_runs(cls, condition: str, columns: np.ndarray, count: int) -> Block:
+        """Means of so many runs of a model, which scatter as the model does; they are nowhere needed."""
+        share = np.full((len(columns), len(columns)), 1.0 / count)
+        return cls(condition, columns, np.zeros(len(columns)), share, NOTHING, np.zeros((2, len(columns))))
 
     @property
     def replicates(self) -> np.ndarray:
         """Replicates of each mean, (k,)."""
         return np.rint(1.0 / np.diag(self.share)).astype(int)
 
-    def scatter(self, covariance: np.ndarray) -> np.ndarray:
-        """Covariance of the means' noise, of that of one run (k, k)."""
-        return np.asarray(covariance * self.share * self.inflation[:, None] * self.inflation)
+    def noise(self, covariance: np.ndarray, excess: Excess) -> np.ndarray:
+        """Covariance of the means' noise (k, k), of that of one run and what replicates scatter beyond it."""
+        return np.asarray(excess.added_to(covariance)[np.ix_(self.columns, self.columns)] * self.share)
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +52,10 @@ class Evidence:
     training: tuple[Block, ...]
     held_out: tuple[Block, ...]
     notes: tuple[str, ...]
+    calibration: Mapping[str, Calibration]
+    """By observable, what its instrument may be off by."""
+    views: Mapping[str, float]
+    """By condition, the azimuth that it was seen from [deg]."""
 
     @property
     def count(self) -> int:
@@ -53,21 +64,18 @@ class Evidence:
 
 
 def gather(measured: Measured, emulator: Emulator) -> Evidence:
-    """Cut measured data to the emulator's conditions and observables.
-
-    What is left out is said in the notes. Scatter beyond the model's own, by a one-sided F test of each
-    observable over all conditions, widens the error of that observable's means.
-    """
+    """Cut measured data to the emulator's conditions and observables; the notes say what is left out."""
     notes = list(measured.notes)
     strange = [name for name in measured.observables if name not in emulator.observables]
     notes += [f"{name} is not among the simulated observables: left out" for name in strange]
-    inflation = _inflation(measured, emulator, notes)
+    known = [condition for condition in measured.conditions if condition in emulator.surfaces]
+    scatter = Scatter.of(measured, emulator.observables, known)
     blocks = []
     for condition in measured.conditions:
         if condition not in emulator.surfaces:
             notes.append(f"condition {condition} is not in the bank: left out")
             continue
-        block = _block(measured, emulator, condition, inflation)
+        block = _block(measured, emulator, condition, scatter)
         if len(block.mean):
             blocks.append(block)
         else:
@@ -76,10 +84,10 @@ def gather(measured: Measured, emulator: Emulator) -> Evidence:
     training = tuple(block for block in blocks if not emulator.space.is_held_out(block.condition))
     present = {block.condition for block in blocks}
     notes += [f"condition {c} was not measured" for c in emulator.space.conditions if c not in present]
-    return Evidence(training, held_out, tuple(dict.fromkeys(notes)))
+    return Evidence(training, held_out, tuple(dict.fromkeys(notes)), measured.calibration, measured.views)
 
 
-def _block(measured: Measured, emulator: Emulator, condition: str, inflation: np.ndarray) -> Block:
+def _block(measured: Measured, emulator: Emulator, condition: str, scatter: Scatter) -> Block:
     names = list(measured.observables)
     rows = measured.values[condition]
     columns = np.array(
@@ -93,34 +101,10 @@ def _block(measured: Measured, emulator: Emulator, condition: str, inflation: np
     present = np.isfinite(rows[:, [names.index(emulator.observables[c]) for c in columns]]).astype(float)
     counts = present.sum(axis=0)
     mean = measured.mean(condition)[[names.index(emulator.observables[c]) for c in columns]]
-    return Block(condition, columns, mean, present.T @ present / np.outer(counts, counts), inflation[columns])
-
-
-def _inflation(measured: Measured, emulator: Emulator, notes: list[str]) -> np.ndarray:
-    """Square root of the measured over the model's variance where that is too large to be chance."""
-    count = len(emulator.observables)
-    squares, freedom, known = np.zeros(count), np.zeros(count), np.zeros(count)
-    centre = np.zeros(len(emulator.space.factors))
-    pairs = [
-        (column, measured.observables.index(name))
-        for column, name in enumerate(emulator.observables)
-        if name in measured.observables
+    share = present.T @ present / np.outer(counts, counts)
+    known = [measured.calibration.get(emulator.observables[c], Calibration()) for c in columns]
+    common = np.array([[one.offset for one in known], [one.scale for one in known]]) * [
+        np.ones(len(mean)),
+        mean,
     ]
-    for condition in (name for name in measured.conditions if name in emulator.surfaces):
-        noise = emulator.surfaces[condition].noise
-        variance, counts = noise.variance(centre), measured.counts(condition)
-        rows = measured.values[condition] - measured.mean(condition)
-        for column, own in pairs:
-            if counts[own] >= 2:
-                squares[column] += np.nansum(rows[:, own] ** 2) / variance[column]
-                freedom[column] += counts[own] - 1
-                known[column] += noise.degrees_of_freedom
-    ratio = squares / np.maximum(freedom, 1.0)
-    limit = stats.f.isf(SCATTER_LEVEL, np.maximum(freedom, 1.0), np.maximum(known, 1.0))
-    wide = (freedom > 0) & (ratio > limit)
-    notes += [
-        f"replicates of {emulator.observables[i]} scatter {np.sqrt(ratio[i]):.1f} times as much as the"
-        " model's, and count so"
-        for i in np.flatnonzero(wide)
-    ]
-    return np.where(wide, np.sqrt(ratio), 1.0)
+    return Block(condition, columns, mean, share, scatter, common)

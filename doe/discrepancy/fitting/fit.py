@@ -2,19 +2,34 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy import stats
 from scipy.linalg import cholesky, solve_triangular
 
 from doe.discrepancy.emulation.bank import sobol_points
-from doe.discrepancy.fitting.model import Model, Stack
+from doe.discrepancy.fitting.model import STEP, Model, Stack
 
 ITERATIONS = 40
 SCOUTING = 6
 """Steps after which only the best starts go on."""
 FINALISTS = 3
+"""Starts that go on, each with the weights of where it is."""
+DEEPEST = 10.0
+"""Fall of the score that a descent may bring: the best goes down to the least, others if they may pass it."""
+APART = 0.1
+"""Starts that have come nearer to each other than this, in coded units, are one."""
+DESCENTS = 12
+"""Most steps down the score."""
+ARRIVED = 0.01
+"""Fall of the score that a last step brings: its noise is a hundred times as large."""
+TURNS = (30.0, 60.0, 90.0, -30.0, -60.0, -90.0)
+"""Azimuths about one of the two sides that are tried [deg]: between two, a cosine changes by half at most."""
+TURNED = 6.63
+"""Fall of the score that chance brings by one more parameter in one case of a hundred."""
 CONVERGED = 1e-4
 """Longest step of a fit that has arrived, in coded units."""
 AT_BOUND = 1e-3
@@ -46,8 +61,20 @@ class Fitted:
     """Sum of squares of the whitened residuals."""
     score: float
     """q plus the logarithm of the determinant: minus twice the log-likelihood, but for a constant."""
-    spread: np.ndarray
-    """Covariance of the parameters, but for the error of the model's shift, (parameters, parameters)."""
+
+    @cached_property
+    def slopes(self) -> np.ndarray:
+        """Whitened derivatives by the parameters, (means, parameters)."""
+        return np.asarray(self.whitening @ self.stack.jacobian(self.x[None])[0])
+
+    @cached_property
+    def spread(self) -> np.ndarray:
+        """Covariance of the parameters, but for the error of the model's shift, (parameters, parameters).
+
+        The ranges are what is known of a parameter that the data say nothing of.
+        """
+        information = self.slopes.T @ self.slopes + np.diag(model_width(self.model) ** -2)
+        return np.asarray(np.linalg.inv(information))
 
     @property
     def model(self) -> Model:
@@ -95,7 +122,7 @@ class Fitted:
     def sensitivities(self) -> np.ndarray:
         """Whitened derivatives by the parameters that are not at an end of their range, (means, free)."""
         free = (self.x > self.model.lower + AT_BOUND) & (self.x < self.model.upper - AT_BOUND)
-        return np.asarray(self.whitening @ self.stack.jacobian(self.x[None])[0][:, free])
+        return self.slopes[:, free]
 
 
 def minimise(
@@ -112,7 +139,7 @@ def minimise(
     Parameters
     ----------
     stack : Stack
-    whitening : (means, means) array
+    whitening : (means, means) or (n, means, means) array
     target : (means,) or (n, means) array
         Of all, or of each.
     starts : (n, parameters) array
@@ -128,10 +155,10 @@ def minimise(
     """
     x = np.clip(starts, lower, upper)
     damping = np.full(len(x), 1e-2)
-    residual = (target - stack.predict(x)) @ whitening.T
+    residual = _whitened(whitening, target - stack.predict(x))
     q = (residual**2).sum(axis=1)
     for _ in range(iterations):
-        slopes = np.einsum("ij,njk->nik", whitening, stack.jacobian(x))
+        slopes = whitening @ stack.jacobian(x)
         descent = np.einsum("nik,ni->nk", slopes, residual)
         frozen = ((x <= lower) & (descent < 0.0)) | ((x >= upper) & (descent > 0.0))
         slopes = np.where(frozen[:, None, :], 0.0, slopes)
@@ -142,7 +169,7 @@ def minimise(
             normal + scale[:, :, None] * np.eye(x.shape[1]), np.where(frozen, 0.0, descent)[:, :, None]
         )
         proposed = np.clip(x + step[:, :, 0], lower, upper)
-        trial = (target - stack.predict(proposed)) @ whitening.T
+        trial = _whitened(whitening, target - stack.predict(proposed))
         better = (trial**2).sum(axis=1) <= q
         moved = np.abs(proposed - x).max(axis=1)
         x = np.where(better[:, None], proposed, x)
@@ -154,8 +181,17 @@ def minimise(
     return x, q
 
 
+def _whitened(whitening: np.ndarray, residuals: np.ndarray) -> np.ndarray:
+    """Whiten residuals (n, means), all alike or each by its own, (n, means)."""
+    return np.asarray((whitening @ residuals[:, :, None])[:, :, 0])
+
+
 def fit(stack: Stack, starts: np.ndarray | None = None, count: int = 8) -> Fitted:
-    """Calibrate a model: the least sum of squares over several starts, weighted at its optimum.
+    """Calibrate a model: the least score, from several starts.
+
+    The weights change with the parameters, so that sums of squares of different places do not compare, and
+    under the weights of one place every other is behind. A direction is looked for at azimuth 0 and from
+    behind, and at others where that lowers the score by `TURNED`.
 
     Parameters
     ----------
@@ -165,28 +201,112 @@ def fit(stack: Stack, starts: np.ndarray | None = None, count: int = 8) -> Fitte
     count : int
         Sobol points to start from.
     """
-    model = stack.model
-    lower, upper = model.lower, model.upper
-    tried = [model.start[None], lower + sobol_points(count, len(lower), 0) * (upper - lower)]
+    lower, upper = stack.model.lower, stack.model.upper
+    tried = [stack.model.start[None], lower + sobol_points(count, len(lower), 0) * (upper - lower)]
     x = np.concatenate(tried if starts is None else [np.atleast_2d(starts), *tried])
-    for iterations in (SCOUTING, ITERATIONS, ITERATIONS):
-        whitening = whiten(stack.covariance(x[0]))
-        x, q = minimise(stack, whitening, stack.target, x, lower, upper, iterations)
-        x = x[np.argsort(q)[:FINALISTS]]
-    return weigh(stack, x[0])
+    if not stack.model.is_directed:
+        return _least([stack], x)
+    best = _least([_facing(stack, heading) for heading in (0.0, 180.0)], x)
+    return _turned(best)
+
+
+def _facing(stack: Stack, heading: float) -> Stack:
+    return Stack(replace(stack.model, heading=heading % 360.0), stack.blocks)
+
+
+def _least(stacks: Sequence[Stack], starts: np.ndarray) -> Fitted:
+    """Find the least score of several models of the same parameters, from the same starts."""
+    scouted = []
+    for stack in stacks:
+        lower, upper = stack.model.lower, stack.model.upper
+        first = whiten(stack.covariance(starts[0]))
+        near, _ = minimise(stack, first, stack.target, starts, lower, upper, SCOUTING)
+        # also where they start: the weights of one place lead away from others
+        scouted += [weigh(stack, each) for each in (*near, *starts)]
+    seen = _best_apart(scouted)
+    for stack in stacks:
+        own = [each for each in seen if each.stack is stack]
+        if own:
+            lower, upper = stack.model.lower, stack.model.upper
+            weights, x = np.array([each.whitening for each in own]), np.array([each.x for each in own])
+            x, _ = minimise(stack, weights, stack.target, x, lower, upper)
+            seen = [*seen, *(weigh(stack, each) for each in x)]
+    leader, *others = _best_apart(seen)
+    best = _descend(leader)
+    near_it = [each for each in others if each.score < best.score + DEEPEST]
+    return min([best, *map(_descend, near_it)], key=lambda each: each.score)
+
+
+def _turned(best: Fitted) -> Fitted:
+    """Turn a directed model to another azimuth where that is better by more than chance."""
+    stacks = [_facing(best.stack, best.model.heading + turn) for turn in TURNS]
+    lower, upper = best.model.lower, best.model.upper
+    steps = [
+        minimise(each, best.whitening, each.target, best.x[None], lower, upper, SCOUTING) for each in stacks
+    ]
+    turn = int(np.argmin([q[0] for _, q in steps]))
+    x, q = steps[turn]
+    if q[0] >= best.q:
+        return best
+    other = _descend(weigh(stacks[turn], x[0]))
+    return other if other.score < best.score - TURNED else best
+
+
+def _best_apart(tried: Sequence[Fitted]) -> list[Fitted]:
+    """Pick those of the best scores that are not near a better one."""
+    chosen: list[Fitted] = []
+    for one in sorted(tried, key=lambda each: each.score):
+        if all(one.stack is not each.stack or np.abs(one.x - each.x).max() > APART for each in chosen):
+            chosen.append(one)
+    return chosen[:FINALISTS]
+
+
+def _descend(fitted: Fitted) -> Fitted:
+    """Go down the score by Fisher's scoring within bounds, the covariance changing with the point."""
+    stack, lower, upper = fitted.stack, fitted.model.lower, fitted.model.upper
+    for _ in range(DESCENTS):
+        slope, information = _score_slope(fitted)
+        free = ~(((fitted.x <= lower) & (slope > 0.0)) | ((fitted.x >= upper) & (slope < 0.0)))
+        step = np.zeros(len(slope))
+        step[free] = -np.linalg.solve(information[np.ix_(free, free)], slope[free])
+        for share in (1.0, 0.3, 0.1, 0.03):
+            tried = weigh(stack, np.clip(fitted.x + share * step, lower, upper))
+            if tried.score < fitted.score:
+                break
+        fall = fitted.score - tried.score
+        fitted = tried if fall > 0.0 else fitted
+        if fall < ARRIVED:
+            break
+    return fitted
+
+
+def _score_slope(fitted: Fitted) -> tuple[np.ndarray, np.ndarray]:
+    """Derivatives of half the score by the parameters, and their information, (p,), (p, p).
+
+    Of a normal law with mean m(x) and covariance C(x): -m' C^-1 r + tr(C^-1 C') / 2 - r' C^-1 C' C^-1 r / 2,
+    and m' C^-1 m' + tr(C^-1 C' C^-1 C') / 2.
+    """
+    stack, whitening, residual, slopes = fitted.stack, fitted.whitening, fitted.residuals, fitted.slopes
+    turns = []
+    for number in range(len(fitted.x)):
+        inward = -1.0 if fitted.x[number] > fitted.model.start[number] else 1.0
+        moved = fitted.x + inward * STEP * (np.arange(len(fitted.x)) == number)
+        change = (stack.covariance(moved) - fitted.covariance) / (inward * STEP)
+        turns.append(whitening @ change @ whitening.T)
+    turned = np.array(turns)
+    slope = -slopes.T @ residual + 0.5 * np.einsum("pii->p", turned) - 0.5 * turned @ residual @ residual
+    information = slopes.T @ slopes + 0.5 * np.einsum("pij,qij->pq", turned, turned)
+    return slope, information + np.diag(model_width(stack.model) ** -2)
 
 
 def weigh(stack: Stack, x: np.ndarray) -> Fitted:
-    """Sums of squares and covariances of a model at given coded parameters."""
+    """Weigh a model at given coded parameters by its covariance there."""
     covariance = stack.covariance(x)
     whitening = whiten(covariance)
     residual = whitening @ (stack.target - stack.predict(x[None])[0])
     q = float(residual @ residual)
     score = q - 2.0 * float(np.log(np.diag(whitening)).sum())
-    slopes = whitening @ stack.jacobian(x[None])[0]
-    # The ranges are what is known of a parameter that the data say nothing of.
-    spread = np.linalg.inv(slopes.T @ slopes + np.diag((model_width(stack.model)) ** -2))
-    return Fitted(stack, x, covariance, whitening, q, score, spread)
+    return Fitted(stack, x, covariance, whitening, q, score)
 
 
 def model_width(model: Model) -> np.ndarray:
@@ -203,7 +323,10 @@ def whiten(covariance: np.ndarray) -> np.ndarray:
 def coded_size_interval(fitted: Fitted, number: int, coverage: float = 0.9) -> tuple[float, float]:
     """Profile-likelihood interval of a coded size.
 
-    It ends where q, with all else refitted, has risen by the point of chi2 for the coverage.
+    It ends where q, with all else refitted, has risen by the point of chi2 for the coverage. The weights stay
+    those of the optimum; what they contribute to the score's slope there is taken out of the residuals, so
+    that q is least at the optimum, too. Where nothing fits, the score may ask for another size than q does,
+    one whose predictions are more uncertain: the interval holds both.
 
     Parameters
     ----------
@@ -221,11 +344,15 @@ def coded_size_interval(fitted: Fitted, number: int, coverage: float = 0.9) -> t
     lower = np.repeat(fitted.model.lower[None], len(grid), axis=0)
     upper = np.repeat(fitted.model.upper[None], len(grid), axis=0)
     lower[:, column] = upper[:, column] = grid
-    _, q = minimise(fitted.stack, fitted.whitening, fitted.stack.target, starts, lower, upper)
+    slopes = fitted.sensitivities
+    left = fitted.residuals - slopes @ (np.linalg.pinv(slopes) @ fitted.residuals)
+    target = fitted.stack.predict(fitted.x[None])[0] + np.linalg.solve(fitted.whitening, left)
+    _, q = minimise(fitted.stack, fitted.whitening, target, starts, lower, upper)
     shifted = (fitted.errors[column] ** 2) / fitted.spread[column, column]
     rise = q - q.min() - stats.chi2.ppf(coverage, 1) * shifted
-    inside = np.flatnonzero(rise <= 0.0)
-    return _crossing(grid, rise, inside[0], -1), _crossing(grid, rise, inside[-1], 1)
+    inside, value = np.flatnonzero(rise <= 0.0), float(fitted.x[column])
+    ends = _crossing(grid, rise, inside[0], -1), _crossing(grid, rise, inside[-1], 1)
+    return min(ends[0], value), max(ends[1], value)
 
 
 def _crossing(grid: np.ndarray, rise: np.ndarray, inside: int, step: int) -> float:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -11,6 +13,7 @@ from scipy.linalg import block_diag
 from doe.discrepancy.emulation.correction import Correction
 from doe.discrepancy.emulation.emulator import Emulator
 from doe.discrepancy.fitting.evidence import Block
+from doe.discrepancy.fitting.scatter import Excess, Scatter
 
 STEP = 0.02
 """Half the step of derivatives, in coded units."""
@@ -38,6 +41,26 @@ class Model:
     """By how much the emulator's parameters are off; None for the emulator alone."""
     corrections: Mapping[str, Correction] = field(default_factory=dict)
     """By condition, what it misses besides; empty for the emulator alone."""
+    heading: float = 0.0
+    """Azimuth of its directed mechanisms [deg]."""
+    views: Mapping[str, float] = field(default_factory=dict)
+    """By condition, the azimuth that it is seen from [deg]; left out: 0."""
+
+    @cached_property
+    def is_directed(self) -> bool:
+        """True if it looks different from another azimuth."""
+        space = self.emulator.space
+        return bool(space.odd) and any(space.mechanism(name).directed for name in self.mechanisms)
+
+    @cached_property
+    def odd(self) -> np.ndarray:
+        """True for observables that a mirror turns over, (observables,)."""
+        return np.isin(self.emulator.observables, self.emulator.space.odd)
+
+    def turn(self, condition: str) -> np.ndarray:
+        """Share of each observable that is seen from the azimuth of a condition, (observables,)."""
+        seen = math.cos(math.radians(self.heading - self.views.get(condition, 0.0)))
+        return np.where(self.odd, seen, 1.0)
 
     @property
     def lower(self) -> np.ndarray:
@@ -60,17 +83,43 @@ class Model:
         values = self.emulator.surfaces[condition].predict(shifted, self.mechanisms)
         if condition in self.corrections:
             values = values + self.corrections[condition].mean(x)
-        return values
+        # without a direction odd observables are noise, which has no mean to be turned
+        return values * self.turn(condition) if self.is_directed else values
 
-    def noise(self, x: np.ndarray, block: Block) -> np.ndarray:
-        """Covariance of the noise of the means of a block, at one row of coded parameters, (k, k)."""
-        surfaces = self.emulator.surfaces[block.condition]
-        covariance = surfaces.noise_covariance(x, self.mechanisms)
-        if block.condition in self.corrections:
-            ratio = self.corrections[block.condition].noise_ratio
+    def run_covariance(self, x: np.ndarray, condition: str) -> np.ndarray:
+        """Covariance of one run at one row of coded parameters, (observables, observables)."""
+        covariance = self.emulator.surfaces[condition].noise_covariance(x, self.mechanisms)
+        if condition in self.corrections:
+            ratio = self.corrections[condition].noise_ratio
             covariance = ratio[:, None] * covariance * ratio
-        covariance = block.scatter(covariance[np.ix_(block.columns, block.columns)])
-        return covariance * surfaces.noise.inverse_bias(len(block.columns))
+        if not self.is_directed:
+            return covariance
+        # from any side odd observables scatter alike, with the others as much as they are turned towards it
+        turn = self.turn(condition)
+        return np.where(self.odd[:, None] & self.odd, covariance, covariance * np.outer(turn, turn))
+
+    def excess(self, x: np.ndarray, scatter: Scatter, runs: Mapping[str, np.ndarray] | None = None) -> Excess:
+        """Estimate what replicates scatter more than its runs do at one row of coded parameters.
+
+        Covariances of the runs by condition, where they are known, need not be computed again.
+        """
+        runs = runs or {}
+        own = {n: runs[n] if n in runs else self.run_covariance(x, n) for n in scatter.products}
+        known = sum(self.emulator.surfaces[name].noise.degrees_of_freedom for name in own)
+        return scatter.excess(own, known, len(self.emulator.observables))
+
+    def noise(self, x: np.ndarray, block: Block, excess: Excess | None = None) -> np.ndarray:
+        """Covariance of the noise of the means of a block, at one row of coded parameters, (k, k).
+
+        What its replicates scatter beyond the model is that at these parameters, unless it is given.
+        """
+        excess = self.excess(x, block.scatter) if excess is None else excess
+        return self.noise_of(self.run_covariance(x, block.condition), block, excess)
+
+    def noise_of(self, run: np.ndarray, block: Block, excess: Excess) -> np.ndarray:
+        """Covariance of the noise of the means of a block, of that of one run, (k, k)."""
+        freed = self.emulator.surfaces[block.condition].noise.inverse_bias(len(block.columns))
+        return block.noise(run, excess) * freed
 
     def error(self, x: np.ndarray, block: Block) -> np.ndarray:
         """Covariance of the error of the prediction of a block, with what is systematic, (k, k)."""
@@ -79,6 +128,9 @@ class Model:
             error = self.corrections[block.condition].error(x)
         else:
             error = surfaces.error(x, self.mechanisms)
+        if self.is_directed:
+            turn = self.turn(block.condition)
+            error = error * np.outer(turn, turn)
         theta = x[: len(self.emulator.space.factors)]
         own = self.systematic**2 * surfaces.noise.variance(theta)
         return np.asarray((error + np.diag(own))[np.ix_(block.columns, block.columns)])
@@ -91,7 +143,7 @@ class Stack:
     model: Model
     blocks: tuple[Block, ...]
 
-    @property
+    @cached_property
     def target(self) -> np.ndarray:
         """The measured means, (means,)."""
         return np.concatenate([block.mean for block in self.blocks])
@@ -110,12 +162,28 @@ class Stack:
 
     def covariance(self, x: np.ndarray) -> np.ndarray:
         """Covariance of measured less predicted means at one row of coded parameters, (means, means)."""
-        return _blocks(self.model.noise(x, block) + self.model.error(x, block) for block in self.blocks)
+        own = self.noise(x) + _blocks(self.model.error(x, block) for block in self.blocks)
+        return own + self.common.T @ self.common
+
+    @cached_property
+    def common(self) -> np.ndarray:
+        """Change of the means by a standard deviation of each calibration error, (2 observables, means).
+
+        Offsets of all observables, then their scales.
+        """
+        numbers = np.arange(len(self.model.emulator.observables))
+        columns = np.concatenate([block.columns for block in self.blocks])
+        moved = np.concatenate([block.common for block in self.blocks], axis=1)
+        return np.concatenate([np.where(columns == numbers[:, None], each, 0.0) for each in moved])
 
     def noise(self, x: np.ndarray) -> np.ndarray:
         """Covariance of the measured means alone, (means, means)."""
-        return _blocks(self.model.noise(x, block) for block in self.blocks)
+        model = self.model
+        runs = {block.condition: model.run_covariance(x, block.condition) for block in self.blocks}
+        # all blocks are means of the same replicates, or of as few
+        excess = model.excess(x, self.blocks[0].scatter, runs)
+        return _blocks(model.noise_of(runs[block.condition], block, excess) for block in self.blocks)
 
 
-def _blocks(parts: Sequence[np.ndarray] | object) -> np.ndarray:
-    return np.asarray(block_diag(*parts))  # type: ignore[misc]
+def _blocks(parts: Iterable[np.ndarray]) -> np.ndarray:
+    return np.asarray(block_diag(*parts))

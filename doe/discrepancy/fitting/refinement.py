@@ -85,7 +85,7 @@ def correct(model: Model, runs: Runs, centre: np.ndarray) -> Model:
     centre : (parameters,) array
         Optimum that they lie around.
     """
-    plain = replace(model, shift=None, corrections={})
+    plain = replace(model, shift=None, corrections={}, heading=0.0, views={})  # as runs are
     names = [c for c in model.emulator.surfaces if np.sum(runs.conditions == c) >= 2]
     ratio = _noise_ratio(plain, runs, names)
     shifted = replace(plain, shift=likeliest_shift(plain, runs, centre, ratio))
@@ -103,7 +103,7 @@ def correct(model: Model, runs: Runs, centre: np.ndarray) -> Model:
         )
         for name, one in seen.items()
     }
-    return replace(shifted, corrections=corrections)
+    return replace(shifted, corrections=corrections, heading=model.heading, views=model.views)
 
 
 def likeliest_shift(model: Model, runs: Runs, centre: np.ndarray, ratio: np.ndarray) -> Shift:
@@ -160,7 +160,8 @@ class _Seen:
     """Covariances of the emulator's errors, (observables, terms, terms)."""
     misfit: np.ndarray
     variance: np.ndarray
-    """Its statement of what no coefficient follows, and variance of one run, (observables,)."""
+    """Its statement of what no coefficient follows, and variance of one run, both where symmetry lets it act,
+    (observables,)."""
     factors: int
     """Number of the factors; the other parameters are sizes."""
 
@@ -188,7 +189,7 @@ def _seen(model: Model, runs: Runs, centre: np.ndarray, ratio: np.ndarray, condi
         variance / counts[:, None],
         surfaces.coefficient_errors(centre[:factors], model.mechanisms),
         surfaces.misfit_variance(centre, model.mechanisms),
-        variance,
+        variance * surfaces.moved(model.mechanisms),
         factors,
     )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -9,6 +10,21 @@ from pathlib import Path
 import numpy as np
 
 from doe.errors import RuleError
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Standard deviations of what may be off alike in every measurement of one observable."""
+
+    offset: float = 0.0
+    """Added to every value, in its natural unit."""
+    scale: float = 0.0
+    """Share of every value."""
+
+    def __post_init__(self) -> None:
+        for name in ("offset", "scale"):
+            if not (math.isfinite(value := getattr(self, name)) and value >= 0.0):
+                raise RuleError("must be a number, 0 or more", value, f"Calibration.{name}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,6 +42,12 @@ class Measured:
     """By condition: reason of each replicate that failed, empty where it did not; left out: none did."""
     pictures: Mapping[str, tuple[Path, ...]] = field(default_factory=dict)
     """By condition: pictures that came with the data."""
+    calibration: Mapping[str, Calibration] = field(default_factory=dict)
+    """By observable, what its instrument may be off by in all conditions; left out: nothing."""
+    views: Mapping[str, float] = field(default_factory=dict)
+    """By condition: azimuth that it was seen from [deg]; left out: 0, as the simulator is."""
+    kinds: tuple[tuple[str, ...], ...] = ()
+    """Observables that are measured in one unit, which a slip of units takes all together."""
     notes: tuple[str, ...] = ()
     """Remarks that a reader must know: too few replicates, values that contradict one another, ..."""
 
@@ -35,6 +57,8 @@ class Measured:
                 raise RuleError("needs at least one, each once", names, f"Measured.{what}")
         if set(self.values) != set(self.conditions):
             raise RuleError("holds every condition and no other", sorted(self.values), "Measured.values")
+        if strange := [name for name in self.calibration if name not in self.observables]:
+            raise RuleError("is of measured observables", strange, "Measured.calibration")
         formed = {name: tuple("" for _ in rows) for name, rows in self.values.items()}
         object.__setattr__(self, "reasons", {**formed, **self.reasons})
         for name, rows in self.values.items():
@@ -99,5 +123,9 @@ class Measured:
             raise RuleError(rule, sorted(wanted), "observables")
         names = tuple(self.observables[index] for index in kept)
         return replace(
-            self, observables=names, values={name: rows[:, kept] for name, rows in self.values.items()}
+            self,
+            observables=names,
+            values={name: rows[:, kept] for name, rows in self.values.items()},
+            kinds=tuple(tuple(name for name in kind if name in names) for kind in self.kinds),
+            calibration={name: one for name, one in self.calibration.items() if name in names},
         )

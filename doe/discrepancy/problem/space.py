@@ -27,6 +27,8 @@ class MechanismRange:
     null: float
     maximum: float
     """Size at which it is absent, and the end of its range, in its natural units."""
+    directed: bool = False
+    """It has a direction, an azimuth; the simulator has it at azimuth 0."""
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.null) and math.isfinite(self.maximum)) or self.null == self.maximum:
@@ -47,6 +49,9 @@ class SearchSpace:
     """True where a condition takes no part in any fit."""
     mechanisms: tuple[MechanismRange, ...] = field(default=())
     """The library."""
+    odd: tuple[str, ...] = field(default=())
+    """Observables that change their sign in a mirror which turns no condition, no factor and no mechanism but
+    the directed ones into another: without one of these they are nothing but noise."""
 
     def __post_init__(self) -> None:
         if not len(self.factors) == len(self.lower) == len(self.upper) or not self.factors:

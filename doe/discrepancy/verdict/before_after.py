@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from doe.discrepancy.fitting.evidence import Block
 from doe.discrepancy.fitting.fit import Fitted, Interval, whiten
@@ -68,21 +69,21 @@ def compare(
     if not kept:
         return None
     counts = [int(np.sum(runs.conditions == b.condition)) for b in kept for runs in (base_runs, chosen_runs)]
-    normal = np.random.default_rng(seed).standard_normal((draws, sum(len(block.mean) for block in kept)))
-    before, after, start = np.zeros(draws + 1), np.zeros(draws + 1), 0
-    for block in kept:
-        own = normal[:, start : start + len(block.mean)]
-        start += len(block.mean)
-        noise = chosen.model.noise(chosen.x, block)
-        for total, runs in ((before, base_runs), (after, chosen_runs)):
-            mean, error = _mean(runs, block, chosen.model, chosen.x)
-            whitening = whiten(noise + error)
-            drawn = np.concatenate([np.zeros((1, len(block.mean))), own]) + whitening @ (block.mean - mean)
-            total += (drawn**2).sum(axis=1)
-    freedom = _expected(chosen, tuple(kept)) if held_out else max(start - len(chosen.x), 1)
+    stack = Stack(chosen.model, tuple(kept))
+    noise = stack.noise(chosen.x) + stack.common.T @ stack.common
+    size = len(stack.target)
+    normal = np.random.default_rng(seed).standard_normal((draws, size))
+    qs = []
+    for runs in (base_runs, chosen_runs):
+        mean, error = _means(runs, kept, chosen.model, chosen.x)
+        whitening = whiten(noise + error)
+        drawn = np.concatenate([np.zeros((1, size)), normal]) + whitening @ (stack.target - mean)
+        qs.append((drawn**2).sum(axis=1))
+    before, after = qs
+    freedom = _expected(chosen, tuple(kept)) if held_out else max(size - len(chosen.x), 1)
     # A noisy residual is larger by its noise on average: a second noise would count it twice.
-    before[1:] -= start
-    after[1:] -= start
+    before[1:] -= size
+    after[1:] -= size
     excess_before = np.maximum(before - freedom, 1e-9)
     removed = np.clip(1.0 - np.maximum(after - freedom, 0.0) / excess_before, -1.0, 1.0)
     return BeforeAfter(
@@ -97,14 +98,14 @@ def _expected(chosen: Fitted, blocks: tuple[Block, ...]) -> int:
     return round(len(stack.target) + float(np.trace(slopes @ chosen.spread @ slopes.T)))
 
 
-def _mean(runs: Runs, block: Block, model: Model, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Mean of the runs of a block, and the covariance of its error."""
-    here = runs.values[runs.conditions == block.condition][:, block.columns]
-    size = here.shape[1]
-    own = Block(
-        block.condition, block.columns, block.mean, np.full((size, size), 1.0 / len(here)), np.ones(size)
-    )
-    return here.mean(axis=0), model.noise(x, own)
+def _means(runs: Runs, blocks: Sequence[Block], model: Model, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Means of runs in the conditions of blocks, and the covariance of their error."""
+    means, errors = [], []
+    for block in blocks:
+        here = runs.values[runs.conditions == block.condition][:, block.columns]
+        means.append(here.mean(axis=0) * model.turn(block.condition)[block.columns])
+        errors.append(model.noise(x, Block.of_runs(block.condition, block.columns, len(here))))
+    return np.concatenate(means), block_diag(*errors)
 
 
 def _interval(values: np.ndarray) -> Interval:

@@ -13,6 +13,7 @@ import numpy as np
 
 from doe.discrepancy.contest.gap import Answer
 from doe.discrepancy.contest.power import Power
+from doe.discrepancy.contest.slips import Slip
 from doe.discrepancy.fitting.fit import Interval
 from doe.discrepancy.verdict.before_after import BeforeAfter
 from doe.discrepancy.verdict.next_experiment import NextExperiment
@@ -49,6 +50,21 @@ class Data:
     """Measurements that each mean is made of, (conditions, observables)."""
 
 
+@dataclass(frozen=True)
+class CalibrationUse:
+    """The calibration error of one observable that a model asks for."""
+
+    observable: str
+    offset: float
+    scale: float
+    """Standard deviations that were allowed: in its natural unit, and as a share of the value."""
+    used_offset: float
+    used_scale: float
+    """Likeliest values of both, measured less true."""
+    deviations: float
+    """Length of the two in their standard deviations."""
+
+
 @dataclass(frozen=True, eq=False)
 class Fit:
     """A model as close to the training conditions as it comes."""
@@ -79,6 +95,10 @@ class Fit:
     adjusted_p: np.ndarray
     """Measured less predicted over the standard deviation of that difference, and its p value after Holm,
     (conditions, observables)."""
+    calibration: tuple[CalibrationUse, ...] = ()
+    """Calibration errors that were allowed, and how much of each it uses."""
+    heading: float | None = None
+    """Azimuth of its directed mechanisms [deg]; None without one."""
 
     @property
     def excess(self) -> float:
@@ -140,6 +160,8 @@ class Candidate:
     """True if it passes every rule."""
     objection: str
     """The first rule that it fails, as a sentence; empty if admitted."""
+    heading: float | None = None
+    """As in ``Fit``."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,11 +212,17 @@ class Discovery:
     notes: tuple[str, ...]
     """Faults of the data or the runs, and what was done about them."""
     effort: Effort
+    closest: Fit | None = None
+    """The candidate of the best score, where none was chosen."""
+    slips: tuple[Slip, ...] = ()
+    """Likely slips, which this verdict was given with."""
+    without_slips: Discovery | None = None
+    """The same analysis without their values; None without slips."""
 
     def __post_init__(self) -> None:
         shape = (len(self.data.conditions), len(self.data.observables))
         _check("data", self.data, shape, ("means", "standard_errors", "replicates"))
-        for name, fit in (("base", self.base), ("chosen", self.chosen)):
+        for name, fit in (("base", self.base), ("chosen", self.chosen), ("closest", self.closest)):
             if fit is not None:
                 _check(name, fit, shape, ("predicted", "predicted_se", "residuals", "adjusted_p"))
 

@@ -48,7 +48,7 @@ def propose(first: Fitted, second: Fitted, replicates: int) -> NextExperiment:
     emulator = first.model.emulator
     best: tuple[float, str, str] | None = None
     for condition in emulator.space.conditions:
-        block = _new_block(emulator.observables, condition, replicates)
+        block = Block.of_runs(condition, np.arange(len(emulator.observables)), replicates)
         expected, contrast = _separation(first, second, block)
         if best is None or expected > best[0]:
             best = (expected, condition, emulator.observables[int(np.argmax(np.abs(contrast)))])
@@ -56,12 +56,6 @@ def propose(first: Fitted, second: Fitted, replicates: int) -> NextExperiment:
         raise ValueError(f"a next experiment needs a condition (received {emulator.space.conditions})")
     titles = (_title(first), _title(second))
     return NextExperiment(best[1], (), titles, best[0], replicates, best[2])
-
-
-def _new_block(observables: tuple[str, ...], condition: str, replicates: int) -> Block:
-    count = len(observables)
-    share = np.full((count, count), 1.0 / replicates)
-    return Block(condition, np.arange(count), np.zeros(count), share, np.ones(count))
 
 
 def _separation(first: Fitted, second: Fitted, block: Block) -> tuple[float, np.ndarray]:

@@ -10,23 +10,27 @@ from doe.discrepancy.contest.held_out import forecast
 from doe.discrepancy.contest.signatures import Signatures, projector
 from doe.discrepancy.emulation.emulator import Emulator
 from doe.discrepancy.fitting.evidence import Block, Evidence
-from doe.discrepancy.fitting.fit import AT_BOUND, Fitted, Interval, coded_size_interval
+from doe.discrepancy.fitting.fit import AT_BOUND, Fitted, Interval, coded_size_interval, weigh
+from doe.discrepancy.fitting.model import Model, Stack
 from doe.discrepancy.problem.settings import Settings
 from doe.discrepancy.verdict.conclusion import Assessment, objections
-from doe.discrepancy.verdict.discovery import Candidate, Data, Drift, Fit
+from doe.discrepancy.verdict.discovery import CalibrationUse, Candidate, Data, Drift, Fit
+
+TOLD = 1.5
+"""Variance of replicates over that of the model from which on the reader is told."""
 
 
-def data_record(emulator: Emulator, evidence: Evidence) -> Data:
-    """The measured means, a row a condition of the emulator."""
+def data_record(emulator: Emulator, evidence: Evidence, base: Fitted | None = None) -> Data:
+    """The measured means, a row a condition of the emulator; their errors as the calibrated base has them."""
     conditions, observables = emulator.space.conditions, emulator.observables
     shape = (len(conditions), len(observables))
     means, errors, replicates = np.full(shape, np.nan), np.full(shape, np.nan), np.zeros(shape, dtype=int)
-    centre = np.zeros(len(emulator.space.factors))
+    model = Model(emulator, (), 0.0) if base is None else base.model
+    x = model.start if base is None else base.x
     for block in (*evidence.training, *evidence.held_out):
         row = conditions.index(block.condition)
-        noise = emulator.surfaces[block.condition].noise.covariance(centre)
         means[row, block.columns] = block.mean
-        own = block.scatter(noise[np.ix_(block.columns, block.columns)])
+        own = block.noise(model.run_covariance(x, block.condition), model.excess(x, block.scatter))
         errors[row, block.columns] = np.sqrt(np.diag(own))
         replicates[row, block.columns] = block.replicates
     return Data(conditions, observables, emulator.space.held_out, means, errors, replicates)
@@ -59,7 +63,26 @@ def fit_record(fitted: Fitted, gap: GapTest, evidence: Evidence) -> Fit:
         predicted_se=predicted_se,
         residuals=residuals,
         adjusted_p=adjusted,
+        calibration=calibration_uses(fitted, evidence),
+        heading=_heading(fitted),
     )
+
+
+def calibration_uses(fitted: Fitted, evidence: Evidence) -> tuple[CalibrationUse, ...]:
+    """Calibration errors that were allowed, each with its expected value given all residuals of a model."""
+    whole = weigh(Stack(fitted.model, (*evidence.training, *evidence.held_out)), fitted.x)
+    common = whole.stack.common
+    asked = (common @ whole.whitening.T @ whole.residuals).reshape(2, -1)
+    uses = []
+    for column, observable in enumerate(fitted.model.emulator.observables):
+        if not common.reshape(2, len(asked[0]), -1)[:, column].any():
+            continue
+        one = evidence.calibration[observable]
+        z = asked[:, column]
+        offset, scale = (float(each) for each in z * [one.offset, one.scale])
+        length = float(np.hypot(*z))
+        uses.append(CalibrationUse(observable, one.offset, one.scale, offset, scale, length))
+    return tuple(uses)
 
 
 def size_intervals(fitted: Fitted) -> tuple[Interval, ...]:
@@ -72,14 +95,29 @@ def size_intervals(fitted: Fitted) -> tuple[Interval, ...]:
     return tuple(out)
 
 
+def scatter_notes(fitted: Fitted) -> tuple[str, ...]:
+    """Say what replicates scatter more than the model at its optimum, and count so."""
+    stack = fitted.stack
+    excess = fitted.model.excess(fitted.x, stack.blocks[0].scatter)
+    notes = []
+    if excess.runs > TOLD:
+        notes.append(f"replicates scatter {excess.runs**0.5:.1f} times as much as the model's, and count so")
+    notes += [
+        f"readings of {name} scatter {reading**0.5:.1f} times as much as the model's runs do, each by itself,"
+        " and count so"
+        for name, reading in zip(fitted.model.emulator.observables, excess.reading, strict=True)
+        if reading > TOLD - 1.0
+    ]
+    return tuple(notes)
+
+
 def _predictions(fitted: Fitted) -> tuple[np.ndarray, np.ndarray]:
     """Every observable of every condition, and its standard error from the fit and the emulator."""
     emulator = fitted.model.emulator
     count = len(emulator.observables)
     values, errors = [], []
     for condition in emulator.space.conditions:
-        whole = Block(condition, np.arange(count), np.zeros(count), np.ones((count, count)), np.ones(count))
-        told = forecast(fitted, (whole,))
+        told = forecast(fitted, (Block.of_runs(condition, np.arange(count), 1),))
         values.append(told.predicted)
         errors.append(np.sqrt(np.maximum(np.diag(told.covariance - told.noise), 0.0)))
     return np.array(values), np.array(errors)
@@ -152,4 +190,9 @@ def candidate_record(
         simulated=assessment.simulated,
         admitted=not found,
         objection=found[0] if found else "",
+        heading=_heading(fitted),
     )
+
+
+def _heading(fitted: Fitted) -> float | None:
+    return fitted.model.heading if fitted.model.is_directed else None

@@ -39,6 +39,10 @@ def residual_maps(found: Discovery, terms: Terms) -> list[Chart]:
         title = terms.titles(found.chosen.mechanisms)
         caption = f"After: measured less the model with {title}, factors and size fitted together."
         maps.append(_residual_map("residuals-after", found, found.chosen, caption))
+    if found.closest:
+        title = terms.titles(found.closest.mechanisms)
+        caption = f"The closest model: measured less that with {title}, factors and size fitted together."
+        maps.append(_residual_map("residuals-closest", found, found.closest, caption))
     return maps
 
 

@@ -9,6 +9,7 @@ from typing import Any
 from doe.discrepancy import Discovery, Settings, Verdict
 from experiments.report.cautions import Caution, study_cautions
 from experiments.report.discovery import charts, tables
+from experiments.report.discovery.disagreement import conventions, misses
 from experiments.report.discovery.paper_text import search_pastes
 from experiments.report.discovery.terms import Terms, percent
 from experiments.report.discovery.verdict import (
@@ -91,8 +92,10 @@ def render_discovery(
         "terms": terms,
         "headline": headline(found, terms),
         "sentence": verdict_sentence(found, terms),
-        "reason": reason_sentence(found),
-        "settled": found.verdict in SETTLED,
+        "reason": reason_sentence(found, terms),
+        "settled": found.verdict in SETTLED and not found.slips,
+        "misses": misses(found, terms) if found.verdict is Verdict.UNKNOWN else [],
+        "conventions": conventions(found, terms) if found.verdict is Verdict.UNKNOWN else [],
         "cards": _cards(found, terms),
         "explained": found.named,
         "next_step": next_step(found, terms),
@@ -166,6 +169,8 @@ def _gap(found: Discovery, terms: Terms) -> Chapter | None:
     if found.base is None:
         return None
     shown = {"parameters": tables.parameters_table(found, terms)}
+    if (calibration := tables.calibration_table(found, terms)) is not None:
+        shown["calibration"] = calibration
     if found.drifts:
         shown["drifts"] = tables.drifts_table(found, terms)
     return _chapter("gap", shown, {"maps": charts.residual_maps(found, terms)})

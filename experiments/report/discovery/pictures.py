@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from dem_warp import CaseResult
 from experiments.report.pictures import HeapPicture, drawn_heap
@@ -50,6 +51,15 @@ def photograph(path: Path, condition: str, fit: str) -> HeapPicture | None:
     sides = f"left {angle.left:.1f}°, right {angle.right:.1f}°"
     caption = f"“{condition}”, {path.name}: {angle.mean:.1f}°; {sides}."
     return HeapPicture("Measured", caption, _shown(read_picture(path), angle, _Window.around(*_size(angle))))
+
+
+def turned(result: CaseResult, azimuth: float) -> CaseResult:
+    """Turn a heap about its vertical by an azimuth [deg]; one that did not finish stays."""
+    if not azimuth or result.status != "finished":
+        return result
+    turn = Rotation.from_euler("z", azimuth, degrees=True)
+    orientations = (turn * Rotation.from_quat(result.orientations)).as_quat()
+    return replace(result, positions=turn.apply(result.positions), orientations=orientations)
 
 
 def simulated_heaps(models: Mapping[str, CaseResult], condition: str, study: Study) -> list[HeapPicture]:

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from doe.discrepancy import BeforeAfter, Candidate, Discovery, Drift, Fit, Interval, Power
-from experiments.report.discovery.terms import GAP, Terms, condition_name
+from experiments.report.discovery.terms import GAP, Terms, condition_name, percent, spaced
 from experiments.report.kit.numbers import MISSING, estimate, trimmed
 from experiments.report.kit.table import Column, Layout, Table, columns, make_table
 
@@ -37,6 +37,10 @@ def frames(found: Discovery) -> dict[str, pd.DataFrame]:
             ]
         ),
     }
+    uses = {name: fit.calibration for name, fit in _models(found).items()}
+    tables["calibration"] = pd.DataFrame(
+        [{"model": name} | vars(use) for name, each in uses.items() for use in each]
+    )
     if found.confounding:
         names = list(found.confounding.mechanisms)
         matrix = pd.DataFrame(found.confounding.correlations, index=names, columns=names)
@@ -168,12 +172,43 @@ def parameters_table(found: Discovery, terms: Terms) -> Table:
     frame["bound"] = [
         ", ".join(model for model, fit in models if factor in fit.at_bounds) for factor in frame["factor"]
     ]
-    numbers = columns("level", base="base", base_se="se", chosen="with the mechanism", chosen_se="se")
+    titles = {"base": "base", "chosen": "with the mechanism", "closest": "closest model"}
+    heads = {f"{name}{end}": "se" if end else title for name, title in titles.items() for end in ("", "_se")}
+    numbers = columns("level", **heads)
     for number in (column.key for column in numbers if column.key in frame):
         frame[number] = [float(f"{value:.3g}") for value in frame[number]]
     frame = frame.drop(columns=[name for name in ("unit", "bound") if not frame[name].any()])
     words = columns(label="what it is", unit="unit", bound="at an end of its range")
     return make_table("parameters", frame, ["factor", words[0], *numbers, *words[1:]], "The fitted factors.")
+
+
+def calibration_table(found: Discovery, terms: Terms) -> Table | None:
+    """Lay out the calibration errors that were allowed, and how much each model uses; None without any."""
+    rows = []
+    models = {name: {use.observable: use for use in fit.calibration} for name, fit in _models(found).items()}
+    for observable, allowed in next(iter(models.values()), {}).items():
+        factor, unit = terms.scale(observable)
+        row: dict[str, object] = {"observable": spaced(observable)}
+        row["offset"] = f"{trimmed(factor * allowed.offset, 2)}{GAP}{unit}" if allowed.offset else MISSING
+        row["scale"] = percent(allowed.scale, 1) if allowed.scale else MISSING
+        for name, uses in models.items():
+            use = uses[observable]
+            row[name] = f"{trimmed(factor * use.used_offset, 2)}{GAP}{unit}".strip()
+            row[f"{name}_sd"] = use.deviations
+        rows.append(row)
+    if not rows:
+        return None
+    shown: Layout = ["observable", Column("offset", "offset allowed"), Column("scale", "scale allowed")]
+    for name, title in {"base": "base", "chosen": "with the mechanism", "closest": "closest model"}.items():
+        if name in models:
+            shown += [Column(name, f"offset used, {title}"), Column(f"{name}_sd", "of both, in sd", "ratio")]
+    note = (
+        "Standard deviations of what an instrument may be off by in all conditions alike, as the file of"
+        " measured heaps states them or as is usual for the instrument; and the likeliest offset, measured"
+        " less true, given all residuals of a model. Above 2 a model leans on an allowance: check that"
+        " instrument."
+    )
+    return make_table("calibration", pd.DataFrame(rows), shown, "What instruments may be off by.", note)
 
 
 def drifts_table(found: Discovery, terms: Terms) -> Table:
@@ -225,7 +260,8 @@ def _laid_out(
 
 
 def _models(found: Discovery) -> dict[str, Fit]:
-    return {name: fit for name, fit in (("base", found.base), ("chosen", found.chosen)) if fit is not None}
+    fits = {"base": found.base, "chosen": found.chosen, "closest": found.closest}
+    return {name: fit for name, fit in fits.items() if fit is not None}
 
 
 def _candidate_row(candidate: Candidate) -> dict[str, object]:

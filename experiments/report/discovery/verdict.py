@@ -17,11 +17,20 @@ from doe.discrepancy import (
     Settings,
     Verdict,
 )
+from experiments.report.discovery.disagreement import (
+    heading_phrase,
+    misses,
+    slip_sentences,
+    with_and_without,
+)
 from experiments.report.discovery.terms import Terms, percent, spaced
-from experiments.report.kit.numbers import capital, fixed, p_clause, trimmed
+from experiments.report.kit.numbers import capital, enumeration, fixed, p_clause, trimmed
 
 SETTLED = (Verdict.NONE, Verdict.NAMED)
 """Verdicts that leave no question open."""
+
+DRIFTS = 1e-3
+"""P value of a drift below which a verdict that nothing is missing says a word about it."""
 
 SHOWN_RIVALS = 2
 """Refused mechanisms whose objection is told."""
@@ -30,23 +39,33 @@ SHOWN_RIVALS = 2
 def headline(found: Discovery, terms: Terms) -> str:
     """Say the verdict in a few words."""
     named = terms.titles(found.named)
+    if found.slips:
+        return "A likely slip in the data"
     return {
         Verdict.NONE: "Nothing is missing that these data could show",
         Verdict.NAMED: f"Missing: {named}",
         Verdict.TIE: f"A tie: {terms.titles(found.named, 'or')}",
-        Verdict.UNKNOWN: "Something is missing, and nothing in the library explains it",
+        Verdict.UNKNOWN: "Something is missing, and no effect of the library is sure to be it",
         Verdict.NOT_IDENTIFIABLE: "These data cannot tell",
     }[found.verdict]
 
 
 def verdict_sentence(found: Discovery, terms: Terms) -> str:
     """Say what was found, with its numbers, in one sentence or two."""
-    return _SENTENCES[found.verdict](found, terms)
+    told = _SENTENCES[found.verdict](found, terms)
+    return " ".join([*slip_sentences(found), with_and_without(found), told]).strip() if found.slips else told
 
 
-def reason_sentence(found: Discovery) -> str:
+def reason_sentence(found: Discovery, terms: Terms) -> str:
     """The rule that gave the verdict, as a sentence."""
-    return f"{capital(found.reason).rstrip('.')}."
+    return f"{capital(_one_name(found.reason, terms)).rstrip('.')}."
+
+
+def _one_name(text: str, terms: Terms) -> str:
+    """Call every mechanism of a text by its title, as all the page does."""
+    for name, mechanism in terms.mechanisms.items():
+        text = text.replace(spaced(name), mechanism.title)
+    return text
 
 
 def verdict_line(found: Discovery, terms: Terms) -> str:
@@ -85,20 +104,31 @@ def next_step(found: Discovery, terms: Terms) -> str:
 
 def _none(found: Discovery, terms: Terms) -> str:
     if found.base is None or found.gap is None:
-        return reason_sentence(found)
+        return reason_sentence(found, terms)
     return (
         "Fitted as well as it can be, the model agrees with the data within their noise:"
         f" Q = {trimmed(found.base.q, 3)} at {fixed(found.base.degrees_of_freedom, 0)} degrees of freedom,"
-        f" p {p_clause(found.base.p_value)}."
+        f" p {p_clause(found.base.p_value)}.{_drifting(found, terms)}"
+    )
+
+
+def _drifting(found: Discovery, terms: Terms) -> str:
+    """Say why a drift of a factor is no contradiction to a model that lacks nothing."""
+    drifting = [terms.factors[drift.factor].label for drift in found.drifts if drift.p_value < DRIFTS]
+    if not drifting:
+        return ""
+    return (
+        f" Fitted to one condition at a time, {enumeration(drifting)} would differ between conditions; one"
+        " value fits them all within the noise, so that this is no sign of an effect that is missing."
     )
 
 
 def _added(found: Discovery, terms: Terms) -> str:
     """``Adding X at a removed c % of the excess; held out, Q fell from d to e``."""
     if found.chosen is None:
-        return reason_sentence(found)
+        return reason_sentence(found, terms)
     sizes = terms.sizes(found.chosen.mechanisms, found.chosen.sizes)
-    text = f"Adding {terms.titles(found.chosen.mechanisms)} at {sizes}"
+    text = f"Adding {terms.titles(found.chosen.mechanisms)} at {sizes}{heading_phrase(found.chosen)}"
     training, held_out = _set(found, held_out=False), _set(found, held_out=True)
     if training:
         text += f" removed {_share(training.removed)} of the excess"
@@ -107,7 +137,8 @@ def _added(found: Discovery, terms: Terms) -> str:
     if held_out:
         fell = "fell" if held_out.after.value < held_out.before.value else "rose"
         text += f"; held out, Q {fell} from {_q(held_out.before)} to {_q(held_out.after)}"
-    return text + "."
+    confirm = [terms.mechanisms[name].confirm for name in found.named if name in terms.mechanisms]
+    return " ".join([f"{text}.", *(f"Do this next: {one}" for one in confirm[:1])])
 
 
 def _tie(found: Discovery, terms: Terms) -> str:
@@ -121,20 +152,26 @@ def _tie(found: Discovery, terms: Terms) -> str:
 
 def _unknown(found: Discovery, terms: Terms) -> str:
     if found.base is None:
-        return reason_sentence(found)
+        return reason_sentence(found, terms)
     within = found.base.q <= found.base.q_limit
     how = f", not by Q alone but in that {_beyond(found.base.clearest, terms)}" if within else ""
     text = (
         f"The model disagrees with the data (Q = {trimmed(found.base.q, 3)} at"
         f" {fixed(found.base.degrees_of_freedom, 0)} degrees of freedom, p"
-        f" {p_clause(found.base.p_value)}){how}, and nothing in the library explains it"
+        f" {p_clause(found.base.p_value)}){how}"
     )
-    if found.candidates:
-        best = found.candidates[0]
-        share = f"removes {percent(best.explained)} of the excess"
-        does = share if found.base.excess else f"leaves Q = {trimmed(best.q, 3)}"
-        text += f"; the best, {terms.titles(best.mechanisms)}, {does}"
-    return text + "."
+    if not found.candidates:
+        return f"{text}, and the library has nothing to explain it with."
+    best = found.candidates[0]
+    share = f"it removes {percent(min(max(best.explained, 0.0), 1.0))} of the excess"
+    does = share if found.base.excess else f"it leaves Q = {trimmed(best.q, 3)}"
+    why = (
+        f", but {_one_name(best.objection, terms).rstrip('.')}"
+        if best.objection
+        else ", but it does not stand out"
+    )
+    text += f". {capital(terms.titles(best.mechanisms))} comes closest ({does}){why}."
+    return " ".join([text, *(capital(one) for one in misses(found, terms)[:1])])
 
 
 def _beyond(answer: Answer, terms: Terms) -> str:
@@ -188,7 +225,8 @@ def _room(found: Discovery, terms: Terms, settings: Settings) -> Iterator[str]:
 def _rivals(found: Discovery, terms: Terms, settings: Settings) -> Iterator[str]:
     refused = [c for c in found.candidates if not c.admitted and c.objection]
     for rival in refused[:SHOWN_RIVALS]:
-        yield f"{capital(terms.titles(rival.mechanisms))} was refused: {rival.objection.rstrip('.')}."
+        objection = _one_name(rival.objection, terms).rstrip(".")
+        yield f"{capital(terms.titles(rival.mechanisms))} was refused: {objection}."
 
 
 def _unresolved(found: Discovery, terms: Terms, settings: Settings) -> Iterator[str]:
@@ -216,7 +254,7 @@ _SENTENCES: dict[Verdict, Callable[[Discovery, Terms], str]] = {
     Verdict.NAMED: _added,
     Verdict.TIE: _tie,
     Verdict.UNKNOWN: _unknown,
-    Verdict.NOT_IDENTIFIABLE: lambda found, terms: reason_sentence(found),
+    Verdict.NOT_IDENTIFIABLE: reason_sentence,
 }
 
 _OUTSIDE = (
@@ -249,7 +287,8 @@ def _share(share: Interval) -> str:
 
 
 def _q(interval: Interval) -> str:
-    low, value, high = (trimmed(end, 3) for end in (interval.low, interval.value, interval.high))
+    # of a sum of squares nothing is below zero; its interval is less the noise of the means
+    low, value, high = (trimmed(max(end, 0.0), 3) for end in (interval.low, interval.value, interval.high))
     return f"{value} ({low} to {high})"
 
 

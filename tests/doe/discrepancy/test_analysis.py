@@ -59,17 +59,17 @@ def test_a_hidden_mechanism_is_named_with_its_size() -> None:
 
 
 def test_the_numbers_of_an_analysis_stay() -> None:
-    # As they were when the statistics stood among the simulator's; rounding differs from host to host.
+    # As they were when fits went down to their score; rounding differs from host to host.
     found, _ = _named()
     assert found.base is not None
     assert found.chosen is not None
     assert found.gap is not None
     [size] = found.chosen.sizes
     numbers = [found.base.q, found.gap.largest_drop, found.chosen.q, size.low, size.value, size.high]
-    kept = [730.3634449, 677.0098736, 61.24957629, 0.5969043551, 0.6427359270, 0.6885103953]
+    kept = [729.9896272, 676.5972381, 61.23860248, 0.5981010791, 0.6439388577, 0.689719186]
     np.testing.assert_allclose(numbers, kept, rtol=1e-6)
     gaps = [q for both in found.before_after for q in (both.before.value, both.after.value)]
-    np.testing.assert_allclose(gaps, [484.6496541, 39.55356983, 31.62015152, 7.565687453], rtol=1e-6)
+    np.testing.assert_allclose(gaps, [484.2677247, 39.78569919, 32.00858918, 7.606044527], rtol=1e-6)
     detectable = [power.detectable_size for power in found.power]
     np.testing.assert_allclose(detectable, [0.05, 0.18, 0.19, 0.1, 0.17, 0.16], rtol=1e-12)
     assert found.effort.fresh_cases == 140
@@ -147,7 +147,8 @@ def test_what_cannot_fit_costs_one_look() -> None:
     one_model = SETTINGS.refinement_points * SETTINGS.refinement_repeats * len(CONDITIONS)
     # No mechanism of the library, and not the base, comes near: the best is run to be sure, no other is.
     assert len(waves[0]) == one_model
-    assert sum(map(len, waves)) <= 5 * one_model
+    # So it goes with the singles of every round, and with the pairs.
+    assert sum(map(len, waves)) <= 2 * SETTINGS.refinement_rounds * one_model
 
 
 def test_a_forecast_that_fails_is_a_gap_though_the_fit_is_good() -> None:

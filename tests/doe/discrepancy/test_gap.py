@@ -183,12 +183,12 @@ def test_what_an_effect_shows_is_the_q_that_a_calibration_leaves_of_it() -> None
     for name in ("beta", "delta"):
         added = (
             fitted.whitening
-            @ secants(fitted.model.emulator, fitted.stack.blocks, fitted.x, name, np.array([1.0]))[0]
+            @ secants(fitted.model, fitted.stack.blocks, fitted.x, name, CODED_SIZES[19:20])[0]
         )
         moved = _without_noise(fitted, added)
         # The fit weighs by the covariance where it ends, some per cent from that where the effect was drawn.
-        assert effects.squares[effects.names.index(name), -1] == pytest.approx(fit(moved.stack).q, rel=0.1)
-        assert effects.whole[effects.names.index(name), -1] == pytest.approx(added @ added)
+        assert effects.squares[effects.names.index(name), 19] == pytest.approx(fit(moved.stack).q, rel=0.1)
+        assert effects.whole[effects.names.index(name), 19] == pytest.approx(added @ added)
 
 
 def test_of_a_large_effect_that_calibration_takes_up_a_small_rest_is_not_believed() -> None:

@@ -278,10 +278,23 @@ def test_the_plan_holds_at_least_120_trials_of_what_the_code_can_make() -> None:
         engine_for("edem")
 
 
-def test_what_hides_nothing_is_measured_first() -> None:
-    kinds = [Kind.SINGLE, Kind.NULL, Kind.STRANGER, Kind.NULL]
-    labels = [Label(f"t-{n}", kind, (), (), (), n, "") for n, kind in enumerate(kinds)]
-    assert [label.trial for label in in_turn(labels)] == ["t-1", "t-3", "t-0", "t-2"]
+def test_trials_are_measured_evenly_over_their_classes() -> None:
+    rng = np.random.default_rng(3)
+    drawn = [(Kind.NULL, ())] * 20 + [(Kind.PAIR, ("a", "b")), (Kind.PAIR, ("a", "c"))] * 3
+    drawn += [
+        (kind, (name,)) for kind, name in ((Kind.SINGLE, "a"), (Kind.SINGLE, "b"), (Kind.STRANGER, "d"))
+    ] * 4
+    labels = [
+        Label(f"t-{n:02d}", drawn[at][0], (), tuple((name, 1.0) for name in drawn[at][1]), (), n, "")
+        for n, at in enumerate(rng.permutation(len(drawn)))
+    ]
+    order = in_turn(labels)
+    assert {label.trial for label in order} == {label.trial for label in labels}
+    for kind in Kind:
+        seen = np.cumsum([label.kind is kind for label in order])
+        even = seen[-1] * (np.arange(len(order)) + 1) / len(order)
+        # each class is half a trial off its share at most, and no kind here has more than two
+        assert np.abs(seen - even).max() < 2.0
 
 
 def test_the_reality_says_how_each_effect_is_made(tmp_path: Path) -> None:

@@ -206,7 +206,7 @@ def _surfaces(
     coefficients, gram_inverse = np.zeros(terms), np.zeros((terms, terms))
     coefficients[: len(fitted)] = fitted
     gram_inverse[: len(fitted), : len(fitted)] = spread
-    return Surfaces(_exact(coefficients), gram_inverse, noise, additions)
+    return Surfaces(_exact(coefficients), gram_inverse, noise, additions, np.zeros(1, dtype=bool))
 
 
 def _addition(signature: pd.Series, noise: Noise) -> Addition:
@@ -223,6 +223,7 @@ def _addition(signature: pd.Series, noise: Noise) -> Addition:
         chance=gram_inverse,
         growth=np.zeros(1),
         variance=variance,
+        silent=np.zeros(1, dtype=bool),
         correlation=noise.correlation,
     )
 

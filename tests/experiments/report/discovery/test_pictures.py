@@ -12,7 +12,7 @@ import pytest
 
 from dem_warp import CaseResult
 from experiments.report.discovery import pictures
-from experiments.report.discovery.pictures import photograph, simulated_heaps
+from experiments.report.discovery.pictures import photograph, simulated_heaps, turned
 from experiments.studyfile import Study, load_study
 from imaging import measure, save_picture, snapshot
 
@@ -98,3 +98,17 @@ def test_simulated_heaps_share_a_scale_and_a_failed_one_is_left_out(
     widths = [np.ptp(measure(picture.image).outline.position) for picture in drawn]
     # The drawn lines widen an outline by some pixels of hundreds.
     assert widths[1] / widths[0] == pytest.approx(1.5, rel=0.05)
+
+
+def test_a_heap_from_behind_is_the_mirror_image(cone: Callable[..., CaseResult]) -> None:
+    heap = cone(slope=0.4)
+    # leaning: what is at +x stands higher
+    positions = heap.positions + 0.2 * heap.positions[:, :1] * [0.0, 0.0, 1.0]
+    leaning = replace(heap, positions=positions)
+    behind = turned(leaning, 180.0)
+    x, y, z = leaning.sphere_centers.T
+    # double precision of centimetres
+    np.testing.assert_allclose(behind.sphere_centers, np.column_stack([-x, -y, z]), atol=1e-12)
+    along = turned(leaning, 90.0)
+    np.testing.assert_allclose(along.sphere_centers, np.column_stack([-y, x, z]), atol=1e-12)
+    assert turned(leaning, 0.0) is leaning
