@@ -22,8 +22,8 @@ CAVITY_SHADING = 0.6
 """Largest darkening of what lies behind its neighbours."""
 CAVITY_REACH = 0.02
 """Neighbours shade over three radii, but at most over this share of the picture's width."""
-FRAGMENT_LIMIT = 4_000_000
-"""Pixels of spheres held in memory at a time while a depth buffer is filled."""
+FRAGMENT_LIMIT = 250_000
+"""Pixels of spheres worked on at a time while a depth buffer is filled: few enough for a cache."""
 
 
 def coverage(spheres: Spheres, frame: Frame, azimuth: float) -> Picture:
