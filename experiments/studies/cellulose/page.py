@@ -103,7 +103,7 @@ def _parts(
 
 def _beside_the_source(residuals: pd.DataFrame) -> str:
     """Say at which speeds the areas are smaller than the source's, and if any settings are at all of them."""
-    areas = residuals.groupby(["stage", "point", "rpm"])["area_mm2"].mean().unstack()
+    areas = residuals.pivot_table("area_mm2", ["stage", "point"], "rpm")
     smaller = areas < pd.Series(PUBLISHED_AREA)
     best = smaller.loc["check"].all()
     told = ", ".join(f"{'smaller' if best[rpm] else 'larger'} at {rpm}/min" for rpm in MEASURED)
