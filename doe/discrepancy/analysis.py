@@ -169,7 +169,10 @@ def _nothing_fits(singles: Sequence[Assessment], settings: Settings) -> bool:
 def _pairs(
     parts: _Parts, base: _Base, singles: Sequence[Assessment]
 ) -> Generator[list[Point], Outcomes, list[Assessment]]:
-    contenders: Contenders = parts.contenders(_promising_pairs(singles)[: parts.settings.pair_candidates])
+    promising = _promising_pairs(singles)[: parts.settings.pair_candidates]
+    if not promising:  # a single mechanism makes none
+        return []
+    contenders: Contenders = parts.contenders(promising)
     error = parts.settings.shortlist_share * base.gap.excess
     contenders = yield from simulate_again(contenders, parts.laboratory, parts.settings, error)
     return parts.assess(base, contenders)

@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 
-from dem_warp.device import resolve_device
 from dem_warp.model import WorldSetup
 from dem_warp.scenes.lifted_cylinder import CLOGGED, GONE, LiftController
 from dem_warp.scenes.poured_controller import CALM, HEAPED
@@ -32,6 +31,9 @@ gravity and contacts, its centre then [m], and its orientation."""
 
 def world_of(lift: Lift) -> WorldSetup:
     """World of a case before its first step."""
+    # a wrong study is answered before the simulator is loaded
+    from dem_warp.device import resolve_device
+
     (world,) = lift.scene.prepare([lift.case], resolve_device(None))
     return world
 

@@ -8,7 +8,16 @@ from functools import cache
 
 import numpy as np
 import pytest
-from synthetic import CONDITIONS, OBSERVABLES, SETTINGS, SyntheticSimulator, emulator, measure, space
+from synthetic import (
+    CONDITIONS,
+    MECHANISMS,
+    OBSERVABLES,
+    SETTINGS,
+    SyntheticSimulator,
+    emulator,
+    measure,
+    space,
+)
 
 from doe.discrepancy import Discovery, Emulator, Measured, Outcomes, Point, Verdict, analyse
 from doe.errors import RuleError
@@ -140,6 +149,12 @@ def test_what_the_library_lacks_is_unknown() -> None:
     assert found.named == ()
     assert found.before_after == ()
     assert all(not candidate.admitted for candidate in found.candidates)
+
+
+def test_a_library_of_one_makes_no_pairs() -> None:
+    found, _ = _run(measure({"stranger": 1.0}, 6), emulator().without(*MECHANISMS[1:]))
+    assert found.verdict == Verdict.UNKNOWN
+    assert [candidate.mechanisms for candidate in found.candidates] == [("alpha",)]
 
 
 def test_what_cannot_fit_costs_one_look() -> None:
