@@ -88,22 +88,22 @@ def write_benchmark(folder: Path, benchmark: Benchmark, labels: Sequence[Label])
             withheld=np.array([" ".join(one.withheld) for one in trials]),
             conditions=np.array(conditions),
             observables=np.array(trials[0].measured.observables),
-            values=np.array([[one.measured.values[c] for c in conditions] for one in trials], dtype=np.float32),
+            values=np.array(
+                [[one.measured.values[c] for c in conditions] for one in trials], dtype=np.float32
+            ),
         )
     rules = [
-        {"settings": asdict(settings), "library": [asdict(effect) for effect in library]}
+        {"settings": asdict(settings), "library": [_record(effect) for effect in library]}
         for settings, library in zip(benchmark.rules, benchmark.libraries, strict=True)
     ]
-    write_text(folder / RULES, json.dumps(_finite(rules), indent=1, allow_nan=False) + "\n")
+    write_text(folder / RULES, json.dumps(rules, indent=1, allow_nan=False) + "\n")
     write_labels(folder / ANSWERS, labels)
 
 
-def _finite(rules: list[dict[str, object]]) -> list[dict[str, object]]:
-    """Infinite detectable sizes as null: JSON has no infinity."""
-    for one in rules:
-        for effect in one["library"]:  # type: ignore[attr-defined]
-            effect["detectable"] = effect["detectable"] if np.isfinite(effect["detectable"]) else None
-    return rules
+def _record(effect: Declared) -> dict[str, object]:
+    """Fields of a declared mechanism; JSON has no infinity, so a size that no data show is null."""
+    detectable = effect.detectable if np.isfinite(effect.detectable) else None
+    return asdict(effect) | {"detectable": detectable}
 
 
 def load_benchmark(folder: Path = FOLDER) -> Benchmark:

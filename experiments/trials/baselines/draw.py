@@ -94,7 +94,8 @@ def draw_benchmark(banks: int, rounds: int, seed: int) -> tuple[Benchmark, list[
         rules.append(with_names(settings, library))
         libraries.append(library)
     rng = np.random.default_rng([seed, 1])
-    labels, posed = [], []
+    labels: list[Label] = []
+    posed: list[Posed] = []
     for turn in range(rounds):
         for number, library in enumerate(libraries):
             for hidden in round_of(library, turn, rng):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Protocol
@@ -88,7 +87,9 @@ class Problem:
             if mechanisms:
                 factors = len(self.emulator.space.factors)
                 base = self.fitted(mechanisms[:-1]).x
-                starts = np.array([[*base, size] for size in SIZES]).reshape(len(SIZES), factors + len(mechanisms))
+                starts = np.array([[*base, size] for size in SIZES]).reshape(
+                    len(SIZES), factors + len(mechanisms)
+                )
             self._fits[mechanisms] = fit(self.stack(mechanisms), starts, count=2)
         return self._fits[mechanisms]
 
@@ -114,17 +115,17 @@ class Problem:
 class Method(Protocol):
     """A way to criticise a model."""
 
-    name: str
-    """Word for it in tables."""
-    source: str
-    """Publication that it follows."""
-    level: str
-    """Level at which it raises an alarm, in words."""
+    @property
+    def name(self) -> str:
+        """Word for it in tables."""
+
+    @property
+    def source(self) -> str:
+        """Publication that it follows."""
+
+    @property
+    def level(self) -> str:
+        """Level at which it raises an alarm, in words."""
 
     def __call__(self, problem: Problem) -> Answer:
         """Answer one trial."""
-
-
-def right(answer_named: Sequence[str], truth: Sequence[str]) -> bool:
-    """Say if the names are the hidden ones, and no other."""
-    return bool(truth) and set(answer_named) == set(truth)

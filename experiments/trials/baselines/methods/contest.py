@@ -18,7 +18,15 @@ FIT_LEVEL = 0.05
 """Probability that a true model fails the check."""
 
 
-def judged(problem: Problem, score: float, limit: float, weights: Mapping[Mechanisms, float], odds: float) -> Answer:
+def surprise(q: float, freedom: int) -> float:
+    """Minus the decimal logarithm of the p value of a sum of squares; its asymptote where that underflows."""
+    log_p = float(stats.chi2.logsf(q, freedom))
+    return (-log_p if np.isfinite(log_p) else 0.5 * q) / float(np.log(10.0))
+
+
+def judged(
+    problem: Problem, score: float, limit: float, weights: Mapping[Mechanisms, float], odds: float
+) -> Answer:
     """Name every mechanism that has such odds to be in the model (Barbieri and Berger 2004).
 
     Where none has, single mechanisms that share them are a tie.
@@ -33,10 +41,10 @@ def judged(problem: Problem, score: float, limit: float, weights: Mapping[Mechan
     odds : float
     """
     best = problem.fitted(max(weights, key=weights.__getitem__))
-    log_p = float(stats.chi2.logsf(best.q, best.freedom))
-    alarm, fails = score > limit, log_p < np.log(FIT_LEVEL)
+    against = surprise(best.q, best.freedom)
+    alarm, fails = bool(score > limit), against > -np.log10(FIT_LEVEL)
     named, tied = _names(weights, odds / (1.0 + odds)) if alarm and not fails else ((), False)
-    return Answer(score, alarm, named, tied, unknown=alarm and fails, outside=-log_p / np.log(10.0))
+    return Answer(score, alarm, named, tied, unknown=alarm and fails, outside=against)
 
 
 def _names(weights: Mapping[Mechanisms, float], least: float) -> tuple[Mechanisms, bool]:

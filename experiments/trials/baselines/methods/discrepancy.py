@@ -38,7 +38,7 @@ class Discrepancy:
     def __call__(self, problem: Problem) -> Answer:
         """Weigh both models."""
         factor = log_bayes_factor(problem.fitted())
-        return Answer(score=factor, alarm=factor > np.log(ODDS))
+        return Answer(score=factor, alarm=factor > float(np.log(ODDS)))
 
 
 def log_bayes_factor(base: Fitted) -> float:
@@ -66,7 +66,9 @@ def log_evidence(stack: Stack, x: np.ndarray, covariance: np.ndarray) -> float:
     left = stack.target - stack.predict(x[None])[0] + slopes @ x
     whitening = whiten(covariance + PRIOR_VARIANCE * slopes @ slopes.T)
     white = whitening @ left
-    return float(np.log(np.diag(whitening)).sum() - 0.5 * white @ white - 0.5 * len(left) * np.log(2.0 * np.pi))
+    return float(
+        np.log(np.diag(whitening)).sum() - 0.5 * white @ white - 0.5 * len(left) * np.log(2.0 * np.pi)
+    )
 
 
 def discrepancy_covariance(stack: Stack, x: np.ndarray, rho: float) -> np.ndarray:

@@ -39,7 +39,9 @@ def log_evidence(fitted: Fitted, rng: np.random.Generator) -> float:
 
     total, particles = smc(frozen, stack.model.lower, stack.model.upper, rng)
     some = particles[rng.permutation(len(particles))[:EXACT]]
-    exact = np.array([-0.5 * weigh(stack, x).score for x in some]) - 0.5 * len(stack.target) * np.log(2.0 * np.pi)
+    exact = np.array([-0.5 * weigh(stack, x).score for x in some]) - 0.5 * len(stack.target) * np.log(
+        2.0 * np.pi
+    )
     total += float(logsumexp(exact - frozen(some)) - np.log(len(some)))
     return total - (np.log(2.0) if stack.model.is_directed else 0.0)
 

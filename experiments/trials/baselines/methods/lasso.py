@@ -15,8 +15,8 @@ import numpy as np
 from scipy import stats
 
 from doe.discrepancy.contest.gap import holm
-from doe.discrepancy.contest.signatures import LEAST_LENGTH, projector, signatures
-from experiments.trials.baselines.methods.contest import FIT_LEVEL
+from doe.discrepancy.contest.signatures import LEAST_LENGTH, Signatures, projector, signatures
+from experiments.trials.baselines.methods.contest import FIT_LEVEL, surprise
 from experiments.trials.baselines.protocol import LEVEL, Answer, Problem
 
 
@@ -42,24 +42,34 @@ class Lasso:
     def __call__(self, problem: Problem) -> Answer:
         """Select signatures."""
         base = problem.fitted()
-        seen = signatures(base)
-        columns = np.concatenate([seen.visible, seen.turned.reshape(-1, len(base.covariance))])
-        names = np.array([*seen.names, *seen.turned_names])
-        there = np.linalg.norm(columns, axis=1) > LEAST_LENGTH
-        columns, names = columns[there], names[there]
+        names, columns = facing(signatures(base), base.residuals)
         project = projector(base.sensitivities)
         found = selected(columns.T, project @ base.residuals)
         taken = found.chosen & (found.p_values < LEVEL)
         freedom = max(round(float(np.trace(project))) - int(found.chosen.sum()), 1)
-        log_p = float(stats.chi2.logsf(found.left, freedom))
-        alarm, fails = bool(taken.any()), log_p < np.log(FIT_LEVEL)
+        against = surprise(found.left, freedom)
+        alarm, fails = bool(taken.any()), against > -np.log10(FIT_LEVEL)
         return Answer(
             score=-float(np.log10(max(found.p_values.min(initial=1.0), 1e-300))),
             alarm=alarm,
-            named=tuple(sorted(set(names[taken]))) if alarm and not fails else (),
+            named=tuple(sorted(names[taken])) if alarm and not fails else (),
             unknown=alarm and fails,
-            outside=-log_p / np.log(10.0),
+            outside=against,
         )
+
+
+def facing(seen: Signatures, residuals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Names (columns,) of what is visible, and visible signatures, (columns, means).
+
+    Of a mechanism with a direction that from the side which the residuals agree with more.
+    """
+    columns = seen.visible.copy()
+    for name, turned in zip(seen.turned_names, seen.turned, strict=True):
+        row = seen.names.index(name)
+        if turned @ residuals > columns[row] @ residuals:
+            columns[row] = turned
+    there = np.linalg.norm(columns, axis=1) > LEAST_LENGTH
+    return np.array(seen.names)[there], columns[there]
 
 
 def selected(columns: np.ndarray, residuals: np.ndarray) -> Selection:
