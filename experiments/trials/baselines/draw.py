@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import cache
 from itertools import combinations
 from pathlib import Path
 from typing import Annotated
@@ -19,7 +20,7 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from doe.discrepancy import Bank, Measured, SearchSpace, Settings, fit_emulator
+from doe.discrepancy import Bank, Measured, Outcomes, Point, SearchSpace, Settings, fit_emulator
 from experiments.discover.search import Search
 from experiments.studyfile import load_study
 from experiments.trials.baselines.benchmark_files import FOLDER, Benchmark, Posed, write_benchmark
@@ -44,10 +45,16 @@ Hidden = tuple[Kind, tuple[tuple[Declared, float], ...]]
 """Kind of a trial, and its mechanisms with their sizes in detectable ones."""
 
 
+@cache
 def true_world() -> tuple[EmulatedSimulator, Settings]:
     """Return the simulator that stands for reality, and the rules of its study."""
     search = Search.of(load_study(STUDY, SCALE))
     return EmulatedSimulator(fit_emulator(search.read_bank(bank_beside(SCALE))), BEND), search.settings
+
+
+def fresh_runs(points: Sequence[Point]) -> Outcomes:
+    """Observables of points in the true world, as an analysis may ask for them."""
+    return true_world()[0](points)
 
 
 def round_of(library: Sequence[Declared], number: int, rng: np.random.Generator) -> Iterator[Hidden]:

@@ -63,7 +63,7 @@ class Problem:
     """Of the search; of these the others take the systematic part of the errors."""
     seed: int
     """Of a method's own draws."""
-    _fits: dict[Mechanisms, Fitted] = field(default_factory=dict)
+    _fits: dict[Mechanisms, Fitted] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property
     def evidence(self) -> Evidence:

@@ -26,7 +26,7 @@ from experiments.studyfile import load_study
 from experiments.trials.baselines import benchmark_files
 from experiments.trials.baselines.answers_table import add_answer, answered, file_of
 from experiments.trials.baselines.benchmark_files import load_benchmark
-from experiments.trials.baselines.draw import true_world
+from experiments.trials.baselines.draw import fresh_runs
 from experiments.trials.baselines.library import methods
 from experiments.trials.baselines.protocol import Method, Problem
 from experiments.trials.declaration import read_declaration
@@ -100,10 +100,10 @@ def main(
     """Let the methods answer what they have not answered."""
     with clear_errors("Resume with the same command."):
         if folder is None:
-            problems, simulator = emulated_problems(benchmark, count), true_world()[0]
+            problems, wanted = emulated_problems(benchmark, count), chosen(names, methods(fresh_runs))
         else:
-            problems, simulator = measured_problems(Folder(folder), bank, count), None
-        answers = answer_all(out, problems, chosen(names, methods(simulator)), seconds)
+            problems, wanted = measured_problems(Folder(folder), bank, count), chosen(names, methods(None))
+        answers = answer_all(out, problems, wanted, seconds)
         print(f"{answers} trials have an answer of every method: {out}")
 
 
