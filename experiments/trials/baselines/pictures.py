@@ -23,12 +23,15 @@ def draw_roc(table: pd.DataFrame, path: Path) -> None:
         _curve(axes[0], *alarm_scores(parts), colour, str(name))
         if has_outside(parts):
             _curve(axes[1], *outside_scores(parts), colour, None)
-    titles = (("nothing hidden", "something hidden", "alarm"), ("in the library", "not in it", "unknown"))
+    titles = (
+        ("alarms where nothing is hidden", "alarms where something is", "alarm"),
+        ("unknown, though in the library", "unknown, and not in it", "unknown"),
+    )
     for each, (negative, positive, title) in zip(axes, titles, strict=True):
         each.plot([0, 1], [0, 1], color=GRID, linewidth=1.0, zorder=0)
         each.spines[["top", "right"]].set_visible(False)
-        each.set(xlabel=f"share of {negative}", title=title, xlim=(-0.02, 1.02), ylim=(-0.02, 1.02))
-        each.set_ylabel(f"share of {positive}")
+        each.set(xlabel=f"share: {negative}", title=title, xlim=(-0.02, 1.02), ylim=(-0.02, 1.02))
+        each.set_ylabel(f"share: {positive}")
     figure.legend(frameon=False, loc="outside lower center", ncols=4)
     save_figure(figure, path)
 
@@ -40,7 +43,8 @@ def _curve(axes: Axes, positive: np.ndarray, negative: np.ndarray, colour: str, 
     limits = np.unique(np.concatenate([positive, negative]))[::-1]
     x = [0.0, *((negative >= limit).mean() for limit in limits)]
     y = [0.0, *((positive >= limit).mean() for limit in limits)]
-    axes.plot(x, y, color=colour, linewidth=1.6, label=label)
+    # the first method is drawn over the others
+    axes.plot(x, y, color=colour, linewidth=1.6, label=label, zorder=3.0 - 0.1 * SERIES.index(colour))
 
 
 def draw_power(table: pd.DataFrame, path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
+from doe.discrepancy import Settings
 from experiments.errors import InputError
 from experiments.trials.baselines import benchmark_files, record, run
 from experiments.trials.baselines.answers_table import add_answer, file_of, read_answers
@@ -32,8 +34,12 @@ from experiments.trials.baselines.compare import (
 from experiments.trials.baselines.draw import round_of
 from experiments.trials.baselines.library import ALONE, methods
 from experiments.trials.baselines.protocol import Answer
-from experiments.trials.drawing import STRONG, Declared
-from experiments.trials.truth import Kind, Label, write_labels
+from experiments.trials.declaration import Declaration
+from experiments.trials.drawing import STRONG, Declared, Plan
+from experiments.trials.findings import EVERYTHING, PHOTOGRAPHS, Finding, findings_table, write_findings
+from experiments.trials.folder import Folder
+from experiments.trials.generate import STUDY
+from experiments.trials.truth import Kind, Label, Sealed, write_labels, write_sealed
 
 KEPT = Path(benchmark_files.FOLDER).parents[1] / "record" / "baselines"
 
@@ -127,6 +133,45 @@ def test_the_command_goes_on_where_it_stopped(tmp_path: Path) -> None:
     refused = CliRunner().invoke(app, [str(tmp_path), "--methods", "guessing"])
     assert refused.exit_code == 2
     assert "guessing" in refused.output
+
+
+def test_measured_trials_are_posed_as_the_search_has_them(tmp_path: Path) -> None:
+    folder = Folder(tmp_path)
+    settings = Settings(systematic=0.2)
+    Declaration("trial", "bench", "2026-11-23", Plan(), settings, (), ()).write(folder.declared)
+    write_sealed(
+        folder.sealed, [Sealed(name, "alone", ("vibration",), "") for name in ("alone-001", "alone-002")]
+    )
+    folder.data.mkdir()
+    shutil.copy(STUDY.with_name("tilted-bench.csv"), folder.measured("alone-001"))
+    [problem] = run.measured_problems(folder, None, None)  # the second has no heaps yet
+    assert problem.trial == "alone-001"
+    assert "vibration" not in problem.emulator.space.names
+    assert problem.settings == settings
+    # A plate that tilts by 5 degrees is hidden in these heaps, which the engine made.
+    answer = methods(None)["lasso"](problem)
+    assert answer.alarm
+    assert set(answer.named) <= {"plate_tilt"}
+
+
+def test_findings_of_measured_trials_are_answers_of_the_search(tmp_path: Path) -> None:
+    folder = Folder(tmp_path / "trials")
+    rows = [
+        Finding("alone-001", EVERYTHING, "named", "plate_tilt", True, q=120.0, degrees_of_freedom=60.0),
+        Finding("alone-002", EVERYTHING, "unknown", "", True, q=180.0, degrees_of_freedom=60.0),
+        Finding("alone-002", PHOTOGRAPHS, "none", "", False, q=10.0, degrees_of_freedom=20.0),
+    ]
+    folder.findings.parent.mkdir(parents=True)
+    write_findings(folder.findings, findings_table(rows))
+    record.gather_search(folder, tmp_path / "record")
+    named, unknown = read_answers(file_of(tmp_path / "record", "search")).to_dict("records")
+    assert (named["trial"], named["named"], named["alarm"], named["score"]) == (
+        "alone-001",
+        "plate_tilt",
+        True,
+        2.0,
+    )
+    assert (unknown["trial"], unknown["named"], unknown["unknown"]) == ("alone-002", "", True)
 
 
 def _label(trial: str, kind: Kind, *names: str, multiple: float = 2.0) -> Label:

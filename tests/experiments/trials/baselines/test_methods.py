@@ -47,7 +47,7 @@ def test_no_method_raises_an_alarm_where_nothing_is_hidden(name: str, nothing: P
     assert answer.named == ()
 
 
-@pytest.mark.parametrize("name", (*NAMING, ALONE))
+@pytest.mark.parametrize("name", [*NAMING, ALONE])
 def test_a_strong_effect_is_named(name: str, strong: Problem) -> None:
     answer = methods(None)[name](strong)
     assert answer.alarm
