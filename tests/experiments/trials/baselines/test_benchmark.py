@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 
 from doe.discrepancy import Settings
 from experiments.errors import InputError
+from experiments.report.kit.markdown import markdown_table
 from experiments.trials.baselines import benchmark_files, record, run
 from experiments.trials.baselines.answers_table import add_answer, file_of, read_answers
 from experiments.trials.baselines.benchmark_files import (
@@ -24,6 +25,7 @@ from experiments.trials.baselines.benchmark_files import (
 from experiments.trials.baselines.compare import (
     Paired,
     Parts,
+    areas,
     auroc,
     comparisons,
     judged,
@@ -273,3 +275,6 @@ def test_the_kept_record_is_of_the_released_trials_and_its_page_says_what_its_fi
     assert list(dict.fromkeys(table["method"])) == ["search", *methods(None)]
     written = record.write_methods_page(tmp_path).read_text(encoding="utf-8")
     assert written == (KEPT / "README.md").read_text(encoding="utf-8")
+    released = (benchmark_files.FOLDER / "README.md").read_text(encoding="utf-8")
+    assert markdown_table(summary(table)).strip() in released
+    assert markdown_table(areas(table)).strip() in released
