@@ -18,7 +18,7 @@ from typer.main import get_command
 from dem_warp import SCENES
 from experiments.cli import app
 from experiments.discover.library import FILES
-from experiments.measurement.observables import OBSERVABLES
+from experiments.measurement.observables import OBSERVABLES, OUTLINE
 from experiments.studyfile.reference import study_reference
 
 
@@ -88,7 +88,7 @@ def observables_page() -> str:
             each.instrument.value if each.instrument else "",
             each.definition,
         )
-        for each in OBSERVABLES
+        for each in (*OBSERVABLES, *OUTLINE)
     ]
     parts = [
         "# List of observables",

@@ -9,6 +9,9 @@ from .analysis.formula import LinearFit, fit_formula, fit_mixture
 from .analysis.optimum_region import stationary_region
 from .anova import ErrorTerm, pure_error
 from .compare import Comparison, compare_means
+from .compatible import compatible_points, even_points
+from .curve_fit import CurveFit, Forecast, MeasuredCurve, fit_curves
+from .curves import CurveEmulator
 from .design import Design
 from .designs.aliases import AliasStructure, alias_structure
 from .designs.augment import add_axial, add_center, foldover, join
@@ -34,7 +37,7 @@ from .noise import (
     variance_ratio,
 )
 from .optimum import StationaryPoint
-from .profiles import Mode, ProfileSample
+from .profiles import Mode, ProfileSample, scatter_of_views
 from .region import Region
 from .sample import Sample
 from .screening import ScreenResult, aliases, screen
@@ -51,15 +54,19 @@ __all__ = [
     "Category",
     "ClimbPath",
     "Comparison",
+    "CurveEmulator",
+    "CurveFit",
     "Design",
     "DesignError",
     "DesignQuality",
     "ErrorTerm",
     "Estimate",
     "Factor",
+    "Forecast",
     "Goal",
     "JointFit",
     "LinearFit",
+    "MeasuredCurve",
     "Mixture",
     "Mode",
     "NoiseFloor",
@@ -86,11 +93,14 @@ __all__ = [
     "central_composite",
     "climb_table",
     "compare_means",
+    "compatible_points",
     "curvature_test",
     "definitive_screening",
     "design_quality",
     "detectable_effect",
     "effect_power",
+    "even_points",
+    "fit_curves",
     "fit_formula",
     "fit_mixture",
     "fit_surface",
@@ -111,6 +121,7 @@ __all__ = [
     "pure_error",
     "ridge_path",
     "robust_coefficients",
+    "scatter_of_views",
     "screen",
     "simplex_centroid",
     "simplex_lattice",

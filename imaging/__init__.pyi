@@ -7,6 +7,7 @@ from .heap import HeapAngle, HeapOutlines, heap_angle, heap_outlines
 from .outline import Outline
 from .overlay import overlay
 from .pictures import read_picture, save_picture
+from .profile import heap_profile, profile_heights
 from .reasons import Doubt
 from .render import Snapshot, silhouette, snapshot
 from .repose import AngleDifference, ReposeAngle, compare, measure, measure_photograph
@@ -30,10 +31,12 @@ __all__ = [
     "find_outline",
     "heap_angle",
     "heap_outlines",
+    "heap_profile",
     "heap_shape",
     "measure",
     "measure_photograph",
     "overlay",
+    "profile_heights",
     "read_picture",
     "save_picture",
     "silhouette",

@@ -11,6 +11,7 @@ from doe import Design
 from experiments.calibrate.cases import Runner, StageEnd, with_combinations
 from experiments.calibrate.checks import check_study
 from experiments.calibrate.climb import climb, require_crossing
+from experiments.calibrate.directions import with_directions
 from experiments.calibrate.noise_floor import analyse_noise_floor, plan_noise_floor
 from experiments.calibrate.optimum import find_optimum
 from experiments.calibrate.results import (
@@ -68,8 +69,7 @@ def calibrate(study: Study, runner: Runner, on_stage: StageHook | None = None) -
         outcome, reason = _run(study, record)
     except StageEnd as end:
         outcome, reason = end.outcome, end.reason
-    cases = pd.concat(record.tables, ignore_index=True)
-    target = study.target.responses
+    cases, target = pd.concat(record.tables, ignore_index=True), record.responses
     return Campaign(tuple(study.factors), target, study.campaign, outcome, reason, cases, **record.stages)
 
 
@@ -79,14 +79,21 @@ class _Record:
     def __init__(self, runner: Runner, on_stage: StageHook | None, responses: Sequence[Response]) -> None:
         self.stages: dict[str, Any] = {}
         self.tables: list[pd.DataFrame] = []
-        self._runner, self._responses = runner, responses
-        self._on_stage = on_stage
+        self.responses = tuple(responses)
+        """What is matched."""
+        self._runner, self._on_stage = runner, on_stage
 
     def run(self, table: pd.DataFrame) -> pd.DataFrame:
         """Simulate a table of cases and remember them."""
-        cases = with_combinations(self._runner(table), self._responses)
+        cases = with_combinations(self._runner(table), self.responses)
         self.tables.append(cases)
         return cases
+
+    def match(self, responses: Sequence[Response]) -> pd.DataFrame:
+        """Match other responses from now on; return the cases of the last table with their columns."""
+        self.responses = tuple(responses)
+        self.tables = [with_combinations(cases, self.responses) for cases in self.tables]
+        return self.tables[-1]
 
     def keep(self, name: str, result: Found) -> Found:
         """Remember the result of a stage, report it and hand it back."""
@@ -98,8 +105,8 @@ class _Record:
 
 def _run(study: Study, record: _Record) -> tuple[Outcome, str]:
     """Run the stages one after another and return the outcome; StageEnd where the campaign cannot go on."""
+    study, target, noise, screening = _open(study, record)
     settings, response = study.campaign.selection, study.target.leading
-    target, noise, screening = _open(study, record)
     selection = record.keep("selection", select_factors(settings, screening, noise, response))
     require_kept(study, selection)
     path = climb(study, screening, selection.kept, noise, target, record.run)
@@ -111,16 +118,24 @@ def _run(study: Study, record: _Record) -> tuple[Outcome, str]:
     return _verdict(study, optimum, verification)
 
 
-def _open(study: Study, record: _Record) -> tuple[TargetResult, NoiseFloorResult, ScreeningResult]:
-    """Run the stages that wait for nothing, in one batch: a twin's target, the noise floor, the screening."""
+def _open(study: Study, record: _Record) -> tuple[Study, TargetResult, NoiseFloorResult, ScreeningResult]:
+    """Run the stages that wait for nothing, in one batch: a twin's target, the noise floor, the screening.
+
+    The study goes on with fewer responses where it has a profile.
+    """
     design = screening_design(study.factors, study.campaign.screening)
-    finished = record.run(plan_opening(study, design)).groupby("stage", sort=False)
-    *hidden, noise_cases, screening_cases = (cases.reset_index(drop=True) for _, cases in finished)
-    target = record.keep("target", settle_target(study, *hidden))
+    *hidden, _, screening_cases = _by_stage(record.run(plan_opening(study, design)))
+    study, samples = with_directions(study, design, screening_cases, hidden)
+    *hidden, noise_cases, screening_cases = _by_stage(record.match(study.target.responses))
+    target = record.keep("target", settle_target(study, next(iter(hidden), None), samples))
     noise = record.keep("noise_floor", analyse_noise_floor(study, noise_cases))
     name = study.campaign.screening.design
     screening = analyse_screening(design, screening_cases, study.target.fitted, name)
-    return target, noise, record.keep("screening", screening)
+    return study, target, noise, record.keep("screening", screening)
+
+
+def _by_stage(cases: pd.DataFrame) -> list[pd.DataFrame]:
+    return [found.reset_index(drop=True) for _, found in cases.groupby("stage", sort=False)]
 
 
 def plan_opening(study: Study, design: Design) -> pd.DataFrame:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import pandas as pd
 
 from doe import Sample
@@ -23,10 +25,15 @@ def plan_target(study: Study) -> pd.DataFrame:
     return plan_cases(study, STAGE, hidden, target.twin.replicates, target.responses)
 
 
-def settle_target(study: Study, cases: pd.DataFrame | None = None) -> TargetResult:
-    """Take what was measured, or in a twin study what its cases give; StageEnd with fewer than two values."""
-    target = study.target
-    samples = {r.name: _sample(r, cases) for r in target.responses}
+def settle_target(
+    study: Study, cases: pd.DataFrame | None = None, samples: Mapping[str, Sample] | None = None
+) -> TargetResult:
+    """Take what was measured, or in a twin study what its cases give; StageEnd with fewer than two values.
+
+    Some ``samples`` of a twin study may be known already: of directions of a profile.
+    """
+    target, known = study.target, samples or {}
+    samples = {r.name: known[r.name] if r.name in known else _sample(r, cases) for r in target.responses}
     numbers: dict[str, float] = {}
     for response, sample in zip(target.responses, samples.values(), strict=True):
         for what in ("mean", "sd", "se"):

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from dem_warp import Case, LiftedCylinder
+from dem_warp.device import resolve_device
 from dem_warp.laws.contact_law import memory_size
 from dem_warp.room import neighbour_room
 from dem_warp.scenes.poured_scene import PouredScene
@@ -99,7 +100,7 @@ class _Test:
 @lru_cache(maxsize=256)
 def _own_phases(test: _Test) -> float:
     """Time that a test expects of its phases after the filling [s]."""
-    [setup] = test.scene.prepare([test.case], "cpu")
+    [setup] = test.scene.prepare([test.case], resolve_device(None))
     phases = test.scene.controller(test.case, setup, CHUNK).phases
     return float(sum(phase.expected for name, phase in phases.items() if name not in ("fill", "settle")))
 
@@ -113,7 +114,7 @@ def device_bytes(case: Case[Any]) -> int:
     They follow from the longest neighbour lists that it may have; what compiled kernels and graphs take is
     not among them.
     """
-    [setup] = case.scene.prepare([case], "cpu")
+    [setup] = case.scene.prepare([case], resolve_device(None))
     found, listed = neighbour_room(setup)
     real = 8 if case.numerics.precision == "double" else 4
     grains, spheres = setup.grains.count, setup.grains.count * case.grains.sphere_count

@@ -72,7 +72,7 @@ def angle(
     """
     with clear_errors():
         from experiments.commands import photographs
-        from experiments.commands.heap_files import heap_settings
+        from experiments.measurement.heap_files import heap_settings
 
         view = photographs.view_of(crop, plate, heap_number, elevation, distance)
         heaps = heap_settings(unit, plate_height)

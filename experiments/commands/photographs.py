@@ -14,9 +14,9 @@ from typing import Any, Literal
 import numpy as np
 from scipy import special
 
-from experiments.commands.heap_files import HeapSettings, is_heap_file, measure_heap_file, values_of
 from experiments.errors import InputError
 from experiments.files import replacing
+from experiments.measurement.heap_files import HeapSettings, is_heap_file, measure_heap_file, values_of
 from imaging import (
     FitSettings,
     PictureError,

@@ -16,7 +16,7 @@ from experiments.discover.library import Mechanism, with_mechanisms
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.wave import WaveRunner
 from experiments.errors import StudyError
-from experiments.measurement.observables import PHOTOGRAPHED, VERSION
+from experiments.measurement.observables import BY_NAME, VERSION
 from experiments.studyfile import Study
 
 
@@ -57,9 +57,10 @@ class EngineSimulator:
         engine: Engine | None = None,
     ) -> None:
         self.study, self.table, self.engine = study, table, engine or engine_of(study)
-        names = [each.name for each in study.scene.measurable]
+        names = [each.name for each in study.measurable]
         told = getattr(self.engine, "observables", names)
-        self.observables = tuple(name for name in names if name in (*PHOTOGRAPHED, *told))
+        seen = [name for name in names if name in BY_NAME and BY_NAME[name].by_photograph]
+        self.observables = tuple(name for name in names if name in (*seen, *told))
         """Names of what it answers with."""
         self._runner = WaveRunner(study.measurement, table, workers, progress, self.engine, self.observables)
         self._library = {mechanism.name: mechanism for mechanism in library}
@@ -134,7 +135,7 @@ class EngineSimulator:
 
     def key(self, case: Case) -> str:
         """Key of a case: a hash of all that determines its observables."""
-        reading = {"measurement": self.study.measurement.model_dump(), "observables": VERSION}
+        reading = {"measurement": self.study.measurement.told, "observables": VERSION}
         return case_key(case, self.engine, **reading)
 
     def _extend(self, names: tuple[str, ...], condition: str) -> Study:

@@ -16,7 +16,7 @@ def odd_observables(study: Study) -> tuple[str, ...]:
     cases = [each.case(_open(each, settings), seed=0) for each in under for settings in ends]
     if any(_leans(case) for case in cases):
         return ()
-    return tuple(each.name for each in study.scene.measurable if each.directed)
+    return tuple(each.name for each in study.measurable if each.directed)
 
 
 def _leans(case: Case) -> bool:

@@ -85,4 +85,6 @@ DEME = Exporter(
     material_terms,
     contact_terms,
     translate,
+    CONVENTIONS,
+    "This program has not been run in DEM-Engine yet, which needs a GPU.",
 )

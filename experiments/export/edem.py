@@ -22,12 +22,20 @@ CONVENTIONS = LawsOfCode(
         "tangential_history": {"displacement": ""},
         "sliding": {"spring": ""},
         "friction_load": {"push": ""},
-        "rolling": {"own_spin": "Standard Rolling Friction", "elastic_plastic": "Type C"},
+        "rolling": {
+            "own_spin": "Standard Rolling Friction",
+            "elastic_plastic": "Type C",
+            "edem_rvd": "RVD Rolling Friction",
+        },
     },
     {"own_spin_whole_step": "own_spin"},
 )
 
+TYPE_C_STIFFNESS = 2.25
+"""Factor of the rolling spring in Type C, which has no entry."""
+
 _SOURCE = "EDEM documentation, Hertz-Mindlin (no slip)"
+_TYPE_C = "EDEM documentation, Type C Rolling Friction"
 
 
 def material_terms(material: Material) -> tuple[Term, ...]:
@@ -40,12 +48,14 @@ def material_terms(material: Material) -> tuple[Term, ...]:
 
 
 def contact_terms(contact: Contact) -> tuple[Term, ...]:
-    """Terms of a contact, under Interaction."""
-    surface = contact.surface
+    """Terms of a contact, under Interaction; the ratio belongs to Type C, the only one with a spring."""
+    surface, law = contact.surface, contact.coefficients
+    ratio = Term("Rolling Viscous Damping Ratio", law.rolling_dashpot, "1", "eta", _TYPE_C)
     return (
         Term("Coefficient of Restitution", surface.restitution, "1", "e", _SOURCE),
         Term("Coefficient of Static Friction", surface.static_friction, "1", "mu", _SOURCE),
         Term("Coefficient of Rolling Friction", surface.rolling_friction, "1", "mu_r", _SOURCE),
+        *((ratio,) if law.rolling_spring else ()),
     )
 
 
@@ -74,16 +84,26 @@ def translate(test: ExportedTest) -> Translation:
         ),
         Entry("Simulator", "Fixed Time Step", f"{case.time_step:.6g}", "s"),
     ]
-    warnings = CONVENTIONS.warnings(laws) + mechanism_warnings(test.case, "EDEM")
-    return sheet_translation(lift, "EDEM", entries, CONVENTIONS.translated(laws), warnings)
+    return sheet_translation(lift, "EDEM", entries, CONVENTIONS.translated(laws), _warnings(test))
+
+
+def _warnings(test: ExportedTest) -> tuple[str, ...]:
+    laws, stiffness = test.case.laws, test.case.laws.rolling_stiffness
+    has_spring = CONVENTIONS.taken(laws)["rolling"] == "elastic_plastic"
+    other = (
+        f"law rolling_stiffness = {stiffness:g}: EDEM's Type C has {TYPE_C_STIFFNESS:g}, and no entry for it"
+    )
+    lacking = (other,) if has_spring and stiffness != TYPE_C_STIFFNESS else ()
+    return CONVENTIONS.warnings(laws) + lacking + mechanism_warnings(test.case, "EDEM")
 
 
 EDEM = Exporter(
     "EDEM",
-    "Hertz-Mindlin (no slip) with Standard Rolling Friction or Type C",
-    "The formulas are those of its manual; nothing has been run there.",
+    "Hertz-Mindlin (no slip) with Standard, Type C or RVD Rolling Friction",
+    "The formulas are those of its manual.",
     material_terms,
     contact_terms,
     translate,
     CONVENTIONS,
+    "This sheet has not been run in EDEM: names and meanings are those of its manual.",
 )

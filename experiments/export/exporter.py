@@ -91,3 +91,5 @@ class Exporter:
     code cannot have in any form."""
     conventions: LawsOfCode | None = None
     """Conventions that its input has."""
+    unproven: str = ""
+    """Words for an input that nobody has run in the code yet, and why; empty where it has been run."""

@@ -15,7 +15,8 @@ from experiments.export.translated import Translated
 
 def laws_row(test: ExportedTest, exporter: Exporter) -> Translated:
     """Say which laws stand for which."""
-    own = ", ".join(["Hertz-Mindlin", *(mechanism.name for mechanism in test.case.mechanisms)])
+    named = f"the set `{test.case.laws.name}`"
+    own = ", ".join([named, *(mechanism.name for mechanism in test.case.mechanisms)])
     return Translated("contact laws", own, f"{exporter.laws}. {exporter.differs}")
 
 

@@ -49,15 +49,16 @@ def export_input(test: ExportedTest, to: str, approximate: bool = False) -> Tran
 def write_export(test: ExportedTest, to: str, translation: Translation, folder: Path) -> list[Path]:
     """Write the files of a translation and its README into a folder, made when it is missing."""
     files = dict(translation.files)
-    files[translation.main] = _head(test, translation) + files[translation.main]
+    files[translation.main] = _head(test, to, translation) + files[translation.main]
     files[README] = readme(test, to, translation)
     for name, text in files.items():
         write_text(folder / name, text)
     return [folder / name for name in files]
 
 
-def _head(test: ExportedTest, translation: Translation) -> str:
+def _head(test: ExportedTest, to: str, translation: Translation) -> str:
     lines = [f"{test.name}, {test.source}; written by dem-warp {__version__}; README.md says what is what"]
+    lines += [EXPORTERS[to].unproven] if EXPORTERS[to].unproven else []
     lines += [f"WARNING: {warning}" for warning in translation.warnings]
     return "".join(f"{translation.comment} {line}\n" for line in lines)
 
@@ -66,6 +67,8 @@ def readme(test: ExportedTest, to: str, translation: Translation) -> str:
     """Say how to run an exported test, what was translated how, and what could not be."""
     exporter = EXPORTERS[to]
     parts = [f"# {test.name} in {exporter.code}\n\nFrom {test.source}, by dem-warp {__version__}.\n"]
+    if exporter.unproven:
+        parts.append(f"**{exporter.unproven}**\n")
     if translation.warnings:
         parts.append("## Not the same there\n\n" + "".join(f"- {text}\n" for text in translation.warnings))
     if translation.command:

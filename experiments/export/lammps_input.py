@@ -8,9 +8,13 @@ from collections.abc import Sequence
 from experiments.export.exporter import Translation
 from experiments.export.lift import LOOK, Lift, Template
 from experiments.export.lift_rows import lift_rows, lift_warnings
+from experiments.export.looks import rest_loop, watched
 from experiments.export.translated import Translated
 
 INPUT, HEAP = "lift.in", "heap.dump"
+
+_QUIT = "quit 1"
+"""End of a program that has failed."""
 
 _SETUP = """\
 units si
@@ -43,19 +47,6 @@ region rain cylinder z 0 0 {rain_radius:.6g} {rain_bottom:.6g} {rain_top:.6g}
 fix rain {poured} pour {count} {first_type} {rain_seed} region rain vel 0 0 0 0 -{rain_speed} &
     vol {vol:.9g} 1000 {kinds}
 
-# grains are looked at every {look} steps
-variable speed atom sqrt(vx*vx+vy*vy+vz*vz)
-variable square atom vx*vx+vy*vy+vz*vz
-variable above atom "z > {strike:.6g} && v_speed < {slow:.6g}"
-compute fastest all reduce max v_speed
-compute square all reduce ave v_square
-compute heaped all reduce sum v_above
-compute highest all reduce max z
-variable heaped equal c_heaped
-variable moving equal "sqrt(c_square) > {rest:.6g} || c_fastest > {calm:.6g}"
-thermo_style custom step atoms cpu c_fastest c_square c_heaped c_highest
-thermo {look}
-thermo_modify lost ignore norm no
 """
 
 _SPHERES = """\
@@ -91,22 +82,6 @@ _FILL_COUNT = """
 # until all grains are in
 run {steps}
 unfix rain
-"""
-
-_REST = """
-# until the grains have been slow for {rest_time} s
-variable looks loop {limit_looks}
-variable calm equal 0
-label {name}
-run {look}
-if "${{moving}} == 1" then "variable calm equal 0" else "variable calm equal ${{calm}}+1"
-if "${{calm}} >= {calm_looks}" then "jump SELF {name}_done"
-next looks
-jump SELF {name}
-print "ERROR: no rest within {limit:.6g} s"
-quit 1
-label {name}_done
-variable looks delete
 """
 
 _LIFT = """
@@ -190,12 +165,7 @@ def _setup(lift: Lift, contacts: Sequence[str]) -> str:
         rain_seed=lift.seeds(1)[0],
         rain_speed=scene.rain_speed,
         vol=_volume_fraction(lift, gravity),
-        look=lift.steps(LOOK),
-        strike=lift.strike,
-        slow=0.5 * scene.rain_speed,
-        rest=scene.rest_speed,
-        calm=lift.calm_speed,
-    )
+    ) + watched(lift)
 
 
 def _diameters(templates: Sequence[Template]) -> str:
@@ -253,7 +223,7 @@ def _molecule(template: Template) -> str:
 
 
 def _filling(lift: Lift) -> str:
-    look, settle = lift.steps(LOOK), _rest(lift, "settle", lift.settle_limit)
+    look, settle = lift.steps(LOOK), rest_loop(lift, "settle", lift.settle_limit, _QUIT)
     if lift.scene.grain_count is not None:
         time = lift.count / lift.rain_rate + 2.0 * lift.rain_period
         return _FILL_COUNT.format(steps=lift.steps(time)) + settle
@@ -278,18 +248,7 @@ def _lifting(lift: Lift) -> str:
         step_rise=lift.case.time_step * scene.lift_speed,
         largest=lift.largest_radius,
     )
-    return lifting + _rest(lift, "rest", lift.rest_limit) + _END.format(heap=HEAP)
-
-
-def _rest(lift: Lift, name: str, limit: float) -> str:
-    return _REST.format(
-        name=name,
-        look=lift.steps(LOOK),
-        rest_time=lift.scene.rest_time,
-        calm_looks=max(round(lift.scene.rest_time / LOOK), 1),
-        limit=limit,
-        limit_looks=max(round(limit / LOOK), 1),
-    )
+    return lifting + rest_loop(lift, "rest", lift.rest_limit, _QUIT) + _END.format(heap=HEAP)
 
 
 def _rows(lift: Lift) -> tuple[Translated, ...]:

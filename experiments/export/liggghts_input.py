@@ -7,9 +7,13 @@ from collections.abc import Mapping, Sequence
 from experiments.export.exporter import Translation
 from experiments.export.lift import LOOK, Lift, Template, disc, prism, stl_text
 from experiments.export.lift_rows import lift_rows, lift_warnings
+from experiments.export.looks import rest_loop, watched
 from experiments.export.translated import Translated
 
 INPUT, HEAP, TUBE_FILE, PLATE_FILE = "lift.in", "heap.dump", "tube.stl", "plate.stl"
+
+_QUIT = "quit"
+"""End of a program that has failed."""
 
 _SETUP = """\
 atom_style granular
@@ -44,19 +48,6 @@ fix rain all insert/rate/region seed {rain_seed} distributiontemplate sizes &
     nparticles {count} particlerate {rate:.6g} insert_every {rain_steps} overlapcheck yes all_in yes &
     maxattempt 500 vel constant 0 0 -{rain_speed} orientation random region rain ntry_mc 10000
 
-# grains are looked at every {look} steps
-variable speed atom sqrt(vx*vx+vy*vy+vz*vz)
-variable square atom vx*vx+vy*vy+vz*vz
-variable above atom "z > {strike:.6g} && v_speed < {slow:.6g}"
-compute fastest all reduce max v_speed
-compute square all reduce ave v_square
-compute heaped all reduce sum v_above
-compute highest all reduce max z
-variable heaped equal c_heaped
-variable moving equal "sqrt(c_square) > {rest:.6g} || c_fastest > {calm:.6g}"
-thermo_style custom step atoms cpu c_fastest c_square c_heaped c_highest
-thermo {look}
-thermo_modify lost ignore norm no
 """
 
 _FILL_TO_RIM = """
@@ -79,22 +70,6 @@ _FILL_COUNT = """
 # until all grains are in
 run {rain_steps_all}
 unfix rain
-"""
-
-_REST = """
-# until the grains have been slow for {rest_time} s
-variable looks loop {limit_looks}
-variable calm equal 0
-label {name}
-run {look}
-if "${{moving}} == 1" then "variable calm equal 0" else "variable calm equal ${{calm}}+1"
-if "${{calm}} >= {calm_looks}" then "jump SELF {name}_done"
-next looks
-jump SELF {name}
-print "ERROR: no rest within {limit:.6g} s"
-quit
-label {name}_done
-variable looks delete
 """
 
 _LIFT = """
@@ -183,12 +158,7 @@ def _setup(lift: Lift, model: str, properties: Mapping[str, str], walls: str) ->
         rain_top=rain_top,
         rain_steps=lift.steps(lift.rain_period),
         rain_speed=scene.rain_speed,
-        look=lift.steps(LOOK),
-        strike=lift.strike,
-        slow=0.5 * scene.rain_speed,
-        rest=scene.rest_speed,
-        calm=lift.calm_speed,
-    )
+    ) + watched(lift)
 
 
 def grain_template(number: int, template: Template, seed: int, atom_type: int = 1) -> str:
@@ -214,7 +184,7 @@ def _filling(lift: Lift) -> list[str]:
     look = lift.steps(LOOK)
     if lift.scene.grain_count is not None:
         fill = _FILL_COUNT.format(rain_steps_all=lift.steps(lift.count / lift.rain_rate + lift.rain_period))
-        return [fill, _rest(lift, "settle", lift.settle_limit)]
+        return [fill, rest_loop(lift, "settle", lift.settle_limit, _QUIT)]
     spheres = min(template.shape.sphere_count for template in lift.templates)
     strike = (
         f"region above block INF INF INF INF {lift.scene.height + lift.rise_of_spheres:.6g} INF units box\n"
@@ -225,7 +195,12 @@ def _filling(lift: Lift) -> list[str]:
         look=look,
         heaped=lift.heaped * spheres,
     )
-    return [strike, fill, _rest(lift, "settle", lift.settle_limit), "delete_atoms region above compress no\n"]
+    return [
+        strike,
+        fill,
+        rest_loop(lift, "settle", lift.settle_limit, _QUIT),
+        "delete_atoms region above compress no\n",
+    ]
 
 
 def _lifting(lift: Lift) -> list[str]:
@@ -238,18 +213,7 @@ def _lifting(lift: Lift) -> list[str]:
         look_rise=look * lift.case.time_step * scene.lift_speed,
         largest=lift.largest_radius,
     )
-    return [lifting, _rest(lift, "rest", lift.rest_limit), _END.format(heap=HEAP)]
-
-
-def _rest(lift: Lift, name: str, limit: float) -> str:
-    return _REST.format(
-        name=name,
-        look=lift.steps(LOOK),
-        rest_time=lift.scene.rest_time,
-        calm_looks=max(round(lift.scene.rest_time / LOOK), 1),
-        limit=limit,
-        limit_looks=max(round(limit / LOOK), 1),
-    )
+    return [lifting, rest_loop(lift, "rest", lift.rest_limit, _QUIT), _END.format(heap=HEAP)]
 
 
 def _rows(lift: Lift) -> tuple[Translated, ...]:

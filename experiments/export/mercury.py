@@ -84,4 +84,6 @@ MERCURY = Exporter(
     no_terms,
     contact_terms,
     translate,
+    CONVENTIONS,
+    "This driver has not been run in MercuryDPM yet.",
 )

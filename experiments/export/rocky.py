@@ -22,7 +22,7 @@ CONVENTIONS = LawsOfCode(
         "tangential_history": {"displacement": "Mindlin-Deresiewicz"},
         "sliding": {"spring": ""},
         "friction_load": {"push": ""},
-        "rolling": {"rocky_3": "Type C: Linear Spring Rolling Limit"},
+        "rolling": {"rocky_3": "Type C: Linear Spring Rolling Limit", "own_spin": "Type A: Constant Moment"},
     },
     {},
 )
@@ -90,10 +90,12 @@ def _warnings(test: ExportedTest) -> tuple[str, ...]:
 
 ROCKY = Exporter(
     "Rocky",
-    "Hertzian Spring Dashpot, Mindlin-Deresiewicz, Type C: Linear Spring Rolling Limit",
-    "Mindlin-Deresiewicz softens as a contact is about to slide, ours does not; nothing has been run there.",
+    "Hertzian Spring Dashpot, Mindlin-Deresiewicz, rolling resistance of Type C or A",
+    "Its tangential spring is another, as said above.",
     material_terms,
     contact_terms,
     translate,
     CONVENTIONS,
+    "This sheet has not been run in Rocky: names and meanings are those of its manual. Its tangential spring "
+    "(Mindlin-Deresiewicz) softens as a contact is about to slide, ours does not.",
 )

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from dem_warp.device import resolve_device
 from dem_warp.model import WorldSetup
 from dem_warp.scenes.lifted_cylinder import CLOGGED, GONE, LiftController
 from dem_warp.scenes.poured_controller import CALM, HEAPED
@@ -31,7 +32,7 @@ gravity and contacts, its centre then [m], and its orientation."""
 
 def world_of(lift: Lift) -> WorldSetup:
     """World of a case before its first step."""
-    (world,) = lift.scene.prepare([lift.case], "cpu")
+    (world,) = lift.scene.prepare([lift.case], resolve_device(None))
     return world
 
 

@@ -40,18 +40,17 @@ def sheet_translation(
     spheres = _spheres(lift)
     scale = lift.case.numerics.modulus_scale
     softened = (
-        "" if scale == 1.0 else f" The grains' modulus is softened by {scale:g}: calibrated so, keep it."
+        "" if scale == 1.0 else f"The grains' modulus is softened by {scale:g}: calibrated so, keep it.\n\n"
     )
     text = (
         f"# {lift.test.name}: values for {code}\n\n"
-        f"This sheet has not been run in {code}: names and meanings are those of its manual.{softened}\n\n"
-        f"## Values\n\n{_markdown(rows)}\n"
+        f"{softened}## Values\n\n{_markdown(rows)}\n"
         f"## Spheres of a grain of size 1 (`{SPHERES}`)\n\n{_markdown(spheres)}\n"
         f"## Protocol\n\n{_protocol(lift)}"
     )
     files = {SHEET: text, VALUES: _csv(rows), SPHERES: _csv(spheres)}
     warnings += lift_warnings(lift)
-    return Translation(files, SHEET, (), "", (*laws, *lift_rows(lift, True)), warnings, comment=">")
+    return Translation(files, SHEET, (), "", (*laws, *_rows(lift)), warnings, comment=">")
 
 
 def term_entries(dialog: str, terms: Iterable[Term]) -> list[Entry]:
@@ -72,6 +71,17 @@ def size_entries(lift: Lift, dialog: str, names: tuple[str, str, str, str]) -> l
         ]
     values = (grains.size_mean, grains.size_sd, *grains.size_range)
     return [Entry(dialog, name, f"{value:.6g}") for name, value in zip(names, values, strict=True)]
+
+
+def _rows(lift: Lift) -> list[Translated]:
+    """Rows of the README, with what a person enters in place of what an input holds."""
+    entered = {
+        "sizes": "the same, as entered",
+        "mass and inertia": "enter those of the table below, or compare what the program finds",
+        "seed": "the program's own: another heap of the same kind",
+    }
+    rows = lift_rows(lift, exact_tube=True)
+    return [Translated(row.subject, row.here, entered.get(row.subject, row.there)) for row in rows]
 
 
 def _spheres(lift: Lift) -> list[tuple[str, ...]]:

@@ -43,22 +43,23 @@ def material_terms(material: Material) -> tuple[Term, ...]:
 
 
 def contact_terms(contact: Contact) -> tuple[Term, ...]:
-    """Terms of a contact, by ``MatchMaker``; ratios are of the critical damping 2 sqrt(S m*)."""
+    """Terms of a contact: those of the functor, and those of every contact's ``MindlinPhys``."""
+    law = contact.coefficients
+    return (
+        *matched_terms(contact),
+        Term("maxBendPl", law.rolling_friction, "1", "mu_r, times R*", _BENDING),
+        Term("kr", law.rolling_spring, "N m/rad", "k R*^2", _BENDING),
+    )
+
+
+def matched_terms(contact: Contact) -> tuple[Term, ...]:
+    """Terms of the functor, by ``MatchMaker``; ratios are of the critical damping 2 sqrt(S m*)."""
     law = contact.coefficients
     ratio = law.damping / 2.0
     return (
         Term("frictAngle", math.atan(law.static_friction), "rad", "atan mu", _PHYSICS),
         Term("betan", ratio, "1", "sqrt(5/6) |beta|", _PHYSICS),
         Term("betas", ratio * law.tangential_damping, "1", "sqrt(5/6) |beta|", _PHYSICS),
-    )
-
-
-def rolling_terms(contact: Contact) -> tuple[Term, ...]:
-    """Terms of the resistance to rolling: the limit's coefficient, and the spring in every contact."""
-    law = contact.coefficients
-    return (
-        Term("maxBendPl", law.rolling_friction, "1", "mu_r, times R*", _BENDING),
-        Term("kr", law.rolling_spring, "N m/rad", "k R*^2", _BENDING),
     )
 
 
@@ -81,7 +82,7 @@ def translate(test: ExportedTest) -> Translation:
     among, tube = contacts_of(case, lift.largest_radius, max(t.mass for t in lift.templates))
     plate = replace(tube, coefficients=scene.contacts(case)[2])
     materials = [values(material_terms(each)) for each in (among.first, tube.second, plate.second)]
-    contacts = [values(contact_terms(each) + rolling_terms(each)) for each in (among, tube, plate)]
+    contacts = [values(contact_terms(each)) for each in (among, tube, plate)]
     return translate_lift(lift, materials, contacts, warnings, CONVENTIONS.translated(laws))
 
 
@@ -92,4 +93,5 @@ YADE = Exporter(
     material_terms,
     contact_terms,
     translate,
+    CONVENTIONS,
 )

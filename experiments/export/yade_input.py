@@ -20,6 +20,11 @@ _ROWS = (
         "none",
         "a sphere over an edge touches both facets at once; they share its stiffness and damping",
     ),
+    Translated(
+        "limit of rolling",
+        "mu_r R*",
+        "the same, set contact by contact; among unequal spheres that of equal ones in the first 20 steps",
+    ),
     Translated("endless plate", "plane", "one triangle, far larger than the heap"),
     Translated("numerical damping", "none", "none: `NewtonIntegrator(damping=0)`, whose default is 0.2"),
     Translated("rotation into shear", "at the contact point", "the same: `avoidGranularRatcheting=False`"),

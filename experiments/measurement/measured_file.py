@@ -2,6 +2,7 @@
 
 Columns, in any order: ``condition`` (of the study), ``replicate`` (a label; one heap), ``observable``,
 ``value``, ``unit`` (left out: the observable's own), ``picture`` (a photograph, relative to the file),
+``profile`` (a file of profiles, `experiments.measurement.profile_files`, with one of the same replicate),
 ``pixel`` (the size of one of its pixels at the heap, as ``0.1 mm``) and ``fit`` (part of the flank that an
 angle was fitted to, where it is written). A row with a picture and no value is
 measured on the picture; without an observable, all that the picture shows. Several pictures of one heap are
@@ -34,7 +35,7 @@ from experiments.studyfile import Condition, Study
 from experiments.texts import nearest_name
 from imaging import PictureError
 
-COLUMNS = ("condition", "replicate", "observable", "value", "unit", "picture", "pixel", "fit")
+COLUMNS = ("condition", "replicate", "observable", "value", "unit", "picture", "pixel", "fit", "profile")
 """Columns of the file."""
 NEEDED = COLUMNS[:3]
 """Those that it must have."""
@@ -50,7 +51,7 @@ def read_measured(path: Path, study: Study) -> Measured:
         no value is left.
     """
     sizes = {condition.name: size_of_test(study.under(condition.name)) for condition in study.conditions}
-    observables = study.scene.measurable
+    observables = study.measurable
     found = _Found({name: each for each in observables for name in (each.name, each.column)})
     stated = []
     for row in read_rows(path, NEEDED, COLUMNS):

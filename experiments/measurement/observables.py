@@ -9,16 +9,20 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from functools import partial
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dem_warp import LiftedCylinder
+from dem_warp.scenes.drum_surface import STATIONS
 from dem_warp.scenes.scene import Observable as Told
 
 if TYPE_CHECKING:
     from imaging import HeapAngle, HeapShape, ReposeAngle
+
+SURFACE_PROFILE, OUTLINE_PROFILE = "surface", "outline"
+"""Observables that are functions: the surface of the bed in a drum, the outline of a heap."""
 
 ANGLE = "angle"
 """Spelling of the repose angle in study files and tables of cases."""
@@ -57,6 +61,13 @@ class View:
 
         return cls(angle, heap_shape(angle.outline))
 
+    @cached_property
+    def profile(self) -> np.ndarray:
+        """Heights of the outline at its places."""
+        from imaging import heap_profile
+
+        return heap_profile(self.angle.outline)
+
 
 @dataclass(frozen=True)
 class Observable:
@@ -84,6 +95,8 @@ class Observable:
     """Observable of the same heap that is the larger of the two."""
     alias: str = ""
     """Spelling in study files and tables of cases, where it is another."""
+    part_of: str = ""
+    """Profile that it is a height of; empty where it is a number of its own."""
 
     @property
     def by_photograph(self) -> bool:
@@ -189,14 +202,41 @@ OBSERVABLES = (
 )
 """Observables of the lifted cylinder that a laboratory can measure, in the order of every table."""
 
+SURFACE = tuple(f"surface_{number + 1}" for number in range(len(STATIONS)))
+"""Names of the heights of the bed's surface in a drum, its profile."""
+
+OUTLINE_STATIONS = 8
+"""Places of a heap's outline, `imaging.profile.STATIONS`."""
+
+
+def _height_at(number: int, view: View) -> float:
+    return float(view.profile[number])
+
+
+OUTLINE = tuple(
+    _photographed(
+        f"outline_{number + 1}",
+        f"outline at {0.2 * number:.1f}",
+        "m",
+        f"height of the outline at {0.2 * number:.1f} roots of its area from its middle, mean of both flanks",
+        seen=partial(_height_at, number),
+        part_of=OUTLINE_PROFILE,
+    )
+    for number in range(OUTLINE_STATIONS)
+)
+"""Heights of a heap's outline, its profile; a study asks for them (``[measurement] outline``)."""
+
 NAMES = tuple(observable.name for observable in OBSERVABLES)
 """Their names."""
 
 PHOTOGRAPHED = tuple(observable.name for observable in OBSERVABLES if observable.by_photograph)
 """Names of those that a photograph shows."""
 
-BY_NAME = {name: each for each in OBSERVABLES for name in (each.name, each.column)}
+BY_NAME = {name: each for each in (*OBSERVABLES, *OUTLINE) for name in (each.name, each.column)}
 """The same by name and by alias."""
+
+PROFILES = {SURFACE_PROFILE: SURFACE, OUTLINE_PROFILE: tuple(each.name for each in OUTLINE)}
+"""Heights of each profile that responses and files may ask for, by its name."""
 
 OF_THE_RUN = ("grain_count", "simulated_time", "grains_lost", "clogged")
 """Observables of a test that tell of its simulation, and of no measurement."""
@@ -217,7 +257,7 @@ VERSION = 2
 
 def observables_of(told: Mapping[str, Told], leaves_a_heap: bool) -> dict[str, Observable]:
     """Collect what a scene tells of, and what pictures of its heap show, by columns in a table of cases."""
-    heap = {each.column: each for each in OBSERVABLES} if leaves_a_heap else {}
+    heap = {each.column: each for each in (*OBSERVABLES, *OUTLINE)} if leaves_a_heap else {}
     return heap | {
         name: Observable(name, name.replace("_", " "), unit, meaning)
         for name, (unit, meaning) in told.items()
@@ -225,16 +265,25 @@ def observables_of(told: Mapping[str, Told], leaves_a_heap: bool) -> dict[str, O
     }
 
 
-def measurable(told: Mapping[str, Told], leaves_a_heap: bool) -> tuple[Observable, ...]:
-    """List what a laboratory can measure of a test, in the order of every table.
+def measurable(
+    told: Mapping[str, Told], leaves_a_heap: bool, outline: bool = False
+) -> tuple[Observable, ...]:
+    """List what a laboratory can measure of a test, in the order of every table; outlines where asked for.
 
     Of a test that leaves no heap it is all that the scene tells of, but for what is about the simulation, and
     for the error, the spread or a side of another observable, whose name begins with that of the other.
     """
     if leaves_a_heap:
-        return OBSERVABLES
+        return (*OBSERVABLES, *(OUTLINE if outline else ()))
     return tuple(
-        Observable(name, name.replace("_", " "), unit, meaning, _INSTRUMENTS[unit])
+        Observable(
+            name,
+            name.replace("_", " "),
+            unit,
+            meaning,
+            _INSTRUMENTS[unit],
+            part_of=SURFACE_PROFILE if name in SURFACE else "",
+        )
         for name, (unit, meaning) in told.items()
         if name not in OF_THE_RUN and not any(name.startswith(f"{other}_") for other in told)
     )

@@ -67,8 +67,8 @@ def find_pictures(pattern: str, folder: Path, place: str) -> list[Path]:
     return found
 
 
-def measure_pictures(paths: Sequence[Path], fit: str) -> list[ReposeAngle]:
-    """Measure the repose angle of the heap in each picture.
+def measure_pictures(paths: Sequence[Path], fit: str) -> dict[Path, ReposeAngle]:
+    """Measure the repose angle of the heap in each picture; one in doubt is measured too.
 
     Raises
     ------
@@ -77,10 +77,11 @@ def measure_pictures(paths: Sequence[Path], fit: str) -> list[ReposeAngle]:
     """
     from imaging import measure_photograph
 
-    angles, problems = [], []
+    angles: dict[Path, ReposeAngle] = {}
+    problems = []
     for path in paths:
         try:
-            angles.append(measure_photograph(path, fit))
+            angles[path] = measure_photograph(path, fit)
         except PictureError as error:
             problems.append(Problem("must show a heap that can be measured", str(error), str(path)))
     if problems:

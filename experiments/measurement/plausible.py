@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from dem_warp import LiftedCylinder
+from dem_warp import Drum, LiftedCylinder
 from experiments.measurement.observables import OBSERVABLES, Observable
 from experiments.studyfile import Study
 
@@ -27,10 +27,14 @@ class SizeOfTest:
     """Radius of the flattest heap that the grains of the tube can make, or the room of another test [m]."""
     time: float
     """Time from the start of the lift until long after its end, endless of another test [s]."""
+    radius: float | None = None
+    """Radius of a drum [m]."""
 
     def limits(self, observable: Observable) -> tuple[float, float]:
         """Smallest and largest value that an observable can have, in its unit (deg, m, s or 1)."""
         by_unit = {"deg": (0.0, 90.0), "m": (self.grain, self.length), "s": (0.0, self.time)}
+        if observable.part_of:  # a heap has no height beyond its foot, and a drum's axis is in its middle
+            return (0.0 if self.radius is None else -self.length), self.length
         masses = {"kg": (0.0, math.inf), "kg/s": (0.0, math.inf)}
         return observable.limits or (by_unit | masses).get(observable.unit, (-math.inf, math.inf))
 
@@ -42,7 +46,8 @@ def size_of_test(study: Study) -> SizeOfTest:
     if not isinstance(scene, LiftedCylinder):
         half_x, half_y, bottom = scene.room(case.grains.grain_reach)
         room = max(2.0 * half_x, 2.0 * half_y, scene.brim - bottom)
-        return SizeOfTest(case.grains.smallest_sphere, room, math.inf)
+        radius = scene.diameter / 2 if isinstance(scene, Drum) else None
+        return SizeOfTest(case.grains.smallest_sphere, room, math.inf, radius)
     reach = 4.0 * scene.diameter + 2.0 * scene.height
     return SizeOfTest(case.grains.smallest_sphere, reach, PATIENCE + 10.0 * scene.height / scene.lift_speed)
 

@@ -2,43 +2,37 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from dem_warp import Drum
-from dem_warp.scenes.drum_surface import STATIONS
-from doe import ProfileSample
+from doe import ProfileSample, scatter_of_views
 from doe.errors import RuleError
 from experiments.errors import InputError
-from experiments.rows import Row, read_rows
+from experiments.measurement.observables import OUTLINE_PROFILE, PROFILES, SURFACE_PROFILE
+from experiments.measurement.profile_files import Profiles, read_drum_profiles, read_heap_profiles
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import TARGET_SCENE
-from experiments.studyfile.units import Quantity
 
-SURFACE = "surface"
-"""Observable that profiles are of: that of a drum, at its stations."""
-
-COLUMNS = ("replicate", "x", "z")
-"""Columns of a file of profiles: a label of each, place from the axis and height above it, with units."""
-
-LEAST_STATIONS = 3
-"""Stations of a drum that all profiles must span."""
+OWN = ("note", "twin")
+"""Keys of ``[target]`` that no ``[[response]]`` has."""
 
 
 def with_profiles(study: Study) -> Study:
-    """Put the independent directions of measured profiles in place of the responses that name files of them.
+    """Put responses of their own in place of profiles: independent directions of measured ones, or heights.
+
+    Of a twin's profile, whose cases are still to be simulated, it is the heights at its places. A campaign
+    takes either as one profile again (`experiments.calibrate.directions`).
 
     Raises
     ------
     InputError
-        When a file cannot be read or breaks a rule, or the test is no drum.
+        When a file cannot be read or breaks a rule, or the test does not show the profile.
     """
     document = study.document
     tables = {"target": [document["target"]] if "target" in document else []}
     tables["response"] = list(document.get("response", []))
-    if not any("profiles" in table for found in tables.values() for table in found):
+    named = {table.get("observable") for found in tables.values() for table in found} & set(PROFILES)
+    if not named and not any("profiles" in table for found in tables.values() for table in found):
         return study
     first, *others = [
         made
@@ -46,85 +40,58 @@ def with_profiles(study: Study) -> Study:
         for number, table in enumerate(found)
         for made in _made(study, table, f"{study.file}: {key}" + f"[{number + 1}]" * (key == "response"))
     ]
+    # what belongs to the section itself, and to no other response
+    first |= {key: document["target"][key] for key in OWN if key in document.get("target", {})}
     left = {key: value for key, value in document.items() if key not in tables}
+    if OUTLINE_PROFILE in named:
+        left["measurement"] = left.get("measurement", {}) | {"outline": True}
     return study.with_document(left | {"target": first} | ({"response": others} if others else {}))
 
 
 def _made(study: Study, table: dict[str, Any], place: str) -> list[dict[str, Any]]:
-    """Responses that a table stands for: itself, or the directions of its profiles."""
-    if "profiles" not in table:
-        return [table]
-    if table.get("observable") != SURFACE:
-        raise InputError(f'profiles are of the observable "{SURFACE}"', table.get("observable"), place)
+    """Responses that a table stands for: itself, or those of its profiles."""
+    profile, twin = table.get("observable"), study.target_section is not None and study.target_section.twin
+    if profile not in PROFILES:
+        if "profiles" not in table:
+            return [table]
+        known = " or ".join(f'"{name}"' for name in PROFILES)
+        raise InputError(f"profiles are of the observable {known}", profile, place)
+    if "profiles" not in table and not twin:
+        raise InputError(f'"{profile}" needs profiles, a file of them, or a twin', "neither", place)
     name = table.get("scene", TARGET_SCENE)
+    shared = {key: table[key] for key in ("scene",) if key in table}
+    shared["part_of"] = f"{profile}_{name}".replace("-", "_") if name != TARGET_SCENE else profile
     scene = study.case({}, 0, name).scene
-    if not isinstance(scene, Drum):
-        raise InputError("profiles are those of a drum", scene.name, place)
+    if (profile == SURFACE_PROFILE) != isinstance(scene, Drum) or not (
+        isinstance(scene, Drum) or scene.leaves_a_heap
+    ):
+        rule = 'profiles are those of a drum, a "surface", or of a heap, an "outline"'
+        raise InputError(rule, f"{profile} of {scene.name}", place)
+    if twin:
+        return [shared | {"observable": height} for height in PROFILES[profile]]
     path = study.file.parent / table["profiles"]
-    kept, heights = read_profiles(path, scene.diameter / 2)
+    if isinstance(scene, Drum):
+        found = read_drum_profiles(path, scene.diameter / 2)
+    else:
+        found = read_heap_profiles(path, study.measurement.fit)
     try:
-        sample = ProfileSample.of(heights)
+        sample = ProfileSample.of(found.heights, scatter_of_views(found.views))
     except RuleError as error:
         raise InputError(f"profiles {error.rule}", error.value, str(path)) from None
-    shared = {key: table[key] for key in ("scene", "note") if key in table}
-    title = f"{SURFACE}_{name}".replace("-", "_") if name != TARGET_SCENE else SURFACE
+    return [shared | mode for mode in _modes(sample, found, profile, shared["part_of"])]
+
+
+def _modes(sample: ProfileSample, found: Profiles, profile: str, title: str) -> list[dict[str, Any]]:
+    """Tables of the independent directions of profiles."""
+    names = [PROFILES[profile][station] for station in found.stations]
     return [
-        shared
-        | {
+        {
             "observable": f"{title}_mode_{number}",
-            "weights": {f"{SURFACE}_{kept[i] + 1}": float(w) for i, w in enumerate(mode.weights)},
+            "weights": dict(zip(names, map(float, mode.weights), strict=True)),
             "mean": f"{mode.target.mean!r} m",
             "sd": f"{mode.target.sd!r} m",
             "n": mode.target.n,
+            "measurements": (found.heights @ mode.weights).tolist(),
         }
         for number, mode in enumerate(sample.modes, 1)
     ]
-
-
-def read_profiles(path: Path, radius: float) -> tuple[list[int], np.ndarray]:
-    """Read profiles of a drum of a radius [m], each with a label, as heights at its stations.
-
-    Returns
-    -------
-    stations
-        Numbers of the stations, from 0, that all profiles span.
-    heights
-        Heights above the axis there [m], shape (profiles, stations).
-
-    Raises
-    ------
-    InputError
-        When the file cannot be read, a point lies outside the drum, or the profiles span too few stations.
-    """
-    points: dict[str, dict[float, float]] = {}
-    for row in read_rows(path, COLUMNS, COLUMNS):
-        if not row["replicate"]:
-            raise row.error("needs a label, one for each profile", "replicate")
-        x, z = _length(row, "x"), _length(row, "z")
-        if np.hypot(x, z) > radius:
-            rule = f"must lie in the drum, within {1e3 * radius:g} mm of its axis"
-            value = f"x {row['x']}, z {row['z']}"
-            raise InputError(rule, value, f"{path}:{row.line}: x, z")
-        profile = points.setdefault(row["replicate"], {})
-        if x in profile:
-            raise row.error("every place of a profile stands once", "x")
-        profile[x] = z
-    places = np.array(STATIONS) * radius
-    ends = [(min(profile), max(profile)) for profile in points.values()] or [(0.0, 0.0)]
-    low, high = max(end[0] for end in ends), min(end[1] for end in ends)
-    kept = [number for number, place in enumerate(places) if low <= place <= high]
-    if len(kept) < LEAST_STATIONS:
-        told = f"{1e3 * low:.4g} to {1e3 * high:.4g} mm, {len(kept)} stations"
-        raise InputError(f"all profiles must span {LEAST_STATIONS} stations of the drum", told, str(path))
-    rows = [
-        np.interp(places[kept], sorted(profile), [profile[x] for x in sorted(profile)])
-        for profile in points.values()
-    ]
-    return kept, np.array(rows)
-
-
-def _length(row: Row, column: str) -> float:
-    try:
-        return Quantity.parse(row[column]).to_base("length")
-    except ValueError as error:
-        raise row.error(str(error), column) from None

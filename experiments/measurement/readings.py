@@ -9,9 +9,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from experiments.errors import Problem
-from experiments.measurement.observables import DIMENSIONS, OBSERVABLES, Observable, View
+from experiments.measurement.observables import (
+    DIMENSIONS,
+    OUTLINE_PROFILE,
+    PROFILES,
+    SURFACE_PROFILE,
+    Observable,
+    View,
+)
 from experiments.measurement.pictures import require_same_fit
 from experiments.measurement.plausible import SizeOfTest
+from experiments.measurement.profile_files import read_drum_profiles, read_heap_profiles
 from experiments.rows import Row
 from experiments.studyfile.units import Quantity
 from experiments.texts import nearest_name
@@ -51,7 +59,9 @@ def readings_of(row: Row, size: SizeOfTest, fit: str, known: Mapping[str, Observ
         When the picture shows no heap that can be measured.
     """
     name = row["observable"]
-    if name == CLOGGED_ROW:
+    if row["profile"]:
+        yield from _profiled(row, size, fit, known)
+    elif name == CLOGGED_ROW:
         if row["value"] or row["picture"]:
             raise row.error("stands without a value and a picture: there is no heap", "observable")
         yield Reading(row, CLOGGED_ROW, np.nan)
@@ -66,6 +76,30 @@ def readings_of(row: Row, size: SizeOfTest, fit: str, known: Mapping[str, Observ
         yield _written(row, known[name], size)
     elif row["picture"]:
         yield from _seen(row, size, fit, known)
+
+
+def _profiled(row: Row, size: SizeOfTest, fit: str, known: Mapping[str, Observable]) -> Iterator[Reading]:
+    """Heights of the profile that a row's file has of its replicate."""
+    profile = SURFACE_PROFILE if size.radius is not None else OUTLINE_PROFILE
+    heights = PROFILES[profile]
+    if row["observable"] not in ("", profile) or row["value"] or row["picture"]:
+        raise row.error(f"stands alone, or with the observable {profile}", "profile")
+    if heights[0] not in known:
+        rule = "needs a drum, or outlines that the study asks for (outline = true in [measurement])"
+        raise row.error(rule, "profile")
+    path = row.file.parent / row["profile"]
+    if size.radius is not None:
+        found = read_drum_profiles(path, size.radius)
+    else:
+        found = read_heap_profiles(path, fit)
+    name = row["replicate"]
+    if name not in found.names:
+        rule = f"the file {path} has a profile of each replicate, {nearest_name(name, found.names)}"
+        raise row.error(rule, "replicate")
+    own = map(float, found.heights[found.names.index(name)])
+    for station, value in zip(found.stations, own, strict=True):
+        observable = known[heights[station]]
+        yield Reading(row, observable.name, value, doubt=_doubt(row, observable, value, size))
 
 
 def _written(row: Row, observable: Observable, size: SizeOfTest) -> Reading:
@@ -104,11 +138,15 @@ def _seen(row: Row, size: SizeOfTest, fit: str, known: Mapping[str, Observable])
     if name and pixel is None and known[name].unit == "m":
         raise row.error("a length in a picture needs the size of its pixels, as 0.1 mm", "pixel")
     # a file of numbers needs no pictures
-    from imaging import find_outline, measure, read_picture
+    from imaging import PictureError, find_outline, measure, read_picture
 
     outline = find_outline(read_picture(path), meters_per_pixel=pixel, place=str(path))
-    views = [View.of(measure(outline, fit, str(path)))]
-    for observable in OBSERVABLES:
+    angle = measure(outline, fit, str(path))
+    if angle.doubts:
+        told = "; ".join(map(str, angle.doubts))
+        raise PictureError("a picture counts where nothing about it is in doubt", told, str(path))
+    views = [View.of(angle)]
+    for observable in dict.fromkeys(known.values()):
         wanted = observable is known[name] if name else observable.unit != "m" or pixel
         if wanted and observable.by_photograph:
             value = observable.in_pictures(views)
@@ -139,4 +177,4 @@ def _doubt(row: Row, observable: Observable, value: float, size: SizeOfTest) -> 
 
 
 def _place(row: Row) -> str:
-    return f"{row.file}:{row.line}: {'value' if row['value'] else 'picture'}"
+    return f"{row.file}:{row.line}: {next((key for key in ('value', 'picture') if row[key]), 'profile')}"

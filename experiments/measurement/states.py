@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from dem_warp import CaseResult
-from experiments.measurement.observables import BY_NAME, NAMES, OBSERVABLES, PHOTOGRAPHED, View
+from experiments.measurement.observables import BY_NAME, NAMES, OBSERVABLES, OUTLINE, View
 from experiments.studyfile.study import MeasurementSection
 from imaging import HeapAngle, PictureError, heap_angle
 
@@ -58,7 +58,8 @@ def observe(settings: MeasurementSection, result: CaseResult, leaves_a_heap: boo
     except PictureError as error:
         return Observed(told, reason=f"no heap: {error}")
     views = [View.of(view) for view in heap.views]
-    seen = {each.column: each.in_heap(heap, views) for each in OBSERVABLES if each.by_photograph}
+    wanted = (*OBSERVABLES, *(OUTLINE if settings.outline else ()))
+    seen = {each.column: each.in_heap(heap, views) for each in wanted if each.by_photograph}
     return Observed(seen | told, heap)
 
 
@@ -76,7 +77,7 @@ def measure(
     reason : str
         Why a case has none: it failed, its heap cannot be measured, or one was not told; else empty.
     """
-    leaves_a_heap = any(name in PHOTOGRAPHED for name in names)
+    leaves_a_heap = any(name in BY_NAME and BY_NAME[name].by_photograph for name in names)
     found = observe(settings, result, leaves_a_heap)
     columns = [BY_NAME[name].column if name in BY_NAME else name for name in names]
     untold = [column for column in columns if column not in found.observables]

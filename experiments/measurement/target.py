@@ -53,20 +53,30 @@ def with_measurements(study: Study) -> tuple[Study, tuple[str, ...]]:
         if section.observable != ANGLE or section.scene != TARGET_SCENE:
             raise InputError("photographs give the angle of the study's own scene", section.title, place)
         paths = find_pictures(section.pictures, study.file.parent, f"{place}.pictures")
-        sample = Sample.of([angle.mean for angle in measure_pictures(paths, study.measurement.fit)])
-        note = f"{len(paths)} pictures: {', '.join(path.name for path in paths)}"
-        return _given(study, [Replicated(TARGET_SCENE, ANGLE, sample)], note), ()
+        angles = measure_pictures(paths, study.measurement.fit)
+        clear = {path: angle for path, angle in angles.items() if not angle.doubts}
+        notes = tuple(
+            f"{path.name} is doubtful, and left out: {'; '.join(map(str, angle.doubts))}"
+            for path, angle in angles.items()
+            if angle.doubts
+        )
+        if len(clear) < 2:
+            rule = f"needs two pictures of heaps without a doubt ({'; '.join(notes)})"
+            raise InputError(rule, len(clear), f"{place}.pictures")
+        sample = Sample.of([angle.mean for angle in clear.values()])
+        note = f"{len(clear)} pictures: {', '.join(path.name for path in clear)}"
+        return _given(study, [Replicated(TARGET_SCENE, ANGLE, sample)], note), notes
     if section.file is not None:
         measured = read_measured(study.file.parent / section.file, study)
-        found, notes = [], list(measured.notes)
+        found, said = [], list(measured.notes)
         for condition in measured.conditions:
             for name, column in zip(measured.observables, measured.values[condition].T, strict=True):
                 values = column[np.isfinite(column)]
                 if len(values) > 1 and np.ptp(values) > 0.0:
                     found.append(Replicated(condition, name, Sample.of(values)))
                 elif len(values):
-                    notes.append(f"{condition}: {name} shows no scatter, so that it is not to be matched")
-        return _given(study, found, f"file {section.file}"), tuple(notes)
+                    said.append(f"{condition}: {name} shows no scatter, so that it is not to be matched")
+        return _given(study, found, f"file {section.file}"), tuple(said)
     return study, ()
 
 
@@ -101,7 +111,7 @@ def _given(study: Study, measured: list[Replicated], note: str) -> Study:
 
 def _table(study: Study, one: Replicated) -> dict[str, Any]:
     """Write one as the table of a response: numbers that read back as the same floats."""
-    units = {name: each.unit for each in study.scene.measurable for name in (each.name, each.column)}
+    units = {name: each.unit for each in study.measurable for name in (each.name, each.column)}
     unit, column = units[one.observable], _column(one)
     numbers: dict[str, Any] = {
         key: value if unit == "1" else f"{value!r} {unit}"

@@ -36,6 +36,8 @@ replicate: one heap, a label. Five or more of each condition show small effects;
 observable: what was measured, or {clogged} (without a value) where the grains got stuck: no result.
 {observables}
 
+profile: instead of a value, a file of profiles, columns replicate, x, z, with one of the same replicate.
+
 calibration: in the place of a condition, what an instrument may be off by in all conditions alike, a standard
 deviation: "offset" or "scale" for the replicate (scale: a share, as 0.2 %), or "none" where nothing is off.
 What is not stated is as usual for the instrument: a film of 60 frames a second, a ruler's millimetre, a
@@ -96,7 +98,7 @@ def _flat(table: Mapping[str, Any], place: str = "") -> Iterator[tuple[str, Any]
 
 def _defined(study: Study) -> Iterator[str]:
     """Every observable of a study's test, with its unit, its instrument and its definition."""
-    for observable in study.scene.measurable:
+    for observable in study.measurable:
         unit = LABORATORY_UNITS.get(observable.unit, observable.unit)
         text = f"{observable.name} [{unit}], {observable.instrument}: {observable.definition}"
         yield textwrap.fill(text, 108, initial_indent=4 * " ", subsequent_indent=8 * " ")
@@ -105,7 +107,7 @@ def _defined(study: Study) -> Iterator[str]:
 def _empty_rows(study: Study) -> Iterator[dict[str, object]]:
     for condition in study.conditions:
         for replicate in range(1, REPLICATES + 1):
-            for observable in study.scene.measurable:
+            for observable in study.measurable:
                 yield {
                     "condition": condition.name,
                     "replicate": replicate,

@@ -101,7 +101,7 @@ def run_search(job: Job, resume: bool = False, watch: Watch = lambda title: null
     if not resume:
         require_unused(job.folder, "; --resume goes on in it")
     companion, search = companion_of(job.study), Search.of(job.study)
-    terms = Terms.of(search.library, job.study.scene.measurable, job.study.factor_sections)
+    terms = Terms.of(search.library, job.study.measurable, job.study.factor_sections)
     bank = known_bank(job)
     measured = _measured(job)
     for note in measured.notes if measured else ():
@@ -206,7 +206,7 @@ def _measured(job: Job) -> Measured | None:
     if job.measured is None:
         return None
     measured = read_measured(job.measured, job.study)
-    shown = [each.name for each in job.study.scene.measurable if each.instrument is Instrument.PHOTOGRAPH]
+    shown = [each.name for each in job.study.measurable if each.instrument is Instrument.PHOTOGRAPH]
     return measured.only(shown) if job.photographs_only else measured
 
 

@@ -213,6 +213,10 @@ class Response:
     """Takes no part in any fit; only judges the chosen point."""
     weights: tuple[tuple[str, float], ...] = ()
     """Observables that its column is the weighted sum of; empty where an observable is its column."""
+    part_of: str = ""
+    """Profile that it is a height or a direction of; empty where it is a number of its own."""
+    measurements: tuple[float, ...] = ()
+    """Single measurements, of a direction of a profile."""
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,6 @@ from pydantic import model_validator
 from dem_warp import SCENES, Material
 from dem_warp.scenes.poured_scene import PouredScene
 from dem_warp.scenes.scene import Observable
-from experiments.measurement.observables import Observable as Measurable
-from experiments.measurement.observables import measurable
 from experiments.studyfile.generated import EngineSection, LibrarySection, library_section
 
 
@@ -47,11 +45,6 @@ class SceneSection(LibrarySection):
     def observables(self) -> Mapping[str, Observable]:
         """Observables of the test."""
         return self.kind.observables
-
-    @property
-    def measurable(self) -> tuple[Measurable, ...]:
-        """Observables that a laboratory can measure of it, in the order of every table."""
-        return measurable(self.observables, self.leaves_a_heap)
 
     def scene(self, wall: Material) -> PouredScene:
         """Build the engine's scene, its walls of a material."""

@@ -18,6 +18,7 @@ from pydantic import Field, PrivateAttr, field_validator
 from dem_warp import Case
 from doe import Factor
 from experiments.errors import StudyError
+from experiments.measurement.observables import Observable, measurable
 from experiments.studyfile.campaign import TARGET_SCENE, CampaignSettings, Target
 from experiments.studyfile.card import card_document, with_material
 from experiments.studyfile.cluster_section import ClusterSection
@@ -55,6 +56,13 @@ class MeasurementSection(Section):
     """Views of one heap, over half a turn."""
     pixels: int = Field(default=800, ge=50, le=4000)
     """Width of the heap in a view."""
+    outline: bool = False
+    """True: the heights of the outline are observables too, ``outline_1`` to ``outline_8``."""
+
+    @property
+    def told(self) -> dict[str, Any]:
+        """Settings by name, for keys and cards; outlines are left out where nobody asks for them."""
+        return self.model_dump(exclude=None if self.outline else {"outline"})
 
     @field_validator("fit")
     @classmethod
@@ -149,6 +157,11 @@ class Study(Physics):
         tests = {name: self.under(name).scene for name in self.condition_sections}
         return {TARGET_SCENE: self.scene, **self.response_scenes, **tests}
 
+    @property
+    def measurable(self) -> tuple[Observable, ...]:
+        """Observables that a laboratory can measure of the study's test, in the order of every table."""
+        return measurable(self.scene.observables, self.scene.leaves_a_heap, self.measurement.outline)
+
     @cached_property
     def factors(self) -> tuple[Factor, ...]:
         """Factors of the designs in natural units, in the order of the file."""
@@ -197,6 +210,12 @@ class Study(Physics):
             When the document breaks a rule.
         """
         return _build(dict(document), self._places)
+
+    def with_target(self, target: Target) -> Study:
+        """The same study, whose cases must match something else."""
+        study = self.model_copy()
+        study._target = target
+        return study
 
     def natural_settings(self, settings: Mapping[str, object], source: str = "settings") -> dict[str, float]:
         """Read factor values with their units, as ``{"B": "34 MPa", "E": 0.46}``, in natural units.

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from doe import Sample
 from experiments.errors import StudyError
-from experiments.measurement.observables import ANGLE, DIMENSIONS, Observable, observables_of
+from experiments.measurement.observables import ANGLE, DIMENSIONS, PROFILES, Observable, observables_of
 from experiments.studyfile.campaign import TARGET_SCENE, FactorValues, Response, Target, Twin
 from experiments.studyfile.places import KeyPath, Places
 from experiments.studyfile.scene_sections import SceneSection
@@ -36,12 +36,16 @@ class ResponseSection(Section):
     """``[[response]]``: a number to be matched, beside the ``[target]`` or instead of it."""
 
     observable: str
-    """Observable of the scene, as ``"solid_fraction"``; ``"angle"`` of a scene that leaves a heap;
-    ``"surface"``, with profiles, of a drum."""
+    """Observable of the scene, as ``"solid_fraction"``; ``"angle"`` of a scene that leaves a heap; with
+    profiles ``"surface"`` of a drum, ``"outline"`` of a heap."""
     weights: dict[str, float] | None = Field(default=None, min_length=1)
     """Observables of one unit that the response is the weighted sum of; observable is then its name."""
     profiles: str | None = None
     """File of measured profiles, instead of numbers: their heights, with the covariance, are matched."""
+    part_of: str = ""
+    """Profile that it is a height or a direction of; written by the program."""
+    measurements: tuple[float, ...] = ()
+    """Single measurements of a direction of a profile, in SI; written by the program."""
     name: str | None = Field(default=None, pattern=r"^[A-Za-z_]\w*$")
     """Name in tables; left out: as the observable."""
     scene: str = TARGET_SCENE
@@ -77,7 +81,16 @@ class ResponseSection(Section):
                 raise StudyError(rule, self.title, places.of(path))
             sample = Sample(values["mean"], values["sd"], int(self.n or 0))
         weights = tuple((self.weights or {}).items())
-        return Response(self.title, self.observable, unit, self.scene, sample, weights=weights)
+        return Response(
+            self.title,
+            self.observable,
+            unit,
+            self.scene,
+            sample,
+            weights=weights,
+            part_of=self.part_of,
+            measurements=self.measurements,
+        )
 
     def _value(self, name: str, unit: str, path: KeyPath, places: Places) -> float:
         """Convert a measurement; NaN where it was left out."""
@@ -147,7 +160,7 @@ def build_target(
     built: list[Response] = []
     for path, section in sections:
         _check_name(section, built, path, places)
-        if section.profiles is not None:
+        if section.profiles is not None or section.observable in PROFILES:
             waiting = waiting or "profiles"
             continue
         unit = _observable(section, scenes, path, places).unit

@@ -63,8 +63,10 @@ def small_study(write_study: Callable[..., Path]) -> Study:
 def cone() -> Callable[..., CaseResult]:
     """Build the result of a case that ended in a cone of spheres with a given slope."""
 
-    def build(slope: float = 0.5, status: str = "finished", reason: str = "") -> CaseResult:
-        radius, base = 0.5e-3, 20e-3
+    def build(
+        slope: float = 0.5, status: str = "finished", reason: str = "", radius: float = 0.5e-3
+    ) -> CaseResult:
+        base = 20e-3
         grid = np.arange(-base, base, radius)
         x, y = (axis.ravel() for axis in np.meshgrid(grid, grid))
         top = slope * (base - np.hypot(x, y))

@@ -147,11 +147,22 @@ def test_lammps_gets_molecules_with_the_mass_of_the_union() -> None:
     assert "rolling sds" in files["lift.in"]
 
 
-def test_sheets_say_that_nothing_was_run_there() -> None:
+@pytest.mark.parametrize("code", list(EXPORTERS))
+def test_an_input_that_nobody_has_run_says_so_at_the_top(code: str, tmp_path: Path) -> None:
+    test = exported("deme", SPHERE)
+    translation = export_input(test, code, approximate=True)
+    write_export(test, code, translation, tmp_path)
+    run = code in ("liggghts", "lammps", "yade")
+    told = f"has not been run in {EXPORTERS[code].code}"
+    for file in (translation.main, "README.md"):
+        top = (tmp_path / file).read_text(encoding="utf-8").splitlines()[:6]
+        assert any(told in line for line in top) is not run
+
+
+def test_sheets_have_the_spheres_and_the_time_step() -> None:
     for code, laws in (("edem", "edem"), ("rocky", "rocky")):
         test = exported(laws)
         translation = export_input(test, code, approximate=True)
-        assert "has not been run" in translation.files["values.md"]
         rows = list(csv.DictReader(io.StringIO(translation.files["spheres.csv"])))
         assert [float(row["radius"]) for row in rows] == pytest.approx([1.0] * 3)
         values = {
@@ -163,6 +174,28 @@ def test_sheets_say_that_nothing_was_run_there() -> None:
         assert translation.command == ()
 
 
+@pytest.mark.parametrize("laws", ["edem", "edem-rvd", "edem-c", "relative"])
+def test_a_sheet_for_edem_names_its_rolling_friction_with_its_ratio(laws: str) -> None:
+    translation = export_input(exported(laws), "edem")
+    text = translation.files["values.csv"]
+    chosen = PRESETS[laws]
+    words = {
+        "own_spin": "Standard Rolling Friction",
+        "edem_rvd": "RVD Rolling Friction",
+        "elastic_plastic": "Type C",
+    }
+    assert f",Rolling Friction,{words[chosen.rolling]}," in text
+    ratio = f",Rolling Viscous Damping Ratio,{chosen.rolling_damping:g}," in text
+    assert ratio is (chosen.rolling == "elastic_plastic")
+
+
+def test_a_rolling_spring_that_edem_has_no_entry_for_is_told() -> None:
+    test = exported("relative")
+    laws = replace(test.case.laws, rolling_stiffness=1.0)
+    with pytest.raises(InputError, match=r"rolling_stiffness = 1: EDEM's Type C has 2\.25"):
+        export_input(replace(test, case=replace(test.case, laws=laws)), "edem")
+
+
 @pytest.mark.parametrize("name", list(EXPORTERS))
 def test_terms_of_a_case_are_there_for_every_code_and_set_of_laws(name: str) -> None:
     for laws in PRESETS.values():
@@ -171,6 +204,14 @@ def test_terms_of_a_case_are_there_for_every_code_and_set_of_laws(name: str) -> 
         assert {"grain with grain", "grain with wall"} <= set(subjects)
     own = next(iter(set(PRESETS) & {name}), None)
     assert own is None or term_warnings(name, replace(exported("edem").case, laws=PRESETS[own])) == ()
+
+
+@pytest.mark.parametrize("name", list(EXPORTERS))
+def test_the_box_in_the_report_warns_of_the_laws_that_the_input_warns_of(name: str) -> None:
+    test = exported("edem" if name in ("lammps", "yade", "deme", "liggghts") else "lammps")
+    told = [text for text in term_warnings(name, test.case) if text.startswith("law ")]
+    assert told
+    assert set(told) <= set(export_input(test, name, approximate=True).warnings)
 
 
 # ---- what is refused ---------------------------------------------------------------------------------------

@@ -47,7 +47,7 @@ def drum(write_study: WriteStudy) -> Study:
 
 
 def test_a_drum_is_searched_with_what_a_laboratory_measures_of_it(drum: Study, tmp_path: Path) -> None:
-    assert [each.name for each in drum.scene.measurable] == MEASURABLE
+    assert [each.name for each in drum.measurable] == MEASURABLE
     search = Search.of(drum)
     assert "plate_tilt" not in search.space.names  # a drum has no plate
     table = OutcomeTable(tmp_path / "o.sqlite")

@@ -325,7 +325,8 @@ def coded_size_interval(fitted: Fitted, number: int, coverage: float = 0.9) -> t
 
     It ends where q, with all else refitted, has risen by the point of chi2 for the coverage. The weights stay
     those of the optimum; what they contribute to the score's slope there is taken out of the residuals, so
-    that q is least at the optimum, too.
+    that q is least at the optimum, too. Where nothing fits, the score may ask for another size than q does,
+    one whose predictions are more uncertain: the interval holds both.
 
     Parameters
     ----------
@@ -349,8 +350,9 @@ def coded_size_interval(fitted: Fitted, number: int, coverage: float = 0.9) -> t
     _, q = minimise(fitted.stack, fitted.whitening, target, starts, lower, upper)
     shifted = (fitted.errors[column] ** 2) / fitted.spread[column, column]
     rise = q - q.min() - stats.chi2.ppf(coverage, 1) * shifted
-    inside = np.flatnonzero(rise <= 0.0)
-    return _crossing(grid, rise, inside[0], -1), _crossing(grid, rise, inside[-1], 1)
+    inside, value = np.flatnonzero(rise <= 0.0), float(fitted.x[column])
+    ends = _crossing(grid, rise, inside[0], -1), _crossing(grid, rise, inside[-1], 1)
+    return min(ends[0], value), max(ends[1], value)
 
 
 def _crossing(grid: np.ndarray, rise: np.ndarray, inside: int, step: int) -> float:

@@ -2,12 +2,12 @@
 
     python -m experiments.benchmarks.bridge.laws_of_liggghts --out DIR [--study FILE --scale bench]
 
-Each study is calibrated by dem-warp in the laws of LIGGGHTS; the card's own test is then run in LIGGGHTS with
-fresh seeds. The angle is to be within a degree of the target, plus the noise of both.
+Each study is calibrated by dem-warp in the laws of LIGGGHTS, with some changes; the card's own test is then
+run in LIGGGHTS with fresh seeds. The angle is to be within a degree of the target, plus the noise of both.
 """
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import pandas as pd
 import typer
@@ -24,12 +24,21 @@ HERE = Path(__file__).parent
 MARGIN = 1.0
 """Difference between the codes that does not matter [deg]."""
 
+CHANGES: dict[str, Any] = {
+    # columns of spheres tremble at 1 to 2 mm/s in these laws, and would never rest at 1 mm/s (docs/laws.md)
+    "scene": {"lifted-cylinder": {"rest_speed": "3 mm/s"}},
+    # heaps as small as these scatter by one or two degrees: steps of four tenths of the range, once each,
+    # show no slope of the angular grain
+    "campaign": {"surface": {"half_range_least": 0.8, "replicates": 2}},
+}
+"""Changes to every study."""
+
 COLUMNS = ("study", "target", "mean", "sd", "n", "difference", "low", "high", "met", "equivalent")
 
 
 def in_laws(file: Path, scale: str | None, laws: str) -> Study:
-    """Load a study in other laws."""
-    return load_study(file, scale, {"solver": {"laws": laws}})
+    """Load a study in other laws, with the changes that they ask for."""
+    return load_study(file, scale, CHANGES | {"solver": {"laws": laws}})
 
 
 def prove(study: Study, folder: Path, laws: str, seeds: int, workers: int | None) -> dict[str, object]:
@@ -45,7 +54,8 @@ def prove(study: Study, folder: Path, laws: str, seeds: int, workers: int | None
             return {"study": named, "met": False, "why": made and made.reason}
     source = read_source(card)
     there = with_engine(source.study, "liggghts")
-    store, _ = open_folder(folder / "liggghts", there, resume=True)
+    heaps = folder / "liggghts"
+    store, _ = open_folder(heaps, there, resume=heaps.is_dir())
     table = pd.DataFrame([source.point] * seeds).assign(seed=range(1001, 1001 + seeds))
     with CaseProgress("LIGGGHTS") as progress:
         cases = run_cases(there, table, store, OwnWorkers(workers=workers), progress)

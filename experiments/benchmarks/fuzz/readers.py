@@ -37,6 +37,7 @@ from experiments.discover.outcome_table import OutcomeTable
 from experiments.errors import InputError
 from experiments.live.trail.glimpses import Glimpses, read_glimpse
 from experiments.measurement.measured_file import read_measured
+from experiments.measurement.profile_files import read_drum_profiles, read_heap_profiles
 from experiments.studyfile import load_study
 from imaging import PictureError, measure_photograph
 
@@ -100,6 +101,24 @@ def measured(folder: Path) -> Reader:
     (folder / "heap.png").write_bytes(_picture(".png"))
     study = load_study(folder / "study.toml")
     return Reader(_corpus("measured.csv"), lambda path: read_measured(path, study))
+
+
+def profiles(folder: Path) -> Reader:
+    """Profiles of drums and of heaps, these with a picture beside."""
+    (folder / "heap.png").write_bytes(_picture(".png"))
+    rows = [f"{n},{x} mm,{0.3 * x + n:.1f} mm" for n in (1, 2, 3) for x in range(-18, 19, 6)]
+    heap = [f"1,,{x} mm,{max(9 - 0.5 * abs(x), 0):.1f} mm,," for x in range(-20, 21, 4)]
+    texts = {
+        "drum.csv": "\n".join(["replicate,x,z", *rows]),
+        "heap.csv": "\n".join(["replicate,view,x,z,picture,pixel", *heap, "2,a,,,heap.png,0.2 mm"]),
+    }
+
+    def read(path: Path) -> object:
+        if path.name.startswith("drum"):
+            return read_drum_profiles(path, 0.03)
+        return read_heap_profiles(path, "flank")
+
+    return Reader({name: text.encode() for name, text in texts.items()}, read)
 
 
 def clump(folder: Path) -> Reader:
@@ -213,6 +232,7 @@ READERS: dict[str, Callable[[Path], Reader]] = {
     "study": study,
     "card": card,
     "csv": measured,
+    "profiles": profiles,
     "clump": clump,
     "mesh": mesh,
     "picture": picture,

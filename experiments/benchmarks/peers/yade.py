@@ -18,7 +18,7 @@ from experiments.benchmarks.columns import Moment
 from experiments.benchmarks.peers.peer import MARGIN, PeerRun, Plan, common_size, execute, judged
 from experiments.benchmarks.timing import Timing
 from experiments.export import contacts_of, values
-from experiments.export.yade import contact_terms, material_terms
+from experiments.export.yade import matched_terms, material_terms
 
 SIDES = 180
 """Sides of the prism; its edges stand out of the tube by 0.015 % of the radius."""
@@ -147,7 +147,7 @@ def write_input(folder: Path, case: Case[LiftedCylinder], moment: Moment, plan: 
         "time_step": setup.time_step,
         "gravity": setup.gravity,
         "materials": [values(material_terms(one)) for one in (case.grain_material, scene.wall_material)],
-        "contacts": [values(contact_terms(contact)) for contact in contacts],
+        "contacts": [values(matched_terms(contact)) for contact in contacts],
         "facets": _prism(scene.diameter / 2, scene.height + MARGIN).tolist(),
         "centers": centers.tolist(),
         "radii": radii.tolist(),

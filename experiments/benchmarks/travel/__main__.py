@@ -2,11 +2,10 @@
 
     python -m experiments.benchmarks.travel ours --device cuda --out out/travel
     python -m experiments.benchmarks.travel theirs --code liggghts --workers 16 --out out/travel
-    python -m experiments.benchmarks.travel page --out out/travel --record FOLDER
+    python -m experiments.benchmarks.travel page --out out/travel
 
-The page of the last recorded run is record/README.md.
-
-Every heap is stored as it ends: a command that was stopped goes on, and any part may be run anywhere.
+The page of the last recorded run is record/README.md. Every heap is stored as it ends, those of the record
+are taken up, and any part may be run anywhere: what was made from the same input is not made again.
 """
 
 from __future__ import annotations
@@ -17,14 +16,17 @@ from typing import Annotated
 import typer
 
 from experiments.benchmarks.travel.cards import CARDS, CODES, OWN_SEEDS, SEEDS
-from experiments.benchmarks.travel.heaps import run_theirs, simulate_ours, stored_heaps
+from experiments.benchmarks.travel.heaps import run_theirs, simulate_ours, stored_heaps, take_up
 from experiments.benchmarks.travel.travel_page import write_page
+from experiments.commands.console import clear_errors
 
 app = typer.Typer(add_completion=False, help=__doc__)
 
+RECORD = Path(__file__).parent / "record"
+
 Out = Annotated[Path, typer.Option(help="Folder of the stored heaps.")]
 Cards = Annotated[list[str] | None, typer.Option("--card", help="A card; may be repeated. Left out: all.")]
-Seeds = Annotated[int | None, typer.Option(min=2, help="How many seeds. Left out: all.")]
+Seeds = Annotated[int | None, typer.Option(min=1, help="How many seeds. Left out: all.")]
 
 
 @app.command()
@@ -37,29 +39,32 @@ def ours(
     workers: Annotated[int | None, typer.Option(min=1, help="Processes on the CPU.")] = None,
 ) -> None:
     """Simulate the cards here, under the laws of each code."""
+    take_up(RECORD, out)
     simulate_ours(out, _known(code, CODES), _known(card, CARDS), OWN_SEEDS[:seeds], device, workers)
 
 
 @app.command()
 def theirs(
     out: Out,
-    code: Annotated[str, typer.Option(help="Code to run.")],
+    code: Annotated[list[str], typer.Option(help="Code to run; may be repeated.")],
     card: Cards = None,
     seeds: Seeds = None,
     workers: Annotated[int, typer.Option(min=1, help="Runs at once.")] = 1,
     programs: Annotated[Path | None, typer.Option(help="Folder with its programs, before the PATH.")] = None,
 ) -> None:
-    """Run the exported cards in another code."""
-    [known] = _known([code], CODES)
-    run_theirs(out, known, _known(card, CARDS), SEEDS[:seeds], workers, programs)
+    """Run the exported cards in other codes, all cards of a seed before the next."""
+    take_up(RECORD, out)
+    with clear_errors():
+        run_theirs(out, _known(code, CODES), _known(card, CARDS), SEEDS[:seeds], workers, programs)
 
 
 @app.command()
 def page(
-    out: Out, record: Annotated[Path | None, typer.Option(help="Folder of the page; left out: OUT.")] = None
+    out: Out, record: Annotated[Path, typer.Option(help="Folder of the page and its tables.")] = RECORD
 ) -> None:
     """Compare what is stored and write the page."""
-    print(write_page(stored_heaps(out), record or out))
+    take_up(record, out)
+    print(write_page(stored_heaps(out), record))
 
 
 def _known(names: list[str] | None, known: dict) -> list[str]:

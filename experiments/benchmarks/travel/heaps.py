@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
+import shutil
+import signal
 import subprocess
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from dem_warp import CaseResult, simulate
-from experiments.benchmarks.travel.cards import CARDS
-from experiments.export import ExportedTest, export_input, write_export
+from experiments.benchmarks.travel.cards import CARDS, SHAPES
+from experiments.cases.key import case_key
+from experiments.errors import InputError
+from experiments.export import ExportedTest, Translation, export_input, write_export
 from experiments.files import write_text
 from imaging import PictureError, heap_angle
 
@@ -28,6 +34,12 @@ AZIMUTHS, FIT, PIXELS = 16, "flank", 400
 
 TAIL = 300
 """Characters that are kept of what a program said last."""
+
+DIGITS = 16
+"""Hexadecimal digits of the hash of what a heap was made from."""
+
+HEAPS = "heaps.csv"
+"""Table of all heaps in a record."""
 
 
 @dataclass(frozen=True)
@@ -46,9 +58,16 @@ class Heap:
     height: float
     """Highest sphere centre [m]."""
     seconds: float
-    """Wall time; of ours, the batch's over its heaps."""
+    """Wall time; of ours, that since the start of the batch over its heaps."""
     reason: str = ""
     """Reason that there is none."""
+    made_from: str = ""
+    """Hash of the input in the other code, or of the case and our engine."""
+
+    @property
+    def job(self) -> tuple[str, str, str, int]:
+        """Code, laws, card and seed."""
+        return self.code, self.laws, self.card, self.seed
 
     @classmethod
     def read(cls, path: Path) -> Heap:
@@ -57,9 +76,7 @@ class Heap:
 
     def write(self, folder: Path) -> None:
         """Store the heap."""
-        write_text(
-            heap_file(folder, self.code, self.laws, self.card, self.seed), json.dumps(asdict(self)) + "\n"
-        )
+        write_text(heap_file(folder, *self.job), json.dumps(asdict(self)) + "\n")
 
 
 def heap_file(folder: Path, code: str, laws: str, card: str, seed: int) -> Path:
@@ -72,6 +89,22 @@ def stored_heaps(folder: Path) -> list[Heap]:
     return [Heap.read(path) for path in sorted((folder / "heaps").glob("*.json"))]
 
 
+def take_up(record: Path, folder: Path) -> None:
+    """Store the heaps of a record's table that the folder has not."""
+    if not (record / HEAPS).is_file():
+        return
+    table = pd.read_csv(record / HEAPS, dtype={"reason": str, "made_from": str}, keep_default_na=False)
+    for row in table.to_dict("records"):
+        heap = Heap(**row | {"angle": float(row["angle"]) if row["angle"] != "" else None})
+        if not heap_file(folder, *heap.job).exists():
+            heap.write(folder)
+
+
+def _is_stored(folder: Path, job: tuple[str, str, str, int], made_from: str) -> bool:
+    path = heap_file(folder, *job)
+    return path.exists() and Heap.read(path).made_from == made_from
+
+
 def simulate_ours(
     folder: Path,
     codes: Iterable[str],
@@ -82,12 +115,8 @@ def simulate_ours(
 ) -> None:
     """Simulate here what is not stored yet, under the laws of the codes, one launch a code."""
     for code in codes:
-        todo = [
-            (card, seed)
-            for card in cards
-            for seed in seeds
-            if not heap_file(folder, OURS, code, card, seed).exists()
-        ]
+        keys = {(card, seed): _own_key(code, card, seed) for card in cards for seed in seeds}
+        todo = [job for job, key in keys.items() if not _is_stored(folder, (OURS, code, *job), key)]
         started, count = time.perf_counter(), len(todo)
 
         def keep(
@@ -96,12 +125,13 @@ def simulate_ours(
             todo: Sequence[tuple[str, int]] = todo,
             code: str = code,
             started: float = started,
+            keys: Mapping[tuple[str, int], str] = keys,
         ) -> None:
             card, seed = todo[index]
             seconds = (time.perf_counter() - started) / len(todo)
-            _measured(
-                OURS, code, card, seed, result.sphere_centers, result.sphere_radii, seconds, result.reason
-            ).write(folder)
+            made = partial(Heap, OURS, code, card, seed, seconds=seconds, made_from=keys[card, seed])
+            spheres = np.column_stack([result.sphere_centers, result.sphere_radii])
+            _measured(made, card, spheres, result.reason).write(folder)
 
         if count:
             simulate(
@@ -113,66 +143,80 @@ def simulate_ours(
         print(f"{OURS}, laws of {code}: {count} heaps, {time.perf_counter() - started:.0f} s", flush=True)
 
 
+def _own_key(code: str, card: str, seed: int) -> str:
+    return case_key(CARDS[card].case(code, seed))[:DIGITS]
+
+
 def run_theirs(
-    folder: Path, code: str, cards: Iterable[str], seeds: Iterable[int], workers: int, programs: Path | None
+    folder: Path,
+    codes: Sequence[str],
+    cards: Sequence[str],
+    seeds: Iterable[int],
+    workers: int,
+    programs: Path | None,
 ) -> None:
-    """Run in another code what is not stored yet, so many at once; its programs may lie in a folder."""
-    todo = [
-        (card, seed)
-        for card in cards
-        for seed in seeds
-        if not heap_file(folder, code, code, card, seed).exists()
-    ]
+    """Run in other codes what is not stored yet, so many at once and all cards of a seed before the next.
+
+    The programs may lie in a folder.
+    """
+    jobs = [(code, card, seed) for seed in seeds for card in cards for code in codes]
     with ThreadPoolExecutor(workers) as pool:
-        run = partial(_run_one, folder, code, programs)
-        for heap in pool.map(lambda job: run(*job), todo):
-            heap.write(folder)
-            told = heap.reason or f"{heap.angle:.2f} degrees"
-            print(f"{code} {heap.card} {heap.seed}: {told}, {heap.seconds:.0f} s", flush=True)
+        list(pool.map(lambda job: _run_one(folder, programs, *job), jobs))
 
 
-def _run_one(folder: Path, code: str, programs: Path | None, card: str, seed: int) -> Heap:
-    place = folder / "runs" / f"{code}-{card}-{seed}"
+def _run_one(folder: Path, programs: Path | None, code: str, card: str, seed: int) -> None:
     test = ExportedTest(card, CARDS[card].case(code, seed), "the proof's cards")
     translation = export_input(test, code)
-    write_export(test, code, translation, place)
+    made_from = _input_key(translation)
+    if _is_stored(folder, (code, code, card, seed), made_from):
+        return
     path = os.environ["PATH"] if programs is None else f"{programs.resolve()}{os.pathsep}{os.environ['PATH']}"
+    program = translation.command[0]
+    if shutil.which(program, path=path) is None:
+        raise InputError("must be installed, its program on the PATH", program, f"--code {code}")
+    place = folder / "runs" / f"{code}-{card}-{seed}"
+    (place / translation.heap).unlink(missing_ok=True)
+    write_export(test, code, translation, place)
     started = time.perf_counter()
     with (place / "screen.log").open("w", encoding="utf-8") as screen:
-        subprocess.run(
+        ended = subprocess.run(
             translation.command,
             cwd=place,
             env=os.environ | {"PATH": path, "OMP_NUM_THREADS": "1"},
             stdout=screen,
             stderr=subprocess.STDOUT,
         )
+    if -ended.returncode in (signal.SIGINT, signal.SIGTERM, signal.SIGKILL):
+        return  # somebody has ended it: nothing is known of the heap
     seconds = time.perf_counter() - started
-    if not (place / translation.heap).is_file():
+    made = partial(Heap, code, code, card, seed, seconds=seconds, made_from=made_from)
+    if (place / translation.heap).is_file():
+        heap = _measured(made, card, read_dump(place / translation.heap))
+    else:
         said = (place / "screen.log").read_text(encoding="utf-8", errors="replace")[-TAIL:]
-        return Heap(code, code, card, seed, None, 0, 0.0, seconds, f"no heap: {said}")
-    spheres = read_dump(place / translation.heap)
-    return _measured(code, code, card, seed, spheres[:, :3], spheres[:, 3], seconds)
+        heap = made(angle=None, grain_count=0, height=0.0, reason=f"no heap: {said}")
+    heap.write(folder)
+    told = heap.reason or f"{heap.angle:.2f} degrees"
+    print(f"{code} {card} {seed}: {told}, {seconds:.0f} s", flush=True)
 
 
-def _measured(
-    code: str,
-    laws: str,
-    card: str,
-    seed: int,
-    centers: np.ndarray,
-    radii: np.ndarray,
-    seconds: float,
-    reason: str = "",
-) -> Heap:
-    spheres = CARDS[card].case(laws, seed).grains.sphere_count
-    heap = partial(Heap, code, laws, card, seed)
+def _input_key(translation: Translation) -> str:
+    """Hash of all files of an input and of the command, without the head that names the version."""
+    text = json.dumps([dict(translation.files), translation.command], sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()[:DIGITS]
+
+
+def _measured(heap: Callable[..., Heap], card: str, spheres: np.ndarray, reason: str = "") -> Heap:
+    """Complete a heap by what its spheres (centres and radii [m], (spheres, 4)) show."""
+    known = partial(heap, grain_count=len(spheres) // SHAPES[CARDS[card].shape].sphere_count)
     if reason:
-        return heap(None, len(radii) // spheres, 0.0, seconds, reason)
+        return known(angle=None, height=0.0, reason=reason)
+    centers, radii = spheres[:, :3], spheres[:, 3]
     try:
         angle = heap_angle(centers, radii, azimuths=AZIMUTHS, fit=FIT, pixels=PIXELS).mean
     except PictureError as error:
-        return heap(None, len(radii) // spheres, 0.0, seconds, f"no heap: {error}")
-    return heap(angle, len(radii) // spheres, float(centers[:, 2].max()), seconds)
+        return known(angle=None, height=0.0, reason=f"no heap: {error}")
+    return known(angle=angle, height=float(centers[:, 2].max()))
 
 
 def read_dump(path: Path) -> np.ndarray:

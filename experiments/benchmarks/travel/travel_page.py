@@ -2,63 +2,76 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
+from scipy import stats
 
-from doe import DesignError, Sample, compare_means
-from experiments.benchmarks.travel.cards import CARDS, CODES, GRAIN_COUNT, SOFTENING
-from experiments.benchmarks.travel.heaps import AZIMUTHS, FIT, OURS, Heap
+from doe import DesignError, compare_means
+from experiments.benchmarks.travel.cards import CARDS, CODES, GRAIN_COUNT, SEEDS, SOFTENING
+from experiments.benchmarks.travel.heaps import AZIMUTHS, FIT, HEAPS, OURS, Heap
 from experiments.files import write_text
-from experiments.report.kit.markdown import markdown_table
+from experiments.report.kit.markdown import markdown_page, markdown_table
 
 MARGIN = 1.0
 """Difference of the mean angles that does not matter [degrees]."""
 
-PAGE, TABLE, HEAPS = "README.md", "cells.csv", "heaps.csv"
+PAGE, TABLE, CAUSES = "README.md", "cells.csv", "causes.md"
 
-TEXT = """# A card that travels
+EQUIVALENT, APART, FEW, NOT_RUN = "yes", "not shown", "too few heaps", "not run"
+"""Verdicts on a cell."""
+
+WAITING = {"deme": "DEM-Engine runs on a GPU alone"}
+"""Codes that wait for a machine, and why."""
+
+INTRODUCTION = """# A card that travels
 
 Written by `python -m experiments.benchmarks.travel page`. Ten cards, {count} grains each with a modulus
 divided by {softening:g}: here under the laws of a code, and in that code from what `dem-warp export` writes.
-Angles are of the `{fit}` fit, mean of {azimuths} views. A cell is equivalent when two one-sided tests (Welch,
-level .05) show the two means to differ by less than {margin:g} degree.
+Angles are of the `{fit}` fit, mean of {azimuths} views. A cell is one card in one code, with {seeds} heaps
+there when it is done. It is equivalent when two one-sided tests (guarded, level .05) show the two means to
+differ by less than {margin:g} degree."""
 
-{verdict}
+BY_CODE = """## By code
 
-"""
+Differences are dem-warp's mean less the code's, in degrees, over all cells with a heap on both sides. The
+bias is their mean with its 95 % interval, each cell counting as one value."""
+
+CELLS = """## By cell
+
+Angles in degrees. `smallest_margin` is the smallest margin at which the cell would be equivalent."""
 
 
 def compare_cells(heaps: Sequence[Heap]) -> pd.DataFrame:
-    """Compare every card in every code that has at least two heaps on either side."""
-    rows = []
-    for code in CODES:
-        for card in CARDS:
-            own = _angles(heaps, OURS, code, card)
-            theirs = _angles(heaps, code, code, card)
-            if min(len(own), len(theirs)) < 2:
-                continue
-            row = {"code": code, "card": card, "n": len(theirs), "n_own": len(own)}
-            rows.append(row | _compared(own, theirs))
+    """Compare every card in every code; a cell without two heaps on either side has no test."""
+    rows = [_cell(code, card, heaps) for code in CODES for card in CARDS]
     return pd.DataFrame(rows)
 
 
-def _compared(own: Sequence[float], theirs: Sequence[float]) -> dict[str, object]:
+def _cell(code: str, card: str, heaps: Sequence[Heap]) -> dict[str, object]:
+    own, theirs = _angles(heaps, OURS, code, card), _angles(heaps, code, code, card)
+    mine, other = np.mean(own or [math.nan]), np.mean(theirs or [math.nan])
+    row: dict[str, object] = {"code": code, "card": card, "n": len(theirs), "n_own": len(own)}
+    row |= {"own": mine, "own_sd": _sd(own), "theirs": other, "theirs_sd": _sd(theirs)}
+    row |= {"difference": mine - other, "smallest_margin": math.nan}
+    if not theirs:
+        return row | {"equivalent": NOT_RUN}
+    if min(len(own), len(theirs)) < 2:
+        return row | {"equivalent": FEW}
     try:
-        found = compare_means(own, theirs, margin=MARGIN)
+        found = compare_means(own, theirs, margin=MARGIN, method="guarded")
     except DesignError as error:
-        return {"equivalent": "no", "reason": str(error)}
-    mine, other = Sample.of(own), Sample.of(theirs)
-    return {
-        "own": mine.mean,
-        "own_sd": mine.sd,
-        "theirs": other.mean,
-        "theirs_sd": other.sd,
-        "difference": found.difference,
-        "smallest_margin": found.smallest_margin,
-        "equivalent": "yes" if found.equivalent else "no",
-    }
+        return row | {"equivalent": f"{APART}: {error}"}
+    verdict = EQUIVALENT if found.equivalent else APART
+    return row | {"smallest_margin": found.smallest_margin, "equivalent": verdict}
+
+
+def _sd(angles: Sequence[float]) -> float:
+    return float(np.std(angles, ddof=1)) if len(angles) > 1 else math.nan
 
 
 def _angles(heaps: Sequence[Heap], code: str, laws: str, card: str) -> list[float]:
@@ -69,22 +82,70 @@ def _angles(heaps: Sequence[Heap], code: str, laws: str, card: str) -> list[floa
     ]
 
 
+def summarise_codes(cells: pd.DataFrame, heaps: Sequence[Heap]) -> pd.DataFrame:
+    """Summarise each code: heaps, cells by verdict, bias and root mean square of the differences."""
+    rows = []
+    for code, group in cells.groupby("code", sort=False):
+        made = [heap for heap in heaps if heap.code == code]
+        apart = group["difference"].dropna().to_numpy()
+        row = {
+            "code": code,
+            "heaps": f"{len(made)} of {len(CARDS) * len(SEEDS)}",
+            "without an angle": f"{sum(heap.angle is None for heap in made)}",
+            "cells compared": f"{len(apart)} of {len(group)}",
+            "equivalent": f"{(group['equivalent'] == EQUIVALENT).sum()}",
+            "bias": "",
+            "root mean square": "",
+            "largest": "",
+        }
+        if len(apart) > 1:
+            low, high = stats.t.interval(0.95, len(apart) - 1, apart.mean(), stats.sem(apart))
+            row["bias"] = f"{apart.mean():+.2f} ({low:+.2f}, {high:+.2f})"
+            row["root mean square"] = f"{np.sqrt((apart**2).mean()):.2f}"
+            row["largest"] = f"{np.abs(apart).max():.2f}"
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
 def write_page(heaps: Sequence[Heap], folder: Path) -> Path:
-    """Write the page, its table and every heap's numbers into a folder."""
-    cells = compare_cells(heaps)
-    failed = [heap for heap in heaps if heap.angle is None]
-    verdict = f"{len(heaps)} heaps, {len(failed)} without an angle; no cell can be compared yet."
-    if len(cells):
-        passed = int((cells["equivalent"] == "yes").sum())
-        verdict = f"{passed} of {len(cells)} cells are equivalent; {len(failed)} heaps are without an angle."
-    text = TEXT.format(
-        count=GRAIN_COUNT, softening=SOFTENING, fit=FIT, azimuths=AZIMUTHS, margin=MARGIN, verdict=verdict
+    """Write the page, its table and every heap's numbers into a folder.
+
+    Causes of what is not equivalent stand in the folder's `causes.md`, if it has one.
+    """
+    cells, failed = compare_cells(heaps), [heap for heap in heaps if heap.angle is None]
+    head = INTRODUCTION.format(
+        count=GRAIN_COUNT, softening=SOFTENING, fit=FIT, azimuths=AZIMUTHS, margin=MARGIN, seeds=len(SEEDS)
     )
-    if len(cells):
-        text += markdown_table(cells.round(2)) + "\n"
-    text += "".join(f"\n- {heap.code} {heap.card} {heap.seed}: {heap.reason}" for heap in failed)
-    write_text(folder / PAGE, text.rstrip() + "\n")
+    causes = folder / CAUSES
+    parts = [head, _verdict(cells), BY_CODE, markdown_table(summarise_codes(cells, heaps))]
+    parts += [CELLS, markdown_table(cells.round(2))]
+    if failed:
+        parts.append("## Heaps without an angle")
+        parts.append("\n".join(f"- {heap.code} {heap.card} {heap.seed}: {heap.reason}" for heap in failed))
+    if causes.is_file():
+        parts.append(causes.read_text(encoding="utf-8"))
+    write_text(folder / PAGE, markdown_page(*parts))
     write_text(folder / TABLE, cells.to_csv(index=False, float_format="%.4g"))
-    table = pd.DataFrame([vars(heap) for heap in heaps])
+    table = pd.DataFrame([asdict(heap) for heap in sorted(heaps, key=lambda heap: heap.job)])
     write_text(folder / HEAPS, table.to_csv(index=False, float_format="%.6g"))
     return folder / PAGE
+
+
+def _verdict(cells: pd.DataFrame) -> str:
+    """Count the cells by their verdicts, and name the codes that wait for a machine."""
+    counts = cells["equivalent"].value_counts()
+    of = {name: int(counts.get(name, 0)) for name in (EQUIVALENT, FEW, NOT_RUN)}
+    tested, shown = len(cells) - of[FEW] - of[NOT_RUN], cells[cells["equivalent"] == EQUIVALENT]
+    whole = int((shown["n"] >= len(SEEDS)).sum())
+    lines = [
+        f"**{of[EQUIVALENT]} of {len(cells)} cells are shown to be equivalent**, {whole} of them "
+        f"with all {len(SEEDS)} heaps there. Tested are {tested}; "
+        f"{of[FEW]} have too few heaps for a test, and {of[NOT_RUN]} have not been run."
+    ]
+    for code, why in WAITING.items():
+        group = cells[cells["code"] == code]
+        waiting = int((group["equivalent"] == NOT_RUN).sum())
+        if waiting:
+            told = f"{waiting} of its {len(group)} cells have not been run"
+            lines.append(f"**{why}, and waits for one: {told}.**")
+    return "\n\n".join(lines)

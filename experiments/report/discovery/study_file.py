@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,9 @@ HEAD = """\
 DIGITS = 4
 """Significant digits of the ends of a range."""
 
+LEAST_SEEN = 0.5
+"""Share of a direction that a camera sees at the least where a study is to match it."""
+
 
 def write_study_files(found: Discovery, study: Study, terms: Terms, folder: Path) -> list[Path]:
     """Write a study file for each model that the verdict leaves standing, and its clumps beside it.
@@ -38,9 +42,9 @@ def write_study_files(found: Discovery, study: Study, terms: Terms, folder: Path
     A tie gives a file ``study-with-NAME.toml`` a mechanism, a pair one file, nothing named none.
     """
     written = []
-    for candidate in _standing(found):
+    for candidate, heading in _standing(found):
         added = {terms.mechanisms[name]: size for name, size in candidate}
-        document = extended_document(study, added, found.data)
+        document = extended_document(study, added, found.data, heading)
         gather_clumps(document, study.file.parent, folder)
         path = folder / f"study-with-{'-and-'.join(name for name, _ in candidate)}.toml"
         title = terms.titles(name for name, _ in candidate)
@@ -50,26 +54,30 @@ def write_study_files(found: Discovery, study: Study, terms: Terms, folder: Path
     return written
 
 
-def extended_document(study: Study, added: Mapping[Mechanism, Interval], data: Data) -> dict[str, Any]:
+def extended_document(
+    study: Study, added: Mapping[Mechanism, Interval], data: Data, heading: float | None = None
+) -> dict[str, Any]:
     """Add mechanisms to a study's document, each as a factor that ranges over its interval.
 
     Every observable that was measured more than once under a condition is to be matched; what was measured
-    under a held-out condition only judges.
-
+    under a held-out condition only judges. In the study a mechanism with a direction has the azimuth 0: what
+    counts along it is taken to there from its `heading` [deg], where the camera saw half of it or more.
     """
     ranges = {mechanism.name: _range(mechanism, size) for mechanism, size in added.items()}
     document = with_mechanisms(study, list(added), ranges).document
-    if tables := target_tables(study, _replicated(data)):
+    seen = {one.name: math.cos(math.radians((heading or 0.0) - one.camera)) for one in study.conditions}
+    directed = [each.name for each in study.measurable if each.directed]
+    if tables := target_tables(study, _replicated(data, directed, seen)):
         document = {key: value for key, value in document.items() if key != "response"} | tables
     return document
 
 
-def _standing(found: Discovery) -> list[list[tuple[str, Interval]]]:
-    """Models to write: the chosen one, or each of a tie."""
+def _standing(found: Discovery) -> list[tuple[list[tuple[str, Interval]], float | None]]:
+    """Models to write, with their headings: the chosen one, or each of a tie."""
     models: list[Candidate | Fit] = [found.chosen] if found.chosen else []
     if found.verdict is Verdict.TIE:
         models = [*tied(found)]
-    return [list(zip(model.mechanisms, model.sizes, strict=True)) for model in models]
+    return [(list(zip(model.mechanisms, model.sizes, strict=True)), model.heading) for model in models]
 
 
 def _range(mechanism: Mechanism, size: Interval) -> tuple[float, float]:
@@ -79,12 +87,17 @@ def _range(mechanism: Mechanism, size: Interval) -> tuple[float, float]:
     return (low, high) if low < high else (mechanism.null, mechanism.maximum)
 
 
-def _replicated(data: Data) -> Iterator[Replicated]:
-    """Every mean of more than one measurement, with the scatter that the analysis gave it."""
+def _replicated(data: Data, directed: Sequence[str], seen: Mapping[str, float]) -> Iterator[Replicated]:
+    """Every mean of more than one measurement, with the scatter that the analysis gave it.
+
+    By condition, so much is seen of what has a direction; less than `LEAST_SEEN` of it is left out.
+    """
     for row, condition in enumerate(data.conditions):
         for column, observable in enumerate(data.observables):
             read = (data.means, data.standard_errors, data.replicates)
             mean, se, count = (table[row, column] for table in read)
-            if count >= 2 and np.isfinite(se) and se > 0.0:
+            share = seen.get(condition, 1.0) if observable in directed else 1.0
+            if count >= 2 and np.isfinite(se) and se > 0.0 and abs(share) >= LEAST_SEEN:
+                mean, se = mean / share, se / abs(share)
                 mean, sd = (float(f"{value:.6g}") for value in (mean, se * np.sqrt(count)))
                 yield Replicated(condition, observable, Sample(mean, sd, int(count)))

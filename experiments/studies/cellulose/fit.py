@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from doe.curve_fit import CurveFit, MeasuredCurve, fit_curves
-from doe.curves import CurveEmulator
+from doe import CurveEmulator, CurveFit, MeasuredCurve, fit_curves
 from experiments.measurement.drum_edges import area_of_disagreement
 from experiments.studies.cellulose.plan import (
     EVERY,

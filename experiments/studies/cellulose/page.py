@@ -32,6 +32,7 @@ from experiments.studies.cellulose.plan import (
     study_at,
 )
 from experiments.studies.cellulose.simulation import read_curves
+from experiments.studies.drum_commands import require_run
 from experiments.studyfile import Study
 
 PAGE = "README.md"
@@ -39,6 +40,7 @@ PAGE = "README.md"
 
 def write_record(folder: Path) -> Path:
     """Write the page of a run, its tables and its pictures, from the tables that the run left."""
+    require_run(folder, CURVES, FACTS, PREDICTION)
     table, curves = read_curves(folder / CURVES)
     facts = json.loads((folder / FACTS).read_text(encoding="utf-8"))
     study = study_at(facts["scale"])

@@ -12,42 +12,17 @@ fourth a study and a table for `dem-warp discover`. What a folder holds is not s
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
-
-import typer
 
 from experiments.commands.console import clear_errors
+from experiments.studies.drum_commands import Out, drum_commands
 
-Out = Annotated[Path, typer.Option(help="Folder of the results.")]
+DEFAULT = Path("out/wheat-drums")
 
-app = typer.Typer(help=__doc__, no_args_is_help=True)
-
-
-@app.command()
-def run(
-    scale: Annotated[str, typer.Option(help="h200 or bench.")] = "h200",
-    device: Annotated[str | None, typer.Option(help="cpu, cuda or cuda:N.")] = None,
-    workers: Annotated[int | None, typer.Option(min=1, help="Processes on a CPU.")] = None,
-    out: Out = Path("out/wheat-drums"),
-) -> None:
-    """Simulate the drums, fit the slopes, simulate heaps."""
-    from experiments.studies.wheat_drums.campaign import run_study
-
-    with clear_errors("What is stored is not simulated again."):
-        run_study(scale, out, device, workers)
+app = drum_commands("experiments.studies.wheat_drums", __doc__, DEFAULT)
 
 
 @app.command()
-def page(out: Out = Path("out/wheat-drums")) -> None:
-    """Write the page of a finished run."""
-    from experiments.studies.wheat_drums.page import write_record
-
-    with clear_errors():
-        print(write_record(out))
-
-
-@app.command()
-def search(out: Out = Path("out/wheat-drums")) -> None:
+def search(out: Out = DEFAULT) -> None:
     """Write a study and a table for a search, and say how to run it."""
     from experiments.studies.wheat_drums.page import fit_of
     from experiments.studies.wheat_drums.search import write_search

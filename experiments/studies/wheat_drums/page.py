@@ -13,6 +13,7 @@ from doe.palette import BLUE, INK, VERMILION
 from experiments.report.kit.figure import new_axes, save_figure
 from experiments.report.kit.markdown import facts_list, markdown_table, wall_times_table, write_page
 from experiments.report.kit.table import make_table
+from experiments.studies.drum_commands import require_run
 from experiments.studies.wheat_drums.campaign import DRUMS, FACTS, HEAPS
 from experiments.studies.wheat_drums.fit import LEVEL, Slopes, WheatFit, fit_slopes
 from experiments.studies.wheat_drums.plan import PUBLISHED_HEAP, data, study_at
@@ -23,6 +24,7 @@ PAGE, PICTURE = "README.md", "slopes.png"
 
 def fit_of(folder: Path) -> tuple[Study, WheatFit, dict[str, Any]]:
     """Fit all data with the drums of a run; its study and its facts beside."""
+    require_run(folder, FACTS, DRUMS, HEAPS)
     facts = json.loads((folder / FACTS).read_text(encoding="utf-8"))
     study = study_at(facts["scale"])
     return study, fit_slopes(Slopes.of(study, pd.read_csv(folder / DRUMS)), data()), facts

@@ -13,6 +13,7 @@ from experiments.export.contact import values
 from experiments.export.lift import prism, stl_text
 from experiments.export.liggghts import CONVENTIONS, contact_terms, material_terms, model_words
 from experiments.export.liggghts_input import grain_template
+from experiments.export.looks import rest_loop
 from experiments.trials.other_codes.odd_lift import OddLift
 from experiments.trials.other_codes.reading import DRAG, FRAMES
 from experiments.trials.other_codes.surfaces import FILL_MARGIN, Bench
@@ -73,21 +74,6 @@ thermo_modify lost ignore norm no
 
 run {fill_steps}
 unfix rain
-"""
-
-_REST = """
-variable looks loop {limit_checks}
-variable calm equal 0
-label {name}
-run {check}
-if "${{moving}} == 1" then "variable calm equal 0" else "variable calm equal ${{calm}}+1"
-if "${{calm}} >= {calm_checks}" then "jump SELF {name}_done"
-next looks
-jump SELF {name}
-print "ERROR: no rest after {name}"
-quit
-label {name}_done
-variable looks delete
 """
 
 _LIFT = """
@@ -322,11 +308,5 @@ def _lift(bench: Bench) -> str:
 
 
 def _rest(bench: Bench, name: str) -> str:
-    check_time = bench.check_steps * bench.case.time_step
     limit = bench.lift.settle_limit if name == "settle" else bench.lift.rest_limit
-    return _REST.format(
-        name=name,
-        check=bench.check_steps,
-        calm_checks=math.ceil(bench.scene.rest_time / check_time),
-        limit_checks=math.ceil(limit / check_time),
-    )
+    return rest_loop(bench.lift, name, limit, "quit", bench.check_steps)

@@ -9,8 +9,7 @@ import tempfile
 from pathlib import Path
 
 from dem_warp import PRESETS
-from experiments.export import Contact, Term
-from experiments.export.yade import contact_terms, material_terms, rolling_terms
+from experiments.export.yade import contact_terms, material_terms
 from experiments.verification.problems.contact_paths import PathSetup, Trajectory, compare_paths, result_of
 from experiments.verification.problems.contact_programs import path_numbers, program_text, trajectory_of
 from experiments.verification.result import Result
@@ -46,7 +45,7 @@ def follow(setup: PathSetup, folder: Path) -> Trajectory:
     """Follow one path in Yade."""
     if (yade := shutil.which("yade")) is None:
         raise ValueError("yade must be installed (Debian package yade), found none")
-    numbers = path_numbers(setup, material_terms, _terms)
+    numbers = path_numbers(setup, material_terms, contact_terms)
     (folder / "path.json").write_text(json.dumps(numbers), encoding="utf-8")
     (folder / "path.py").write_text(program_text(PROGRAM), encoding="utf-8")
     with (folder / "screen.log").open("w", encoding="utf-8") as screen:
@@ -55,7 +54,3 @@ def follow(setup: PathSetup, folder: Path) -> Trajectory:
     if ended.returncode or not (folder / "states.json").is_file():
         raise RuntimeError(f"yade failed in {folder}: {ended.returncode}; screen.log says why")
     return trajectory_of(json.loads((folder / "states.json").read_text(encoding="utf-8"))["states"])
-
-
-def _terms(contact: Contact) -> tuple[Term, ...]:
-    return contact_terms(contact) + rolling_terms(contact)

@@ -8,12 +8,14 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from experiments.benchmarks.travel import heaps as travel
 from experiments.benchmarks.travel.cards import CARDS, CODES, FRICTIONS, SHAPES, VOLUME
-from experiments.benchmarks.travel.heaps import OURS, Heap, run_theirs, stored_heaps
+from experiments.benchmarks.travel.heaps import OURS, Heap, run_theirs, stored_heaps, take_up
 from experiments.benchmarks.travel.travel_page import compare_cells, write_page
+from experiments.errors import InputError
 
 PROGRAM = """\
 #!{python}
@@ -51,30 +53,53 @@ def test_equal_means_are_equivalent_and_shifted_ones_are_not(tmp_path: Path) -> 
     # heaps of other laws do not count, nor do those without an angle
     made += [heap(OURS, "yade", "sphere-low", i, 30.0) for i in range(3)]
     made += [heap("lammps", "lammps", "sphere-low", 9, None)]
-    cells = compare_cells(made).set_index("card")
-    assert list(cells["equivalent"]) == ["yes", "no"]
-    assert list(cells["n"]) == [5, 5]
-    assert cells.loc["rod-high", "difference"] == pytest.approx(-2.0, abs=0.5)
+    cells = compare_cells(made).set_index(["code", "card"])
+    tested = cells.loc["lammps"].loc[["sphere-low", "rod-high"]]
+    assert list(tested["equivalent"]) == ["yes", "not shown"]
+    assert list(tested["n"]) == [5, 5]
+    assert tested.loc["rod-high", "difference"] == pytest.approx(-2.0, abs=0.5)
+    # one heap is no test, and a code without heaps waits
+    made += [heap(OURS, "yade", "egg-low", i, 12.0) for i in range(3)] + [
+        heap("yade", "yade", "egg-low", 1, 12.0)
+    ]
     page = write_page(made, tmp_path).read_text(encoding="utf-8")
-    assert "1 of 2 cells are equivalent; 1 heaps are without an angle" in page
-    assert (tmp_path / "cells.csv").exists()
+    assert "**1 of 40 cells are shown to be equivalent**, 1 of them with all 5 heaps there." in page
+    assert "Tested are 2; 1 have too few heaps" in page
+    assert "37 have not been run" in page
+    assert "10 of its 10 cells have not been run" in page
+    assert "- lammps sphere-low 9: no heap" in page
+    assert len(pd.read_csv(tmp_path / "cells.csv")) == 40
 
 
-def test_a_run_is_measured_stored_and_not_repeated(tmp_path: Path) -> None:
+def test_heaps_of_a_record_are_taken_up(tmp_path: Path) -> None:
+    made = [heap("yade", "yade", "egg-low", 1, 12.25), heap("yade", "yade", "egg-low", 2, None)]
+    write_page(made, tmp_path / "record")
+    newer = replace(made[0], angle=13.0)
+    newer.write(tmp_path / "out")
+    take_up(tmp_path / "record", tmp_path / "out")
+    assert stored_heaps(tmp_path / "out") == [newer, made[1]]
+
+
+def test_a_run_is_measured_stored_and_not_repeated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     programs = tmp_path / "bin"
     programs.mkdir()
     program = programs / "liggghts"
     program.write_text(PROGRAM.format(python=sys.executable), encoding="utf-8")
     program.chmod(program.stat().st_mode | stat.S_IXUSR)
     out = tmp_path / "out"
-    run_theirs(out, "liggghts", ["sphere-low"], [1, 2], 2, programs)
+    run_theirs(out, ["liggghts"], ["sphere-low"], [1, 2], 2, programs)
     stored = stored_heaps(out)
     assert [found.seed for found in stored] == [1, 2]
     # the flank of a cone; spheres round off its apex and its foot
     assert stored[0].angle == pytest.approx(30.0, abs=1.0)
     program.unlink()
-    run_theirs(out, "liggghts", ["sphere-low"], [1, 2], 2, programs)
+    run_theirs(out, ["liggghts"], ["sphere-low"], [1, 2], 2, programs)
     assert stored_heaps(out) == stored
+    # a heap of another input is made again, which a missing program cannot do
+    replace(stored[0], made_from="other").write(out)
+    monkeypatch.setenv("PATH", str(programs))
+    with pytest.raises(InputError, match="must be installed, its program on the PATH"):
+        run_theirs(out, ["liggghts"], ["sphere-low"], [1, 2], 1, None)
 
 
 def test_a_run_without_a_heap_has_a_reason(tmp_path: Path) -> None:
@@ -83,9 +108,19 @@ def test_a_run_without_a_heap_has_a_reason(tmp_path: Path) -> None:
     program = programs / "lmp"
     program.write_text("#!/bin/sh\necho ERROR: lost\nexit 1\n", encoding="utf-8")
     program.chmod(program.stat().st_mode | stat.S_IXUSR)
-    run_theirs(tmp_path, "lammps", ["rod-low"], [1], 1, programs)
+    run_theirs(tmp_path, ["lammps"], ["rod-low"], [1], 1, programs)
     [found] = stored_heaps(tmp_path)
     assert found.angle is None
     assert "ERROR: lost" in found.reason
     assert replace(found, reason="") != found
     assert travel.heap_file(tmp_path, "lammps", "lammps", "rod-low", 1).is_file()
+
+
+def test_a_run_that_somebody_has_ended_is_no_heap_and_no_failure(tmp_path: Path) -> None:
+    programs = tmp_path / "bin"
+    programs.mkdir()
+    program = programs / "lmp"
+    program.write_text("#!/bin/sh\nkill -TERM $$\n", encoding="utf-8")
+    program.chmod(program.stat().st_mode | stat.S_IXUSR)
+    run_theirs(tmp_path, ["lammps"], ["rod-low"], [1], 1, programs)
+    assert stored_heaps(tmp_path) == []

@@ -30,7 +30,7 @@ from doe.discrepancy.contest.held_out import forecast
 from doe.discrepancy.contest.signatures import signatures
 from doe.discrepancy.emulation.bank import sobol_points
 from doe.discrepancy.fitting.evidence import gather
-from doe.discrepancy.fitting.fit import fit, weigh
+from doe.discrepancy.fitting.fit import coded_size_interval, fit, weigh
 from doe.discrepancy.fitting.model import Model, Stack
 from doe.discrepancy.verdict.conclusion import Conclusion, withdrawn
 from doe.discrepancy.verdict.records import calibration_uses
@@ -152,6 +152,16 @@ def test_a_fit_ends_no_higher_than_the_truth_or_any_other_place(hidden: dict[str
             places.append(np.append(theta(seed), [hidden[name] for name in mechanisms]))
             # The descent ends where a step brings 0.01 or less.
             assert fit(stack).score <= min(weigh(stack, x).score for x in places) + 0.01
+
+
+def test_an_interval_holds_its_size_even_where_nothing_fits() -> None:
+    # The score of a gross misfit asks for large sizes, whose predictions are uncertain; q for small ones.
+    measured = shifted(heaps({"rolling_torque": 1.0}, 1), "height", 0.01)
+    evidence = gather(measured, known())
+    for name in known().space.names:
+        fitted = fit(Stack(Model(known(), (name,), SYSTEMATIC), evidence.training))
+        low, high = coded_size_interval(fitted, 0)
+        assert low <= fitted.coded_sizes[0] <= high
 
 
 def shifted(measured: Measured, observable: str, offset: float) -> Measured:

@@ -40,10 +40,16 @@ class Linear:
             name: 8.0 * rng.standard_normal(width) + 3.0 * rng.standard_normal((conditions, width))
             for name in self.space.names
         }
+        # what a mirror turns over is 0, but for what has a direction
+        self._even = ~np.isin(NAMES, self.space.odd)
+        self._slopes *= self._even
+        for name in self.space.names:
+            if not self.space.mechanism(name).directed:
+                self._signatures[name] = self._signatures[name] * self._even
 
     def __call__(self, points: Sequence[Point]) -> Outcomes:
         rows = np.array([self._row(point) for point in points]).reshape(len(points), len(NAMES))
-        return Outcomes(1.0 + 0.1 * rows, ("",) * len(points))
+        return Outcomes(self._even + 0.1 * rows, ("",) * len(points))
 
     def _row(self, point: Point) -> np.ndarray:
         condition = self.space.conditions.index(point.condition)

@@ -9,7 +9,14 @@ import numpy as np
 import pytest
 
 from dem_warp import CaseResult, Drum, LiftedCylinder
-from experiments.measurement.observables import BY_NAME, NAMES, OBSERVABLES, PHOTOGRAPHED, observables_of
+from experiments.measurement.observables import (
+    BY_NAME,
+    NAMES,
+    OBSERVABLES,
+    OUTLINE,
+    PHOTOGRAPHED,
+    observables_of,
+)
 from experiments.measurement.states import measure, observe
 from experiments.studyfile.study import MeasurementSection
 
@@ -81,7 +88,7 @@ def test_a_campaign_is_given_the_same_values_as_a_search(cone: Cone) -> None:
 def test_observables_of_a_scene_have_one_definition_each() -> None:
     told = LiftedCylinder.observables
     known = observables_of(told, leaves_a_heap=True)
-    assert set(known) == set(told) | {each.column for each in OBSERVABLES}
+    assert set(known) == set(told) | {each.column for each in (*OBSERVABLES, *OUTLINE)}
     for name, (unit, meaning) in told.items():
         assert known[name].unit == unit
         assert known[name].definition.startswith(meaning)

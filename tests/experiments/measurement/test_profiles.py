@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from experiments.errors import InputError, StudyError
-from experiments.measurement.profiles import read_profiles, with_profiles
+from experiments.measurement.profile_files import read_drum_profiles
+from experiments.measurement.profiles import with_profiles
 from experiments.studyfile import load_study
 
 TUBE = '[scene.lifted-cylinder]\ndiameter = "28 mm"\nheight = "28 mm"\ngrain_count = 30\n'
@@ -26,7 +27,7 @@ def file(folder: Path, text: str) -> Path:
 
 
 def test_a_profile_is_read_at_the_stations_that_it_spans(tmp_path: Path) -> None:
-    kept, heights = read_profiles(file(tmp_path, LINE), 0.03)
+    _, kept, heights, _ = read_drum_profiles(file(tmp_path, LINE), 0.03)
     assert kept == [1, 2, 3, 4, 5, 6, 7]
     places = np.array([-0.8, -0.6, -0.4, -0.2, 0.0, 0.2, 0.4, 0.6, 0.8])[kept] * 0.03
     assert heights[0] == pytest.approx(0.5 * places, abs=1e-12)
@@ -46,7 +47,7 @@ def test_a_profile_is_read_at_the_stations_that_it_spans(tmp_path: Path) -> None
 )
 def test_a_bad_profile_is_refused_with_its_row(tmp_path: Path, text: str, message: str) -> None:
     with pytest.raises(InputError, match=message):
-        read_profiles(file(tmp_path, text), 0.03)
+        read_drum_profiles(file(tmp_path, text), 0.03)
 
 
 def test_a_profile_alone_has_no_scatter_to_weigh_it_by(
@@ -62,10 +63,14 @@ def test_a_profile_alone_has_no_scatter_to_weigh_it_by(
 
 def test_profiles_of_another_test_or_observable_are_refused(write_study: Callable[..., Path]) -> None:
     heap = load_study(write_study((ANGLE, TARGET)))
-    with pytest.raises(InputError, match=r"profiles are those of a drum \(received lifted-cylinder\)"):
+    with pytest.raises(
+        InputError, match=r'those of a drum, a "surface", .* \(received surface of lifted-cylinder\)'
+    ):
         with_profiles(heap)
     other = load_study(write_study((TUBE, DRUM), (ANGLE, TARGET.replace('"surface"', '"mass_angle"'))))
-    with pytest.raises(InputError, match=r'profiles are of the observable "surface" \(received mass_angle\)'):
+    with pytest.raises(
+        InputError, match=r'profiles are of the observable "surface" or "outline" \(received mass_angle\)'
+    ):
         with_profiles(other)
 
 

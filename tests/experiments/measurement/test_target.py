@@ -81,6 +81,19 @@ def test_pictures_are_measured_with_the_fit_of_the_study(write_study: WriteStudy
     assert study.target.leading.measured == expected
 
 
+def test_a_picture_in_doubt_is_left_out_and_told(from_source, photographs: list[Path]) -> None:
+    lean = draw(DrawnHeap(24.0, 33.0), Camera(noise=0))
+    save_picture(photographs[1], lean)
+    study, notes = with_measurements(from_source('pictures = "photos"'))
+    angles = [measure_photograph(path, "flank").mean for path in (photographs[0], photographs[2])]
+    assert study.target.leading.measured == Sample.of(angles)
+    assert len(notes) == 1
+    assert notes[0].startswith("heap-1.png is doubtful, and left out: ")
+    save_picture(photographs[0], lean)
+    with pytest.raises(InputError, match=r"target.pictures: .*without a doubt .*received 1"):
+        with_measurements(from_source('pictures = "photos"'))
+
+
 def test_every_picture_without_a_heap_is_named(from_source, photographs: list[Path]) -> None:
     for path in photographs[:2]:
         save_picture(path, np.full((300, 500, 3), 200, np.uint8))

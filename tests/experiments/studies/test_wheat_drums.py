@@ -5,10 +5,13 @@ import json
 import numpy as np
 import pandas as pd
 import pytest
+from typer.testing import CliRunner
 
 from experiments.errors import InputError
 from experiments.measurement.measured_file import read_measured
+from experiments.studies.cellulose.__main__ import app as cellulose_app
 from experiments.studies.wheat_drums import campaign, plan
+from experiments.studies.wheat_drums.__main__ import app as wheat_app
 from experiments.studies.wheat_drums.fit import SETTINGS, Slopes, fit_slopes
 from experiments.studies.wheat_drums.page import write_record
 from experiments.studies.wheat_drums.search import write_search
@@ -136,3 +139,10 @@ def test_the_heap_is_of_thirty_grams():
 def test_an_unknown_scale_is_refused(tmp_path):
     with pytest.raises(InputError, match="the scale is one of h200, bench"):
         campaign.run_study("paper", tmp_path)
+
+
+@pytest.mark.parametrize("study_app", [cellulose_app, wheat_app])
+def test_the_page_of_no_run_is_refused(study_app, tmp_path):
+    shown = CliRunner().invoke(study_app, ["page", "--out", str(tmp_path)])
+    assert shown.exit_code == 2
+    assert "must be the folder of a finished run: run the study first (received without" in shown.stderr

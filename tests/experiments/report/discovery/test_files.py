@@ -117,6 +117,28 @@ def test_all_that_was_measured_is_to_be_matched_under_its_condition(
     assert faster.mechanisms == study.case(settings, seed=1).mechanisms
 
 
+def test_a_tilt_seen_from_behind_is_written_as_the_study_has_it(
+    trial: Study, trial_terms: Terms, discovered: Discovered, tmp_path: Path
+) -> None:
+    found = found_on(trial, discovered, Verdict.NAMED)
+    assert found.chosen is not None
+    tilted = {"mechanisms": ("plate_tilt",), "sizes": (Interval(4.0, 5.0, 6.0),)}
+    lean = found.data.observables.index("asymmetry")
+    for heading, share in ((0.0, 1.0), (180.0, -1.0), (60.0, 0.5), (90.0, None)):
+        chosen = replace(found.chosen, heading=heading, **tilted)
+        folder = tmp_path / f"{heading}"
+        write_discovery(replace(found, chosen=chosen), trial, trial_terms, Settings(), folder)
+        study = load_study(folder / "study-with-plate_tilt.toml")
+        matched = [one for one in study.target.responses if one.observable == BY_NAME["asymmetry"].column]
+        if share is None:
+            assert not matched
+            continue
+        first = next(one for one in matched if one.scene == TARGET_SCENE)
+        # Written with six digits.
+        assert first.measured.mean == pytest.approx(found.data.means[0, lean] / share, rel=1e-5)
+        assert first.measured.se == pytest.approx(found.data.standard_errors[0, lean] / abs(share), rel=1e-5)
+
+
 def test_a_tie_gives_a_study_for_each(
     trial: Study, trial_terms: Terms, discovered: Discovered, tmp_path: Path
 ) -> None:

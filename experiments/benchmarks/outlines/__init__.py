@@ -1,0 +1,1 @@
+"""How much more outlines of heaps pin down than their angles, on twin data."""

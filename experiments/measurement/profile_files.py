@@ -1,0 +1,189 @@
+"""Files of measured profiles: heights over distance of a drum's surface or a heap's outline, as a tidy CSV.
+
+A row is a point, ``replicate, x, z`` with units, or, of a heap, ``replicate, picture, pixel``: a photograph,
+or a file of spheres of another code. The column ``view`` tells views of a heap, or frames of a drum, apart.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from dem_warp.scenes.drum_surface import STATIONS
+from experiments.errors import InputError
+from experiments.rows import Row, read_rows
+from experiments.studyfile.units import Quantity
+from imaging import PictureError
+
+COLUMNS = ("replicate", "view", "x", "z", "picture", "pixel")
+"""Columns of a file of profiles."""
+
+LEAST_STATIONS = 3
+"""Stations of a drum that all profiles must span."""
+
+LEAST_POINTS = 8
+"""Points of a heap's profile."""
+
+FOOT = 0.1
+"""A heap's profile ends lower than this part of its height."""
+
+
+class Profiles(NamedTuple):
+    """Measured profiles."""
+
+    names: list[str]
+    """Replicate of each."""
+    stations: list[int]
+    """Numbers of their places, from 0."""
+    heights: np.ndarray
+    """Mean of the views of each [m], shape (profiles, stations)."""
+    views: list[np.ndarray]
+    """Views of each [m], shape (views, stations)."""
+
+
+class _Points(NamedTuple):
+    """Points of one view, by place [m], and the line of its first row."""
+
+    line: int
+    heights: dict[float, float]
+
+
+def read_drum_profiles(path: Path, radius: float) -> Profiles:
+    """Read profiles of a drum of a radius [m] as heights above its axis, at its stations.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be read, a point lies outside the drum, or the profiles span too few stations.
+    """
+    found: dict[str, dict[str, _Points]] = {}
+    for row in read_rows(path, ("replicate", "x", "z"), COLUMNS[:4]):
+        x, z = _take_point(row, found)
+        if np.hypot(x, z) > radius:
+            rule = f"must lie in the drum, within {1e3 * radius:g} mm of its axis"
+            value = f"x {row['x']}, z {row['z']}"
+            raise InputError(rule, value, f"{path}:{row.line}: x, z")
+    places = np.array(STATIONS) * radius
+    views = {name: [view.heights for view in each.values()] for name, each in found.items()}
+    ends = [(min(view), max(view)) for each in views.values() for view in each] or [(0.0, 0.0)]
+    low, high = max(end[0] for end in ends), min(end[1] for end in ends)
+    kept = [number for number, place in enumerate(places) if low <= place <= high]
+    if len(kept) < LEAST_STATIONS:
+        told = f"{1e3 * low:.4g} to {1e3 * high:.4g} mm, {len(kept)} stations"
+        raise InputError(f"all profiles must span {LEAST_STATIONS} stations of the drum", told, str(path))
+    heights = {name: [_between(view, places[kept]) for view in each] for name, each in views.items()}
+    return _profiles(kept, heights)
+
+
+def read_heap_profiles(path: Path, fit: str) -> Profiles:
+    """Read outlines of heaps at the places of `imaging.profile`, from points, pictures and files of spheres.
+
+    Those of spheres have their flanks fitted by a ``fit``, which tells what is no heap.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be read, a picture shows no heap or one in doubt, or a profile lacks a foot.
+    """
+    points: dict[str, dict[str, _Points]] = {}
+    heaps: dict[str, list[np.ndarray]] = {}
+    for row in read_rows(path, ("replicate",), COLUMNS):
+        if row["picture"]:
+            if row["x"] or row["z"]:
+                raise row.error("a row has a picture or a point, not both", "picture")
+            heaps.setdefault(_label(row), []).extend(_pictured(row, fit))
+        else:
+            _, z = _take_point(row, points)
+            if z < 0.0:
+                raise row.error("must stand on the plate: z counts from it", "z")
+            heaps.setdefault(row["replicate"], [])
+    for name, views in points.items():
+        heaps[name] += [_drawn(view, f"{path}:{view.line}") for view in views.values()]
+    stations = list(range(len(next(iter(heaps.values()))[0]))) if heaps else []
+    return _profiles(stations, heaps)
+
+
+def _profiles(stations: list[int], found: Mapping[str, list[np.ndarray]]) -> Profiles:
+    views = [np.array(each) for each in found.values()]
+    means = [each.mean(axis=0) for each in views]
+    return Profiles(list(found), stations, np.array(means).reshape(len(means), len(stations)), views)
+
+
+def _take_point(row: Row, found: dict[str, dict[str, _Points]]) -> tuple[float, float]:
+    """Put the point of a row with those of its view; return it."""
+    x, z = _length(row, "x"), _length(row, "z")
+    views = found.setdefault(_label(row), {})
+    view = views.setdefault(row["view"], _Points(row.line, {}))
+    if x in view.heights:
+        raise row.error("every place of a profile stands once", "x")
+    view.heights[x] = z
+    return x, z
+
+
+def _label(row: Row) -> str:
+    if not row["replicate"]:
+        raise row.error("needs a label, one for each profile", "replicate")
+    return row["replicate"]
+
+
+def _between(view: Mapping[float, float], places: np.ndarray) -> np.ndarray:
+    x = sorted(view)
+    return np.interp(places, x, [view[each] for each in x])
+
+
+def _drawn(view: _Points, place: str) -> np.ndarray:
+    """Heights of an outline that points draw."""
+    from imaging import profile_heights
+
+    x = np.array(sorted(view.heights))
+    z = np.array([view.heights[each] for each in x])
+    if len(x) < LEAST_POINTS:
+        raise InputError(f"a heap's profile has {LEAST_POINTS} points or more", len(x), place)
+    if max(z[0], z[-1]) > FOOT * z.max():
+        rule = f"a heap's profile goes from foot to foot: both ends lower than {FOOT:.0%} of its height"
+        ends = f"{1e3 * z[0]:.4g} and {1e3 * z[-1]:.4g} of {1e3 * z.max():.4g} mm"
+        raise InputError(rule, ends, place)
+    try:
+        return profile_heights(x, z, place)
+    except PictureError as error:
+        raise InputError("a heap's profile has an area", "none", place) from error
+
+
+def _pictured(row: Row, fit: str) -> Iterator[np.ndarray]:
+    """Heights of the outlines that a photograph, or a file of spheres from all around, shows."""
+    # a file of points needs no pictures
+    from experiments.measurement.heap_files import HeapSettings, is_heap_file, measure_heap_file
+    from imaging import find_outline, heap_profile, measure, read_picture
+
+    path, place = row.file.parent / row["picture"], f"{row.file}:{row.line}: picture"
+    if not os.path.isfile(path):  # a name too long is none, and raises nothing
+        rule = f"must name a picture or a file of spheres, relative to this one (looked for {path})"
+        raise row.error(rule, "picture")
+    try:
+        if is_heap_file(path):
+            heap = measure_heap_file(path, fit, HeapSettings())
+            yield from (heap_profile(view.outline) for view in heap.angle.views)
+            return
+        if not row["pixel"]:
+            raise row.error("an outline in a picture needs the size of its pixels, as 0.1 mm", "pixel")
+        pixel = _length(row, "pixel")
+        if pixel <= 0.0:
+            raise row.error("must be greater than 0", "pixel")
+        seen = measure(find_outline(read_picture(path), meters_per_pixel=pixel, place=str(path)), fit)
+    except PictureError as error:
+        raise InputError("must show a heap that can be measured", str(error), place) from None
+    if seen.doubts:
+        rule = "must show a heap without a doubt: crop it, or leave the row out"
+        raise InputError(rule, "; ".join(map(str, seen.doubts)), place)
+    yield heap_profile(seen.outline)
+
+
+def _length(row: Row, column: str) -> float:
+    try:
+        return Quantity.parse(row[column]).to_base("length")
+    except ValueError as error:
+        raise row.error(str(error), column) from None

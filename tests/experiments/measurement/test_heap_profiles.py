@@ -1,0 +1,156 @@
+"""Outlines of heaps as profiles: alike from points, pictures, spheres and states; bad ones refused."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from dem_warp import CaseResult
+from experiments.errors import InputError, StudyError
+from experiments.measurement.measured_file import read_measured
+from experiments.measurement.observables import OUTLINE, OUTLINE_STATIONS
+from experiments.measurement.profile_files import read_heap_profiles
+from experiments.measurement.profiles import with_profiles
+from experiments.measurement.states import measure, observe
+from experiments.studyfile import load_study
+from experiments.studyfile.study import MeasurementSection
+from imaging import save_picture, silhouette
+from imaging.profile import SPACING, STATIONS, profile_heights
+from imaging.synthetic import Camera, DrawnHeap, draw
+
+SETTINGS = MeasurementSection(azimuths=4, pixels=400, outline=True)
+NAMES = [each.name for each in OUTLINE]
+ANGLE = '[target]\nmean = "30 deg"\nsd = "0.5 deg"\nn = 5\n'
+TARGET = '[target]\nobservable = "outline"\nprofiles = "p.csv"\n'
+Cone = Callable[..., CaseResult]
+
+
+def file(folder: Path, text: str, head: str = "replicate,x,z") -> Path:
+    path = folder / "p.csv"
+    path.write_text(f"{head}\n{text}", encoding="utf-8")
+    return path
+
+
+def test_a_triangle_has_the_heights_of_its_formula() -> None:
+    """Slope 1/2, 40 wide, 10 high, area 200: the mean of a straight flank is its height at the station."""
+    x = np.linspace(100.0, 140.0, 4001)
+    z = 10.0 - 0.5 * np.abs(x - 120.0)
+    root = np.sqrt(200.0)
+    expected = 10.0 - 0.5 * np.array(STATIONS) * root
+    expected[0] = 10.0 - 0.5 * 0.25 * SPACING * root  # the apex stands in the middle of its width
+    inside = np.array(STATIONS) + SPACING / 2 < 20.0 / root
+    assert profile_heights(x, z)[inside] == pytest.approx(expected[inside], rel=1e-6)
+    assert len(STATIONS) == OUTLINE_STATIONS == len(OUTLINE)
+
+
+def test_the_profile_knows_neither_where_the_heap_stands_nor_a_tail_of_single_grains() -> None:
+    x = np.linspace(-20.0, 20.0, 801)
+    z = 10.0 - 0.5 * np.abs(x)
+    moved = profile_heights(x + 7.0, z)
+    assert moved == pytest.approx(profile_heights(x, z))
+    far, grain = np.linspace(30.0, 31.0, 21), np.full(21, 0.5)
+    tailed = profile_heights(np.append(x, far), np.append(z, grain))
+    # Half an area of one in 200 moves the middle by 0.4 of a step, and two flanks are averaged.
+    assert tailed[:6] == pytest.approx(moved[:6], abs=0.1)
+
+
+def test_states_spheres_pictures_and_points_give_one_profile(cone: Cone, tmp_path: Path) -> None:
+    heap = cone(radius=1e-3)
+    own = np.array([observe(SETTINGS, heap).observables[name] for name in NAMES])
+    values, reason = measure(SETTINGS, heap, NAMES)
+    assert (reason, values.tolist()) == ("", own.tolist())
+    assert "outline_1" not in observe(MeasurementSection(azimuths=4, pixels=400), heap).observables
+    spheres = np.column_stack([heap.sphere_centers, heap.sphere_radii])
+    np.savetxt(tmp_path / "heap.csv", spheres, delimiter=",", header="x,y,z,radius", comments="")
+    drawn = silhouette(heap.sphere_centers, heap.sphere_radii, 0.0)
+    cv2.imwrite(str(tmp_path / "heap.png"), drawn.image)
+    x = np.linspace(-0.022, 0.022, 400)
+    points = "".join(
+        f"2,,{1e3 * a:.4f} mm,{1e3 * b:.4f} mm,,\n"
+        for a, b in zip(
+            x, np.maximum(0.5 * (0.02 - np.abs(x)) + 0.5e-3, 0.0) * (np.abs(x) < 0.021), strict=True
+        )
+    )
+    text = f"1,,,,heap.csv,\n{points}3,a,,,heap.png,{1e3 * drawn.meters_per_pixel} mm\n"
+    found = read_heap_profiles(file(tmp_path, text, "replicate,view,x,z,picture,pixel"), "flank")
+    assert [len(views) for views in found.views] == [8, 1, 1]
+    # The points draw a smooth cone over the spheres, whose radius is 1 mm.
+    for heights in found.heights:
+        assert heights == pytest.approx(own, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("1,0 mm,0 mm\n1,1 mm,1 mm\n", r"p.csv:2: .*has 8 points or more \(received 2\)"),
+        (
+            "".join(f"1,{n} mm,{n} mm\n" for n in range(9)),
+            r"p.csv:2: .*from foot to foot.*received 0 and 8 ",
+        ),
+        ("1,0 mm,-1 mm\n", r"p.csv:2: z: must stand on the plate"),
+        ("1,0 in,1 in\n", r"p.csv:2: x: needs a unit of length"),
+        ("1,0,1\n", r"p.csv:2: x: needs a unit of length"),
+        ("1,0 mm,1 mm\n1,0 mm,2 mm\n", r"p.csv:3: x: .*every place of a profile stands once"),
+        ("".join(f"1,{n} mm,0 mm\n" for n in range(9)), r"p.csv:2: .*has an area"),
+    ],
+)
+def test_points_that_are_no_heap_are_refused_with_their_row(tmp_path: Path, text: str, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        read_heap_profiles(file(tmp_path, text), "flank")
+
+
+@pytest.mark.parametrize(
+    ("row", "message"),
+    [
+        ("1,none.png,1 mm\n", r"p.csv:2: picture: must name a picture or a file of spheres"),
+        ("1,plain.png,\n", r"p.csv:2: pixel: an outline in a picture needs the size of its pixels"),
+        ("1,plain.png,0 mm\n", r"p.csv:2: pixel: must be greater than 0"),
+        ("1,plain.png,1 kg\n", r"p.csv:2: pixel: needs a unit of length"),
+        ("1,plain.png,1 mm\n", r"p.csv:2: picture: .*must show a heap that can be measured"),
+        ("1,top.png,1 mm\n", r"p.csv:2: picture: .*must show a heap"),
+    ],
+)
+def test_a_picture_that_shows_no_side_of_a_heap_is_refused(tmp_path: Path, row: str, message: str) -> None:
+    cv2.imwrite(str(tmp_path / "plain.png"), np.full((200, 300), 200, np.uint8))
+    top = np.full((400, 600, 3), 220, np.uint8)
+    cv2.circle(top, (300, 200), 120, (60, 90, 120), -1)
+    cv2.imwrite(str(tmp_path / "top.png"), top)
+    with pytest.raises(InputError, match=message):
+        read_heap_profiles(file(tmp_path, row, "replicate,picture,pixel"), "flank")
+
+
+def test_an_outline_in_doubt_is_refused_with_the_doubt(tmp_path: Path) -> None:
+    save_picture(tmp_path / "lean.png", draw(DrawnHeap(24.0, 33.0), Camera(noise=0)))
+    row = file(tmp_path, "1,lean.png,0.1 mm\n", "replicate,picture,pixel")
+    with pytest.raises(InputError, match=r"p.csv:2: picture: .*without a doubt: .*left"):
+        read_heap_profiles(row, "flank")
+
+
+def test_an_outline_needs_profiles_or_a_twin(write_study: Callable[..., Path], tmp_path: Path) -> None:
+    study = load_study(write_study((ANGLE, '[target]\nobservable = "outline"\n')))
+    with pytest.raises(InputError, match=r'"outline" needs profiles, a file of them, or a twin'):
+        with_profiles(study)
+    with pytest.raises(StudyError, match=r"names pictures, profiles or a file"):
+        _ = load_study(write_study((ANGLE, TARGET))).target
+
+
+def test_a_measured_file_has_outlines_where_the_study_asks(
+    write_study: Callable[..., Path], tmp_path: Path
+) -> None:
+    table = tmp_path / "m.csv"
+    table.write_text(
+        "condition,replicate,observable,value,unit\nbase,1,outline_3,4.2,mm\nbase,2,outline_8,0,mm\n",
+        encoding="utf-8",
+    )
+    plain = load_study(write_study())
+    with pytest.raises(InputError, match=r"must be an observable or 'clogged'"):
+        read_measured(table, plain)
+    asked = load_study(write_study(("pixels = 200", "pixels = 200\noutline = true")))
+    data = read_measured(table, asked)
+    assert data.observables == ("outline_3", "outline_8")
+    # Beyond its foot a heap has no height, and that is a value.
+    assert data.values["base"][:, 1].tolist()[1] == 0.0
