@@ -9,7 +9,6 @@ from .analysis.formula import LinearFit, fit_formula, fit_mixture
 from .analysis.optimum_region import stationary_region
 from .anova import ErrorTerm, pure_error
 from .compare import Comparison, compare_means
-from .compatible import compatible_points, even_points
 from .curve_fit import CurveFit, Forecast, MeasuredCurve, fit_curves
 from .curves import CurveEmulator
 from .design import Design
@@ -93,13 +92,11 @@ __all__ = [
     "central_composite",
     "climb_table",
     "compare_means",
-    "compatible_points",
     "curvature_test",
     "definitive_screening",
     "design_quality",
     "detectable_effect",
     "effect_power",
-    "even_points",
     "fit_curves",
     "fit_formula",
     "fit_mixture",

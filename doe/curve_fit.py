@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
+from doe.checks import checked_count, checked_kind, checked_list, checked_map, checked_number, real_array
 from doe.compatible import compatible_points, even_points
 from doe.curves import CurveEmulator
 from doe.discrepancy.threads import in_one_thread
@@ -146,11 +147,12 @@ def fit_curves(
 
     Raises
     ------
-    RuleError
-        When no curve is given.
+    DesignError
+        When no curve is given, or an argument is none of these.
     """
-    if not curves:
-        raise RuleError("needs a measured curve", "none", "curves")
+    _check(emulators, curves)
+    places, reading = real_array("places", places), checked_number("reading", reading, above=0.0)
+    checked_count("seed", seed, least=0)
     tie = np.eye(_settings_of(emulators)) if free is None else np.asarray(free, dtype=np.float64)
     rng = np.random.default_rng(seed)
     first = even_points(tie.shape[1], rng)
@@ -166,6 +168,17 @@ def fit_curves(
     best = found.best @ tie.T
     chi2 = float(_chi2(trial, best[None], miss)[0])
     return CurveFit(emulators, places, tuple(curves), miss, found.likely @ tie.T, best, chi2)
+
+
+def _check(emulators: Mapping[str, CurveEmulator], curves: Sequence[MeasuredCurve]) -> None:
+    """Refuse what is no emulator or no measured curve, and curves of conditions that no emulator has."""
+    for emulator in checked_map("emulators", emulators).values():
+        checked_kind("an emulator", emulator, CurveEmulator)
+    if not checked_list("curves", curves):
+        raise RuleError("needs a measured curve", "none", "curves")
+    for curve in curves:
+        if checked_kind("a measured curve", curve, MeasuredCurve).condition not in emulators:
+            raise RuleError(f"are of conditions {', '.join(emulators)}", curve.condition, "curves")
 
 
 def _settings_of(emulators: Mapping[str, CurveEmulator]) -> int:

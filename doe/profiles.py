@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from doe.checks import checked_list, real_array
 from doe.errors import RuleError
 from doe.sample import Sample
 
@@ -166,10 +167,20 @@ def scatter_of_views(heaps: Sequence[ArrayLike]) -> NDArray[np.float64] | None:
     -------
     (places, places) array or None
         None where no two profiles have several views, or these are all alike.
+
+    Raises
+    ------
+    DesignError
+        When views are no finite numbers, or at other places than those of the first profile.
     """
     from sklearn.covariance import ledoit_wolf
 
-    several = [np.asarray(views, dtype=np.float64) for views in heaps if len(np.atleast_2d(views)) > 1]
+    profiles = [real_array("views of a profile", views) for views in checked_list("profiles", heaps)]
+    for views in profiles:
+        if views.ndim != 2 or views.shape[1:] != profiles[0].shape[1:] or not np.isfinite(views).all():
+            rule = "are finite, a row a view, at the places of the first profile"
+            raise RuleError(rule, f"shape {views.shape}", "views")
+    several = [views for views in profiles if len(views) > 1]
     if len(several) < LEAST_VIEWED:
         return None
     # as many degrees of freedom as views less their means

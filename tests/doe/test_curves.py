@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import qmc
 
-from doe.curve_fit import CurveFit, MeasuredCurve, fit_curves
-from doe.curves import CurveEmulator
+from doe import CurveEmulator, CurveFit, MeasuredCurve, fit_curves
 from doe.errors import RuleError
 
 PLACES = np.linspace(-40.0, 40.0, 41)

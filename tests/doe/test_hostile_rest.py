@@ -15,6 +15,7 @@ from doe import (
     DesignError,
     Factor,
     Goal,
+    MeasuredCurve,
     Mixture,
     Sample,
     Wish,
@@ -27,6 +28,7 @@ from doe import (
     climb_table,
     definitive_screening,
     design_quality,
+    fit_curves,
     fit_formula,
     fit_mixture,
     fit_surface,
@@ -44,6 +46,7 @@ from doe import (
     power_table,
     pure_error,
     ridge_path,
+    scatter_of_views,
     screen,
     simplex_lattice,
     sobol,
@@ -72,6 +75,7 @@ AGREED = agreement([1.0, 2.0, 4.0], [1.5, 2.0, 3.5])
 EFFECTS = two_level_effects(CORNERS, EIGHT)
 FORMULA = fit_formula(DESIGN, RESPONSE, "A * B")
 
+CURVE = MeasuredCurve("slow", 0.0, np.array([0]), np.array([1.0]))
 THINGS = [None, "x", 3, np.nan, [], {}, pd.DataFrame(), np.array([1.0, 2.0]), object()]
 NO_FLAGS = [None, "yes", 1, np.nan, [], pd.DataFrame()]
 NO_COUNTS = ["x", -1, 1.5, np.nan, np.inf, [], {}, True, 1j, 10**9, datetime.date(2024, 1, 1)]
@@ -233,6 +237,12 @@ CALLS: dict[str, tuple[Callable, list]] = {
         [0.0, *NO_NUMBERS],
     ),
     "transfer_points turn": (lambda value: transfer_points(SURFACE, POINT, 5, turn=value), NO_COUNTS[:9]),
+    "scatter_of_views": (scatter_of_views, [*NO_LISTS, ["x"], [None], [[1.0, 2.0]], [[[1.0, np.nan]]]]),
+    "fit_curves emulators": (
+        lambda value: fit_curves(value, [0.0], [CURVE], 1.0, 1),
+        [*THINGS[:4], {"a": 3}],
+    ),
+    "fit_curves curves": (lambda value: fit_curves({}, [0.0], value, 1.0, 1), [*NO_LISTS, [], [3], [CURVE]]),
     "pareto_chart": (plots.pareto_chart, [*THINGS, SURFACE]),
     "pareto_chart alphas": (lambda value: plots.pareto_chart(SCREEN, value), [*NO_LISTS, [0.0], ["x"]]),
     "half_normal_plot": (plots.half_normal_plot, [*THINGS, SURFACE]),

@@ -22,7 +22,7 @@ from experiments.studies.cellulose.plan import (
     second_points,
     study_at,
 )
-from experiments.studies.cellulose.simulation import simulate_drums, with_curves, write_curves
+from experiments.studies.cellulose.simulation import WALL_TIMES, simulate_drums, with_curves, write_curves
 
 CURVES, FACTS, PREDICTION = "curves.csv", "provenance.json", "prediction.csv"
 """Files of a record: averaged edges of all drums, what made them, and the sealed prediction."""
@@ -36,15 +36,12 @@ def run_study(scale: str, folder: Path, device: str | None = None, workers: int 
     if scale not in RUNS:
         raise InputError(f"the scale is one of {', '.join(RUNS)}", scale, "--scale")
     study, runs = study_at(scale), RUNS[scale]
-    walls: list[dict[str, Any]] = []
     tables: list[pd.DataFrame] = []
 
     def simulated(points: pd.DataFrame, stage: str, speeds: tuple[int, ...], seed: int) -> None:
         planned = batch(points, stage, speeds, seed)
         print(f"{stage}: {len(planned)} drums", flush=True)
-        table, seconds = simulate_drums(study, planned, folder, device, workers)
-        tables.append(table)
-        walls.append({"stage": stage, "simulated": len(table), "seconds": round(seconds, 1)})
+        tables.append(simulate_drums(study, planned, folder, device, workers))
 
     simulated(first_points(study, runs), "first", MEASURED, 1000)
     wide = calibrate_on(study, *_half_dark(tables, folder))
@@ -59,8 +56,14 @@ def run_study(scale: str, folder: Path, device: str | None = None, workers: int 
     write_text(
         folder / PREDICTION, prediction(final, study.case({}, 0).scene.diameter / 2).to_csv(index=False)
     )
-    facts = _origin(device) | {"scale": scale, "failed": _failed(tables), "wall_times": walls}
+    facts = _origin(device) | {"scale": scale, "failed": _failed(tables), "wall_times": _wall_times(folder)}
     write_text(folder / FACTS, json.dumps(facts, indent=1) + "\n")
+
+
+def _wall_times(folder: Path) -> list[dict[str, Any]]:
+    """Drums and seconds of each stage, over all calls."""
+    table = pd.read_csv(folder / WALL_TIMES).groupby("stage", sort=False, as_index=False).sum()
+    return table.to_dict("records")
 
 
 def _half_dark(tables: list[pd.DataFrame], folder: Path) -> tuple[pd.DataFrame, Any]:

@@ -19,20 +19,22 @@ from experiments.studyfile import Study
 LEVELS = (0.2, 0.5, 0.8)
 """Darkness of the averaged picture at which its edge is read."""
 
+WALL_TIMES = "wall_times.csv"
+"""Drums and seconds of each call, by stage."""
+
 
 def simulate_drums(
     study: Study, table: pd.DataFrame, folder: Path, device: str | None = None, workers: int | None = None
-) -> tuple[pd.DataFrame, float]:
-    """Simulate the drums of a table that the folder lacks.
+) -> pd.DataFrame:
+    """Simulate the drums of a table that the folder lacks, and add a row to its wall times.
 
     Returns
     -------
     table
         With status, reason, grain_count and the name of the case.
-    seconds
-        Wall time of what was simulated now.
     """
     store, edges, began = Store(folder / "cases"), folder / "edges", time.perf_counter()
+    stage, done = str(table["stage"].iloc[0]), 0
     cases = [case_of(study, row) for _, row in table.iterrows()]
     keys, names = [store.key(case) for case in cases], [case_name(case) for case in cases]
     missing = [
@@ -42,24 +44,34 @@ def simulate_drums(
     ]
 
     def keep(number: int, result: CaseResult) -> None:
+        nonlocal done
+        done += 1
         store.save(keys[missing[number]], result)
-        done = f"{number + 1}: {table.loc[missing[number], 'stage']}"
-        print(
-            f"{time.perf_counter() - began:6.0f} s, drum {done}, {result.status} {result.reason}", flush=True
-        )
+        what = f"{stage}, {result.status} {result.reason}".rstrip()
+        print(f"{time.perf_counter() - began:6.0f} s, drum {number + 1}: {what}", flush=True)
 
     if missing:
         machine = OwnWorkers(device, workers, EdgeWatch(edges, places()))
-        machine.simulate([cases[i] for i in missing], on_result=keep, checkpoint=store.unfinished)
+        try:
+            machine.simulate([cases[i] for i in missing], on_result=keep, checkpoint=store.unfinished)
+        finally:
+            _note_time(folder, stage, done, time.perf_counter() - began)
     ends = [store.load(key) for key in keys]
-    found = table.assign(
+    return table.assign(
         status=[end.status for end in ends],
         reason=[end.reason for end in ends],
         grain_count=[end.observables.get("grain_count", np.nan) for end in ends],
         dynamic_angle=[end.observables.get("dynamic_angle", np.nan) for end in ends],
         case=names,
     )
-    return found, time.perf_counter() - began if missing else 0.0
+
+
+def _note_time(folder: Path, stage: str, simulated: int, seconds: float) -> None:
+    """Add the drums of a call, also of one that was stopped, to the wall times of the folder."""
+    row = pd.DataFrame([{"stage": stage, "simulated": simulated, "seconds": round(seconds, 1)}])
+    path = folder / WALL_TIMES
+    known = [pd.read_csv(path)] if path.is_file() else []
+    write_text(path, pd.concat([*known, row]).to_csv(index=False))
 
 
 def with_curves(table: pd.DataFrame, folder: Path) -> tuple[pd.DataFrame, dict[float, np.ndarray]]:

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from doe import CurveEmulator, Sample, compatible_points, even_points
+from doe import CurveEmulator, Sample
+from doe.compatible import compatible_points, even_points
 from experiments.studies.wheat_drums.plan import GRAIN, INCLINED, SHELLS, UPRIGHT, coded
 from experiments.studyfile import Study
 

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from experiments.errors import InputError
-from experiments.studies.cellulose import campaign, plan
+from experiments.studies.cellulose import campaign, plan, simulation
 from experiments.studies.cellulose.fit import measured_edge, residual_table, residuals
 from experiments.studies.cellulose.page import write_record
 from experiments.studies.cellulose.simulation import simulate_drums
@@ -79,8 +79,9 @@ def made_up(study: Study, row: pd.Series) -> np.ndarray:
 
 def test_the_whole_study_on_made_up_edges(tmp_path, monkeypatch):
     def pretend(study, table, folder, device=None, workers=None):
+        simulation._note_time(folder, table["stage"].iloc[0], len(table), 1.0)
         told = {"status": "finished", "reason": "", "grain_count": 1.0, "dynamic_angle": 1.0}
-        return table.assign(**told, case=[str(seed) for seed in table["seed"]]), 1.0
+        return table.assign(**told, case=[str(seed) for seed in table["seed"]])
 
     def curves_of(table, folder):
         study = plan.study_at("bench")
@@ -136,10 +137,10 @@ def test_a_drum_is_simulated_once(tmp_path, monkeypatch):
     small = plan.load_study(plan.STUDY, "bench", {"scene": {"drum": tiny}})
     monkeypatch.setattr(plan, "_filled", lambda study, fill: small)
     table = plan.batch(pd.DataFrame([plan.PUBLISHED]), "first", (15,), 1)
-    found, seconds = simulate_drums(small, table, tmp_path, "cpu", 1)
+    found = simulate_drums(small, table, tmp_path, "cpu", 1)
     assert list(found["status"]) == ["finished"], found["reason"].iloc[0]
-    assert seconds > 0.0
     assert (tmp_path / "edges" / f"{found['case'].iloc[0]}.npz").is_file()
-    again, none = simulate_drums(small, table, tmp_path, "cpu", 1)
-    assert none == 0.0
-    assert again.equals(found)
+    assert simulate_drums(small, table, tmp_path, "cpu", 1).equals(found)
+    calls = pd.read_csv(tmp_path / simulation.WALL_TIMES)
+    assert calls[["stage", "simulated"]].to_numpy().tolist() == [["first", 1]]
+    assert calls["seconds"].iloc[0] > 0.0
