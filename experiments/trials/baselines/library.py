@@ -1,0 +1,22 @@
+"""The methods by name."""
+
+from __future__ import annotations
+
+from experiments.trials.baselines.methods.bayes_factors import BayesFactors
+from experiments.trials.baselines.methods.bic import Bic
+from experiments.trials.baselines.methods.discrepancy import Discrepancy
+from experiments.trials.baselines.methods.lasso import Lasso
+from experiments.trials.baselines.methods.mmd import Mmd
+from experiments.trials.baselines.methods.search import Search, Simulator
+from experiments.trials.baselines.protocol import Method
+
+SEARCH, ALONE = "search", "search, bank alone"
+"""Names of the search with fresh runs, and without: what the others have."""
+
+
+def methods(simulator: Simulator | None) -> dict[str, Method]:
+    """List every method by name; the search with fresh runs where a simulator answers them."""
+    found: list[Method] = [Search(ALONE, None), BayesFactors(), Bic(), Lasso(), Discrepancy(), Mmd()]
+    if simulator is not None:
+        found.insert(0, Search(SEARCH, simulator))
+    return {method.name: method for method in found}

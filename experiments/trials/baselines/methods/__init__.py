@@ -1,0 +1,1 @@
+"""Methods: each is one file and one entry in `library`."""

@@ -1,0 +1,181 @@
+"""The record of the methods: tables, pictures and one page, written from their answers and the truths.
+
+    python -m experiments.trials.baselines.record out/baselines --out experiments/trials/record/baselines
+    python -m experiments.trials.baselines.record out/measured out/trials --out out/record
+    python -m experiments.trials.baselines.record --out experiments/trials/record/baselines
+
+The second is of measured trials, with what `experiments.trials.run` found in them as the search's answers.
+The last writes the page again from the files of the record.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated
+
+import pandas as pd
+import typer
+
+from doe.discrepancy import Verdict
+from experiments.commands.console import clear_errors
+from experiments.errors import InputError
+from experiments.files import copy_file
+from experiments.report.kit.markdown import markdown_table, write_page
+from experiments.trials.baselines import benchmark_files
+from experiments.trials.baselines.answers_table import FOLDER, add_answer, file_of, read_answers
+from experiments.trials.baselines.compare import (
+    areas,
+    common,
+    comparisons,
+    judged,
+    power,
+    summary,
+)
+from experiments.trials.baselines.library import ALONE, SEARCH, methods
+from experiments.trials.baselines.methods.search import Search
+from experiments.trials.baselines.pictures import draw_power, draw_roc
+from experiments.trials.baselines.protocol import Answer, Method
+from experiments.trials.findings import EVERYTHING, read_findings
+from experiments.trials.folder import LABELS, NOTES, PAGE, Folder
+from experiments.trials.truth import Label, read_labels
+
+ROC, POWER = "roc.png", "power.png"
+"""Pictures of a record."""
+
+INTRODUCTION = """# Methods of model criticism on the same bank and the same heaps
+
+Every method gets the same bank of runs and the same heaps of all conditions. It answers with a score of its
+alarm, an alarm at the level that it declares, names or none, and, if it has one, a score that what is missing
+is not in the library. Only the *search* may ask the simulator for fresh runs; *search, bank alone* may not.
+Hidden is nothing, one mechanism of the library at several multiples of its detectable size (*one effect*
+below: of 1.5 or more), two of these, or one that was taken out of the library. *Wrong* is a name of what is
+not hidden. Seconds are of one core; fits of models count with the method that first asks for them.
+"""
+
+AREAS = """## Areas under the curves
+
+Of the alarm: something hidden against nothing hidden; weak effects are those below 1.5 detectable sizes. Of
+*unknown*: what the library lacks against strong effects and pairs of it. In brackets 95 % (bootstrap over
+trials).
+"""
+
+POWERS = """## Power
+
+Share of trials of one mechanism with an alarm, by multiples of its detectable size, and then with its name.
+"""
+
+PAIRED = """Trials in which only the {0} is right : only the other, with McNemar's exact p value. *No false
+alarm*: nothing hidden; *alarm*: something hidden; *right answer*: quiet, the right name, or unknown, whatever
+is due (weak effects left out).
+"""
+
+
+def gather(out: Path, record: Path, answers: Path) -> None:
+    """Take answers and truths over into a record.
+
+    Raises
+    ------
+    InputError
+        When there are no answers, or no truths.
+    """
+    files = sorted((out / FOLDER).glob("*.csv"))
+    if not files or not answers.is_file():
+        raise InputError("needs answers of methods, and the truths", "none", f"{out / FOLDER}, {answers}")
+    for file in files:
+        copy_file(file, record / FOLDER / file.name)
+    copy_file(answers, record / LABELS)
+
+
+def gather_search(folder: Folder, record: Path) -> None:
+    """Write what the search found in measured trials, with every observable, as answers of a method.
+
+    A record of trials keeps Q of the base, which is the score; *outside* has none.
+    """
+    if not folder.findings.is_file():
+        return
+    findings = read_findings([folder.findings])
+    path = file_of(record, SEARCH)
+    path.unlink(missing_ok=True)
+    for row in findings[findings["view"] == EVERYTHING].itertuples():
+        naming = row.verdict in (Verdict.NAMED, Verdict.TIE)
+        answer = Answer(
+            score=float(row.q / row.degrees_of_freedom),
+            alarm=bool(row.alarm),
+            named=tuple(row.named.split()) if naming else (),
+            tied=row.verdict == Verdict.TIE,
+            unknown=row.verdict == Verdict.UNKNOWN,
+        )
+        add_answer(path, row.trial, answer, float("nan"))
+
+
+def read_record(record: Path) -> pd.DataFrame:
+    """Read the answers of a record, judged; only trials that every method has answered."""
+    labels: Mapping[str, Label] = {label.trial: label for label in read_labels(record / LABELS)}
+    tables = []
+    for name in (SEARCH, *methods(None)):
+        if (path := file_of(record, name)).is_file():
+            tables.append(read_answers(path).assign(method=name))
+    if not tables:
+        raise InputError("needs answers of methods", "none", str(record / FOLDER))
+    answers = pd.concat(tables, ignore_index=True)
+    return judged(common(answers, list(dict.fromkeys(answers["method"]))), labels)
+
+
+def write_methods_page(record: Path) -> Path:
+    """Write the page and the pictures of a record from its files, its notes after the introduction."""
+    table = read_record(record)
+    notes = record / NOTES
+    names = list(dict.fromkeys(table["method"]))
+    reference = SEARCH if SEARCH in names else ALONE
+    draw_roc(table, record / ROC)
+    draw_power(table, record / POWER)
+    kinds = table.drop_duplicates("trial")["kind"].value_counts()
+    counted = ", ".join(f"{count} {kind}" for kind, count in kinds.items())
+    alarm, named = (power(table, column).reset_index() for column in ("alarm", "named_right"))
+    return write_page(
+        record / PAGE,
+        INTRODUCTION,
+        notes.read_text(encoding="utf-8") if notes.is_file() else "",
+        f"## Answers\n\n{table['trial'].nunique()} trials that every method has answered: {counted}.",
+        markdown_table(summary(table)),
+        markdown_table(_declared(names)),
+        AREAS,
+        markdown_table(areas(table)),
+        f"![curves of the alarm and of unknown]({ROC})",
+        POWERS,
+        markdown_table(alarm.round(2)),
+        markdown_table(named.round(2)),
+        f"![shares of alarms and of names by size]({POWER})",
+        f"## The {reference} against each other method\n\n{PAIRED.format(reference)}",
+        markdown_table(comparisons(table, reference)),
+    )
+
+
+def _declared(names: list[str]) -> pd.DataFrame:
+    known: dict[str, Method] = {SEARCH: Search(SEARCH, None), **methods(None)}
+    rows = [
+        {"method": name, "level of the alarm": known[name].level, "after": known[name].source}
+        for name in names
+    ]
+    return pd.DataFrame(rows)
+
+
+def main(
+    record: Annotated[Path, typer.Option("--out", help="The record.")],
+    out: Annotated[Path | None, typer.Argument(help="Answers; left out: those of the record.")] = None,
+    folder: Annotated[Path | None, typer.Argument(help="Folder of measured trials; left out: none.")] = None,
+    benchmark: Annotated[Path, typer.Option(help="Folder of the benchmark.")] = benchmark_files.FOLDER,
+) -> None:
+    """Write the record of the methods."""
+    with clear_errors():
+        if out is not None:
+            truths = benchmark / benchmark_files.ANSWERS if folder is None else Folder(folder).hidden_labels
+            gather(out, record, truths)
+            if folder is not None:
+                gather_search(Folder(folder), record)
+        print(write_methods_page(record))
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -1,0 +1,111 @@
+"""Let every method answer trials: those of the benchmark, or a folder of measured ones.
+
+    python -m experiments.trials.baselines.run out/baselines --count 120
+    python -m experiments.trials.baselines.run out/measured out/trials
+
+The second takes a folder as `experiments.trials.generate` and `experiments.trials.run` leave it; what the
+search found there is not looked for again. Answers are kept as trials end; called again, it goes on.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+import zlib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from doe.discrepancy import fit_emulator
+from experiments.commands.console import clear_errors
+from experiments.discover.search import Search
+from experiments.errors import InputError
+from experiments.studyfile import load_study
+from experiments.trials.baselines import benchmark_files
+from experiments.trials.baselines.answers_table import add_answer, answered, file_of
+from experiments.trials.baselines.benchmark_files import load_benchmark
+from experiments.trials.baselines.draw import fresh_runs
+from experiments.trials.baselines.library import methods
+from experiments.trials.baselines.protocol import Method, Problem
+from experiments.trials.declaration import read_declaration
+from experiments.trials.desk import read_data
+from experiments.trials.folder import Folder
+from experiments.trials.generate import STUDY, bank_beside
+from experiments.trials.truth import read_sealed
+
+
+def emulated_problems(folder: Path, count: int | None) -> Iterator[Problem]:
+    """Pose the first so many trials of a benchmark."""
+    benchmark = load_benchmark(folder)
+    for trial in benchmark.trials[:count]:
+        yield benchmark.problem(trial)
+
+
+def measured_problems(folder: Folder, bank: Path | None, count: int | None) -> Iterator[Problem]:
+    """Pose the first so many trials of a folder that have heaps."""
+    declaration = read_declaration(folder.declared)
+    study = load_study(STUDY, declaration.scale or None)
+    emulator = fit_emulator(Search.of(study).read_bank(bank or bank_beside(declaration.scale)))
+    sealed = [trial for trial in read_sealed(folder.sealed) if folder.measured(trial.trial).exists()][:count]
+    measured, _ = read_data(folder, sealed, study)
+    for trial in sealed:
+        if trial.trial in measured:
+            known, seed = emulator.without(*trial.withheld), zlib.crc32(trial.trial.encode())
+            yield Problem(trial.trial, known, measured[trial.trial], declaration.settings, seed)
+
+
+def answer_all(out: Path, problems: Iterator[Problem], wanted: Mapping[str, Method], seconds: float) -> int:
+    """Answer trials in turn until all are, or no time is left; count those that were answered in full."""
+    deadline = time.monotonic() + seconds
+    done = {name: answered(file_of(out, name)) for name in wanted}
+    count = 0
+    for problem in problems:
+        for name, method in wanted.items():
+            if time.monotonic() > deadline:
+                return count
+            if problem.trial not in done[name]:
+                started = time.process_time()
+                answer = method(problem)
+                add_answer(file_of(out, name), problem.trial, answer, time.process_time() - started)
+        count += 1
+    return count
+
+
+def chosen(names: str, known: Mapping[str, Method]) -> dict[str, Method]:
+    """Pick methods by their names, parted by semicolons; all without any.
+
+    Raises
+    ------
+    InputError
+        For a name that no method has.
+    """
+    wanted = [name.strip() for name in names.split(";") if name.strip()] or list(known)
+    for name in wanted:
+        if name not in known:
+            raise InputError(f"must be one of {'; '.join(known)}", name, "--methods")
+    return {name: known[name] for name in wanted}
+
+
+def main(
+    out: Annotated[Path, typer.Argument(help="Folder of the answers.")],
+    folder: Annotated[Path | None, typer.Argument(help="Folder of measured trials; left out: none.")] = None,
+    benchmark: Annotated[Path, typer.Option(help="Folder of the benchmark.")] = benchmark_files.FOLDER,
+    bank: Annotated[Path | None, typer.Option(help="Bank of measured trials; left out: its own.")] = None,
+    names: Annotated[str, typer.Option("--methods", help="Names parted by ';'; left out: all.")] = "",
+    count: Annotated[int | None, typer.Option(help="First so many trials; left out: all.", min=1)] = None,
+    seconds: Annotated[float, typer.Option(help="Begin nothing after this time.")] = math.inf,
+) -> None:
+    """Let the methods answer what they have not answered."""
+    with clear_errors("Resume with the same command."):
+        if folder is None:
+            problems, wanted = emulated_problems(benchmark, count), chosen(names, methods(fresh_runs))
+        else:
+            problems, wanted = measured_problems(Folder(folder), bank, count), chosen(names, methods(None))
+        answers = answer_all(out, problems, wanted, seconds)
+        print(f"{answers} trials have an answer of every method: {out}")
+
+
+if __name__ == "__main__":
+    typer.run(main)
