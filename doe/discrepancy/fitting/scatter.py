@@ -122,7 +122,9 @@ def _parted(
     mean = float(raw.mean())
     total = float(np.sum(moments**2 * error)) * 2.0 / len(raw) ** 2
     between = max(float(np.mean((raw - mean) ** 2 - errors)), 0.0)
-    own = between / (between + errors)
+    spread = between + errors
+    # what has no scatter at all is known without error
+    own = np.divide(between, spread, out=np.zeros_like(spread), where=spread > 0.0)
     return runs, np.maximum(_drawn(mean, total) + own * (raw - mean), 0.0)
 
 

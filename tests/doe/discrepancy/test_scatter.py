@@ -1,0 +1,29 @@
+"""Scatter of replicates: that of the runs, and that of their readings."""
+
+import numpy as np
+
+from doe.discrepancy.fitting.scatter import Scatter
+
+FREEDOM = 40.0
+
+
+def scatter_of(moments: np.ndarray) -> Scatter:
+    """Scatter of a condition whose mean products of deviations are so many."""
+    return Scatter({"base": FREEDOM * moments}, {"base": np.full(moments.shape, FREEDOM)})
+
+
+def test_readings_are_told_from_runs() -> None:
+    model = np.array([[1.0, 0.8, 0.5], [0.8, 1.0, 0.4], [0.5, 0.4, 1.0]])
+    excess = scatter_of(model + np.diag([0.0, 0.0, 2.0])).excess({"base": model}, 1e6, 3)
+    assert excess.runs == 1.0
+    # Of two variances that 40 degrees of freedom know to a quarter each, most is left where they are.
+    assert 1.2 < excess.reading[2] < 2.0
+    assert excess.reading[:2].max() < 0.5
+
+
+def test_what_has_no_scatter_at_all_is_no_excess() -> None:
+    for moments in (np.diag([1.0, 0.0]), np.zeros((2, 2))):
+        excess = scatter_of(moments).excess({"base": np.eye(2)}, 1e6, 2)
+        assert excess.runs == 1.0
+        assert excess.reading[1] == 0.0
+        assert np.isfinite(excess.reading).all()
