@@ -149,7 +149,7 @@ def main(
     )
     ratio = (times[False] / times[True]).groupby(level=["laws", "grains"]).agg(["median", "min", "max"])
     head = (
-        f"# Whole heaps\n\n{machine('cpu')}, shared with other work. Processor time from the first grain to "
+        f"On {machine('cpu')}, shared with other work. Processor time from the first grain to "
         f"rest, {grains} grains from the same seed here and in the code that `dem-warp export` writes them "
         "for, in turn."
     )
