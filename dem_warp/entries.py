@@ -2,8 +2,8 @@
 
 MAX_SPHERES_PER_GRAIN = 256
 
-_MAX_PARTNER_BITS = 24
-"""Lists of more partners would need more memory than one device has."""
+_MAX_PARTNER_BITS = 27
+"""Lists of more partners need more memory than one device has."""
 
 
 def partner_bits(sphere_count: int) -> int:

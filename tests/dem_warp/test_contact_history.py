@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from worlds import GRAIN, GRAVITY, RADIUS, grains, pair, solve, world
 
-from dem_warp.entries import SPHERE_MASK
+from dem_warp.entries import max_partners
 from dem_warp.materials import rayleigh_time
 from dem_warp.solver import Solver
 from dem_warp.walls import Motion, Plane
@@ -59,7 +59,7 @@ def springs(solver: Solver) -> dict[tuple[int, int], np.ndarray]:
     entries = neighbours.entry.numpy().reshape(-1, neighbours.capacity)[row : row + 2]
     histories = neighbours.history.numpy().reshape(-1, neighbours.capacity, 4)[row : row + 2]
     return {
-        (g, int(entries[g, k]) & SPHERE_MASK): histories[g, k].copy()
+        (g, int(entries[g, k]) % max_partners(solver.layout.sphere_count)): histories[g, k].copy()
         for g in range(2)
         for k in range(counts[g])
         if histories[g, k, :3].any()

@@ -13,5 +13,5 @@ def test_the_last_sphere_and_the_last_partner_come_back_from_an_entry(spheres: i
     assert divmod(entry, max_partners(spheres)) == (own, partner)
 
 
-def test_three_million_clumps_of_three_fit_into_a_world() -> None:
-    assert max_partners(3) > 3 * 3_000_000
+def test_three_million_clumps_of_nine_fit_into_a_world() -> None:
+    assert max_partners(9) > 9 * 3_000_000
