@@ -28,10 +28,8 @@ CONVENTIONS = LawsOfCode(
             "edem_rvd": "RVD Rolling Friction",
         },
     },
-    # what resists the relative roll, with the reduced radius, is nearer to Type C than to a torque on each spin
-    dict.fromkeys(
-        ("relative_constant", "cdt", "epsd2", "sds", "rocky_3", "yade", "deme"), "elastic_plastic"
-    ),
+    # what resists the relative roll is nearer to Type C than to a torque on each spin
+    dict.fromkeys(("relative_constant", "cdt", "epsd2", "sds", "rocky_3", "yade", "deme"), "elastic_plastic"),
 )
 
 TYPE_C_STIFFNESS = 2.25
