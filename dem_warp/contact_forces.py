@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
-from dem_warp.entries import SPHERE_MASK
+from dem_warp.entries import max_partners
 from dem_warp.kernels.probe import probe_kernels
 from dem_warp.rollback import Rollback
 from dem_warp.solver import Solver
@@ -73,7 +73,8 @@ class ForceProbe:
         layout, capacity = solver.layout, solver.neighbours.capacity
         grains = found // capacity
         row = int(solver.neighbours.list.numpy()[world]) * layout.grain_total + world * layout.grain_count
-        partner = solver.neighbours.entry.numpy()[row * capacity + found] & SPHERE_MASK
+        entry = solver.neighbours.entry.numpy()[row * capacity + found]
+        partner = entry % max_partners(layout.sphere_count)
         number = partner - layout.grain_count * layout.sphere_count
         is_wall = number >= 0
         partners = np.where(is_wall, NO_GRAIN, partner // layout.sphere_count)

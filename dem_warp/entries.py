@@ -1,8 +1,23 @@
-"""Entries of the neighbour lists: how many bits name a partner, and so how many partners there may be."""
+"""Entries of the neighbour lists: 31 bits, the own sphere's number above the partner's."""
 
-SPHERE_BITS = 23
-"""Bits of a neighbour entry that hold the partner (a sphere or a wall); above is the own sphere's number."""
+MAX_SPHERES_PER_GRAIN = 256
 
-SPHERE_MASK = (1 << SPHERE_BITS) - 1
-MAX_PARTNERS = 1 << SPHERE_BITS
-MAX_SPHERES_PER_GRAIN = 1 << (31 - SPHERE_BITS)
+_MAX_PARTNER_BITS = 24
+"""Lists of more partners would need more memory than one device has."""
+
+
+def partner_bits(sphere_count: int) -> int:
+    """Bits of an entry that hold the partner (a sphere, a wall or a triangle).
+
+    Parameters
+    ----------
+    sphere_count
+        Spheres of the grain that has most of them; their numbers take the bits above.
+    """
+    own = (sphere_count - 1).bit_length()
+    return min(31 - own, _MAX_PARTNER_BITS)
+
+
+def max_partners(sphere_count: int) -> int:
+    """Partners that the entries of a world can tell apart."""
+    return 1 << partner_bits(sphere_count)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from dem_warp.clumps import ClumpShape
-from dem_warp.entries import MAX_PARTNERS, MAX_SPHERES_PER_GRAIN
+from dem_warp.entries import MAX_SPHERES_PER_GRAIN, max_partners
 from dem_warp.laws.conventions import BASE_FORMS, EDEM, ContactLaws, LawForms
 from dem_warp.laws.library import MECHANISMS
 from dem_warp.laws.mechanism import Mechanism, Mechanisms, check_forms, clashes
@@ -224,9 +224,9 @@ class WorldSetup:
         if spheres > MAX_SPHERES_PER_GRAIN:
             raise ValueError(f"ClumpShape: at most {MAX_SPHERES_PER_GRAIN} spheres a grain, got {spheres}")
         partners = spheres * self.grains.count + len(self.walls) + self.triangle_count
-        if partners > MAX_PARTNERS:
+        if partners > (most := max_partners(spheres)):
             raise ValueError(
-                f"WorldSetup.grains: at most {MAX_PARTNERS} spheres, walls and triangles, got {partners}"
+                f"WorldSetup.grains: at most {most} spheres, walls and triangles, got {partners}"
             )
 
     @property

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from dem_warp.entries import SPHERE_BITS, SPHERE_MASK
+from dem_warp.entries import max_partners
 from dem_warp.solver import CHUNK, Solver
 from dem_warp.state import arrays_of
 
@@ -35,7 +35,7 @@ def take_snapshot(solver: Solver, world: int) -> Snapshot:
     """
     counts = _counts(solver, world)
     snapshot = {field.name: field.read() for field in _fields(solver, world, counts)}
-    entries = _renumbered(snapshot[ENTRY], *_first_walls(solver, world))
+    entries = _renumbered(solver, snapshot[ENTRY], *_first_walls(solver, world))
     return snapshot | {COUNT: counts[:, None], ENTRY: entries}
 
 
@@ -54,7 +54,7 @@ def put_snapshot(solver: Solver, world: int, snapshot: Snapshot) -> None:
     if odd := sorted(snapshot.keys() ^ {field.name for field in fields}):
         raise ValueError(f"a snapshot must have the fields of the state, got a difference in {odd}")
     in_batch, in_snapshot = _first_walls(solver, world)
-    numbered = snapshot | {ENTRY: _renumbered(snapshot[ENTRY], in_snapshot, in_batch)}
+    numbered = snapshot | {ENTRY: _renumbered(solver, snapshot[ENTRY], in_snapshot, in_batch)}
     filled = [field.filled(numbered[field.name]) for field in fields]
     _check_values(solver, world, snapshot, in_snapshot)
     for field, whole in zip(fields, filled, strict=True):
@@ -124,8 +124,8 @@ def _check_values(solver: Solver, world: int, snapshot: Snapshot, first_wall: in
     if step < 0 or step % CHUNK or (snapshot[COUNT] < 0).any():
         raise ValueError(f"a snapshot must be of whole chunks of {CHUNK} steps, got step {step}")
     partners = first_wall + len(solver.worlds[world].walls) + solver.worlds[world].triangle_count
-    own, partner = entries >> SPHERE_BITS, entries & SPHERE_MASK
-    if entries.size and ((entries < 0) | (own >= solver.layout.sphere_count) | (partner >= partners)).any():
+    own, partner = np.divmod(entries, max_partners(solver.layout.sphere_count))
+    if entries.size and ((own < 0) | (own >= solver.layout.sphere_count) | (partner >= partners)).any():
         raise ValueError(f"{ENTRY}: must name spheres, walls or triangles of the world")
     walls, present = snapshot[WALLS], _fields_of_walls(solver, world)
     for name in FIXED_OF_WALLS:
@@ -168,6 +168,7 @@ def _first_walls(solver: Solver, world: int) -> tuple[int, int]:
     return solver.layout.grain_count * each, solver.worlds[world].grains.count * each
 
 
-def _renumbered(entries: np.ndarray, first: int, new_first: int) -> np.ndarray:
+def _renumbered(solver: Solver, entries: np.ndarray, first: int, new_first: int) -> np.ndarray:
     """Neighbour entries whose walls are counted from another number."""
-    return np.where(entries & SPHERE_MASK >= first, entries + np.int32(new_first - first), entries)
+    partner = entries % max_partners(solver.layout.sphere_count)
+    return np.where(partner >= first, entries + np.int32(new_first - first), entries)

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from dem_warp.entries import SPHERE_BITS, SPHERE_MASK
+from dem_warp.entries import max_partners, partner_bits
 from dem_warp.kernels.lanes import load_pair
 from dem_warp.kernels.packing import packing
 from dem_warp.kernels.walls import wall_functions
@@ -35,6 +35,8 @@ def contact_functions(build: Build) -> SimpleNamespace:
     is_speculative = build.cooperative and build.has_base_law and not build.has_mesh
     walls = wall_functions(build.without_forces)
     spheres_each = wp.constant(build.sphere_count)
+    bits = wp.constant(partner_bits(build.sphere_count))
+    mask = wp.constant(max_partners(build.sphere_count) - 1)
     walls_each = wp.constant(build.wall_count)
 
     @wp.func
@@ -42,9 +44,9 @@ def contact_functions(build: Build) -> SimpleNamespace:
         model: Model, world: World, grains: Grains, w: int, g: int, entry: int, margin: real, step: int
     ) -> bool:
         """Tell whether the two partners of an entry are nearer to each other than a margin [m]."""
-        partner = entry & SPHERE_MASK
+        partner = entry & mask
         wall_base = model.grain_count * spheres_each
-        a = pack.load_sphere(grains.spheres, g * spheres_each + (entry >> SPHERE_BITS))
+        a = pack.load_sphere(grains.spheres, g * spheres_each + (entry >> bits))
         reach = pack.last(a) + margin
         if partner >= wall_base:
             return walls.nears(model, w, partner - wall_base, pack.place(a, world), reach, step)
@@ -56,7 +58,7 @@ def contact_functions(build: Build) -> SimpleNamespace:
     @wp.func
     def is_free(model: Model, neighbours: Neighbours, w: int, item: int, step: int) -> bool:
         """Tell whether the partner in an item of `near` is a grain that moves freely."""
-        partner = load_pair(neighbours.near.item, item)[0] & SPHERE_MASK
+        partner = load_pair(neighbours.near.item, item)[0] & mask
         j = partner // spheres_each
         return j < model.grain_count and step >= model.release_step[w * model.grain_count + j]
 
@@ -122,18 +124,18 @@ def contact_functions(build: Build) -> SimpleNamespace:
     def joined(model: Model, w: int, entry: int, other: int) -> bool:
         """Tell whether the partners of two entries are triangles that share a corner, the first being one."""
         wall_base = model.grain_count * spheres_each
-        return walls.joined(model, w, (entry & SPHERE_MASK) - wall_base, (other & SPHERE_MASK) - wall_base)
+        return walls.joined(model, w, (entry & mask) - wall_base, (other & mask) - wall_base)
 
     @wp.func
     def touches_triangle(
         model: Model, world: World, grains: Grains, w: int, g: int, entry: int, step: int
     ) -> bool:
         """Tell whether the triangle of an entry has a contact with the entry's sphere."""
-        a = pack.load_sphere(grains.spheres, g * spheres_each + (entry >> SPHERE_BITS))
+        a = pack.load_sphere(grains.spheres, g * spheres_each + (entry >> bits))
         reach = pack.last(a)
         if wp.static(is_apart):
             reach += world.reach
-        number = (entry & SPHERE_MASK) - model.grain_count * spheres_each
+        number = (entry & mask) - model.grain_count * spheres_each
         return walls.touches(model, w, number, pack.place(a, world), reach, step)
 
     @wp.func
@@ -151,7 +153,7 @@ def contact_functions(build: Build) -> SimpleNamespace:
         first = row * neighbours.capacity
         for k in range(first, first + neighbours.count[row]):
             other = neighbours.entry[k]
-            if other >> SPHERE_BITS == entry >> SPHERE_BITS and joined(model, w, entry, other):
+            if other >> bits == entry >> bits and joined(model, w, entry, other):
                 if not touches_triangle(model, world, grains, w, g, other, step):
                     history = pack.load_vec4(neighbours.history, k)
                     if pack.stamped_step(history) == step:
@@ -168,7 +170,7 @@ def contact_functions(build: Build) -> SimpleNamespace:
         """Tangential displacement [m] of a contact in the step before, and whether there was no contact."""
         if wp.static(build.has_mesh):
             first_triangle = model.grain_count * spheres_each + walls_each
-            is_triangle = neighbours.entry[slot] & SPHERE_MASK >= first_triangle
+            is_triangle = neighbours.entry[slot] & mask >= first_triangle
             if is_triangle and pack.stamped_step(pack.load_vec4(neighbours.history, slot)) != step:
                 take_over(model, world, grains, neighbours, w, g, slot, step)
         history = pack.load_vec4(neighbours.history, slot)
@@ -211,9 +213,9 @@ def contact_functions(build: Build) -> SimpleNamespace:
         force = vec3()
         torque = vec3()
         rolling = real(0.0)
-        partner = entry & SPHERE_MASK
+        partner = entry & mask
         wall_base = model.grain_count * spheres_each
-        a = pack.load_sphere(grains.spheres, g * spheres_each + (entry >> SPHERE_BITS))
+        a = pack.load_sphere(grains.spheres, g * spheres_each + (entry >> bits))
         radius = pack.last(a)
         apart = real(0.0)
         if wp.static(is_apart):

@@ -14,7 +14,7 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from dem_warp.entries import SPHERE_BITS
+from dem_warp.entries import partner_bits
 from dem_warp.kernels.packing import packing
 from dem_warp.laws.contact_law import memory_size
 from dem_warp.types import Build, WorldFlag, device_structs
@@ -40,6 +40,7 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
     Model, Grains, Neighbours, Cells = types.Model, types.Grains, types.Neighbours, types.Cells
     pack = packing(precision)
     spheres_each = wp.constant(build.sphere_count)
+    bits = wp.constant(partner_bits(build.sphere_count))
     memory_each = wp.constant(memory_size(build.mechanisms, build.forms))
     lanes = wp.constant(list_lanes(build))
     module = wp.get_module(f"dem_warp_neighbours_{build.name}")
@@ -95,7 +96,7 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
             partner = cells.found[found + k]
             place = before + rank_of(cells.found, found, own, partner)
             if place < world.most_listed:
-                entry = (s << SPHERE_BITS) | partner
+                entry = (s << bits) | partner
                 slot = new_row * neighbours.capacity + place
                 history = vec4(real(0.0), real(0.0), real(0.0), real(-1.0))
                 old = place_of(neighbours.entry, old_first, old_count, entry, place)

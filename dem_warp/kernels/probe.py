@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from dem_warp.entries import SPHERE_BITS, SPHERE_MASK
+from dem_warp.entries import max_partners, partner_bits
 from dem_warp.kernels.contacts import contact_functions
 from dem_warp.kernels.packing import packing
 from dem_warp.kernels.walls import wall_functions
@@ -24,6 +24,8 @@ def probe_kernels(build: Build) -> SimpleNamespace:
     contacts = contact_functions(build)
     walls = wall_functions(build.without_forces)
     spheres_each = wp.constant(build.sphere_count)
+    bits = wp.constant(partner_bits(build.sphere_count))
+    mask = wp.constant(max_partners(build.sphere_count) - 1)
     module = wp.get_module(f"dem_warp_probe_{build.name}")
     wp.set_module_options(
         {"fast_math": build.cooperative and precision.is_fixed_point, "enable_backward": False}, module
@@ -32,9 +34,9 @@ def probe_kernels(build: Build) -> SimpleNamespace:
     @wp.func
     def meeting_point(model: Model, world: World, grains: Grains, w: int, g: int, entry: int, step: int):
         """Point [m] and unit normal, from the partner to the grain, of an entry whose two meet."""
-        partner = entry & SPHERE_MASK
+        partner = entry & mask
         wall_base = model.grain_count * spheres_each
-        a = pack.load_sphere(grains.spheres, g * spheres_each + (entry >> SPHERE_BITS))
+        a = pack.load_sphere(grains.spheres, g * spheres_each + (entry >> bits))
         radius = pack.last(a)
         place = pack.place(a, world)
         normal = vec3()

@@ -11,7 +11,7 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from dem_warp.entries import SPHERE_MASK
+from dem_warp.entries import max_partners
 from dem_warp.kernels.contacts import contact_functions
 from dem_warp.kernels.lanes import WARP, bit_count, lanes_with, largest_of_warp
 from dem_warp.kernels.packing import packing
@@ -50,6 +50,7 @@ def watch_kernels(build: Build) -> SimpleNamespace:
     contacts = contact_functions(build)
     walls = wall_functions(build.without_forces)
     spheres_each = wp.constant(build.sphere_count)
+    mask = wp.constant(max_partners(build.sphere_count) - 1)
     walls_each = wp.constant(build.wall_count)
     lanes = wp.constant(WARP if build.cooperative else 1)
     module = wp.get_module(f"dem_warp_watch_{build.name}")
@@ -177,7 +178,7 @@ def watch_kernels(build: Build) -> SimpleNamespace:
         row = neighbours.list[w] * model.shape.shape[0] + g
         striker = float(0.0)
         for k in range(lane, neighbours.count[row], lanes):
-            partner = neighbours.entry[row * neighbours.capacity + k] & SPHERE_MASK
+            partner = neighbours.entry[row * neighbours.capacity + k] & mask
             speed = neighbours.near.wall_speed[w]
             if partner < model.grain_count * spheres_each:
                 j = w * model.grain_count + partner // spheres_each
@@ -225,7 +226,7 @@ def watch_kernels(build: Build) -> SimpleNamespace:
             is_near = bool(False)
             if k < count:
                 entry = neighbours.entry[slot]
-                partner = entry & SPHERE_MASK
+                partner = entry & mask
                 path = neighbours.near.wall_path[w]
                 if partner < model.grain_count * spheres_each:
                     path = farthest(

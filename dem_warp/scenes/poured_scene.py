@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from dem_warp.case import Case
-from dem_warp.entries import MAX_PARTNERS
+from dem_warp.entries import max_partners
 from dem_warp.materials import WallPart
 from dem_warp.model import GRAVITY, ContactCoefficients, Grains, WorldSetup
 from dem_warp.parameters import Parameter, check_parameters
@@ -165,7 +165,7 @@ class PouredScene(ABC):
         """
         mean_volume = case.grains.mean(lambda shape: shape.volume)
         count = self.grain_count or np.ceil(self.densest_fill * self.volume / mean_volume)
-        most = MAX_PARTNERS // case.grains.sphere_count
+        most = max_partners(case.grains.sphere_count) // case.grains.sphere_count
         if not count <= most:
             raise ValueError(
                 f"{type(self).__name__}: must hold at most {most:,} grains of {case.grains.sphere_count} "

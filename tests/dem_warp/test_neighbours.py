@@ -18,7 +18,7 @@ from worlds import (
     world,
 )
 
-from dem_warp.entries import SPHERE_BITS, SPHERE_MASK
+from dem_warp.entries import max_partners, partner_bits
 from dem_warp.solver import Solver
 from dem_warp.types import WorldFlag
 from dem_warp.walls import Plane
@@ -36,7 +36,7 @@ def listed(solver: Solver) -> list[tuple[int, int]]:
     counts = neighbours.count.numpy()[row : row + n]
     entries = neighbours.entry.numpy().reshape(-1, neighbours.capacity)[row : row + n]
     return [
-        (g * SPHERES + (entry >> SPHERE_BITS), entry & SPHERE_MASK)
+        (g * SPHERES + (entry >> partner_bits(SPHERES)), entry % max_partners(SPHERES))
         for g in range(n)
         for entry in entries[g, : counts[g]].tolist()
     ]

@@ -32,7 +32,7 @@ IMPOSSIBLE = {
     "skin": (small_case(skin=1000.0), "skin: lists of"),
     "tall": (few(height=1.0e4, grain_count=None), "must hold at most"),
     "narrow": (few(diameter=0.002), "the rain finds no free place"),
-    "many": (few(grain_count=10**9), "must hold at most 932,067 grains of 9 spheres"),
+    "many": (few(grain_count=10**9), "must hold at most 1,864,135 grains of 9 spheres"),
     "fast": (few(rain_speed=100.0), "outran the neighbour lists"),
 }
 

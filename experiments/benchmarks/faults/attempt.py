@@ -92,6 +92,8 @@ class Command:
             self.kill()
             self.wait()
         said = self._said.read_text(encoding="utf-8", errors="replace")
+        # records name no place of one machine
+        said = said.replace(f"{Path.cwd()}{os.sep}", "")
         return Ending(int(self._code or 0), said, time.monotonic() - self._started)
 
 
