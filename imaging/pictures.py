@@ -37,7 +37,8 @@ def read_picture(path: str | Path) -> Picture:
     """
     file = Path(path)
     if not os.path.isfile(file):  # a name too long is none, and raises nothing
-        raise PictureError("the picture is a file", "no such file", str(path))
+        found = "a folder; name what is in it, as FOLDER/*.jpg" if os.path.isdir(file) else "no such file"
+        raise PictureError("the picture is a file", found, str(path))
     if file.suffix.lower() in HEIC_ENDINGS:
         return _read_heic(file)
     if (length := file.stat().st_size) > LARGEST_FILE:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from imaging.elevation import level_outline
 from imaging.errors import PictureError
 from imaging.geometry import FloatArray
 from imaging.outline import Outline
@@ -17,9 +18,12 @@ STATIONS = tuple(round(SPACING * number, 1) for number in range(8))
 
 
 def heap_profile(outline: Outline) -> FloatArray:
-    """Heights of an outline at `STATIONS`, in its pixels, or in metres where its scale is known."""
-    scale = outline.meters_per_pixel or 1.0
-    return profile_heights(outline.position * scale, outline.height * scale)
+    """Heights of an outline at `STATIONS`, in its pixels, or in metres where its scale is known.
+
+    The height of the camera is taken out of it.
+    """
+    scale, level = outline.meters_per_pixel or 1.0, level_outline(outline)
+    return profile_heights(level.position * scale, level.height * scale)
 
 
 def profile_heights(position: ArrayLike, height: ArrayLike, place: str = "outline") -> FloatArray:

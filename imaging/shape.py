@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from imaging.elevation import level_outline
 from imaging.flanks import apex_column
 from imaging.geometry import FloatArray
 from imaging.outline import Outline
@@ -31,8 +32,9 @@ class HeapShape:
 
 
 def heap_shape(outline: Outline) -> HeapShape:
-    """Measure the shape of an outline (see `find_outline`)."""
-    x, h = outline.position, outline.height
+    """Measure the shape of an outline (see `find_outline`), the height of the camera taken out of it."""
+    level = level_outline(outline)
+    x, h = level.position, level.height
     scale = outline.meters_per_pixel or 1.0
     step = np.gradient(x)
     apex = apex_column(x, h)

@@ -92,10 +92,10 @@ def _on_plate(
     for border, name in ((heap[:, 0], "left"), (heap[:, -1], "right"), (heap[0], "top")):
         if border.any():
             rule = "the whole heap is in the picture"
-            raise PictureError(rule, f"a heap cropped by the {name} border", place)
+            raise PictureError(rule, f"no heap, or one cropped by the {name} border", place)
     if not plate.visible and body[-1].any():
         rule = "the heap stands on its plate, its whole foot in the picture"
-        raise PictureError(rule, "something that goes on below the bottom border: no heap?", place)
+        raise PictureError(rule, "no heap, or one that goes on below the bottom border", place)
     return plate, body, heap
 
 

@@ -251,15 +251,17 @@ def _ended_with(code: int) -> str:
 
 
 def _last_words(folder: Path) -> str:
-    """Last line that a program wrote, of its errors or else of its output."""
-    for name in (keeper.ERRORS, keeper.OUTPUT):
+    """Last line that a program wrote: one that says ``ERROR``, else of its errors, else of its output."""
+    lines = []
+    for name in (keeper.OUTPUT, keeper.ERRORS):
         try:
             text = (folder / name).read_bytes()[-4096:].decode("utf-8", "replace")
         except OSError:
             continue
-        if lines := [line.strip() for line in text.splitlines() if line.strip()]:
-            return f"; its last words: {lines[-1][:TOLD]}"
-    return ""
+        lines += [line.strip() for line in text.splitlines() if line.strip()]
+    # Yade greets on the stream of its errors, and all codes here write an ERROR to their output
+    telling = [line for line in lines if line.startswith("ERROR")] or lines
+    return f"; its last words: {telling[-1][:TOLD]}" if telling else ""
 
 
 def _remove_others(folder: Path, kept: set[str]) -> None:

@@ -28,7 +28,8 @@ CONVENTIONS = LawsOfCode(
             "edem_rvd": "RVD Rolling Friction",
         },
     },
-    {"own_spin_whole_step": "own_spin"},
+    # what resists the relative roll is nearer to Type C than to a torque on each spin
+    dict.fromkeys(("relative_constant", "cdt", "epsd2", "sds", "rocky_3", "yade", "deme"), "elastic_plastic"),
 )
 
 TYPE_C_STIFFNESS = 2.25

@@ -74,7 +74,8 @@ class LawsOfCode:
     def _taken(self, law: str, choice: str) -> str:
         if choice in self.has[law]:
             return choice
-        return self.nearest.get(choice, next(iter(self.has[law])))
+        near = self.nearest.get(choice)  # two laws may have choices of one name
+        return near if near in self.has[law] else next(iter(self.has[law]))
 
 
 def mechanism_warnings(case: Case[Any], code: str) -> tuple[str, ...]:

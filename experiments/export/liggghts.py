@@ -25,7 +25,7 @@ CONVENTIONS = LawsOfCode(
         "friction_load": {"size": ""},
         "rolling": {"epsd2": "rolling_friction epsd2", "cdt": "rolling_friction cdt"},
     },
-    {"own_spin": "cdt", "own_spin_whole_step": "cdt", "relative_constant": "cdt", "rocky_3": "cdt"},
+    {"own_spin": "cdt", "own_spin_whole_step": "cdt", "relative_constant": "cdt"},
 )
 
 LAWS = "hertz tangential history rolling_friction cdt"

@@ -24,7 +24,7 @@ CONVENTIONS = LawsOfCode(
         "friction_load": {"push": ""},
         "rolling": {"rocky_3": "Type C: Linear Spring Rolling Limit", "own_spin": "Type A: Constant Moment"},
     },
-    {},
+    {"own_spin_whole_step": "own_spin"},
 )
 
 _SOURCE = "Ansys Rocky, DEM Technical Manual"

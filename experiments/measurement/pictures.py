@@ -16,7 +16,7 @@ from imaging import FITS, FitSettings, PictureError
 if TYPE_CHECKING:
     from imaging import ReposeAngle
 
-SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp")
+SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp", ".heic", ".heif")
 """Endings of the pictures that are looked for in a folder."""
 
 

@@ -75,6 +75,8 @@ def _fitted(campaign: Campaign, study: Study) -> dict[str, Any]:
         "numerics": numerics.model_dump(exclude_none=True),
         "response": {response.name: _response(campaign, response) for response in campaign.responses},
     }
+    if study.engine is not None:
+        facts["engine"] = study.engine.name or study.engine.command
     if study.walls:
         facts["walls"] = {name: part.model_dump(exclude_none=True) for name, part in study.walls.items()}
     scenes, document = {response.scene for response in campaign.responses}, study.document

@@ -11,6 +11,7 @@ import subprocess
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ from dem_warp import (
     PRESETS,
     Case,
     ClumpShape,
+    ContactLaws,
     GrainPopulation,
     Interaction,
     LiftedCylinder,
@@ -27,6 +29,7 @@ from dem_warp import (
     Numerics,
     ShapeMixture,
 )
+from dem_warp.laws.conventions import Rolling
 from dem_warp.laws.twisting import Twisting
 from dem_warp.population import SIZE_VARIANCE
 from experiments.cli import app
@@ -187,6 +190,19 @@ def test_a_sheet_for_edem_names_its_rolling_friction_with_its_ratio(laws: str) -
     assert f",Rolling Friction,{words[chosen.rolling]}," in text
     ratio = f",Rolling Viscous Damping Ratio,{chosen.rolling_damping:g}," in text
     assert ratio is (chosen.rolling == "elastic_plastic")
+
+
+@pytest.mark.parametrize("code", ["edem", "rocky"])
+@pytest.mark.parametrize("rolling", get_args(Rolling))
+def test_what_stands_for_a_rolling_law_turns_the_same_way(code: str, rolling: Rolling) -> None:
+    # a torque on each spin misses a drum by ten degrees that one on the relative roll meets
+    stands = EXPORTERS[code].conventions.taken(ContactLaws(rolling=rolling))["rolling"]
+    assert rolling.startswith("own_spin") == stands.startswith("own_spin")
+
+
+@pytest.mark.parametrize("rolling", ["rocky_3", "sds", "yade"])
+def test_a_spring_stands_for_a_spring_in_liggghts(rolling: Rolling) -> None:
+    assert EXPORTERS["liggghts"].conventions.taken(ContactLaws(rolling=rolling))["rolling"] == "epsd2"
 
 
 def test_a_rolling_spring_that_edem_has_no_entry_for_is_told() -> None:

@@ -80,6 +80,8 @@ def test_picture_without_a_whole_heap_is_refused_with_its_reason(picture: np.nda
 def test_missing_and_foreign_files_are_named(tmp_path) -> None:
     with pytest.raises(PictureError, match=r"nowhere\.png.*no such file"):
         measure_photograph(tmp_path / "nowhere.png")
+    with pytest.raises(PictureError, match=r"a folder; name what is in it"):
+        measure_photograph(tmp_path)
     text = tmp_path / "notes.png"
     text.write_text("no picture")
     with pytest.raises(PictureError, match=r"notes\.png"):

@@ -13,6 +13,7 @@ import pandas as pd
 import typer
 
 from experiments import api
+from experiments.benchmarks.bridge.laws_of_liggghts import in_laws
 from experiments.commands.console import CaseProgress, clear_errors
 
 HERE = Path(__file__).parent
@@ -24,21 +25,23 @@ def main(
     out: Annotated[Path, typer.Option(help="Folder of all campaigns and bridges; it may have some of them.")],
     grains: Annotated[list[str] | None, typer.Option("--grain", help="One of the grains.")] = None,
     engines: Annotated[list[str] | None, typer.Option("--engine", help="Code to bridge to.")] = None,
+    laws: Annotated[str | None, typer.Option(help="Set of contact laws. Left out: the studies' own.")] = None,
     workers: Annotated[int | None, typer.Option(min=1, help="Cases at once. Left out: one a core.")] = None,
 ) -> None:
     """Calibrate and bridge every grain, and write ``bridges.csv``."""
     rows = []
     for grain in grains or GRAINS:
-        card = out / grain / "material.toml"
+        home = out / (f"{grain}-of-{laws}" if laws else grain)
+        card = home / "material.toml"
         with clear_errors():
             if not card.is_file():
-                resume = (out / grain).is_dir()
-                study = HERE / f"{grain}.toml"
+                file = HERE / f"{grain}.toml"
+                study = in_laws(file, None, laws) if laws else file
                 api.calibrate(
-                    study, out / grain, device="cpu", workers=workers, resume=resume, watch=CaseProgress
+                    study, home, device="cpu", workers=workers, resume=home.is_dir(), watch=CaseProgress
                 )
             for engine in engines or ["liggghts"]:
-                folder = out / f"{grain}-{engine}"
+                folder = out / f"{home.name}-{engine}"
                 found = api.bridge(
                     card,
                     folder,
@@ -48,7 +51,7 @@ def main(
                     resume=folder.is_dir(),
                     watch=CaseProgress,
                 )
-                rows.append(_row(grain, engine, found.to_dict()))
+                rows.append(_row(home.name, engine, found.to_dict()))
                 typer.echo(json.dumps(rows[-1]))
     pd.DataFrame(rows).to_csv(out / "bridges.csv", index=False)
 

@@ -32,6 +32,7 @@ from pathlib import Path
 text = Path(sys.argv[sys.argv.index("-in") + 1]).read_text()
 if "{way}" == "error":
     print("ERROR: Fix gravity redefined")
+    print("Running script lift.py", file=sys.stderr)
     raise SystemExit(1)
 if "{way}" != "silent":
     rows = ["1 1 0 0 0.002 0.002", "2 1 0.004 0 0.002 0.002"]

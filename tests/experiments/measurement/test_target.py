@@ -103,6 +103,13 @@ def test_every_picture_without_a_heap_is_named(from_source, photographs: list[Pa
     assert "contrast" in error.value.value
 
 
+def test_a_phones_heic_in_the_folder_is_not_passed_over(from_source, photographs: list[Path]) -> None:
+    (photographs[0].parent / "IMG_1.HEIC").write_bytes(b"no picture")
+    with pytest.raises(InputError, match=r"IMG_1\.HEIC") as error:
+        with_measurements(from_source('pictures = "photos"'))
+    assert "HEIC" in error.value.problems[0].value
+
+
 def test_a_file_of_heaps_becomes_a_response_for_each_observable(from_source, tmp_path: Path) -> None:
     (tmp_path / "measured.csv").write_text(MEASURED, encoding="utf-8")
     study, notes = with_measurements(from_source('file = "measured.csv"', CONDITIONS))

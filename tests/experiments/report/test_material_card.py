@@ -85,6 +85,12 @@ def test_a_card_tells_what_was_fitted_and_what_is_as_good(card: Path, campaign: 
     assert (np.abs(fitted["mean"] - target.mean) < 4.0 * error).all()
 
 
+def test_a_card_says_which_other_solver_made_it(campaign: Campaign, study: Study) -> None:
+    other = study.with_document(study.document | {"engine": {"command": "python3 solver.py"}})
+    assert material_card(campaign, campaign.optimum, other)["fitted"]["engine"] == "python3 solver.py"
+    assert "engine" not in material_card(campaign, campaign.optimum, study)["fitted"]
+
+
 def test_a_campaign_without_a_point_has_no_card(campaign: Campaign, study: Study, tmp_path: Path) -> None:
     assert write_material_card(replace(campaign, optimum=None), study, tmp_path) is None
     assert list(tmp_path.iterdir()) == []
