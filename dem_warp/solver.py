@@ -9,7 +9,7 @@ import warp as wp
 
 from dem_warp.kernels.cells import cell_kernels
 from dem_warp.kernels.lanes import BLOCK, WARP
-from dem_warp.kernels.neighbours import list_lanes, neighbour_kernels
+from dem_warp.kernels.neighbours import list_threads, neighbour_kernels
 from dem_warp.kernels.step import step_kernels
 from dem_warp.kernels.summation import MIN_LANES
 from dem_warp.kernels.walls import wall_kernels
@@ -34,8 +34,9 @@ CHUNK = 256
 """Steps that `advance` takes at the least; a multiple of every length of a cycle."""
 
 SHORTEST_CYCLE, LONGEST_CYCLE = 2, 64
-SKIN_PER_CYCLE = 0.1
-"""Part of the skin that the fastest grain of a world may use up between two looks at the neighbour list."""
+SKIN_PER_CYCLE, SKIN_PER_SERIAL_CYCLE = 0.1, 0.2
+"""Part of the skin that the fastest grain of a world may use up between two looks at the neighbour list, on a
+GPU and on a CPU, where a rebuild costs what has moved alone."""
 
 SHORT_CYCLE, SKIN_PER_SHORT_CYCLE = 8, 0.25
 """Steps up to which it may use up more on a GPU, where so few hardly pay for the look."""
@@ -186,8 +187,9 @@ class Solver:
         self._launch(cells.bin_spheres, spheres, [self.model, grains, self.alive, self.stale, self.cells])
         self._launch(cells.open_buckets, self._whole_warps(spheres), [self.model, self.stale, self.cells])
         self._launch(cells.fill_buckets, spheres, [self.model, grains, self.stale, self.cells])
-        self._launch(cells.search, spheres, [self.model, grains, self.stale, self.cells])
-        threads = spheres * list_lanes(self.build)
+        near = self.neighbours.near
+        self._launch(cells.search, spheres, [self.model, grains, self.stale, near, self.cells])
+        threads = self.layout.grain_total * list_threads(self.build)
         self._launch(
             lists.write_lists, threads, [self.model, self.stale, self.cells, self.neighbours, self.flags]
         )
@@ -257,8 +259,11 @@ class Solver:
         speed = self.fastest.numpy()[self._running] + gravity * chunks * CHUNK * time_step
         with np.errstate(divide="ignore"):
             free = float(np.min(skin / (speed * time_step)))
-        short = min(SKIN_PER_SHORT_CYCLE * free, SHORT_CYCLE) if self.device.is_cuda else 0.0
-        length = max(SKIN_PER_CYCLE * free, short, SHORTEST_CYCLE)
+        if self.device.is_cuda:
+            length = max(SKIN_PER_CYCLE * free, min(SKIN_PER_SHORT_CYCLE * free, SHORT_CYCLE))
+        else:
+            length = SKIN_PER_SERIAL_CYCLE * free
+        length = max(length, SHORTEST_CYCLE)
         return int(2 ** np.floor(np.log2(min(length, self.cycle_limit))))
 
     def advance(self, chunks: int = 1) -> None:

@@ -245,11 +245,12 @@ def build_neighbours(
     near.path = wp.zeros(layout.grain_total, dtype=precision.real, device=device)
     near.wall_path = wp.zeros(layout.world_count, dtype=precision.real, device=device)
     near.travel = wp.zeros(layout.grain_total, dtype=precision.real, device=device)
+    serial = 0 if wp.get_device(device).is_cuda else layout.grain_total
+    near.moves = wp.zeros(serial, dtype=int, device=device)
     neighbours.near = near
     neighbours.reactions = device_structs(precision).Reactions()
     for name in ("force", "torque"):
-        reacting = 0 if wp.get_device(device).is_cuda else layout.grain_total
-        setattr(neighbours.reactions, name, wp.zeros(reacting, dtype=precision.vec4, device=device))
+        setattr(neighbours.reactions, name, wp.zeros(serial, dtype=precision.vec4, device=device))
     return neighbours
 
 

@@ -232,6 +232,7 @@ def device_structs(precision: Precision) -> SimpleNamespace:
         path: wp.array(dtype=real)  # farthest that a grain may come meanwhile [m], (grains,)
         wall_path: wp.array(dtype=real)  # and any wall [m], (worlds,)
         travel: wp.array(dtype=real)  # of a grain when this was written [m], (grains,)
+        moves: wp.array(dtype=int)  # 1: it used up much of the skin, (grains,) on a CPU, else (0,)
 
     @wp.struct
     class Reactions:  # to the contacts, so far in a step, with grains before it; 0 between steps
@@ -246,8 +247,9 @@ def device_structs(precision: Precision) -> SimpleNamespace:
         entry: wp.array(dtype=int)  # own sphere's number and partner, (2 * grains * capacity,)
         history: wp.array(dtype=vec4)  # tangential displacement [m] and the step of it, one an entry
         memory: wp.array(dtype=real)  # what the mechanisms remember of a contact, in SI units
-        rebuilt: wp.array(dtype=int)  # step of the last rebuild, (worlds,)
-        travel: wp.array(dtype=real)  # path of a grain's farthest point since the rebuild [m], (grains,)
+        rebuilt: wp.array(dtype=int)  # step of the last rebuild of all lists, (worlds,)
+        # path of a grain's farthest point since its partners were last searched [m], (grains,)
+        travel: wp.array(dtype=real)
         pushed: wp.array(dtype=wp.int64)  # sum of its forces on the weighed wall, in counts, (grains,)
         near: Near
         reactions: Reactions

@@ -12,6 +12,7 @@ import warp as wp
 
 from dem_warp.kernels.lanes import ALL_LANES, WARP, from_lane, lanes_with, running_sum
 from dem_warp.kernels.packing import packing
+from dem_warp.kernels.stale import ALL
 from dem_warp.kernels.triangles import triangle_functions
 from dem_warp.kernels.walls import wall_functions
 from dem_warp.types import Build, device_structs
@@ -28,12 +29,12 @@ def cell_kernels(build: Build) -> SimpleNamespace:
     real = precision.real
     types = device_structs(precision)
     Model, World, Grains, Cells = types.Model, types.World, types.Grains, types.Cells
+    Near = types.Near
     pack = packing(precision)
     walls = wall_functions(build)
     triangles = triangle_functions(precision)
     spheres_each = wp.constant(build.sphere_count)
     walls_each = wp.constant(build.wall_count)
-    first_cell = wp.constant(0 if build.cooperative else OWN_CELL)
     module = wp.get_module(f"dem_warp_cells_{build.name}")
     wp.set_module_options({"enable_backward": False}, module)
 
@@ -143,13 +144,14 @@ def cell_kernels(build: Build) -> SimpleNamespace:
                 append(cells, i, model.grain_count * spheres_each + facets.number + t)
 
     @wp.kernel(module=module)
-    def search(model: Model, grains: Grains, stale: wp.array(dtype=int), cells: Cells):
+    def search(model: Model, grains: Grains, stale: wp.array(dtype=int), near: Near, cells: Cells):
         """Partners of each sphere.
 
         Threads follow the buckets, so that neighbouring threads read the same memory. One thread alone meets
         each pair once: in its own bucket, and in the half of the buckets ahead of it. Many at once find each
         its own partners, so that nobody has to wait for a place in another one's list. Of the first, the
-        earlier grain alone has the other in its list.
+        earlier grain alone has the other in its list; and where some grains have moved, these alone look
+        around, the earlier of two for both.
         """
         slot = wp.tid()
         w = slot // (spheres_each * model.grain_count)
@@ -158,16 +160,21 @@ def cell_kernels(build: Build) -> SimpleNamespace:
             return
         i = cells.order[slot]
         g = i // spheres_each
+        halved = bool(False)
+        if wp.static(not build.cooperative):
+            halved = stale[w] == ALL
+            if not halved and near.moves[g] == 0:
+                return
         world = model.world[w]
         a = pack.load_sphere(cells.ordered, slot)
         reach = pack.last(a) + world.skin + world.reach
         c = cell_of(a, world)
         own = int(0)
-        for n in range(first_cell, CELLS_AROUND):
+        for n in range(wp.where(halved, OWN_CELL, 0), CELLS_AROUND):
             b = bucket_of(c[0] + n % 3 - 1, c[1] + (n // 3) % 3 - 1, c[2] + n // 9 - 1, cells.bits, w)
             begin = first + cells.bucket_start[b]
             end = begin + cells.bucket_size[b]
-            if n == OWN_CELL and first_cell == OWN_CELL:
+            if halved and n == OWN_CELL:
                 begin = slot + 1
             for k in range(begin, end):
                 q = pack.load_sphere(cells.ordered, k)
@@ -175,13 +182,15 @@ def cell_kernels(build: Build) -> SimpleNamespace:
                 touching = reach + pack.last(q)
                 if wp.dot(d, d) < touching * touching:
                     j = cells.order[k]
-                    if j // spheres_each != g:
+                    h = j // spheres_each
+                    if h != g:
                         if wp.static(build.cooperative):
                             if own < cells.found_capacity:
                                 cells.found[i * cells.found_capacity + own] = j - first
                             own += 1
                         else:
-                            append(cells, wp.min(i, j), wp.max(i, j) - first)
+                            if halved or h > g or near.moves[h] == 0:
+                                append(cells, wp.min(i, j), wp.max(i, j) - first)
         if wp.static(build.cooperative):
             cells.found_count[i] = own
         for k in range(walls_each):

@@ -14,21 +14,25 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from dem_warp.entries import partner_bits
+from dem_warp.entries import max_partners, partner_bits
 from dem_warp.kernels.packing import packing
+from dem_warp.kernels.stale import ALL
 from dem_warp.laws.contact_law import memory_size
 from dem_warp.types import Build, WorldFlag, device_structs
 
 NEIGHBOUR_OVERFLOW = wp.constant(int(WorldFlag.NEIGHBOUR_OVERFLOW))
 
 
+NO_ENTRY = wp.constant(2**31 - 1)
+"""Above every entry."""
+
 LIST_LANES = 8
 """Threads that share out the partners of a sphere on a GPU: about half as many as there are."""
 
 
-def list_lanes(build: Build) -> int:
-    """Threads a sphere that `write_lists` is to be launched with."""
-    return LIST_LANES if build.cooperative else 1
+def list_threads(build: Build) -> int:
+    """Threads a grain that `write_lists` is to be launched with."""
+    return LIST_LANES * build.sphere_count if build.cooperative else 1
 
 
 @functools.cache
@@ -41,8 +45,9 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
     pack = packing(precision)
     spheres_each = wp.constant(build.sphere_count)
     bits = wp.constant(partner_bits(build.sphere_count))
+    mask = wp.constant(max_partners(build.sphere_count) - 1)
     memory_each = wp.constant(memory_size(build.mechanisms, build.forms))
-    lanes = wp.constant(list_lanes(build))
+    lanes = wp.constant(LIST_LANES)
     module = wp.get_module(f"dem_warp_neighbours_{build.name}")
     wp.set_module_options({"enable_backward": False}, module)
 
@@ -69,7 +74,7 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
         model: Model, stale: wp.array(dtype=int), cells: Cells, neighbours: Neighbours,
         flags: wp.array(dtype=int),
     ):  # fmt: skip
-        """A sphere's part of its grain's new list, shared out to some lanes on a GPU.
+        """A sphere's part of its grain's new list, shared out to some lanes.
 
         A partner's place is found by counting, as they are few. Histories come over from the old list.
         """
@@ -116,6 +121,89 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
                 neighbours.count[new_row] = wp.min(before + own, world.most_listed)
                 neighbours.travel[g] = real(0.0)
 
+    @wp.func
+    def sort(array: wp.array(dtype=int), first: int, count: int):
+        """Sorts some numbers, which are few, in place."""
+        for k in range(1, count):
+            value = array[first + k]
+            place = int(k)
+            while place > 0 and array[first + place - 1] > value:
+                array[first + place] = array[first + place - 1]
+                place -= 1
+            array[first + place] = value
+
+    @wp.func
+    def stays(model: Model, neighbours: Neighbours, w: int, entry: int) -> bool:
+        """Tell that the partner of an entry has not moved: a wall, or a grain that stays in its place."""
+        partner = entry & mask
+        if partner >= model.grain_count * spheres_each:
+            return True
+        return neighbours.near.moves[w * model.grain_count + partner // spheres_each] == 0
+
+    @wp.func
+    def put(neighbours: Neighbours, slot: int, entry: int, old: int):
+        """Writes an entry, with the history of an old slot where there is one."""
+        history = vec4(real(0.0), real(0.0), real(0.0), real(-1.0))
+        if old >= 0:
+            history = pack.load_vec4(neighbours.history, old)
+            for m in range(memory_each):
+                neighbours.memory[slot * memory_each + m] = neighbours.memory[old * memory_each + m]
+        neighbours.entry[slot] = entry
+        pack.store_vec4(neighbours.history, slot, history)
+
+    @wp.kernel(module=module)
+    def merge_lists(
+        model: Model, stale: wp.array(dtype=int), cells: Cells, neighbours: Neighbours,
+        flags: wp.array(dtype=int),
+    ):  # fmt: skip
+        """A grain's new list by one thread: what was found, and of the old list what stays."""
+        g = wp.tid()
+        w = g // model.grain_count
+        if stale[w] == 0 or cells.rank[g * spheres_each] < 0:
+            return
+        world = model.world[w]
+        moves = stale[w] == ALL or neighbours.near.moves[g] != 0
+        grain_total = model.shape.shape[0]
+        old_row = neighbours.list[w] * grain_total + g
+        new_row = (1 - neighbours.list[w]) * grain_total + g
+        old_end = old_row * neighbours.capacity + neighbours.count[old_row]
+        old = old_row * neighbours.capacity
+        place = int(0)
+        for s in range(model.shape_sphere_count[model.shape[g]]):
+            i = g * spheres_each + s
+            own = wp.min(cells.found_count[i], world.most_found)
+            if cells.found_count[i] > world.most_found:
+                wp.atomic_or(flags, w, NEIGHBOUR_OVERFLOW)
+            found = i * cells.found_capacity
+            sort(cells.found, found, own)
+            end = found + own
+            of_sphere = bool(True)
+            while found < end or of_sphere:
+                listed = int(NO_ENTRY)
+                if old < old_end:
+                    if neighbours.entry[old] >> bits == s:
+                        listed = neighbours.entry[old]
+                of_sphere = listed != NO_ENTRY
+                fresh = int(NO_ENTRY)
+                if found < end:
+                    fresh = (s << bits) | cells.found[found]
+                entry = wp.min(listed, fresh)
+                if entry != NO_ENTRY:
+                    if entry == fresh or (not moves and stays(model, neighbours, w, entry)):
+                        if place < world.most_listed:
+                            slot = new_row * neighbours.capacity + place
+                            put(neighbours, slot, entry, wp.where(entry == listed, old, -1))
+                        place += 1
+                    old += wp.where(entry == listed, 1, 0)
+                    found += wp.where(entry == fresh, 1, 0)
+            # empty for the next time; every sphere of the bucket writes the same
+            cells.bucket_size[cells.bucket[i]] = 0
+        if place > world.most_listed:
+            wp.atomic_or(flags, w, NEIGHBOUR_OVERFLOW)
+        neighbours.count[new_row] = wp.min(place, world.most_listed)
+        if moves:
+            neighbours.travel[g] = real(0.0)
+
     @wp.kernel(module=module)
     def finish(
         grains: Grains, cells: Cells, neighbours: Neighbours,
@@ -124,11 +212,13 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
         w = wp.tid()
         if stale[w] != 0:
             neighbours.list[w] = 1 - neighbours.list[w]
-            neighbours.rebuilt[w] = grains.step[w]
+            if stale[w] == ALL:
+                neighbours.rebuilt[w] = grains.step[w]
             stale[w] = 0
             cells.cursor[w] = 0
             rebuilds[w] = rebuilds[w] + 1
         if w == 0:
             any_stale[0] = 0
 
-    return SimpleNamespace(write_lists=write_lists, finish=finish, module=module)
+    written = write_lists if build.cooperative else merge_lists
+    return SimpleNamespace(write_lists=written, finish=finish, module=module)

@@ -15,6 +15,7 @@ from dem_warp.entries import max_partners
 from dem_warp.kernels.contacts import contact_functions
 from dem_warp.kernels.lanes import WARP, bit_count, lanes_with, largest_of_warp
 from dem_warp.kernels.packing import packing
+from dem_warp.kernels.stale import ALL, SOME
 from dem_warp.kernels.walls import wall_functions
 from dem_warp.types import Build, WorldFlag, device_structs
 
@@ -33,8 +34,9 @@ EXPECTED = 1.5
 LEAST_PATH = 0.025
 """Part of the skin that is allowed for at the least: grains at rest may be set in motion."""
 
-JOINED = 0.25
-"""Part of the skin, up to one half, from which on a world joins a rebuild that another one calls for."""
+JOINED, JOINED_ALONE = 0.25, 0.4
+"""Part of the skin, up to one half, from which on a world joins a rebuild that another one calls for; and, on
+a CPU, a grain one that another grain of its world calls for."""
 
 LATE_REBUILD = wp.constant(int(WorldFlag.LATE_REBUILD))
 
@@ -53,6 +55,7 @@ def watch_kernels(build: Build) -> SimpleNamespace:
     mask = wp.constant(max_partners(build.sphere_count) - 1)
     walls_each = wp.constant(build.wall_count)
     lanes = wp.constant(WARP if build.cooperative else 1)
+    rebuilt = wp.constant(int(ALL if build.cooperative else SOME))
     module = wp.get_module(f"dem_warp_watch_{build.name}")
     wp.set_module_options({"enable_backward": False}, module)
 
@@ -120,13 +123,17 @@ def watch_kernels(build: Build) -> SimpleNamespace:
                 neighbours.near.wall_speed[w] = wp.max(neighbours.near.wall_speed[w], speed)
                 whole = wall_path(model, world, grains, w, i, grains.step[w] + ahead - neighbours.rebuilt[w])
                 if real(2.0) * whole > world.skin:
-                    stale[w] = 1
+                    stale[w] = ALL
                     any_stale[0] = 1
         neighbours.near.speed[g] = speed_of(model, grains, g)
         own = float(HEADROOM) * neighbours.near.speed[g]
         neighbours.near.pace[g] = wp.max(own, float(SHAKEN) * fastest[w])
+        if wp.static(not build.cooperative):
+            moves = uses_up(model, world, grains, neighbours, g, ahead, real(JOINED_ALONE))
+            neighbours.near.moves[g] = wp.where(moves, 1, 0)
         if alive[g] > 0 and uses_up(model, world, grains, neighbours, g, ahead, real(0.5)):
-            stale[w] = 1
+            if stale[w] == 0:
+                stale[w] = rebuilt
             any_stale[0] = 1
 
     @wp.kernel(module=module)
@@ -147,7 +154,7 @@ def watch_kernels(build: Build) -> SimpleNamespace:
         w = g // model.grain_count
         if idle[w] == 0 and alive[g] > 0 and stale[w] == 0:
             if uses_up(model, model.world[w], grains, neighbours, g, ahead, real(JOINED)):
-                stale[w] = 1
+                stale[w] = rebuilt
 
     @wp.kernel(module=module, grid_stride=False)
     def heed_neighbours(

@@ -24,6 +24,9 @@ from experiments.studyfile.sizes_section import SizesSection
 from experiments.studyfile.solver_section import SolverSection
 from experiments.studyfile.wall_sections import InteractionSection, MaterialSection, WallPartSection
 
+LEAST_SIZE, LARGEST_SIZE = 1e-6, 1e6
+"""Sizes of grains, as multiples of their shape, whose cubes are numbers of the machine."""
+
 
 class ShapeSection(Section):
     """Source of a shape: a file of spheres, or the radius of one."""
@@ -85,12 +88,12 @@ class GrainSection(MaterialSection, ShapeSection):
 
     shapes: dict[str, PartSection] = Field(default_factory=dict)
     """Several shapes by name, instead of a clump or a sphere."""
-    size_mean: Number = Field(default=1.0, gt=0.0)
+    size_mean: Number = Field(default=1.0, ge=LEAST_SIZE, le=LARGEST_SIZE)
     """Mean size, as a multiple of the shape."""
     size_mean_of: Literal["sizes", "masses"] = "sizes"
     """Mean of the sizes, as a ruler gives it, or size of a grain of mean mass, as a balance does: a wider
     spread leaves the mass of a number of grains as it is."""
-    size_sd: Number = Field(default=0.05, ge=0.0)
+    size_sd: Number = Field(default=0.05, ge=0.0, le=LARGEST_SIZE)
     """Standard deviation of the size."""
     elongation: Number = Field(default=0.0, ge=0.0)
     """Every shape is drawn out by this part along its longest axis, at the same volume."""

@@ -171,3 +171,12 @@ def test_names_and_integers_beyond_the_machine_are_refused(
     path = write_study((old, new))
     with pytest.raises(InputError):
         with_measurements(load_study(path))
+
+
+@pytest.mark.parametrize(
+    "sizes", ["size_sd = 1e308", "size_mean = 1e-200\nsize_sd = 0.0", "size_mean = 1e200\nsize_sd = 0.1"]
+)
+def test_sizes_whose_cubes_are_no_numbers_are_refused(write_study: WriteStudy, sizes: str) -> None:
+    path = write_study(('sphere = "2 mm"', f'sphere = "2 mm"\nsize_mean_of = "masses"\n{sizes}'))
+    with pytest.raises(StudyError, match="size_(sd|mean): .*(less|greater) than or equal to"):
+        load_study(path)
