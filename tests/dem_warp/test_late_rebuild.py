@@ -28,7 +28,7 @@ def restored(monkeypatch):
 
 def test_a_world_that_outran_its_lists_takes_its_steps_again(heap, restored, monkeypatch):
     # Cycles as long as the fastest grain takes for four skins: what falls outruns its list.
-    monkeypatch.setattr(solver, "SKIN_PER_CYCLE", 4.0)
+    monkeypatch.setattr(solver, "SKIN_PER_SERIAL_CYCLE", 4.0)
     [result] = simulate([small_case()], device="cpu", workers=1)
     assert len(restored) > 1
     assert_same_result(result, heap)
@@ -36,7 +36,7 @@ def test_a_world_that_outran_its_lists_takes_its_steps_again(heap, restored, mon
 
 def test_a_world_that_is_taken_back_changes_no_other(heap, restored, monkeypatch):
     # The wider skin is outrun less often: its world goes on while the other takes its steps again.
-    monkeypatch.setattr(solver, "SKIN_PER_CYCLE", 4.0)
+    monkeypatch.setattr(solver, "SKIN_PER_SERIAL_CYCLE", 4.0)
     cases = [small_case(), small_case(seed=2, skin=2.5e-3)]
     results = run_batch(cases)
     assert restored.count(0) > restored.count(1)

@@ -178,5 +178,5 @@ def test_names_and_integers_beyond_the_machine_are_refused(
 )
 def test_sizes_whose_cubes_are_no_numbers_are_refused(write_study: WriteStudy, sizes: str) -> None:
     path = write_study(('sphere = "2 mm"', f'sphere = "2 mm"\nsize_mean_of = "masses"\n{sizes}'))
-    with pytest.raises(StudyError, match="size_(sd|mean): .*(less|greater) than or equal to"):
+    with pytest.raises(StudyError, match=r"size_(sd|mean): .*(less|greater) than or equal to"):
         load_study(path)

@@ -33,8 +33,8 @@ from experiments.errors import InputError
 from experiments.report.kit.machine import machine
 
 PATIENCE = 600.0
-"""Wall time without a next input after which a process counts as hanging [s]: where others have the machine, one
-that may take what they leave needs minutes to start."""
+"""Wall time without a next input after which a process counts as hanging [s]: on a machine that others have,
+one that may take what they leave needs minutes to start."""
 
 RULE = (
     f"A file may take {SECONDS:g} s of the processor and {MEGABYTES:g} MB. A failure is any end but a value "
