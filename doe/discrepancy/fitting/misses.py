@@ -167,8 +167,8 @@ def misses(model: Model, runs: Runs, centre: np.ndarray, ratio: np.ndarray, cond
 def beside_the_bank(shift: Shift, seen: Sequence[Misses], model: Model) -> Shift:
     """Find a shift again beside what the bank leaves open of the emulator, linearised at the first.
 
-    Beside noise alone it takes up errors of the coefficients, and is stated too well: 83 % of 600 intervals of
-    90 % held the size in emulated twins with a small bank, 88 % of 560 with a large one. A smooth function
+    Beside noise alone it takes up errors of the coefficients, and is stated too well: 83 % of 600 intervals
+    of 90 % held the size in emulated twins with a small bank, 89 % of 560 with a large one. A smooth function
     has no part in it: what it would leave open of the shift, it corrects around the optimum.
     """
     precision = _precision(model)
