@@ -27,7 +27,14 @@ from doe.discrepancy.problem.settings import Settings
 from doe.discrepancy.problem.simulator import Outcomes, Point
 from doe.discrepancy.threads import in_one_thread, steps_in_one_thread
 from doe.discrepancy.verdict.before_after import BeforeAfter, compare
-from doe.discrepancy.verdict.conclusion import Assessment, Conclusion, conclude, explained_share, withdrawn
+from doe.discrepancy.verdict.conclusion import (
+    Assessment,
+    Conclusion,
+    conclude,
+    explained_share,
+    telling_apart,
+    withdrawn,
+)
 from doe.discrepancy.verdict.discovery import (
     Confounding,
     Discovery,
@@ -275,13 +282,19 @@ class _Parts:
     def _next(
         self, base: _Base, conclusion: Conclusion, assessments: Sequence[Assessment]
     ) -> NextExperiment | None:
-        """For the two best explanations, where there are two; else for the best against the base."""
+        """For the two best explanations, where there are two; else for the best against the base.
+
+        Those of a tie are both of the tie.
+        """
         if conclusion.verdict in (Verdict.NONE, Verdict.NOT_IDENTIFIABLE) or not assessments:
             return None
         ranked = [one.fitted for one in sorted(assessments, key=lambda one: one.score)]
+        if conclusion.verdict is Verdict.TIE:
+            ranked = [one for one in ranked if set(one.mechanisms) <= set(conclusion.named)]
         second = ranked[1] if len(ranked) > 1 else base.fitted
         most = max(int(np.max(block.replicates)) for block in self.evidence.training)
-        return propose(ranked[0], second, most)
+        wanted = telling_apart(self.settings.tie_margin, self.settings.power)
+        return propose(ranked[0], second, most, wanted)
 
 
 def _empty(

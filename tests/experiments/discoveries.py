@@ -219,7 +219,7 @@ def made_discovery(verdict: Verdict) -> Discovery:
         else (),
         next_experiment=NextExperiment(
             "wide", (("scene.lifted-cylinder.diameter", "44 mm"),), ("contact_adhesion", "liquid_bridges"),
-            23.0, 8, "t55",
+            23.0, 8, "t55", 20.0,
         )
         if named
         else None,

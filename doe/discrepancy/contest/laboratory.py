@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from doe.discrepancy.emulation.emulator import Emulator
-from doe.discrepancy.fitting.refinement import Runs
+from doe.discrepancy.fitting.misses import Runs
 from doe.discrepancy.problem.simulator import Outcomes, Point
 from doe.errors import RuleError
 

@@ -10,8 +10,9 @@ from scipy import stats
 
 from doe.discrepancy.contest.laboratory import Laboratory, Request
 from doe.discrepancy.fitting.fit import Fitted, fit
+from doe.discrepancy.fitting.misses import Runs
 from doe.discrepancy.fitting.model import Stack
-from doe.discrepancy.fitting.refinement import Runs, correct, has_moved, points_around
+from doe.discrepancy.fitting.refinement import correct, has_moved, points_around
 from doe.discrepancy.problem.settings import Settings
 from doe.discrepancy.problem.simulator import Outcomes, Point
 

@@ -49,9 +49,9 @@ class Scatter:
             M_ij = h R_ij + d_ij r_i,
 
         R being the model's correlation: h comes from the products of different observables, r from what it
-        leaves of the squares. Each is as much nearer to nothing as its standard error makes it (James and
-        Stein 1961, positive part), each r nearer to the mean of all (Efron and Morris 1973). Less scatter
-        than the model's is chance.
+        leaves of the squares. h and the mean of all r are as much nearer to nothing as their standard errors
+        make them (James and Stein 1961, positive part), each r nearer to that mean (Efron and Morris 1973).
+        Less scatter than the model's is chance.
 
         Parameters
         ----------
@@ -125,7 +125,8 @@ def _parted(
     spread = between + errors
     # what has no scatter at all is known without error
     own = np.divide(between, spread, out=np.zeros_like(spread), where=spread > 0.0)
-    return runs, np.maximum(_drawn(mean, total) + own * (raw - mean), 0.0)
+    centre = _drawn(mean, total)
+    return runs, np.maximum(centre + own * (raw - centre), 0.0)
 
 
 def _drawn(value: float, variance: float) -> float:

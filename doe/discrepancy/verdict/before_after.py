@@ -10,8 +10,8 @@ from scipy.linalg import block_diag
 
 from doe.discrepancy.fitting.evidence import Block
 from doe.discrepancy.fitting.fit import Fitted, Interval, whiten
+from doe.discrepancy.fitting.misses import Runs
 from doe.discrepancy.fitting.model import Model, Stack
-from doe.discrepancy.fitting.refinement import Runs
 
 COVERAGE = 0.9
 

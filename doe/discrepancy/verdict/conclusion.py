@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import stats
 
 from doe.discrepancy.contest.gap import Answer, GapTest, Question
 from doe.discrepancy.fitting.fit import Fitted, Interval
@@ -108,7 +109,20 @@ def is_open(behind: float, are_alike: bool, margin: float) -> bool:
         Whether they should look the same.
     margin : float
     """
-    return behind < (margin + 2.0 * CHANCE * margin**0.5 if are_alike else margin)
+    return behind < (_margin_of_alike(margin) if are_alike else margin)
+
+
+def _margin_of_alike(margin: float) -> float:
+    return margin + 2.0 * CHANCE * margin**0.5
+
+
+def telling_apart(margin: float, power: float) -> float:
+    """Compute the Q between two models at which they are told apart with so much power (`is_open`).
+
+    The wrong one is behind by d^2 +- 2 d, which passes the margin of models that look the same.
+    """
+    z = float(stats.norm.ppf(power))
+    return float((z + (z**2 + _margin_of_alike(margin)) ** 0.5) ** 2)
 
 
 def lag(one: Assessment, best: Assessment, margin: float) -> float:

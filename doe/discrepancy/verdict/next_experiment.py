@@ -26,10 +26,24 @@ class NextExperiment:
     replicates: int
     observable: str
     """The observable that differs most."""
+    wanted_q: float
+    """Q between the two that tells them apart."""
+
+    @property
+    def settles(self) -> bool:
+        """True if it can be expected to tell the two apart."""
+        return self.expected_q >= self.wanted_q
 
 
-def propose(first: Fitted, second: Fitted, replicates: int) -> NextExperiment:
+TIMES = (1, 2, 4, 8)
+"""Multiples of the measured replicates that are tried: beyond them the emulator's error is what is left."""
+
+
+def propose(first: Fitted, second: Fitted, replicates: int, wanted_q: float) -> NextExperiment:
     """Choose the condition whose repetition separates two fitted models by most, the second refitted.
+
+    It is repeated as often as it was measured, or twice, four or eight times as often where only that tells
+    them apart.
 
     The expected Q between them is that of the means that the first predicts, fitted by the second
     (linearised) in the old conditions and the new one together.
@@ -38,13 +52,26 @@ def propose(first: Fitted, second: Fitted, replicates: int) -> NextExperiment:
     ----------
     first, second : Fitted
     replicates : int
-        Measurements of the new condition.
+        Measurements of a condition so far.
+    wanted_q : float
+        Q between the two that tells them apart.
 
     Returns
     -------
     NextExperiment
         Without its ``changes``, which whoever defined the conditions knows.
     """
+    tried = (_best(first, second, times * replicates, wanted_q) for times in TIMES)
+    last = next(tried)
+    for each in tried:
+        if last.settles:
+            break
+        last = each
+    return last
+
+
+def _best(first: Fitted, second: Fitted, replicates: int, wanted_q: float) -> NextExperiment:
+    """Choose the condition for so many measurements."""
     emulator = first.model.emulator
     best: tuple[float, str, str] | None = None
     for condition in emulator.space.conditions:
@@ -55,7 +82,7 @@ def propose(first: Fitted, second: Fitted, replicates: int) -> NextExperiment:
     if best is None:
         raise ValueError(f"a next experiment needs a condition (received {emulator.space.conditions})")
     titles = (_title(first), _title(second))
-    return NextExperiment(best[1], (), titles, best[0], replicates, best[2])
+    return NextExperiment(best[1], (), titles, best[0], replicates, best[2], wanted_q)
 
 
 def _separation(first: Fitted, second: Fitted, block: Block) -> tuple[float, np.ndarray]:

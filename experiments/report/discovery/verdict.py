@@ -95,10 +95,11 @@ def next_step(found: Discovery, terms: Terms) -> str:
     pair = " from ".join(models[name] for name in step.separates)
     how = ", ".join(f"{place} = {value}" for place, value in step.changes)
     setting = f"“{step.condition}”" + (f" ({how})" if how else "")
+    settled = "" if step.settles else f", where {trimmed(step.wanted_q, 3)} would tell them apart"
     return (
         f"Measure {step.replicates} heaps under the condition {setting}. It tells {pair} best: after both are"
         f" fitted again they are expected to lie Q = {trimmed(step.expected_q, 3)} apart there, most in the"
-        f" {spaced(step.observable)}."
+        f" {spaced(step.observable)}{settled}."
     )
 
 
@@ -236,8 +237,17 @@ def _unresolved(found: Discovery, terms: Terms, settings: Settings) -> Iterator[
 
 
 def _settle_by_experiment(found: Discovery, terms: Terms, settings: Settings) -> Iterator[str]:
-    if found.next_experiment:
-        yield f"The condition “{found.next_experiment.condition}” would settle it (see the next experiment)."
+    step = found.next_experiment
+    if step is None:
+        return
+    if step.settles:
+        heaps = f"{step.replicates} more heaps under the condition “{step.condition}”"
+        yield f"{capital(heaps)} would settle it (see the next experiment)."
+        return
+    yield f"No condition of the study would settle it, not with {step.replicates} more heaps either."
+    for name in found.named:
+        if name in terms.mechanisms:
+            yield f"To see whether it is {terms.title(name)}: {terms.mechanisms[name].confirm}"
 
 
 def _more_data(found: Discovery, terms: Terms, settings: Settings) -> Iterator[str]:

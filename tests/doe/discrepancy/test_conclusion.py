@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from doe.discrepancy.verdict.conclusion import is_open, lag
+from doe.discrepancy.verdict.conclusion import is_open, lag, telling_apart
 
 MARGIN = 6.0
 DRAWS = 100_000
@@ -42,3 +42,12 @@ def test_a_model_is_not_behind_for_predicting_uncertainly_alone() -> None:
     assert is_open(lag(fits_better, best, MARGIN), False, MARGIN)
     # The emulator alone predicts everything uncertainly.
     assert lag(_candidate(90.0, 40.0, simulated=False), best, MARGIN) == 90.0
+
+
+def test_models_that_far_apart_are_told_apart_with_the_power() -> None:
+    rng = np.random.default_rng(2)
+    distance = telling_apart(MARGIN, 0.8) ** 0.5
+    # the wrong one is behind by the squared distance and twice the distance times a normal number
+    behind = distance**2 + 2.0 * distance * rng.standard_normal(DRAWS)
+    apart = np.mean([not is_open(value, True, MARGIN) for value in behind])
+    assert apart == pytest.approx(0.8, abs=4.0 * (0.8 * 0.2 / DRAWS) ** 0.5)

@@ -11,8 +11,9 @@ from synthetic import CONDITIONS, emulator, measure
 
 from doe.discrepancy.fitting.evidence import gather
 from doe.discrepancy.fitting.fit import coded_size_interval, fit, weigh
+from doe.discrepancy.fitting.misses import Runs, likeliest_shift
 from doe.discrepancy.fitting.model import Model, Shift, Stack
-from doe.discrepancy.fitting.refinement import Runs, correct, likeliest_shift
+from doe.discrepancy.fitting.refinement import correct
 
 OFF = np.array([0.1, -0.05, 0.08, -0.06])
 """The world is the emulator at parameters that are larger by this."""

@@ -27,3 +27,19 @@ def test_what_has_no_scatter_at_all_is_no_excess() -> None:
         assert excess.runs == 1.0
         assert excess.reading[1] == 0.0
         assert np.isfinite(excess.reading).all()
+
+
+def test_readings_that_scatter_less_than_the_model_lend_others_no_excess() -> None:
+    # four of five below the model's scatter: the mean excess is nothing, and the fifth has none of its own
+    excess = scatter_of(np.diag([0.4, 0.4, 0.4, 0.4, 0.9])).excess({"base": np.eye(5)}, 1e6, 5)
+    np.testing.assert_array_equal(excess.reading, np.zeros(5))
+
+
+def test_readings_are_drawn_towards_the_mean_that_is_left() -> None:
+    moments = np.array([3.0, 3.0, 1.0, 1.0, 1.0])
+    reading = scatter_of(np.diag(moments)).excess({"base": np.eye(5)}, 1e6, 5).reading
+    # each lies between its own excess and one mean, so all have the same ratio of distances
+    shares = (reading[0] - reading[2]) / (moments[0] - moments[2])
+    centre = (reading[0] - shares * 2.0) / (1.0 - shares)
+    assert 0.0 < centre < np.mean(moments - 1.0)
+    np.testing.assert_allclose(reading[2:], (1.0 - shares) * centre)

@@ -189,3 +189,19 @@ def test_a_search_has_a_paragraph_and_a_table_to_paste(
     assert verdict_sentence(found, terms) in text
     assert by_name["table-latex"].isascii()
     assert search_pastes(discovered(Verdict.NOT_IDENTIFIABLE), whole_study, terms, {}) == []
+
+
+def test_a_tie_names_what_would_settle_it_and_says_where_no_condition_does(
+    discovered: Discovered, terms: Terms
+) -> None:
+    found = discovered(Verdict.TIE)
+    assert found.next_experiment is not None
+    told = " ".join(changes(found, terms, Settings()))
+    assert "8 more heaps under the condition “wide” would settle it" in told
+    weak = replace(found, next_experiment=replace(found.next_experiment, wanted_q=25.9))
+    told = " ".join(changes(weak, terms, Settings()))
+    assert "would settle it (" not in told
+    assert "No condition of the study would settle it, not with 8 more heaps either." in told
+    # then what each of the two would do by itself
+    for name in found.named:
+        assert terms.mechanisms[name].confirm in told
