@@ -83,8 +83,8 @@ def _made(reality: dict[str, Any]) -> str:
     strange = [
         {"outside the library": name, "what it is": text} for name, text in reality["strangers"].items()
     ]
-    title, tables = f"## How {reality['name']} makes it", (pd.DataFrame(rows), pd.DataFrame(strange))
-    return "\n\n".join((title, f"{reality['laws']}.", *map(markdown_table, tables)))
+    text = f"## How {reality['name']} makes it\n\n{reality['laws']}.\n\n{markdown_table(pd.DataFrame(rows))}"
+    return f"{text}\n{markdown_table(pd.DataFrame(strange))}"
 
 
 def _runs(path: Path) -> str:
@@ -124,22 +124,24 @@ def _view(record: Record, view: str, heading: str, folder: Path) -> list[str]:
     rows, found = record.in_view(view), record.aims(view)
     _draw_power(power_curve(rows), folder / f"power-{view}.png")
     _draw_confusion(confusion(rows), folder / f"confusion-{view}.png")
-    return [
+    verdict = "verdict" if len(rows) == record.sealed else "verdict so far"
+    parts = [
         f"{heading} {_UNAIMED.get(view, '')}",
-        _figures(found) if view in _UNAIMED else _aims(found),
+        _figures(found) if view in _UNAIMED else _aims(found, verdict),
         f"![shares of alarms and names by effect](power-{view}.png)",
         f"![answers by truth](confusion-{view}.png)",
         "Strong effects have a row each. In brackets: trials.",
         "### Strong effects, by mechanism",
         markdown_table(by_mechanism(rows).reset_index()),
-        "### Effects that may not be named",
-        markdown_table(by_outsider(rows).reset_index()),
     ]
+    if len(outside := by_outsider(rows)):
+        parts += ["### Effects that may not be named", markdown_table(outside.reset_index())]
+    return parts
 
 
-def _aims(found: Sequence[Aim]) -> str:
+def _aims(found: Sequence[Aim], verdict: str = "verdict") -> str:
     rows = [
-        {"question": aim.question, "wanted": aim.wanted, "found": aim.found, "verdict": _VERDICTS[aim.passed]}
+        {"question": aim.question, "wanted": aim.wanted, "found": aim.found, verdict: _VERDICTS[aim.passed]}
         for aim in found
     ]
     return markdown_table(pd.DataFrame(rows))

@@ -62,6 +62,7 @@ def test_only_what_has_been_analysed_is_revealed(folder: Folder, tmp_path: Path)
     page = write_trials_page(record).read_text(encoding="utf-8")
     assert "whose heaps LIGGGHTS makes" in page
     assert "1 of 3 trials" in page
+    assert "| verdict so far |" in page
     assert (
         "| one mechanism above 1.5 gamma80: the right name | at least 80 % | 100 % (1 of 1, 3 to 100 %) |"
         in page
