@@ -14,9 +14,9 @@ from experiments.report.kit.machine import machine
 
 DECLARED, SEALED, LABELS = "declared.json", "sealed.csv", "labels.json"
 FINDINGS, RUNS, NOTES, PAGE = "findings.csv", "runs.csv", "notes.md", "README.md"
-REALITY = "reality.json"
-"""Files of a record; labels are there when all is found, notes where something is to be said beside, and the
-reality where another code made the heaps."""
+REALITY, HEAPS = "reality.json", "heaps.zip"
+"""Files of a record; labels are there of what has been analysed, notes where something is to be said beside,
+and the reality and the measured heaps where another code made them."""
 
 
 class Folder:

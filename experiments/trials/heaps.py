@@ -3,20 +3,27 @@
 from __future__ import annotations
 
 import csv
+import zipfile
+import zlib
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from doe.discrepancy import Outcomes, Point
+from experiments.errors import InputError
 from experiments.files import replacing
 from experiments.measurement.calibration import CALIBRATION, NONE
 from experiments.measurement.observables import OBSERVABLES
 from experiments.trials.camera import Camera
-from experiments.trials.truth import Label
+from experiments.trials.folder import Folder
+from experiments.trials.truth import Label, read_sealed
 
 CLOGGED = "clogged"
 """Word of the reason that a tube held its grains, and of its row in a file of measured heaps."""
+
+LARGEST = 1_000_000
+"""Bytes of the largest file of measured heaps in an archive."""
 
 
 def cases_of(label: Label, conditions: Sequence[str], replicates: int) -> list[Point]:
@@ -55,3 +62,39 @@ def write_heaps(
                     writer.writerow((point.condition, replicate, observable.name, f"{value:.8g}", unit))
             elif CLOGGED in reason:
                 writer.writerow((point.condition, replicate, CLOGGED, "", ""))
+
+
+def pack_heaps(folder: Folder, archive: Path) -> Path:
+    """Pack the measured heaps of a folder's trials; the same heaps give the same bytes."""
+    with replacing(archive) as temporary, zipfile.ZipFile(temporary, "w") as packed:
+        for trial in read_sealed(folder.sealed):
+            if (path := folder.measured(trial.trial)).is_file():
+                # its date is the same for all
+                entry = zipfile.ZipInfo(path.name)
+                entry.compress_type = zipfile.ZIP_DEFLATED
+                packed.writestr(entry, path.read_bytes(), compresslevel=9)
+    return archive
+
+
+def unpack_heaps(archive: Path, folder: Folder) -> int:
+    """Unpack the measured heaps of the sealed trials of a folder, and count them.
+
+    Raises
+    ------
+    InputError
+        When the file is no archive, or holds anything else.
+    """
+    known = {folder.measured(trial.trial).name: trial.trial for trial in read_sealed(folder.sealed)}
+    try:
+        with zipfile.ZipFile(archive) as packed:
+            entries = packed.infolist()
+            for entry in entries:
+                if entry.filename not in known or entry.file_size > LARGEST:
+                    rule = f"holds heaps of sealed trials alone, each of {LARGEST:,} bytes at the most"
+                    raise InputError(rule, entry.filename, str(archive))
+            for entry in entries:
+                with replacing(folder.measured(known[entry.filename])) as temporary:
+                    temporary.write_bytes(packed.read(entry))
+    except (OSError, zipfile.BadZipFile, zlib.error) as error:
+        raise InputError("must be an archive of measured heaps", str(error), str(archive)) from None
+    return len(entries)

@@ -3,8 +3,8 @@
     python -m experiments.trials.record out/trials --out experiments/trials/record/first
     python -m experiments.trials.record --page-only --out experiments/trials/record/first
 
-The first takes over what was published, found and, now, hidden; the second writes the page again from the
-files of the record.
+The first takes over what was published, found and, of what has been analysed, hidden; the second writes the
+page again from the files of the record. Of a second reality the measured heaps go with it: they took hours.
 """
 
 from __future__ import annotations
@@ -17,26 +17,34 @@ import typer
 from experiments.commands.console import clear_errors
 from experiments.errors import InputError
 from experiments.files import copy_file
-from experiments.trials.folder import DECLARED, FINDINGS, LABELS, REALITY, RUNS, SEALED, Folder
+from experiments.trials.findings import read_findings
+from experiments.trials.folder import DECLARED, FINDINGS, HEAPS, LABELS, REALITY, RUNS, SEALED, Folder
+from experiments.trials.heaps import pack_heaps
 from experiments.trials.trials_page import write_trials_page
+from experiments.trials.truth import opened, read_labels, read_sealed, revealed, write_labels
 
 
 def gather(folder: Folder, record: Path) -> None:
-    """Take a folder's files over into a record, the labels among them.
+    """Take a folder's files over into a record, with the labels of the trials that have been analysed.
 
     Raises
     ------
     InputError
-        When one is missing.
+        When a file is missing, or a label is missing or does not fit its seal.
     """
-    files = [*(folder.record / name for name in (DECLARED, SEALED, FINDINGS, RUNS)), folder.hidden / LABELS]
-    if (reality := folder.record / REALITY).is_file():
-        files.append(reality)
-    for source in files:
+    files = [folder.record / name for name in (DECLARED, SEALED, FINDINGS, RUNS)]
+    reality = folder.record / REALITY
+    files += [reality] if reality.is_file() else []
+    for source in (*files, folder.hidden_labels):
         if not source.is_file():
             raise InputError("trials that are revealed have run", "no such file", str(source))
+    analysed = opened(read_sealed(folder.sealed), read_findings([folder.findings])["trial"])
+    labels = revealed(read_labels(folder.hidden_labels), analysed)
     for source in files:
         copy_file(source, record / source.name)
+    write_labels(record / LABELS, list(labels.values()))
+    if reality.is_file():
+        pack_heaps(folder, record / HEAPS)
 
 
 def main(

@@ -217,6 +217,26 @@ def aims(table: pd.DataFrame, unresolvable: Sequence[str]) -> tuple[Aim, ...]:
     )
 
 
+def foreign_aims(table: pd.DataFrame) -> tuple[Aim, ...]:
+    """Hold one view's trials against what was aimed at where another code makes the heaps."""
+    kind, verdict = table["kind"], table["verdict"]
+    nulls, pairs, strong = table[kind == Kind.NULL], table[kind == Kind.PAIR], strong_singles(table)
+    unknown = verdict[kind.isin([Kind.WITHHELD, Kind.STRANGER])] == Verdict.UNKNOWN
+    above, outside, two = "one mechanism above 1.5 gamma80", "outside the library", "two mechanisms"
+    return (
+        _limit("nothing hidden: alarms", "at most 2 in 40", nulls["alarm"], most=0.05),
+        _none("nothing hidden: wrong names", nulls["wrong"]),
+        _limit(f"{above}: the right name", "at least 80 %", strong["right"], least=0.80),
+        _limit(f"{above}: right or in a tie", "at least 90 %", strong["right"] | strong["tied"], least=0.90),
+        _limit(f"{above}: a wrong name", "at most 2 %", strong["wrong"], most=0.02),
+        _limit(f"{outside}: unknown", "at least 90 %", unknown, least=0.90),
+        _limit("named: size within its 90 % interval", "82 to 96 %", covered(table), least=0.82, most=0.96),
+        _limit(f"{two}: a wrong name", "at most 2 %", pairs["wrong"], most=0.02),
+        _limit("any trial: a wrong name", "at most 2 %", table["wrong"], most=0.02),
+        _none("analyses that crashed", verdict == CRASH),
+    )
+
+
 MUST_RESOLVE = (
     "contact_adhesion", "liquid_bridges", "size_spread", "plate_tilt", "vibration", "rolling_torque",
 )  # fmt: skip

@@ -12,22 +12,20 @@ import pandas as pd
 from doe.palette import BLUE, MUTED, VERMILION
 from experiments.report.kit.figure import new_axes, save_figure
 from experiments.report.kit.markdown import markdown_table, write_page
-from experiments.trials.declaration import Declaration, read_declaration
+from experiments.trials.declaration import Declaration
 from experiments.trials.drawing import STRONG
-from experiments.trials.findings import EVERYTHING, PHOTOGRAPHS, read_findings
-from experiments.trials.folder import DECLARED, FINDINGS, LABELS, NOTES, PAGE, RUNS, SEALED
+from experiments.trials.findings import EVERYTHING, PHOTOGRAPHS
+from experiments.trials.folder import NOTES, PAGE, RUNS
+from experiments.trials.kept import Record, read_record
 from experiments.trials.score import (
     OTHERS,
     Aim,
-    aims,
     by_mechanism,
     by_outsider,
     confusion,
     declared_aim,
     power_curve,
-    scored,
 )
-from experiments.trials.truth import read_labels, read_sealed, revealed
 
 TITLES = {EVERYTHING: "With every observable", PHOTOGRAPHS: "With photographs only"}
 
@@ -38,10 +36,17 @@ _UNAIMED = {
 
 _VERDICTS = {True: "pass", False: "**FAIL**", None: "too few"}
 
-_INTRODUCTION = """# Blind trials of the search for a missing mechanism
+_OURS = """# Blind trials of the search for a missing mechanism
 
 Heaps of the real engine with a hidden effect: drawn and simulated by a generator that runs apart from the
-analysis, with seeds, time step and camera of its own. The truths were sealed by salted hashes (`sealed.csv`)
+analysis, with seeds, time step and camera of its own."""
+
+_FOREIGN = """# A second reality: blind trials whose heaps {code} makes
+
+Heaps of {code} with a hidden effect: laws, filling, walls, time step, seeds and camera are its own, drawn by
+a generator that runs apart from the analysis."""
+
+_SEALED = """The truths were sealed by salted hashes (`sealed.csv`)
 before anything was simulated, and revealed (`labels.json`) when the verdicts below were in. What was
 declared beforehand, the settings of the analysis by their hash and the smallest effect that it should see of
 each mechanism (gamma80), stands in `declared.json`. An effect is the distance of a size from the mechanism's
@@ -59,18 +64,27 @@ def write_trials_page(folder: Path) -> Path:
     InputError
         When a label does not fit its seal.
     """
-    sealed = read_sealed(folder / SEALED)
-    labels = revealed(read_labels(folder / LABELS), sealed)
-    declared = read_declaration(folder / DECLARED)
-    table = scored(read_findings([folder / FINDINGS]), labels, sealed)
-    notes = folder / NOTES
-    parts = [_INTRODUCTION, *([notes.read_text(encoding="utf-8")] if notes.is_file() else [])]
-    parts += [_runs(folder / RUNS), _declared(declared)]
+    record, notes = read_record(folder), folder / NOTES
+    heaps = _FOREIGN.format(code=record.code) if record.reality else _OURS
+    parts = [f"{heaps} {_SEALED}", *([notes.read_text(encoding="utf-8")] if notes.is_file() else [])]
+    parts += [_runs(folder / RUNS), _declared(record.declaration)]
+    if record.reality:
+        parts.append(_made(record.reality))
     for view, title in TITLES.items():
-        if len(rows := table[table["view"] == view]):
-            some = f" of {len(sealed)}" if len(rows) < len(sealed) else ""
-            parts += _view(rows, view, f"## {title}\n\n{len(rows)}{some} trials.", declared, folder)
+        if done := len(record.in_view(view)):
+            some = f" of {record.sealed}" if done < record.sealed else ""
+            parts += _view(record, view, f"## {title}\n\n{done}{some} trials.", folder)
     return write_page(folder / PAGE, *parts)
+
+
+def _made(reality: dict[str, Any]) -> str:
+    """Say how another code makes each effect."""
+    rows = [{"effect": name, "made by": text} for name, text in reality["library"].items()]
+    strange = [
+        {"outside the library": name, "what it is": text} for name, text in reality["strangers"].items()
+    ]
+    text = f"## How {reality['name']} makes it\n\n{reality['laws']}.\n\n{markdown_table(pd.DataFrame(rows))}"
+    return f"{text}\n{markdown_table(pd.DataFrame(strange))}"
 
 
 def _runs(path: Path) -> str:
@@ -106,26 +120,28 @@ def _declared(declared: Declaration) -> str:
     return f"## Declared beforehand\n\n{stated}\n\n{markdown_table(table)}\n{aim}"
 
 
-def _view(rows: pd.DataFrame, view: str, heading: str, declared: Declaration, folder: Path) -> list[str]:
-    found = aims(rows, [effect.name for effect in declared.library if not effect.resolvable])
+def _view(record: Record, view: str, heading: str, folder: Path) -> list[str]:
+    rows, found = record.in_view(view), record.aims(view)
     _draw_power(power_curve(rows), folder / f"power-{view}.png")
     _draw_confusion(confusion(rows), folder / f"confusion-{view}.png")
-    return [
+    verdict = "verdict" if len(rows) == record.sealed else "verdict so far"
+    parts = [
         f"{heading} {_UNAIMED.get(view, '')}",
-        _figures(found) if view in _UNAIMED else _aims(found),
+        _figures(found) if view in _UNAIMED else _aims(found, verdict),
         f"![shares of alarms and names by effect](power-{view}.png)",
         f"![answers by truth](confusion-{view}.png)",
         "Strong effects have a row each. In brackets: trials.",
         "### Strong effects, by mechanism",
         markdown_table(by_mechanism(rows).reset_index()),
-        "### Effects that may not be named",
-        markdown_table(by_outsider(rows).reset_index()),
     ]
+    if len(outside := by_outsider(rows)):
+        parts += ["### Effects that may not be named", markdown_table(outside.reset_index())]
+    return parts
 
 
-def _aims(found: Sequence[Aim]) -> str:
+def _aims(found: Sequence[Aim], verdict: str = "verdict") -> str:
     rows = [
-        {"question": aim.question, "wanted": aim.wanted, "found": aim.found, "verdict": _VERDICTS[aim.passed]}
+        {"question": aim.question, "wanted": aim.wanted, "found": aim.found, verdict: _VERDICTS[aim.passed]}
         for aim in found
     ]
     return markdown_table(pd.DataFrame(rows))

@@ -9,7 +9,7 @@ from __future__ import annotations
 import csv
 import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -118,6 +118,12 @@ def write_labels(path: Path, labels: Sequence[Label]) -> None:
 def read_labels(path: Path) -> tuple[Label, ...]:
     """Read what `write_labels` wrote."""
     return tuple(_label(record) for record in json.loads(path.read_text(encoding="utf-8")))
+
+
+def opened(sealed: Sequence[Sealed], analysed: Iterable[str]) -> list[Sealed]:
+    """Seals of the trials that have been analysed: no other label may be shown."""
+    ended = set(analysed)
+    return [trial for trial in sealed if trial.trial in ended]
 
 
 def revealed(labels: Sequence[Label], sealed: Sequence[Sealed]) -> dict[str, Label]:

@@ -4,11 +4,17 @@
     python -m experiments.trials.other_codes.generate measure out/liggghts --seconds 3000
     python -m experiments.trials.run out/liggghts --view everything --device cpu
     python -m experiments.trials.record out/liggghts --out experiments/trials/record/liggghts
+    python -m experiments.trials.other_codes.generate resume experiments/trials/record/liggghts out/elsewhere
 
 Folders are those of `experiments.trials.generate`, so that analysis, score and record are the same. Of every
 class of trials an equal part is measured first, so that a record of some of them is balanced. After
 ``--seconds`` no trial is begun; called again, it goes on where it was: a heap that was measured is kept. The
 exit code is 3 while some trials have not been measured.
+
+A trial that was measured stays so, whatever becomes of these sources; of one that was not finished, the heaps
+are made again when they have changed. The last command begins a folder with what a record has, so that the
+analyses can go on from there. Labels of trials that have not been analysed are in no record: to measure more,
+bring the hidden file along. Where it is lost, those trials are, and new ones must be sealed.
 """
 
 from __future__ import annotations
@@ -30,14 +36,15 @@ from experiments.commands.console import clear_errors
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.search import Search
 from experiments.errors import InputError
-from experiments.files import write_text
+from experiments.files import copy_file, write_text
 from experiments.studyfile import load_study
 from experiments.toml_files import read_toml
 from experiments.trials.declaration import Declaration, read_declaration
 from experiments.trials.drawing import Plan
-from experiments.trials.folder import REALITY, Folder, noted_run
+from experiments.trials.folder import DECLARED as DECLARATION
+from experiments.trials.folder import FINDINGS, HEAPS, REALITY, RUNS, SEALED, Folder, noted_run
 from experiments.trials.generate import STUDY, bank_beside, seal_trials
-from experiments.trials.heaps import CLOGGED, cases_of, write_heaps
+from experiments.trials.heaps import CLOGGED, cases_of, unpack_heaps, write_heaps
 from experiments.trials.other_codes.effects import DECLARED, STRANGERS
 from experiments.trials.other_codes.making import LAWS, MADE
 from experiments.trials.other_codes.program import CODES, engine_for
@@ -166,12 +173,30 @@ def measure(
     with clear_errors("Resume with the same command."):
         place = Folder(folder)
         declaration = read_declaration(place.declared)
+        if not place.hidden_labels.is_file():
+            rule = "needs the labels of the sealed trials; where they are lost, seal new ones"
+            raise InputError(rule, "no such file", str(place.hidden_labels))
         labels = list(revealed(read_labels(place.hidden_labels), read_sealed(place.sealed)).values())
         with open_workers(Resources("cpu", workers)) as simulators:
             left = measure_in_time(place, labels, declaration, simulators, deadline)
     if left:
         print(f"time is up; {left} trials have not been measured: run it again")
         raise typer.Exit(UNFINISHED)
+
+
+@app.command()
+def resume(
+    record: Annotated[Path, typer.Argument(help="Record of a second reality.")],
+    folder: Annotated[Path, typer.Argument(help="New folder of its trials.")],
+) -> None:
+    """Begin a folder with what a record has: seals, findings and measured heaps, no hidden label."""
+    with clear_errors():
+        place = Folder(folder)
+        if place.sealed.exists():
+            raise InputError("must be a folder without trials", "sealed trials", str(folder))
+        for name in (DECLARATION, SEALED, FINDINGS, RUNS, REALITY):
+            copy_file(record / name, place.record / name)
+        print(f"{unpack_heaps(record / HEAPS, place)} trials are measured: {place.data}")
 
 
 if __name__ == "__main__":

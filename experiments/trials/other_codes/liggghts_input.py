@@ -26,12 +26,15 @@ GRAIN, ODD = 1, 4
 _BIN = 4.0
 """Side of the bins of neighbours, in reaches of a pair: in smaller ones the empty box costs most."""
 
+_SORTING = "sort 0 0.0"
+"""No sorting of the atoms in memory: its bins fill the empty box, and cost a tenth of the time."""
+
 _SPARE = 1.2
 """Distance at which LIGGGHTS looks for bridges, over that at which they break."""
 
 _SETUP = """\
 atom_style granular
-atom_modify map array
+atom_modify map array {sorting}
 boundary f f f
 newton off
 communicate single vel yes
@@ -149,6 +152,7 @@ def _setup(bench: Bench) -> str:
     look = bench.look_steps
     fill = lift.steps(lift.count / bench.rain_rate + FILL_MARGIN)
     return _SETUP.format(
+        sorting=_SORTING,
         low=-half_width,
         high=half_width,
         bottom=bottom,
