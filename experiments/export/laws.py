@@ -74,8 +74,9 @@ class LawsOfCode:
     def _taken(self, law: str, choice: str) -> str:
         if choice in self.has[law]:
             return choice
-        near = self.nearest.get(choice)  # two laws may have choices of one name
-        return near if near in self.has[law] else next(iter(self.has[law]))
+        first = next(iter(self.has[law]))
+        near = self.nearest.get(choice, first)
+        return near if near in self.has[law] else first  # two laws may have choices of one name
 
 
 def mechanism_warnings(case: Case[Any], code: str) -> tuple[str, ...]:

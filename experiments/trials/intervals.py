@@ -74,8 +74,9 @@ class Twin:
 def trials_of(world: World, count: int, seed: int) -> tuple[Trial, ...]:
     """Draw at least so many trials, as many of each resolvable mechanism, and keep the first so many."""
     each = math.ceil(count / max(sum(one.resolvable for one in world.library), 1))
-    nothing_else = {"nulls": 0, "weak": 0, "unresolved": 0, "withheld": 0, "strangers": 0, "pairs": 0}
-    plan = Plan(strong=each, replicates=REPLICATES, **nothing_else)
+    plan = Plan(
+        nulls=0, strong=each, weak=0, unresolved=0, withheld=0, strangers=0, pairs=0, replicates=REPLICATES
+    )
     space = world.known.space
     factors = [Factor(*one) for one in zip(space.factors, space.lower, space.upper, strict=True)]
     return draw(plan, factors, world.library, (), np.random.default_rng(seed), str)[:count]
