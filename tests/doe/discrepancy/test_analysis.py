@@ -68,17 +68,17 @@ def test_a_hidden_mechanism_is_named_with_its_size() -> None:
 
 
 def test_the_numbers_of_an_analysis_stay() -> None:
-    # As they were when fits went down to their score; rounding differs from host to host.
+    # As they were when shifts were found beside what the bank leaves open; rounding differs from host to host.
     found, _ = _named()
     assert found.base is not None
     assert found.chosen is not None
     assert found.gap is not None
     [size] = found.chosen.sizes
     numbers = [found.base.q, found.gap.largest_drop, found.chosen.q, size.low, size.value, size.high]
-    kept = [729.9896272, 676.5972381, 61.23860248, 0.5981010791, 0.6439388577, 0.689719186]
+    kept = [729.9896272, 676.5972381, 61.25183812, 0.5961952147, 0.6433174922, 0.6903771748]
     np.testing.assert_allclose(numbers, kept, rtol=1e-6)
     gaps = [q for both in found.before_after for q in (both.before.value, both.after.value)]
-    np.testing.assert_allclose(gaps, [484.2677247, 39.78569919, 32.00858918, 7.606044527], rtol=1e-6)
+    np.testing.assert_allclose(gaps, [484.3209485, 39.70806367, 32.00922323, 7.583194479], rtol=1e-6)
     detectable = [power.detectable_size for power in found.power]
     np.testing.assert_allclose(detectable, [0.05, 0.18, 0.19, 0.1, 0.17, 0.16], rtol=1e-12)
     assert found.effort.fresh_cases == 140

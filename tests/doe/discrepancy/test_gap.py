@@ -121,8 +121,12 @@ def test_what_a_refit_to_all_leaves_is_what_the_forecast_misses_too() -> None:
     gap = find_gap(whole, signatures(whole), 0.025, 1000, 0)
     ahead = forecast(fitted, evidence.held_out)
     missed = ahead.measured - ahead.predicted
-    # Ranges as prior knowledge, and where the fit stopped: each some 1e-6 of Q.
-    assert gap.q == pytest.approx(fitted.q + missed @ np.linalg.solve(ahead.covariance, missed), rel=1e-4)
+    # The fit stops at the least score, not at the least Q: under fixed weights a refit to the training
+    # conditions alone takes off a little more. Ranges as prior knowledge are 1e-6 of Q.
+    slack = fitted.q - find_gap(weigh(fitted.stack, fitted.x), signatures(fitted), 0.025, 1000, 0).q
+    assert 0.0 < slack < 0.002 * fitted.q
+    expected = fitted.q + missed @ np.linalg.solve(ahead.covariance, missed)
+    assert gap.q == pytest.approx(expected, abs=slack, rel=1e-4)
     assert gap.freedom == 5 * 12 - 3
 
 
