@@ -15,7 +15,10 @@ from experiments.trials.other_codes.odd_lift import odd
 _STREAM = 2
 """Stream of random numbers of a trial's seed; 1 is that of its camera."""
 
-ROLLING: Mapping[str, tuple[Rolling, ...]] = {"liggghts": ("cdt", "epsd2")}
+ROLLING: Mapping[str, tuple[Rolling, ...]] = {
+    "lammps": ("sds",),
+    "liggghts": ("cdt", "epsd2"),
+}
 """Resistances to rolling of each code."""
 
 
