@@ -112,8 +112,9 @@ def translate_lift(
 
     The contacts are LAMMPS' words for those among grains, with the tube and with the plate.
     """
-    files = {} if lift.is_of_spheres else {_file(n): molecule_text(t) for n, t in enumerate(lift.templates, 1)}
-    files = {INPUT: _setup(lift, contacts) + _filling(lift) + _lifting(lift), **files}
+    kinds = () if lift.is_of_spheres else lift.templates
+    molecules = {_file(number): molecule_text(template) for number, template in enumerate(kinds, 1)}
+    files = {INPUT: _setup(lift, contacts) + _filling(lift) + _lifting(lift), **molecules}
     tilted = ("scene tilt: LAMMPS pours along gravity alone; left out",) if lift.scene.tilt else ()
     translated = (*laws, *lift_rows(lift, exact_tube=True), *_rows(lift))
     command = ("lmp", "-in", INPUT)

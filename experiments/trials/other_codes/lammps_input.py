@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import partial
 from itertools import combinations_with_replacement
 
+import numpy as np
+
 from dem_warp import Material
+from dem_warp.laws.capillary import CapillaryBridge
 from dem_warp.model import ContactCoefficients
 from dem_warp.scenes.lifted_cylinder import GONE
 from experiments.errors import InputError
@@ -41,6 +45,7 @@ pair_style granular
 {pairs}
 
 # walls
+{groups}
 variable rise equal 0.0
 variable turn equal 0.0
 variable shake equal 0.0
@@ -57,8 +62,7 @@ fix bodies all rigid/small molecule mol grains gravity weight
 
 # filling
 region rain cylinder z 0 0 {rain_radius:.6g} {rain_bottom:.6g} {rain_top:.6g}
-fix rain all deposit {count} 0 {rain_steps} {rain_seed} region rain near {near:.6g} attempt 500 &
-    vx 0 0 vy 0 0 vz -{rain_speed} -{rain_speed} mol grains molfrac {shares} rigid bodies
+{rain}
 
 variable speed atom sqrt(vx*vx+vy*vy+vz*vz)
 variable square atom vx*vx+vy*vy+vz*vz
@@ -71,17 +75,14 @@ thermo {check}
 thermo_modify lost ignore norm no
 
 run {fill_steps}
-unfix rain
+{dry}
 variable short equal "atoms < {spheres}"
 if "${{short}} == 1" then "print 'ERROR: not all grains came in'" "{quit}"
 """
 
-_KINDS = """\
-variable odd atom "type == {odd}"
-variable usual atom "type == {grain}"
-group odd dynamic all var odd every 1
-group usual dynamic all var usual every 1
-"""
+_RAIN = """\
+fix rain_{group} {group} deposit {count} 0 {steps} {seed} region rain near {near:.6g} attempt 500 &
+    vx 0 0 vy 0 0 vz -{speed} -{speed} mol grains molfrac {shares} rigid bodies"""
 
 _LIFT = """
 # lifting; the film and the balance run from now on
@@ -89,7 +90,8 @@ variable now equal step
 variable begin equal ${{now}}
 variable rise equal "(step - v_begin) * {step_rise:.12g}"
 variable turn equal "(step - v_begin) * {step_turn:.12g}"
-variable shake equal "{amplitude:.9g} * sin((step - v_begin) * {step_phase:.12g}) * (step < v_begin + {shaken})"
+variable shakes equal "step < v_begin + {shaken}"
+variable shake equal "v_shakes * {amplitude:.9g} * sin((step - v_begin) * {step_phase:.12g})"
 dump film all custom {look} {frames} id mol x y z vx vy vz radius
 dump_modify film sort id format float %.9g
 compute drag all reduce sum {loads}
@@ -124,7 +126,7 @@ def lammps_files(bench: Bench) -> dict[str, str]:
         When it has liquid bridges, which LAMMPS does not make.
     """
     if bench.bridges() is not None:
-        raise InputError("LAMMPS has no liquid bridges", "capillary_bridge", "the case")
+        raise InputError("no liquid bridges, which LAMMPS does not make", CapillaryBridge.name, "the case")
     end = _END.format(check=bench.check_steps)
     phases = [_setup(bench), _rest(bench, "settle"), _lift(bench), _rest(bench, "rest"), end]
     molecules = {
@@ -132,6 +134,42 @@ def lammps_files(bench: Bench) -> dict[str, str]:
         for number, (is_odd, template, _) in enumerate(bench.kinds(), 1)
     }
     return {INPUT: "".join(phases)} | molecules
+
+
+@dataclass(frozen=True)
+class _Lot:
+    """Grains of one kind: a group of LAMMPS, which comes in and touches walls in its own way."""
+
+    group: str
+    is_odd: bool
+    count: int
+    steps: int
+    """From one grain to the next."""
+
+
+def _lots(bench: Bench) -> list[_Lot]:
+    """Lots of a case, which come in over the same time."""
+    lift, share = bench.lift, bench.scene.odd_share
+    odd = round(share * lift.count)
+    time = lift.count / bench.rain_rate
+    counts = (("usual", False, lift.count - odd), ("odd", True, odd))
+    return [_Lot(group, is_odd, count, lift.steps(time / count)) for group, is_odd, count in counts if count]
+
+
+def _rain(bench: Bench, lot: _Lot, seed: int) -> str:
+    """Write the rain of a lot, of the molecules of its kind alone."""
+    kinds = bench.kinds()
+    own = np.array([share for is_odd, _, share in kinds if is_odd is lot.is_odd])
+    shares = iter(written_shares(own / own.sum()))
+    return _RAIN.format(
+        group=lot.group,
+        count=lot.count,
+        steps=lot.steps,
+        seed=seed,
+        near=2.0 * bench.lift.largest_radius,
+        speed=bench.scene.rain_speed,
+        shares=" ".join(next(shares) if is_odd is lot.is_odd else "0" for is_odd, _, _ in kinds),
+    )
 
 
 def _file(number: int) -> str:
@@ -142,8 +180,8 @@ def _setup(bench: Bench) -> str:
     scene, lift = bench.scene, bench.lift
     half_width, _, bottom = scene.room(lift.reach)
     kinds, gravity = bench.kinds(), math.hypot(*scene.gravity)
-    rain_steps = lift.steps(1.0 / bench.rain_rate)
-    fill = lift.count * rain_steps + lift.steps(FILL_MARGIN)
+    lots = _lots(bench)
+    fill = max(lot.count * lot.steps for lot in lots) + lift.steps(FILL_MARGIN)
     return _SETUP.format(
         cutoff=2.0 * lift.reach + lift.skin,
         molecules=" ".join(_file(number) for number, _ in enumerate(kinds, 1)),
@@ -157,18 +195,15 @@ def _setup(bench: Bench) -> str:
         time_step=lift.case.time_step,
         pairs=_pairs(bench),
         tube=_tube(bench),
-        walls=_walls(bench),
+        groups="\n".join(f"group {lot.group} empty" for lot in lots),
+        walls="\n".join(_walls(bench, lot) for lot in lots),
         gravity=gravity,
         direction=" ".join(f"{part / gravity:.9g}" for part in scene.gravity),
         rain_radius=bench.rain_radius - lift.reach,
         rain_bottom=lift.rain_bottom,
         rain_top=bench.rain_top,
-        count=lift.count,
-        rain_steps=rain_steps,
-        rain_seed=lift.seeds(1)[0],
-        near=2.0 * lift.largest_radius,
-        rain_speed=scene.rain_speed,
-        shares=" ".join(written_shares([share for _, _, share in kinds])),
+        rain="\n".join(map(partial(_rain, bench), lots, lift.seeds(len(lots)))),
+        dry="\n".join(f"unfix rain_{lot.group}" for lot in lots),
         rest=scene.rest_speed,
         calm=lift.calm_speed,
         check=bench.check_steps,
@@ -200,17 +235,14 @@ def _pairs(bench: Bench) -> str:
     )
 
 
-def _walls(bench: Bench) -> str:
-    """Write the contacts with tube and plate, of grains of each kind: a wall has one contact for its group."""
+def _walls(bench: Bench, lot: _Lot) -> str:
+    """Write the contacts of grains of a kind with tube and plate."""
     _, tube, plate = _contacts(bench)
-    kinds = (("usual", False), ("odd", True)) if bench.has_odd else (("all", False),)
-    lines = [
-        f"fix {name}_{group} {group} wall/gran/region granular {_words(bench, contact, is_odd)} "
+    return "\n".join(
+        f"fix {name}_{lot.group} {lot.group} wall/gran/region granular {_words(bench, contact, lot.is_odd)} "
         f"region {name} contacts"
-        for group, is_odd in kinds
         for name, contact in (("tube", tube), ("plate", plate))
-    ]
-    return (_KINDS.format(odd=ODD, grain=GRAIN) if bench.has_odd else "") + "\n".join(lines)
+    )
 
 
 def _words(
@@ -226,9 +258,7 @@ def _words(
     factor = scene.odd_friction if first_odd or second_odd else 1.0
     surface = replace(contact.surface, static_friction=factor * contact.surface.static_friction)
     first, second = softened(contact.first, first_odd), softened(contact.second, second_odd)
-    coefficients = ContactCoefficients.of_pair(
-        first, second, surface, laws, (), contact.radius, contact.mass
-    )
+    coefficients = ContactCoefficients.of_pair(first, second, surface, laws, (), contact.radius, contact.mass)
     return granular_words(replace(contact, coefficients=coefficients), CONVENTIONS.words(laws), energy)
 
 
@@ -250,7 +280,7 @@ def _lift(bench: Bench) -> str:
     step = lift.case.time_step
     check_rise = bench.check_steps * step * scene.lift_speed
     shaken = lift.steps(scene.vibration_time) if scene.vibration_amplitude > 0.0 else 0
-    tubes = ("tube_usual", "tube_odd") if bench.has_odd else ("tube_all",)
+    groups = [lot.group for lot in _lots(bench)]
     return _LIFT.format(
         step_rise=step * scene.lift_speed,
         step_turn=step * scene.turn_rate,
@@ -261,8 +291,8 @@ def _lift(bench: Bench) -> str:
         look=look,
         frames=FRAMES,
         # the force on the grains, along the axis
-        loads=" ".join(f"f_{tube}[4]" for tube in tubes),
-        drag_sum="-c_drag[1]-c_drag[2]" if bench.has_odd else "-c_drag",
+        loads=" ".join(f"f_tube_{group}[4]" for group in groups),
+        drag_sum="-c_drag[1]-c_drag[2]" if len(groups) > 1 else "-c_drag",
         drag=DRAG,
         check=bench.check_steps,
         reach=lift.reach,

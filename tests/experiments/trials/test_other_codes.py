@@ -25,11 +25,12 @@ from experiments.measurement.observables import NAMES
 from experiments.studyfile import load_study
 from experiments.trials.drawing import Plan
 from experiments.trials.generate import STUDY
-from experiments.trials.other_codes.effects import DECLARED, STRANGERS
+from experiments.trials.other_codes.effects import DECLARED, SLIPPERY, STRANGERS
 from experiments.trials.other_codes.generate import PLAN, in_turn, plan_for, write_reality
+from experiments.trials.other_codes.lammps_input import lammps_files, surface_energy
 from experiments.trials.other_codes.liggghts_input import energy_density, liggghts_files, wetting
 from experiments.trials.other_codes.making import MADE
-from experiments.trials.other_codes.program import engine_for
+from experiments.trials.other_codes.program import CODES, engine_for
 from experiments.trials.other_codes.reading import (
     Frame,
     Grasp,
@@ -45,8 +46,9 @@ from experiments.trials.truth import Kind, Label
 THETA = {"mu_gg": 0.6, "mu_gw": 0.5, "e_gg": 0.3}
 COUNT = 24
 SMALL = {"scene": {"lifted-cylinder": {"grain_count": COUNT, "height": "25 mm"}}}
-PROGRAMS = {"liggghts": "liggghts"}
+PROGRAMS = {"lammps": "lmp", "liggghts": "liggghts"}
 SETTING = Setting(1.0, 1000.0, 48, 4e-3, "cdt")
+SETTINGS = {"lammps": replace(SETTING, rolling="sds"), "liggghts": SETTING}
 G = 9.81
 
 with_programs = pytest.mark.parametrize(
@@ -54,10 +56,10 @@ with_programs = pytest.mark.parametrize(
 )
 
 
-def case_of(**changes: float) -> Case:
-    """A test of few grains, in the setting of LIGGGHTS's workshop."""
-    case = load_study(STUDY, "bench", SMALL).case(THETA | changes, seed=3)
-    return SETTING.of(case, "liggghts")
+def case_of(code: str = "liggghts") -> Case:
+    """A test of few grains, in the setting of a code's workshop."""
+    case = load_study(STUDY, "bench", SMALL).case(THETA, seed=3)
+    return SETTINGS[code].of(case, code)
 
 
 SHAPE = case_of().grains.mixture.shapes[0]
@@ -241,6 +243,75 @@ def test_liggghts_is_told_what_is_hidden() -> None:
     assert "wiggle amplitude 0 0 0.0001 period 0.02" in liggghts_text(shaken)
 
 
+def lammps_text(case: Case) -> str:
+    return lammps_files(Bench(case))["lift.in"]
+
+
+def test_lammps_is_told_what_is_hidden() -> None:
+    case = case_of("lammps")
+    text = lammps_text(case)
+    assert "dmt" not in text
+    work = 0.02
+    adhesive = lammps_text(replace(case, mechanisms=(JKR(between="grains", work_of_adhesion=work),)))
+    # among grains alone: the walls' laws have no adhesion
+    assert [line.split()[3] for line in adhesive.splitlines() if line.startswith("pair_coeff")] == ["dmt"]
+    assert adhesive.count("dmt") == 1
+    assert "rotate v_turn" in text
+    turning = lammps_text(STRANGERS["turning_tube"].change(case, 5.0))
+    [rate] = re.findall(r"variable turn equal \"\(step - v_begin\) \* (\S+)\"", turning)
+    assert float(rate) == pytest.approx(5.0 * case.time_step)
+    tilt = math.radians(5.0)
+    tilted = lammps_text(replace(case, scene=replace(case.scene, tilt=tilt)))
+    [weight] = re.findall(r"gravity (\S+) vector (\S+) (\S+) (\S+)", tilted)
+    assert [float(number) for number in weight] == pytest.approx(
+        [G, math.sin(tilt), 0.0, -math.cos(tilt)], rel=1e-8
+    )
+    scene = replace(case.scene, vibration_amplitude=1e-4)
+    assert 'variable shake equal "v_shakes * 0.0001 * sin(' in lammps_text(replace(case, scene=scene))
+    cone = STRANGERS["conical_tube"].change(case, 3.0)
+    [ends] = re.findall(r"region tube cone z 0 0 (\S+) (\S+) 0 (\S+) ", lammps_text(cone))
+    low, high, height = (float(number) for number in ends)
+    assert low + high == pytest.approx(case.scene.diameter, rel=1e-8)
+    assert math.degrees(math.atan((low - high) / height)) == pytest.approx(3.0, rel=1e-6)
+
+
+def test_lammps_has_a_contact_for_each_kind_of_grain() -> None:
+    case = case_of("lammps")
+
+    def contacts(effect: str, size: float) -> dict[str, list[float]]:
+        text = lammps_text(STRANGERS[effect].change(case, size))
+        place = r"(?:pair_coeff|fix) (\S+ \S+) (?:wall/gran/region granular )?"
+        found = re.findall(place + r"hertz/material (\S+) .* mindlin \S+ \S+ (\S+)", text)
+        return {name: [float(modulus), float(friction)] for name, modulus, friction in found}
+
+    slippery = contacts("slippery_class", 0.5)
+    mu_gg, mu_gw, less = THETA["mu_gg"], THETA["mu_gw"], SLIPPERY
+    assert slippery["1 1"][1] == pytest.approx(mu_gg)
+    assert slippery["1 2"][1] == slippery["2 2"][1] == pytest.approx(less * mu_gg)
+    assert slippery["tube_usual usual"][1] == slippery["plate_usual usual"][1] == pytest.approx(mu_gw)
+    assert slippery["tube_odd odd"][1] == slippery["plate_odd odd"][1] == pytest.approx(less * mu_gw)
+    soft = {name: modulus for name, (modulus, _) in contacts("soft_class", 20.0).items()}
+    # springs in a row: the compliance of two unlike grains is the mean of those of like ones
+    assert soft["2 2"] == pytest.approx(soft["1 1"] / 20.0)
+    assert 1.0 / soft["1 2"] == pytest.approx(0.5 / soft["1 1"] + 0.5 / soft["2 2"])
+    # walls are far stiffer: a grain on them has twice the modulus that it has on its like, but for 0.2 %
+    assert soft["tube_odd odd"] == pytest.approx(2.0 * soft["2 2"], rel=2e-3)
+
+
+def test_dmt_parts_spheres_as_hard_as_jkr() -> None:
+    work, reduced = 0.02, 0.7e-3
+    pull = 4.0 * math.pi * surface_energy(work) * reduced
+    assert pull == pytest.approx(1.5 * math.pi * work * reduced)
+
+
+def test_lammps_refuses_liquid_bridges_by_name() -> None:
+    bridge = CapillaryBridge(between="grains", surface_tension=0.01, bridge_volume=5e-11)
+    with pytest.raises(InputError, match=r"no liquid bridges, which LAMMPS does not make .*capillary"):
+        lammps_text(replace(case_of("lammps"), mechanisms=(bridge,)))
+    with pytest.raises(InputError, match=r"lammps makes contact_adhesion, .*liquid_bridges"):
+        plan_for("lammps", Plan(mechanisms=("liquid_bridges",)))
+
+
 def test_a_conical_tube_is_right_at_half_its_height() -> None:
     case = STRANGERS["conical_tube"].change(case_of(), 3.0)
     numbers = re.findall(r"vertex (\S+) (\S+) (\S+)", liggghts_files(Bench(case))["tube.stl"])
@@ -274,7 +345,7 @@ def test_the_plan_holds_at_least_120_trials_of_what_the_code_can_make() -> None:
     assert plan.nulls + singles + plan.pairs + plan.strangers * len(STRANGERS) >= 120
     with pytest.raises(InputError, match="liggghts makes"):
         plan_for("liggghts", Plan(mechanisms=("air_drag",)))
-    with pytest.raises(InputError, match="must be one of liggghts"):
+    with pytest.raises(InputError, match="must be one of lammps, liggghts"):
         engine_for("edem")
 
 
@@ -297,29 +368,29 @@ def test_trials_are_measured_evenly_over_their_classes() -> None:
         assert np.abs(seen - even).max() < 2.0
 
 
-def test_the_reality_says_how_each_effect_is_made(tmp_path: Path) -> None:
-    write_reality(tmp_path / "reality.json", "liggghts")
+@pytest.mark.parametrize("code", CODES)
+def test_the_reality_says_how_each_effect_is_made(code: str, tmp_path: Path) -> None:
+    write_reality(tmp_path / "reality.json", code)
     text = (tmp_path / "reality.json").read_text()
-    assert all(name in text for name in (*MADE["liggghts"], *STRANGERS))
+    assert all(name in text for name in (*MADE[code], *STRANGERS))
 
 
 # ---- the codes themselves ----------------------------------------------------------------------------------
 
 
-def observed(code: str, tmp_path: Path, *sizes: tuple[str, float], **theta: float) -> dict[str, float]:
-    """Observables of one small test that a code runs."""
-    study = load_study(STUDY, "bench", SMALL)
-    table = OutcomeTable(tmp_path / "outcomes.sqlite")
-    values = tuple((THETA | theta).values())
-    with OtherCodeSimulator(study, code, SETTING, table, OwnWorkers("cpu", 1)) as simulator:
-        outcomes = simulator([Point(values, sizes, "base", 11)])
-    assert outcomes.reasons == ("",)
-    return dict(zip(NAMES, outcomes.values[0], strict=True))
+def observed(code: str, folder: Path, *sizes: tuple[tuple[str, float], ...]) -> list[dict[str, float]]:
+    """Observables of small tests that a code runs, each with the sizes of some effects."""
+    study, table = load_study(STUDY, "bench", SMALL), OutcomeTable(folder / "outcomes.sqlite")
+    points = [Point(tuple(THETA.values()), own, "base", 12) for own in sizes]
+    with OtherCodeSimulator(study, code, SETTINGS[code], table, OwnWorkers("cpu", 1)) as simulator:
+        outcomes = simulator(points)
+    assert outcomes.reasons == ("",) * len(points)
+    return [dict(zip(NAMES, row, strict=True)) for row in outcomes.values]
 
 
 @with_programs
 def test_a_code_makes_a_heap_that_our_functions_read(code: str, tmp_path: Path) -> None:
-    seen = observed(code, tmp_path)
+    [seen] = observed(code, tmp_path, ())
     assert set(seen) == set(NAMES)
     assert np.isfinite(list(seen.values())).all()
     scene = case_of().scene
@@ -329,31 +400,17 @@ def test_a_code_makes_a_heap_that_our_functions_read(code: str, tmp_path: Path) 
     assert 0.0 < seen["wall_drag"] < 1.0
     # it is kept: no program is asked for again
     assert len(OutcomeTable(tmp_path / "outcomes.sqlite")) == 1
-    assert observed(code, tmp_path) == seen
+    assert observed(code, tmp_path, ()) == [seen]
 
 
-EFFECTS = {
-    "liggghts": (*MADE["liggghts"], *STRANGERS),
-}
-
-
-@pytest.mark.parametrize(
-    ("code", "effect"),
-    [
-        pytest.param(code, effect, marks=pytest.mark.program(PROGRAMS[code]))
-        for code, effects in EFFECTS.items()
-        for effect in effects
-    ],
-)
-def test_a_code_makes_every_effect(
-    code: str, effect: str, tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
-) -> None:
-    strange = STRANGERS.get(effect)
-    size = strange.maximum if strange else _largest(effect)
-    with_it = observed(code, tmp_path, (effect, size))
-    assert np.isfinite(list(with_it.values())).all()
-    # the table of outcomes that all effects share makes it once
-    assert with_it != observed(code, tmp_path_factory.getbasetemp())
+@with_programs
+def test_a_code_makes_every_effect(code: str, tmp_path: Path) -> None:
+    sizes = {name: _largest(name) for name in MADE[code]}
+    sizes |= {name: effect.maximum for name, effect in STRANGERS.items()}
+    without, *with_one = observed(code, tmp_path, (), *(((name, size),) for name, size in sizes.items()))
+    for name, seen in zip(sizes, with_one, strict=True):
+        assert np.isfinite(list(seen.values())).all(), name
+        assert seen != without, name
 
 
 def _largest(effect: str) -> float:
