@@ -26,6 +26,9 @@ INPUT = "lift.in"
 GRAIN, ODD = 1, 2
 """Types of LAMMPS's atoms: grains, and those of another kind."""
 
+_MARGIN = 10.0
+"""Width of the strip around the box in which grains are taken away, in reaches of a grain."""
+
 _SETUP = """\
 units si
 atom_style sphere
@@ -59,6 +62,9 @@ neigh_modify exclude molecule/intra all
 group nothing empty
 fix weight nothing gravity {gravity:.9g} vector {direction}
 fix bodies all rigid/small molecule mol grains gravity weight
+# a body must not leave the box in parts
+region far block -{far:.6g} {far:.6g} -{far:.6g} {far:.6g} INF INF side out
+fix gone all evaporate {look} 1000000 far {gone_seed} molecule yes
 
 # filling
 region rain cylinder z 0 0 {rain_radius:.6g} {rain_bottom:.6g} {rain_top:.6g}
@@ -181,12 +187,16 @@ def _setup(bench: Bench) -> str:
     half_width, _, bottom = scene.room(lift.reach)
     kinds, gravity = bench.kinds(), math.hypot(*scene.gravity)
     lots = _lots(bench)
+    gone_seed, *seeds = lift.seeds(1 + len(lots))
     fill = max(lot.count * lot.steps for lot in lots) + lift.steps(FILL_MARGIN)
     return _SETUP.format(
         cutoff=2.0 * lift.reach + lift.skin,
         molecules=" ".join(_file(number) for number, _ in enumerate(kinds, 1)),
-        low=-half_width,
-        high=half_width,
+        far=half_width,
+        low=-half_width - _MARGIN * lift.reach,
+        high=half_width + _MARGIN * lift.reach,
+        look=bench.look_steps,
+        gone_seed=gone_seed,
         bottom=bottom,
         top=max(bench.rain_top, (1.0 + GONE) * scene.height) + 4.0 * lift.reach,
         types=ODD if bench.has_odd else GRAIN,
@@ -202,7 +212,7 @@ def _setup(bench: Bench) -> str:
         rain_radius=bench.rain_radius - lift.reach,
         rain_bottom=lift.rain_bottom,
         rain_top=bench.rain_top,
-        rain="\n".join(map(partial(_rain, bench), lots, lift.seeds(len(lots)))),
+        rain="\n".join(map(partial(_rain, bench), lots, seeds)),
         dry="\n".join(f"unfix rain_{lot.group}" for lot in lots),
         rest=scene.rest_speed,
         calm=lift.calm_speed,

@@ -25,9 +25,8 @@ from experiments.measurement.observables import NAMES
 from experiments.studyfile import load_study
 from experiments.trials.drawing import Plan
 from experiments.trials.generate import STUDY
-from experiments.trials.other_codes.effects import DECLARED, SLIPPERY, STRANGERS
+from experiments.trials.other_codes.effects import DECLARED, STRANGERS
 from experiments.trials.other_codes.generate import PLAN, in_turn, plan_for, write_reality
-from experiments.trials.other_codes.lammps_input import lammps_files, surface_energy
 from experiments.trials.other_codes.liggghts_input import energy_density, liggghts_files, wetting
 from experiments.trials.other_codes.making import MADE
 from experiments.trials.other_codes.program import CODES, engine_for
@@ -241,75 +240,6 @@ def test_liggghts_is_told_what_is_hidden() -> None:
     assert friction[3, 3] < friction[0, 0]
     shaken = replace(case, scene=replace(case.scene, vibration_amplitude=1e-4))
     assert "wiggle amplitude 0 0 0.0001 period 0.02" in liggghts_text(shaken)
-
-
-def lammps_text(case: Case) -> str:
-    return lammps_files(Bench(case))["lift.in"]
-
-
-def test_lammps_is_told_what_is_hidden() -> None:
-    case = case_of("lammps")
-    text = lammps_text(case)
-    assert "dmt" not in text
-    work = 0.02
-    adhesive = lammps_text(replace(case, mechanisms=(JKR(between="grains", work_of_adhesion=work),)))
-    # among grains alone: the walls' laws have no adhesion
-    assert [line.split()[3] for line in adhesive.splitlines() if line.startswith("pair_coeff")] == ["dmt"]
-    assert adhesive.count("dmt") == 1
-    assert "rotate v_turn" in text
-    turning = lammps_text(STRANGERS["turning_tube"].change(case, 5.0))
-    [rate] = re.findall(r"variable turn equal \"\(step - v_begin\) \* (\S+)\"", turning)
-    assert float(rate) == pytest.approx(5.0 * case.time_step)
-    tilt = math.radians(5.0)
-    tilted = lammps_text(replace(case, scene=replace(case.scene, tilt=tilt)))
-    [weight] = re.findall(r"gravity (\S+) vector (\S+) (\S+) (\S+)", tilted)
-    assert [float(number) for number in weight] == pytest.approx(
-        [G, math.sin(tilt), 0.0, -math.cos(tilt)], rel=1e-8
-    )
-    scene = replace(case.scene, vibration_amplitude=1e-4)
-    assert 'variable shake equal "v_shakes * 0.0001 * sin(' in lammps_text(replace(case, scene=scene))
-    cone = STRANGERS["conical_tube"].change(case, 3.0)
-    [ends] = re.findall(r"region tube cone z 0 0 (\S+) (\S+) 0 (\S+) ", lammps_text(cone))
-    low, high, height = (float(number) for number in ends)
-    assert low + high == pytest.approx(case.scene.diameter, rel=1e-8)
-    assert math.degrees(math.atan((low - high) / height)) == pytest.approx(3.0, rel=1e-6)
-
-
-def test_lammps_has_a_contact_for_each_kind_of_grain() -> None:
-    case = case_of("lammps")
-
-    def contacts(effect: str, size: float) -> dict[str, list[float]]:
-        text = lammps_text(STRANGERS[effect].change(case, size))
-        place = r"(?:pair_coeff|fix) (\S+ \S+) (?:wall/gran/region granular )?"
-        found = re.findall(place + r"hertz/material (\S+) .* mindlin \S+ \S+ (\S+)", text)
-        return {name: [float(modulus), float(friction)] for name, modulus, friction in found}
-
-    slippery = contacts("slippery_class", 0.5)
-    mu_gg, mu_gw, less = THETA["mu_gg"], THETA["mu_gw"], SLIPPERY
-    assert slippery["1 1"][1] == pytest.approx(mu_gg)
-    assert slippery["1 2"][1] == slippery["2 2"][1] == pytest.approx(less * mu_gg)
-    assert slippery["tube_usual usual"][1] == slippery["plate_usual usual"][1] == pytest.approx(mu_gw)
-    assert slippery["tube_odd odd"][1] == slippery["plate_odd odd"][1] == pytest.approx(less * mu_gw)
-    soft = {name: modulus for name, (modulus, _) in contacts("soft_class", 20.0).items()}
-    # springs in a row: the compliance of two unlike grains is the mean of those of like ones
-    assert soft["2 2"] == pytest.approx(soft["1 1"] / 20.0)
-    assert 1.0 / soft["1 2"] == pytest.approx(0.5 / soft["1 1"] + 0.5 / soft["2 2"])
-    # walls are far stiffer: a grain on them has twice the modulus that it has on its like, but for 0.2 %
-    assert soft["tube_odd odd"] == pytest.approx(2.0 * soft["2 2"], rel=2e-3)
-
-
-def test_dmt_parts_spheres_as_hard_as_jkr() -> None:
-    work, reduced = 0.02, 0.7e-3
-    pull = 4.0 * math.pi * surface_energy(work) * reduced
-    assert pull == pytest.approx(1.5 * math.pi * work * reduced)
-
-
-def test_lammps_refuses_liquid_bridges_by_name() -> None:
-    bridge = CapillaryBridge(between="grains", surface_tension=0.01, bridge_volume=5e-11)
-    with pytest.raises(InputError, match=r"no liquid bridges, which LAMMPS does not make .*capillary"):
-        lammps_text(replace(case_of("lammps"), mechanisms=(bridge,)))
-    with pytest.raises(InputError, match=r"lammps makes contact_adhesion, .*liquid_bridges"):
-        plan_for("lammps", Plan(mechanisms=("liquid_bridges",)))
 
 
 def test_a_conical_tube_is_right_at_half_its_height() -> None:
