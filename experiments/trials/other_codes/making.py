@@ -45,10 +45,10 @@ MADE: Mapping[str, Mapping[str, str]] = {
 
 LAWS: Mapping[str, str] = {
     "lammps": (
-        "`hertz/material` with `damping tsuji` at the number that gives our damping, and `tangential "
-        "mindlin`: its dashpot is as strong as the normal one, Coulomb's limit takes the size of the normal "
-        "force, and where a contact slides its spring makes up for the dashpot, while ours slides undamped; "
-        "contacts with the tube, a cylinder, are stiffer by r / 4R or so"
+        "`hertz/material` with `damping tsuji` and `tangential mindlin`, at the numbers that give our "
+        "damping: Coulomb's limit takes the size of the normal force, and where a contact slides its spring "
+        "makes up for the dashpot, while ours slides undamped; contacts with the tube, a cylinder, are "
+        "stiffer by r / 4R or so"
     ),
     "liggghts": (
         "`hertz` with `tangential history`: Coulomb's limit holds for the spring alone, so that spring and "
