@@ -76,16 +76,21 @@ def contact_terms(contact: Contact) -> tuple[Term, ...]:
     )
 
 
-def granular_words(contact: Contact, words: Mapping[str, str] | None = None) -> str:
+def granular_words(
+    contact: Contact, words: Mapping[str, str] | None = None, surface_energy: float = 0.0
+) -> str:
     """LAMMPS' words for a contact, after ``pair_coeff * *`` or ``wall/gran granular``.
 
     `words` are those for each law; left out, Mindlin's spring remembers its displacement and damping may
-    attract.
+    attract. With a surface energy [J/m2] the contact adheres after Derjaguin, Muller and Toporov.
     """
     words = words or {"tangential_history": "mindlin", "attraction": ""}
     terms = values(contact_terms(contact))
+    normal = f"hertz/material {terms['E']!r} {terms['e']!r} 0"
+    if surface_energy > 0.0:
+        normal = f"dmt {terms['E']!r} {terms['e']!r} 0 {surface_energy!r}"
     return (
-        f"hertz/material {terms['E']!r} {terms['e']!r} 0 "
+        f"{normal} "
         f"tangential {words['tangential_history']} {terms['k_t']!r} {terms['x_gamma,t']!r} {terms['mu_s']!r} "
         f"rolling sds {terms['k_roll']!r} {terms['gamma_roll']!r} {terms['mu_roll']!r} "
         f"{words['attraction']} damping tsuji"

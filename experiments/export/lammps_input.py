@@ -13,7 +13,7 @@ from experiments.export.translated import Translated
 
 INPUT, HEAP = "lift.in", "heap.dump"
 
-_QUIT = "quit 1"
+QUIT = "quit 1"
 """End of a program that has failed."""
 
 _SETUP = """\
@@ -112,8 +112,9 @@ def translate_lift(
 
     The contacts are LAMMPS' words for those among grains, with the tube and with the plate.
     """
-    files = {} if lift.is_of_spheres else {_file(n): _molecule(t) for n, t in enumerate(lift.templates, 1)}
-    files = {INPUT: _setup(lift, contacts) + _filling(lift) + _lifting(lift), **files}
+    kinds = () if lift.is_of_spheres else lift.templates
+    molecules = {_file(number): molecule_text(template) for number, template in enumerate(kinds, 1)}
+    files = {INPUT: _setup(lift, contacts) + _filling(lift) + _lifting(lift), **molecules}
     tilted = ("scene tilt: LAMMPS pours along gravity alone; left out",) if lift.scene.tilt else ()
     translated = (*laws, *lift_rows(lift, exact_tube=True), *_rows(lift))
     command = ("lmp", "-in", INPUT)
@@ -137,7 +138,7 @@ def _setup(lift: Lift, contacts: Sequence[str]) -> str:
             f"fix plate all wall/gran/region granular {with_plate} region plate"
         )
     spheres, names = lift.is_of_spheres, " ".join(_file(n) for n in range(1, len(templates) + 1))
-    shares = " ".join(_shares([template.fraction for template in templates]))
+    shares = " ".join(written_shares([template.fraction for template in templates]))
     return _SETUP.format(
         cutoff="" if spheres else f" cutoff {2.0 * lift.reach + lift.skin:.6g}",
         molecules="" if spheres else f"molecule grains {names}\n",
@@ -169,13 +170,13 @@ def _setup(lift: Lift, contacts: Sequence[str]) -> str:
 
 
 def _diameters(templates: Sequence[Template]) -> str:
-    shares = _shares([template.fraction for template in templates])
+    shares = written_shares([template.fraction for template in templates])
     sizes = " ".join(f"{2.0 * t.radii[0]:.9g} {part}" for t, part in zip(templates, shares, strict=True))
     density = templates[0].density
     return f"diam poly {len(templates)} {sizes} dens {density:.9g} {density:.9g}"
 
 
-def _shares(fractions: Sequence[float]) -> list[str]:
+def written_shares(fractions: Sequence[float]) -> list[str]:
     """Write parts that add up to 1 within LAMMPS' tolerance."""
     return [f"{fraction:.15g}" for fraction in (*fractions[:-1], 1.0 - sum(fractions[:-1]))]
 
@@ -203,7 +204,7 @@ def _molecule_radius(template: Template) -> float:
     return float(((away**2).sum(axis=1) ** 0.5 + template.radii).max())
 
 
-def _molecule(template: Template) -> str:
+def molecule_text(template: Template, atom_type: int = 1) -> str:
     """Write a template as a molecule file: mass and inertia are the body's."""
     count = template.shape.sphere_count
     xx, yy, zz = template.inertia.tolist()
@@ -211,7 +212,7 @@ def _molecule(template: Template) -> str:
     share = template.mass / count
     sections = {
         "Coords": [f"{i} {x:.9g} {y:.9g} {z:.9g}" for i, ((x, y, z), _) in rows],
-        "Types": [f"{i} 1" for i, _ in rows],
+        "Types": [f"{i} {atom_type}" for i, _ in rows],
         "Diameters": [f"{i} {2.0 * radius:.9g}" for i, (_, radius) in rows],
         "Masses": [f"{i} {share:.9g}" for i, _ in rows],
     }
@@ -223,7 +224,7 @@ def _molecule(template: Template) -> str:
 
 
 def _filling(lift: Lift) -> str:
-    look, settle = lift.steps(LOOK), rest_loop(lift, "settle", lift.settle_limit, _QUIT)
+    look, settle = lift.steps(LOOK), rest_loop(lift, "settle", lift.settle_limit, QUIT)
     if lift.scene.grain_count is not None:
         time = lift.count / lift.rain_rate + 2.0 * lift.rain_period
         return _FILL_COUNT.format(steps=lift.steps(time)) + settle
@@ -248,7 +249,7 @@ def _lifting(lift: Lift) -> str:
         step_rise=lift.case.time_step * scene.lift_speed,
         largest=lift.largest_radius,
     )
-    return lifting + rest_loop(lift, "rest", lift.rest_limit, _QUIT) + _END.format(heap=HEAP)
+    return lifting + rest_loop(lift, "rest", lift.rest_limit, QUIT) + _END.format(heap=HEAP)
 
 
 def _rows(lift: Lift) -> tuple[Translated, ...]:

@@ -16,15 +16,12 @@ from experiments.export.liggghts_input import grain_template
 from experiments.export.looks import rest_loop
 from experiments.trials.other_codes.odd_lift import OddLift
 from experiments.trials.other_codes.reading import DRAG, FRAMES
-from experiments.trials.other_codes.surfaces import FILL_MARGIN, Bench
+from experiments.trials.other_codes.surfaces import BIN, FILL_MARGIN, Bench
 
 INPUT, TUBE, PLATE = "lift.in", "tube.stl", "plate.stl"
 
 GRAIN, ODD = 1, 4
 """Types of LIGGGHTS's atoms."""
-
-_BIN = 4.0
-"""Side of the bins of neighbours, in reaches of a pair: in smaller ones the empty box costs most."""
 
 _SORTING = "sort 0 0.0"
 """No sorting of the atoms in memory: its bins fill the empty box, and cost a tenth of the time."""
@@ -159,7 +156,7 @@ def _setup(bench: Bench) -> str:
         top=max(bench.rain_top, (1.0 + GONE) * scene.height) + 4.0 * lift.reach,
         types=4 if bench.has_odd else 3,
         skin=lift.skin,
-        bin=_BIN * (2.0 * lift.largest_radius + lift.skin),
+        bin=BIN * (2.0 * lift.largest_radius + lift.skin),
         properties=_properties(_tables(bench) | numbers),
         pair_model=model_words(words | {"cohesion": cohesion}),
         wall_model=model_words(words),

@@ -4,7 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+_TILT = "gravity turned towards +x: the same"
+_SIZES = "five classes of size with the moments of the normal spread, at the same mean mass"
+
 MADE: Mapping[str, Mapping[str, str]] = {
+    "lammps": {
+        "contact_adhesion": (
+            "`dmt` in the place of `hertz/material` among grains: Hertz's force less JKR's largest pull; no "
+            "adhesion beyond the touch, and friction takes Hertz's force as its load"
+        ),
+        "plate_tilt": _TILT,
+        "rolling_torque": (
+            "`sds` against the relative rotation, in place of a torque against each grain's own spin: a "
+            "spring with a dashpot and a slider; the coefficient gives the same mean torque, whose lever is "
+            "R* there and the distance to the grain's centre here"
+        ),
+        "size_spread": _SIZES,
+        "vibration": "the plate, a region, moves as ours does, from the lift on for the same time",
+    },
     "liggghts": {
         "contact_adhesion": (
             "`sjkr`: k 2 pi R* d while spheres overlap, with k for JKR's largest pull between two spheres; "
@@ -14,19 +31,25 @@ MADE: Mapping[str, Mapping[str, str]] = {
             "`easo/capillary/viscous` without viscosity: Soulie's force in place of Willett's, the same when "
             "spheres touch and the same length at the break; liquid is handed on as bridges break"
         ),
-        "plate_tilt": "gravity turned towards +x: the same",
+        "plate_tilt": _TILT,
         "rolling_torque": (
             "`cdt` or `epsd2` against the relative rotation, in place of a torque against each grain's own "
             "spin; the coefficient gives the same mean torque, whose lever is R* there and the distance to "
             "the grain's centre here; `cdt` acts for whole steps, `epsd2` is a spring"
         ),
-        "size_spread": "five classes of size with the moments of the normal spread, at the same mean mass",
+        "size_spread": _SIZES,
         "vibration": "the plate, a mesh, wiggles as ours does, from the lift on for the same time",
     },
 }
 """For each code, the effects that it can make, and how."""
 
 LAWS: Mapping[str, str] = {
+    "lammps": (
+        "`hertz/material` with `damping tsuji` and `tangential mindlin`, at the numbers that give our "
+        "damping: Coulomb's limit takes the size of the normal force, and where a contact slides its spring "
+        "makes up for the dashpot, while ours slides undamped; contacts with the tube, a cylinder, are "
+        "stiffer by r / 4R or so"
+    ),
     "liggghts": (
         "`hertz` with `tangential history`: Coulomb's limit holds for the spring alone, so that spring and "
         "dashpot of a contact that sticks may pass it together, and takes the size of the normal force; ours "

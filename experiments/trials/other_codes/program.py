@@ -19,6 +19,7 @@ from experiments.cases.contract import heap_result
 from experiments.cases.program import ProgramEngine, empty_result
 from experiments.errors import InputError
 from experiments.measurement.observables import OBSERVABLES, PHOTOGRAPHED
+from experiments.trials.other_codes.lammps_input import lammps_files
 from experiments.trials.other_codes.liggghts_input import liggghts_files
 from experiments.trials.other_codes.reading import (
     DRAG,
@@ -88,6 +89,7 @@ class OtherCode:
 
 
 CODES = {
+    "lammps": OtherCode("LAMMPS", "lmp", lammps_files),
     "liggghts": OtherCode("LIGGGHTS", "liggghts", liggghts_files),
 }
 """Codes that make a second reality, by name."""

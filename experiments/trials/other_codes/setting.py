@@ -9,13 +9,23 @@ from typing import Any
 import numpy as np
 
 from dem_warp import PRESETS, Case
-from dem_warp.laws.conventions import Rolling
+from dem_warp.laws.conventions import ContactLaws, Rolling
 from experiments.trials.other_codes.odd_lift import odd
 
 _STREAM = 2
 """Stream of random numbers of a trial's seed; 1 is that of its camera."""
 
-ROLLING: Mapping[str, tuple[Rolling, ...]] = {"liggghts": ("cdt", "epsd2")}
+LAWS: Mapping[str, ContactLaws] = {
+    "lammps": replace(PRESETS["lammps"], restitution="closed_form", tangential_damping="tsuji"),
+    "liggghts": PRESETS["liggghts"],
+}
+"""Laws of each code, but for rolling. LAMMPS is told the damping that the restitution means here: what it
+itself makes of the number is another grain, whose heap is flatter by a standard deviation."""
+
+ROLLING: Mapping[str, tuple[Rolling, ...]] = {
+    "lammps": ("sds",),
+    "liggghts": ("cdt", "epsd2"),
+}
 """Resistances to rolling of each code."""
 
 
@@ -28,7 +38,7 @@ class Setting:
     rain_rate: float
     """Grains a second at the most."""
     tube_sides: int
-    """Sides of the prism that stands for the tube."""
+    """Sides of the prism that stands for the tube, where it is a mesh."""
     look_time: float
     """Time between two looks of the film [s]."""
     rolling: Rolling
@@ -46,8 +56,8 @@ class Setting:
             rolling=ROLLING[code][rng.integers(len(ROLLING[code]))],
         )
 
-    def of(self, case: Case[Any], preset: str) -> Case[Any]:
-        """Take a case to the other workshop, whose code has a set of laws."""
+    def of(self, case: Case[Any], code: str) -> Case[Any]:
+        """Take a case to the other workshop, which has a code."""
         scene = odd(
             replace(case.scene, rain_rate=min(self.rain_rate, case.scene.rain_rate)),
             tube_sides=self.tube_sides,
@@ -58,5 +68,5 @@ class Setting:
             case,
             scene=scene,
             numerics=replace(case.numerics, time_step_fraction=fraction),
-            laws=replace(PRESETS[preset], rolling=self.rolling),
+            laws=replace(LAWS[code], rolling=self.rolling),
         )

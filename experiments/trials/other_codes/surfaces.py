@@ -25,6 +25,9 @@ DIRECTIONS = 4096
 DENSEST_RAIN = 0.17
 """Largest solid fraction of the grains that come in at once: in a denser lot some find no place at random."""
 
+BIN = 4.0
+"""Side of the bins of neighbours, in reaches of a pair: in smaller ones the empty box costs most."""
+
 CHECKED = 4
 """Looks from one decision of an input to the next."""
 

@@ -29,7 +29,7 @@ from experiments.trials.other_codes.effects import DECLARED, STRANGERS
 from experiments.trials.other_codes.generate import PLAN, in_turn, plan_for, write_reality
 from experiments.trials.other_codes.liggghts_input import energy_density, liggghts_files, wetting
 from experiments.trials.other_codes.making import MADE
-from experiments.trials.other_codes.program import engine_for
+from experiments.trials.other_codes.program import CODES, engine_for
 from experiments.trials.other_codes.reading import (
     Frame,
     Grasp,
@@ -45,8 +45,9 @@ from experiments.trials.truth import Kind, Label
 THETA = {"mu_gg": 0.6, "mu_gw": 0.5, "e_gg": 0.3}
 COUNT = 24
 SMALL = {"scene": {"lifted-cylinder": {"grain_count": COUNT, "height": "25 mm"}}}
-PROGRAMS = {"liggghts": "liggghts"}
+PROGRAMS = {"lammps": "lmp", "liggghts": "liggghts"}
 SETTING = Setting(1.0, 1000.0, 48, 4e-3, "cdt")
+SETTINGS = {"lammps": replace(SETTING, rolling="sds"), "liggghts": SETTING}
 G = 9.81
 
 with_programs = pytest.mark.parametrize(
@@ -54,10 +55,10 @@ with_programs = pytest.mark.parametrize(
 )
 
 
-def case_of(**changes: float) -> Case:
-    """A test of few grains, in the setting of LIGGGHTS's workshop."""
-    case = load_study(STUDY, "bench", SMALL).case(THETA | changes, seed=3)
-    return SETTING.of(case, "liggghts")
+def case_of(code: str = "liggghts") -> Case:
+    """A test of few grains, in the setting of a code's workshop."""
+    case = load_study(STUDY, "bench", SMALL).case(THETA, seed=3)
+    return SETTINGS[code].of(case, code)
 
 
 SHAPE = case_of().grains.mixture.shapes[0]
@@ -274,7 +275,7 @@ def test_the_plan_holds_at_least_120_trials_of_what_the_code_can_make() -> None:
     assert plan.nulls + singles + plan.pairs + plan.strangers * len(STRANGERS) >= 120
     with pytest.raises(InputError, match="liggghts makes"):
         plan_for("liggghts", Plan(mechanisms=("air_drag",)))
-    with pytest.raises(InputError, match="must be one of liggghts"):
+    with pytest.raises(InputError, match="must be one of lammps, liggghts"):
         engine_for("edem")
 
 
@@ -297,29 +298,29 @@ def test_trials_are_measured_evenly_over_their_classes() -> None:
         assert np.abs(seen - even).max() < 2.0
 
 
-def test_the_reality_says_how_each_effect_is_made(tmp_path: Path) -> None:
-    write_reality(tmp_path / "reality.json", "liggghts")
+@pytest.mark.parametrize("code", CODES)
+def test_the_reality_says_how_each_effect_is_made(code: str, tmp_path: Path) -> None:
+    write_reality(tmp_path / "reality.json", code)
     text = (tmp_path / "reality.json").read_text()
-    assert all(name in text for name in (*MADE["liggghts"], *STRANGERS))
+    assert all(name in text for name in (*MADE[code], *STRANGERS))
 
 
 # ---- the codes themselves ----------------------------------------------------------------------------------
 
 
-def observed(code: str, tmp_path: Path, *sizes: tuple[str, float], **theta: float) -> dict[str, float]:
-    """Observables of one small test that a code runs."""
-    study = load_study(STUDY, "bench", SMALL)
-    table = OutcomeTable(tmp_path / "outcomes.sqlite")
-    values = tuple((THETA | theta).values())
-    with OtherCodeSimulator(study, code, SETTING, table, OwnWorkers("cpu", 1)) as simulator:
-        outcomes = simulator([Point(values, sizes, "base", 11)])
-    assert outcomes.reasons == ("",)
-    return dict(zip(NAMES, outcomes.values[0], strict=True))
+def observed(code: str, folder: Path, *sizes: tuple[tuple[str, float], ...]) -> list[dict[str, float]]:
+    """Observables of small tests that a code runs, each with the sizes of some effects."""
+    study, table = load_study(STUDY, "bench", SMALL), OutcomeTable(folder / "outcomes.sqlite")
+    points = [Point(tuple(THETA.values()), own, "base", 12) for own in sizes]
+    with OtherCodeSimulator(study, code, SETTINGS[code], table, OwnWorkers("cpu", 1)) as simulator:
+        outcomes = simulator(points)
+    assert outcomes.reasons == ("",) * len(points)
+    return [dict(zip(NAMES, row, strict=True)) for row in outcomes.values]
 
 
 @with_programs
 def test_a_code_makes_a_heap_that_our_functions_read(code: str, tmp_path: Path) -> None:
-    seen = observed(code, tmp_path)
+    [seen] = observed(code, tmp_path, ())
     assert set(seen) == set(NAMES)
     assert np.isfinite(list(seen.values())).all()
     scene = case_of().scene
@@ -329,31 +330,17 @@ def test_a_code_makes_a_heap_that_our_functions_read(code: str, tmp_path: Path) 
     assert 0.0 < seen["wall_drag"] < 1.0
     # it is kept: no program is asked for again
     assert len(OutcomeTable(tmp_path / "outcomes.sqlite")) == 1
-    assert observed(code, tmp_path) == seen
+    assert observed(code, tmp_path, ()) == [seen]
 
 
-EFFECTS = {
-    "liggghts": (*MADE["liggghts"], *STRANGERS),
-}
-
-
-@pytest.mark.parametrize(
-    ("code", "effect"),
-    [
-        pytest.param(code, effect, marks=pytest.mark.program(PROGRAMS[code]))
-        for code, effects in EFFECTS.items()
-        for effect in effects
-    ],
-)
-def test_a_code_makes_every_effect(
-    code: str, effect: str, tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
-) -> None:
-    strange = STRANGERS.get(effect)
-    size = strange.maximum if strange else _largest(effect)
-    with_it = observed(code, tmp_path, (effect, size))
-    assert np.isfinite(list(with_it.values())).all()
-    # the table of outcomes that all effects share makes it once
-    assert with_it != observed(code, tmp_path_factory.getbasetemp())
+@with_programs
+def test_a_code_makes_every_effect(code: str, tmp_path: Path) -> None:
+    sizes = {name: _largest(name) for name in MADE[code]}
+    sizes |= {name: effect.maximum for name, effect in STRANGERS.items()}
+    without, *with_one = observed(code, tmp_path, (), *(((name, size),) for name, size in sizes.items()))
+    for name, seen in zip(sizes, with_one, strict=True):
+        assert np.isfinite(list(seen.values())).all(), name
+        assert seen != without, name
 
 
 def _largest(effect: str) -> float:
