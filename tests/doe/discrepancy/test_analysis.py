@@ -68,7 +68,7 @@ def test_a_hidden_mechanism_is_named_with_its_size() -> None:
 
 
 def test_the_numbers_of_an_analysis_stay() -> None:
-    # As they were when shifts were found beside what the bank leaves open; rounding differs from host to host.
+    # Since shifts are found beside what the bank leaves open; rounding differs from host to host.
     found, _ = _named()
     assert found.base is not None
     assert found.chosen is not None
