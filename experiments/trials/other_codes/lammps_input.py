@@ -63,7 +63,7 @@ group nothing empty
 fix weight nothing gravity {gravity:.9g} vector {direction}
 fix bodies all rigid/small molecule mol grains gravity weight
 # a body must not leave the box in parts
-region far block -{far:.6g} {far:.6g} -{far:.6g} {far:.6g} INF INF side out
+region far block -{far:.6g} {far:.6g} -{far:.6g} {far:.6g} INF {far_top:.6g} side out
 fix gone all evaporate {look} 1000000 far {gone_seed} molecule yes
 
 # filling
@@ -186,19 +186,21 @@ def _setup(bench: Bench) -> str:
     scene, lift = bench.scene, bench.lift
     half_width, _, bottom = scene.room(lift.reach)
     kinds, gravity = bench.kinds(), math.hypot(*scene.gravity)
-    lots = _lots(bench)
+    top = max(bench.rain_top, (1.0 + GONE) * scene.height) + 4.0 * lift.reach
+    margin, lots = _MARGIN * lift.reach, _lots(bench)
     gone_seed, *seeds = lift.seeds(1 + len(lots))
     fill = max(lot.count * lot.steps for lot in lots) + lift.steps(FILL_MARGIN)
     return _SETUP.format(
         cutoff=2.0 * lift.reach + lift.skin,
         molecules=" ".join(_file(number) for number, _ in enumerate(kinds, 1)),
         far=half_width,
-        low=-half_width - _MARGIN * lift.reach,
-        high=half_width + _MARGIN * lift.reach,
+        far_top=top,
+        low=-half_width - margin,
+        high=half_width + margin,
         look=bench.look_steps,
         gone_seed=gone_seed,
         bottom=bottom,
-        top=max(bench.rain_top, (1.0 + GONE) * scene.height) + 4.0 * lift.reach,
+        top=top + margin,
         types=ODD if bench.has_odd else GRAIN,
         skin=lift.skin,
         bin=BIN * (2.0 * lift.largest_radius + lift.skin),
