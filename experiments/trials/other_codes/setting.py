@@ -28,13 +28,6 @@ ROLLING: Mapping[str, tuple[Rolling, ...]] = {
 }
 """Resistances to rolling of each code."""
 
-STEPS: Mapping[str, tuple[float, float]] = {
-    "lammps": (0.3, 0.6),
-    "liggghts": (0.6, 1.0),
-}
-"""Least and largest time step of each code over that of the study. In longer ones grains of a full tube may
-tremble in LAMMPS for ever: at 0.8 in 3 of 48 wide tubes, at half of it in none of them."""
-
 
 @dataclass(frozen=True)
 class Setting:
@@ -56,7 +49,7 @@ class Setting:
         """Draw the setting of a trial from its seed."""
         rng = np.random.default_rng([seed, _STREAM])
         return cls(
-            step_share=float(rng.uniform(*STEPS[code])),
+            step_share=float(rng.uniform(0.6, 1.0)),
             rain_rate=float(rng.uniform(500.0, 1000.0)),
             tube_sides=int(rng.integers(40, 97)),
             look_time=float(rng.uniform(2.5e-3, 5e-3)),

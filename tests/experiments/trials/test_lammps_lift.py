@@ -125,3 +125,13 @@ def test_grains_are_taken_off_before_they_leave_the_box_in_parts() -> None:
         assert abs(end) - abs(float(edge)) > 2.0 * case.grains.grain_reach + looked
     # a clogged tube is known by what has risen by more than its height
     assert float(far[2]) > 1.5 * case.scene.height
+
+
+def test_a_tube_that_trembles_is_lifted_and_a_heap_that_does_is_none() -> None:
+    text = lammps_text(case_of())
+
+    def loop(name: str) -> str:
+        return text.split(f"label {name}\n")[1].split(f"label {name}_done")[0]
+
+    assert "quit 1" not in loop("settle")
+    assert "quit 1" in loop("rest")
