@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from dem_warp import PRESETS, Case
-from dem_warp.laws.conventions import ContactLaws, Rolling
+from dem_warp import PRESETS, Case, ContactLaws
+from dem_warp.laws.conventions import Rolling
 from experiments.trials.other_codes.odd_lift import odd
 
 _STREAM = 2
