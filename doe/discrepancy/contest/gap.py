@@ -10,7 +10,7 @@ import numpy as np
 from scipy import stats
 from scipy.linalg import orth
 
-from doe.discrepancy.contest.signatures import Signatures, projector
+from doe.discrepancy.contest.signatures import Signatures, projector, unshared
 from doe.discrepancy.fitting.fit import Fitted, fit
 from doe.discrepancy.fitting.model import Stack
 
@@ -114,6 +114,7 @@ def find_gap(
     noise = np.random.default_rng(seed).standard_normal((draws, len(project))) @ project
     left = project @ fitted.residuals
     common = _common_directions(fitted, project)
+    seen = unshared(seen, fitted)
     directions = np.concatenate([seen.directions, seen.turned_directions.reshape(-1, len(project))])
     drawn, found = (_statistics(each, directions, len(seen.names), common) for each in (noise, left))
     limits = {of: float(np.quantile(values, 1.0 - level)) for of, values in drawn.items()}

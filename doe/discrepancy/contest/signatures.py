@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from doe.discrepancy.fitting.evidence import Block
 from doe.discrepancy.fitting.fit import Fitted
@@ -89,6 +90,42 @@ class Signatures:
 def _of_length_one(visible: np.ndarray) -> np.ndarray:
     length = np.linalg.norm(visible, axis=1, keepdims=True)
     return np.asarray(np.where(length > LEAST_LENGTH, visible / np.maximum(length, LEAST_LENGTH), 0.0))
+
+
+def unshared(seen: Signatures, fitted: Fitted) -> Signatures:
+    """Signatures without what the bank's errors bring into them and into the residuals alike.
+
+    What a mechanism adds is emulated as a difference from the base, and the base's error is in that and in
+    the residuals: they seem to point at mechanisms where nothing is missing. What the residuals say of that
+    error is taken out of the visible parts; what is left is independent of them if nothing is missing.
+
+    Parameters
+    ----------
+    seen : Signatures
+        Of the mechanisms that are not in the model.
+    fitted : Fitted
+        A model that fresh runs have corrected hangs on them, no longer on the bank: nothing is taken out.
+    """
+    if fitted.model.corrections or not seen.names:
+        return seen
+    project = projector(fitted.sensitivities)
+    told = fitted.whitening.T @ (project @ fitted.residuals)
+    shared = {name: _shared_errors(fitted, name) @ told for name in seen.names}
+    visible, turned = (
+        part - np.array([shared[name] for name in names]).reshape(part.shape) @ fitted.whitening.T @ project
+        for part, names in ((seen.visible, seen.names), (seen.turned, seen.turned_names))
+    )
+    return replace(seen, visible=visible, turned=turned)
+
+
+def _shared_errors(fitted: Fitted, name: str) -> np.ndarray:
+    """Covariance of errors of a signature with those of the residuals, (means, means)."""
+    parts = []
+    for block in fitted.stack.blocks:
+        surfaces = fitted.model.emulator.surfaces[block.condition]
+        covariance = surfaces.shared_error(fitted.x, fitted.mechanisms, name, SECANT) / SECANT
+        parts.append(covariance[np.ix_(block.columns, block.columns)])
+    return np.asarray(block_diag(*parts))
 
 
 def signatures(fitted: Fitted) -> Signatures:

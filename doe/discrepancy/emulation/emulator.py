@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from doe.discrepancy.emulation.bank import Bank
-from doe.discrepancy.emulation.noise import shared_correlations
+from doe.discrepancy.emulation.noise import fit_noises
 from doe.discrepancy.emulation.surface_fits import (
     AddedRuns,
     BaseRuns,
     fit_additions,
     fit_bases,
-    repeats_noise,
+    repeats_of,
 )
 from doe.discrepancy.emulation.surfaces import Addition, Surfaces
 from doe.discrepancy.emulation.symmetry import symmetric_addition, symmetric_base
@@ -107,10 +107,10 @@ def _bases(bank: Bank, columns: np.ndarray, floor: np.ndarray) -> list[Surfaces]
         rows = bank.rows(number, -1)
         theta, values = bank.theta[rows], bank.values[np.ix_(rows, columns)]
         try:
-            data.append((theta, values, repeats_noise(theta, values, floor)))
+            data.append((theta, values, repeats_of(theta, values)))
         except RuleError as error:
             raise RuleError(error.rule, error.value, f"condition {condition} of the bank") from error
-    noises = shared_correlations([noise for _, _, noise in data])
+    noises = fit_noises([repeats for _, _, repeats in data], floor)
     runs = [BaseRuns.of(theta, values, noise) for (theta, values, _), noise in zip(data, noises, strict=True)]
     return fit_bases(runs)
 

@@ -1,8 +1,7 @@
 """The scatter of runs from seed to seed: a covariance over the factors, from repeated runs.
 
-Variances vary over the factors, so each observable's is
-the exponential of a plane; correlations are taken as the same over the factors, and as alike between
-conditions.
+Variances vary over the factors, so each observable's is the exponential of a plane. Planes and correlations
+of the conditions are alike as far as the repeats say so, each condition's own being known from a few.
 """
 
 from __future__ import annotations
@@ -14,12 +13,19 @@ import numpy as np
 
 SLOPE_SD = 0.7
 """Prior standard deviation of the slopes of a log-variance over half a range: a factor of two either way."""
+FIRST_APART = 0.3
+"""Standard deviation of a condition's coefficient about that of all, before the repeats have said it."""
+LEAST_APART = 0.01
+"""Least one: smaller ones are nothing."""
 CORRELATION_SHRINKAGE = 0.02
 """Share of the identity in a correlation matrix, which keeps nearly equal observables apart."""
 ALIKE = 100.0
 """Repeats that the correlation of all conditions is worth in that of one. In a bank of 160 repeats a
 condition correlations differed between conditions by about what 100 repeats leave open."""
 NEWTON_STEPS = 30
+CONVERGED = 1e-6
+"""Longest step of a fit that has arrived, in the logarithm of a variance."""
+EM_STEPS = 30
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,6 +34,8 @@ class Noise:
 
     coefficients: np.ndarray
     """Of the log-variances, (1 + factors, observables)."""
+    spread: np.ndarray
+    """Covariance of their errors, the same for all observables, (1 + factors, 1 + factors)."""
     correlation: np.ndarray
     """(observables, observables)."""
     degrees_of_freedom: int
@@ -36,9 +44,14 @@ class Noise:
     """Number of those that the correlation is worth."""
 
     def variance(self, theta: np.ndarray) -> np.ndarray:
-        """Variance of one run, (..., observables), at coded factors (..., factors) kept to their ranges."""
-        inside = np.clip(theta, -1.0, 1.0)
-        return np.asarray(np.exp(self.coefficients[0] + inside @ self.coefficients[1:]))
+        """Variance of one run, (..., observables), at coded factors (..., factors) kept to their ranges.
+
+        The mean of all that it may be: weights are its inverse, and of an estimate from n squares that
+        inverse is n / (n - 2) times too large. A logarithm of variance v = 2 / n makes it exp(v).
+        """
+        planes = _planes(np.clip(theta, -1.0, 1.0))
+        open_ = np.einsum("...i,ij,...j->...", planes, self.spread, planes)
+        return np.asarray(np.exp(planes @ self.coefficients + open_[..., None]))
 
     def covariance(self, theta: np.ndarray) -> np.ndarray:
         """Covariance of one run at one point, (observables, observables)."""
@@ -46,8 +59,12 @@ class Noise:
         return np.asarray(sd[:, None] * self.correlation * sd)
 
     def inverse_bias(self, count: int) -> float:
-        """Factor that makes the inverse of the covariance of so many observables unbiased (Wishart)."""
-        return self.correlation_freedom / max(self.correlation_freedom - count - 1.0, 1.0)
+        """Factor that makes the inverse of the covariance of so many observables unbiased (Wishart).
+
+        Less what its variances bring to it.
+        """
+        freedom = self.correlation_freedom
+        return max(freedom - 2.0, 1.0) / max(freedom - count - 1.0, 1.0)
 
 
 def fit_noise(theta: np.ndarray, deviations: np.ndarray, floor: np.ndarray) -> Noise:
@@ -61,24 +78,81 @@ def fit_noise(theta: np.ndarray, deviations: np.ndarray, floor: np.ndarray) -> N
         Each with the covariance of one run.
     floor : (observables,) array
         Least standard deviations: what an observable can resolve.
+    """
+    return fit_noises([(theta, deviations)], floor)[0]
+
+
+def fit_noises(repeats: Sequence[tuple[np.ndarray, np.ndarray]], floor: np.ndarray) -> list[Noise]:
+    """Fit the covariances of some conditions, which learn from one another.
+
+    A plane is that of all conditions and what one differs by. How much coefficients differ, all observables
+    say together. Two dozen repeats alone leave a variance open by a factor of 1.5, and a search that takes
+    it as known raised six alarms for one that it declared.
+
+    Parameters
+    ----------
+    repeats : sequence of ((n, factors) array, (n, observables) array)
+        Coded factors and deviations of each condition, as of `fit_noise`.
+    floor : (observables,) array
 
     Returns
     -------
-    Noise
-        Maximum of the penalised gamma likelihood of the squared deviations, by Fisher scoring.
+    list of Noise
+        Maximum of the penalised gamma likelihood of the squared deviations, by Fisher scoring; expectation
+        and maximisation find the penalties.
     """
-    squares = deviations**2 + floor**2
-    planes = np.column_stack([np.ones(len(theta)), theta])
-    penalty = np.diag([0.0, *np.full(theta.shape[1], SLOPE_SD**-2)])
-    information = 0.5 * planes.T @ planes + penalty
-    coefficients = np.zeros((planes.shape[1], squares.shape[1]))
+    planes = [_planes(theta) for theta, _ in repeats]
+    maps = _maps(len(repeats), planes[0].shape[1])
+    terms = np.concatenate([own @ onto for own, onto in zip(planes, maps, strict=True)])
+    squares = np.concatenate([deviations for _, deviations in repeats]) ** 2 + floor**2
+    coefficients, spread = _fit_planes(terms, squares, planes[0].shape[1])
+    noises = []
+    for own, onto, (_, deviations) in zip(planes, maps, repeats, strict=True):
+        plane = onto @ coefficients
+        standard = deviations / np.exp(0.5 * own @ plane)
+        correlation = correlation_of(standard, np.ones(len(standard)))
+        count = len(deviations)
+        noises.append(Noise(plane, onto @ spread @ onto.T, correlation, count, float(count)))
+    return shared_correlations(noises)
+
+
+def _planes(theta: np.ndarray) -> np.ndarray:
+    """Terms of a plane at coded factors (..., factors), (..., 1 + factors)."""
+    return np.concatenate([np.ones((*theta.shape[:-1], 1)), theta], axis=-1)
+
+
+def _maps(conditions: int, size: int) -> list[np.ndarray]:
+    """Plane of each condition from all coefficients: those of all, then what each differs by, if several."""
+    if conditions == 1:
+        return [np.eye(size)]
+    own = np.eye(conditions * size).reshape(conditions, size, conditions * size)
+    return [np.concatenate([np.eye(size), one], axis=1) for one in own]
+
+
+def _fit_planes(terms: np.ndarray, squares: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
+    """Coefficients (terms, observables) of log-variances and the covariance of their errors (terms, terms).
+
+    The first so many are those of the plane of all, the others of what conditions differ by.
+    """
+    coefficients = np.zeros((terms.shape[1], squares.shape[1]))
     coefficients[0] = np.log(squares.mean(axis=0))
-    for _ in range(NEWTON_STEPS):
-        gradient = 0.5 * planes.T @ (squares / np.exp(planes @ coefficients) - 1.0) - penalty @ coefficients
-        coefficients = coefficients + np.clip(np.linalg.solve(information, gradient), -1.0, 1.0)
-    standard = deviations / np.exp(0.5 * planes @ coefficients)
-    correlation = correlation_of(standard, np.ones(len(standard)))
-    return Noise(coefficients, correlation, len(deviations), float(len(deviations)))
+    shared = np.append(0.0, np.full(size - 1, SLOPE_SD**-2))
+    apart = np.full(size, FIRST_APART**2)
+    for _ in range(EM_STEPS):
+        penalty = np.diag(np.concatenate([shared, *[1.0 / apart] * (terms.shape[1] // size - 1)]))
+        spread = np.linalg.inv(0.5 * terms.T @ terms + penalty)
+        for _ in range(NEWTON_STEPS):
+            surplus = squares / np.exp(terms @ coefficients) - 1.0
+            step = np.clip(spread @ (0.5 * terms.T @ surplus - penalty @ coefficients), -1.0, 1.0)
+            coefficients = coefficients + step
+            if np.abs(step).max() < CONVERGED:
+                break
+        moments = (coefficients**2).mean(axis=1) + np.diag(spread)
+        own = moments[size:].reshape(-1, size)
+        if not len(own):
+            break
+        apart = np.maximum(own.mean(axis=0), LEAST_APART**2)
+    return coefficients, spread
 
 
 def correlation_of(standard: np.ndarray, weights: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import stats
+from scipy import special, stats
 
 from doe.discrepancy.emulation.kriging import fit_kriging
 from doe.discrepancy.emulation.noise import (
@@ -19,7 +19,6 @@ from doe.discrepancy.emulation.noise import (
     Noise,
     correlation_of,
     fit_growth,
-    fit_noise,
     repeat_deviations,
 )
 from doe.discrepancy.emulation.surfaces import Addition, Polynomial, Surfaces, added, cubic, quadratic
@@ -27,8 +26,8 @@ from doe.errors import RuleError
 
 FAILURE_LEVEL = 0.005
 """A polynomial fails if leave-one-out errors as large as its own have this probability under noise alone."""
-MISFIT_LEVEL = 0.05
-"""Errors of a larger probability are noise: a variance of the misfit would be chance."""
+LEAST_RATIO = 1e-6
+"""Residuals of smaller mean squares, in those of the noise, are as good as none."""
 BETTER = 0.97
 """Kriging is kept where it lowers the mean square of what is left out to less than this."""
 EM_STEPS = 100
@@ -42,15 +41,13 @@ LEAST_SIZE = 0.05
 """Runs of smaller coded sizes say too little of what a mechanism adds to be divided by their size."""
 
 
-def repeats_noise(theta: np.ndarray, values: np.ndarray, floor: np.ndarray) -> Noise:
-    """Fit the noise to repeated runs without a mechanism.
+def repeats_of(theta: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Coded factors (m, factors) and independent deviations (m, observables) of repeats without a mechanism.
 
     Parameters
     ----------
     theta, values : (n, factors), (n, observables) array
         Repeats have equal factors.
-    floor : (observables,) array
-        Standard deviation that each observable's resolution leaves at the least.
 
     Raises
     ------
@@ -62,7 +59,7 @@ def repeats_noise(theta: np.ndarray, values: np.ndarray, floor: np.ndarray) -> N
     if len(rows) <= values.shape[1] + 1 or len(points) <= quadratic(points).shape[1]:
         rule = "needs more points without a mechanism than polynomial terms, and repeats than observables"
         raise RuleError(rule, f"{len(points)} points, {len(rows)} repeats", "bank")
-    return fit_noise(theta[rows], deviations, floor)
+    return theta[rows], deviations
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,26 +132,85 @@ def fit_bases(conditions: Sequence[BaseRuns]) -> list[Surfaces]:
         grams.append(left.T @ left)
         moments.append(left.T @ runs.response / np.sqrt(runs.noise.variance(runs.theta).mean(axis=0)))
     scales = np.append(np.full(free, np.inf), likeliest_scales(grams, moments))
-    return [_fit_base(runs, scales) for runs in conditions]
+    fits = [_BaseFit.of(runs, scales) for runs in conditions]
+    misfits = shared_misfits(
+        np.array([fit.ratio for fit in fits]),
+        np.array([fit.freedom for fit in fits])[:, None],
+        np.array([runs.noise.degrees_of_freedom for runs in conditions])[:, None],
+    )
+    return [fit.surfaces(misfit) for fit, misfit in zip(fits, misfits, strict=True)]
 
 
-def _fit_base(runs: BaseRuns, scales: np.ndarray) -> Surfaces:
-    """Least squares and leave-one-out; what is smooth in the rest is kriged where they fail."""
-    fitted, noise = _Shrunk.of(runs.terms, runs.response, scales), runs.noise.variance(runs.theta)
-    excess = fitted.residual**2 / (1.0 - fitted.leverage)
-    freedom, degrees = len(noise) - fitted.leverage.sum(), runs.noise.degrees_of_freedom
-    ratio = excess.mean(axis=0) / noise.mean(axis=0)
-    repeats = runs.repeats[:, None]
-    beyond = ratio > stats.f.isf(MISFIT_LEVEL, freedom, degrees)
-    misfit = np.where(beyond, ((excess - noise) / repeats).mean(axis=0), 0.0).clip(min=0.0)
-    kriging = {}
-    for column in np.flatnonzero(ratio > stats.f.isf(FAILURE_LEVEL, freedom, degrees)):
-        missed, scatter = fitted.residual / np.sqrt(repeats), noise / repeats
-        smooth = fit_kriging(runs.theta, missed[:, column], scatter[:, column])
-        if np.mean(smooth.leave_one_out**2) < BETTER * np.mean(missed[:, column] ** 2):
-            kriging[int(column)] = smooth
-    base = Polynomial(fitted.coefficients, misfit, kriging)
-    return Surfaces(base, fitted.gram_inverse, runs.noise, {}, np.zeros(len(misfit), dtype=bool))
+def shared_misfits(ratio: np.ndarray, freedom: np.ndarray, degrees: np.ndarray) -> np.ndarray:
+    """Variances of what polynomials miss, in those of one run, said by all conditions and observables.
+
+    A misfit that is as large as the noise of a mean is too small to be seen in one observable of one
+    condition, and not to be neglected. Logarithms of the ratios less their mean under noise alone scatter by
+    that of F, and about the mean of all by how misfits differ; each is as much nearer to that mean as its
+    noise makes it (Smyth 2004, doi:10.2202/1544-6115.1027, for variances of many genes).
+
+    Parameters
+    ----------
+    ratio : (conditions, observables) array
+        Mean squares of residuals over those of repeats.
+    freedom, degrees : (conditions, 1) array
+        Degrees of freedom of the two.
+
+    Returns
+    -------
+    (conditions, observables) array
+        Not below 0.
+    """
+    halves = 0.5 * freedom, 0.5 * degrees
+    expected = (special.digamma(halves[0]) - np.log(halves[0])) - (
+        special.digamma(halves[1]) - np.log(halves[1])
+    )
+    chance = special.polygamma(1, halves[0]) + special.polygamma(1, halves[1])
+    found = np.log(np.maximum(ratio, LEAST_RATIO)) - expected
+    mean = found.mean()
+    true = max(np.mean((found - mean) ** 2 - chance), 0.0)
+    return np.asarray(np.expm1(mean + true / (true + chance) * (found - mean)).clip(min=0.0))
+
+
+@dataclass(frozen=True, eq=False)
+class _BaseFit:
+    """Least squares of the runs without a mechanism in one condition."""
+
+    runs: BaseRuns
+    fitted: _Shrunk
+    noise: np.ndarray
+    """Variances of one run at the points, (n, observables)."""
+
+    @classmethod
+    def of(cls, runs: BaseRuns, scales: np.ndarray) -> _BaseFit:
+        """Fit with known standard deviations of the coefficients, in those of one run; infinite: free."""
+        return cls(runs, _Shrunk.of(runs.terms, runs.response, scales), runs.noise.variance(runs.theta))
+
+    @property
+    def freedom(self) -> float:
+        """Degrees of freedom of the residuals."""
+        return float(len(self.noise) - self.fitted.leverage.sum())
+
+    @property
+    def ratio(self) -> np.ndarray:
+        """Mean squares of the residuals over those of the noise, (observables,)."""
+        excess = self.fitted.residual**2 / (1.0 - self.fitted.leverage)
+        return np.asarray(excess.mean(axis=0) / self.noise.mean(axis=0))
+
+    def surfaces(self, misfit: np.ndarray) -> Surfaces:
+        """Emulator, of a misfit in variances of one run; where it fails, what is smooth is kriged."""
+        runs, repeats = self.runs, self.runs.repeats[:, None]
+        missed, scatter = self.fitted.residual / np.sqrt(repeats), self.noise / repeats
+        kriging = {}
+        fails = self.ratio > stats.f.isf(FAILURE_LEVEL, self.freedom, runs.noise.degrees_of_freedom)
+        for column in np.flatnonzero(fails):
+            smooth = fit_kriging(runs.theta, missed[:, column], scatter[:, column])
+            if np.mean(smooth.leave_one_out**2) < BETTER * np.mean(missed[:, column] ** 2):
+                kriging[int(column)] = smooth
+        base = Polynomial(
+            self.fitted.coefficients, misfit * self.noise.mean(axis=0) / repeats.mean(), kriging
+        )
+        return Surfaces(base, self.fitted.gram_inverse, runs.noise, {}, np.zeros(len(misfit), dtype=bool))
 
 
 @dataclass(frozen=True, eq=False)

@@ -162,14 +162,49 @@ class Surfaces:
     def error(self, x: np.ndarray, mechanisms: tuple[str, ...]) -> np.ndarray:
         """Covariance of the prediction's error at one row of coded parameters, (observables, observables)."""
         theta = x[: len(x) - len(mechanisms)]
-        base, own = cubic(theta[None])[0], np.diag(self.misfit_variance(x, mechanisms))
+        base, own = self._base_terms(x, mechanisms), np.diag(self.misfit_variance(x, mechanisms))
         for name, size in zip(mechanisms, x[len(theta) :], strict=True):
             part = self.additions[name]
             terms = added(theta[None], np.array([size]))[0]
-            base = base - part.base_terms.T @ terms
             own += (terms @ part.gram_inverse @ terms) * part.covariance
-        noise = self.noise.covariance(theta) * np.outer(~self.silent, ~self.silent)
-        return np.asarray((base @ self.gram_inverse @ base) * noise + own)
+        return np.asarray((base @ self.gram_inverse @ base) * self._base_noise(theta) + own)
+
+    def shared_error(self, x: np.ndarray, mechanisms: tuple[str, ...], name: str, size: float) -> np.ndarray:
+        """Covariance of errors of what another mechanism adds and of measured less predicted.
+
+        Both have the base's in them: the one as it was fitted to runs less the base.
+
+        Parameters
+        ----------
+        x : (parameters,) array
+            Coded, of the mechanisms that are in the prediction.
+        mechanisms : tuple of str
+        name : str
+            The other one.
+        size : float
+            Its coded size.
+
+        Returns
+        -------
+        (observables, observables) array
+        """
+        theta = x[: len(x) - len(mechanisms)]
+        through = added(theta[None], np.array([size]))[0] @ self.additions[name].base_terms
+        return np.asarray(
+            (through @ self.gram_inverse @ self._base_terms(x, mechanisms)) * self._base_noise(theta)
+        )
+
+    def _base_terms(self, x: np.ndarray, mechanisms: tuple[str, ...]) -> np.ndarray:
+        """Terms by which errors of the base's coefficients come into a prediction, (terms,)."""
+        theta = x[: len(x) - len(mechanisms)]
+        terms = cubic(theta[None])[0]
+        for name, size in zip(mechanisms, x[len(theta) :], strict=True):
+            terms = terms - added(theta[None], np.array([size]))[0] @ self.additions[name].base_terms
+        return np.asarray(terms)
+
+    def _base_noise(self, theta: np.ndarray) -> np.ndarray:
+        """Covariance of one run where the base is more than noise, (observables, observables)."""
+        return np.asarray(self.noise.covariance(theta) * np.outer(~self.silent, ~self.silent))
 
     def coefficient_errors(self, theta: np.ndarray, mechanisms: tuple[str, ...]) -> np.ndarray:
         """Covariances of errors of all coefficients, of noise as at some factors (observables, terms, terms).

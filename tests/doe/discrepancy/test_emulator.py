@@ -12,7 +12,7 @@ from synthetic import CONDITIONS, OBSERVABLES, SETTINGS, SyntheticSimulator, ban
 
 from doe.discrepancy import Bank, Outcomes, bank_points, fit_emulator, load_bank, make_bank
 from doe.discrepancy.emulation.kriging import fit_kriging, krige
-from doe.discrepancy.emulation.noise import ALIKE, fit_noise, repeat_deviations, shared_correlations
+from doe.discrepancy.emulation.noise import ALIKE, fit_noise
 from doe.discrepancy.emulation.surface_fits import (
     AddedRuns,
     BaseRuns,
@@ -48,39 +48,6 @@ def test_a_file_that_is_no_bank_is_refused_with_its_name(tmp_path: Path) -> None
     path.write_text("no bank")
     with pytest.raises(RuleError, match=r"photo\.npz: must be a bank"):
         load_bank(path)
-
-
-def test_deviations_of_repeats_have_the_covariance_of_one_run() -> None:
-    rng = np.random.default_rng(1)
-    groups = np.repeat(np.arange(400), 3)
-    triangle = np.array([[1.0, 0.0], [0.8, 0.6]])
-    offsets = 50.0 * rng.standard_normal((400, 2))
-    values = offsets[groups] + rng.standard_normal((1200, 2)) @ triangle.T
-    _, deviations = repeat_deviations(groups, values)
-    assert len(deviations) == 800
-    # A variance from 800 deviations has a relative error of sqrt(2 / 800); four of those.
-    np.testing.assert_allclose(
-        deviations.T @ deviations / 800, triangle @ triangle.T, atol=4.0 * np.sqrt(2.0 / 800)
-    )
-
-
-def test_noise_finds_a_variance_that_changes_over_the_factors() -> None:
-    rng = np.random.default_rng(2)
-    theta = rng.uniform(-1.0, 1.0, (4000, 2))
-    deviations = rng.standard_normal((4000, 1)) * np.exp(0.5 * (0.3 + 0.8 * theta[:, :1]))
-    noise = fit_noise(theta, deviations, np.array([1e-9]))
-    # The information of a slope is n Var(theta) / 2 = 667; four standard errors.
-    np.testing.assert_allclose(noise.coefficients[:, 0], [0.3, 0.8, 0.0], atol=4.0 / np.sqrt(667.0))
-
-
-def test_the_inverse_of_an_estimated_covariance_is_unbiased() -> None:
-    rng = np.random.default_rng(3)
-    inverses = []
-    for _ in range(400):
-        noise = fit_noise(np.zeros((40, 1)), rng.standard_normal((40, 6)), np.full(6, 1e-9))
-        inverses.append(np.linalg.inv(noise.covariance(np.zeros(1)) * noise.inverse_bias(6)))
-    # Without the factor it would be 40 / 33; the identity in the correlation takes 2 %, the rest is 3 errors.
-    assert np.trace(np.mean(inverses, axis=0)) / 6.0 == pytest.approx(1.0, abs=0.04)
 
 
 def test_the_emulator_errs_as_much_as_it_says() -> None:
@@ -194,19 +161,6 @@ def test_a_mechanism_that_always_fails_leaves_the_library() -> None:
 def test_a_condition_that_always_fails_is_an_error_with_its_name() -> None:
     with pytest.raises(RuleError, match="condition wide of the bank"):
         fit_emulator(_with_failures(bank().condition == 2))
-
-
-def test_a_correlation_is_drawn_towards_that_of_all_conditions_the_more_the_fewer_its_repeats() -> None:
-    rng = np.random.default_rng(9)
-    first = fit_noise(np.zeros((25, 1)), rng.standard_normal((25, 3)), np.full(3, 1e-9))
-    second = fit_noise(np.zeros((25, 1)), rng.standard_normal((25, 3)), np.full(3, 1e-9))
-    mean = (first.correlation + second.correlation) / 2.0
-    shared = shared_correlations([first, second])[0]
-    np.testing.assert_allclose(
-        shared.correlation - mean, (first.correlation - mean) * 25.0 / (25.0 + ALIKE), atol=1e-12
-    )
-    assert 25.0 < shared.correlation_freedom <= 50.0
-    assert shared_correlations([first])[0].correlation_freedom == pytest.approx(25.0)
 
 
 def test_scales_of_coefficients_are_found_behind_their_noise() -> None:

@@ -169,7 +169,9 @@ def _noise(base: Replay, stage: str, factors: int) -> Noise:
     known = base.noise([stage]) if base.noise([stage]).df > 0 else base.noise()
     coefficients = np.zeros((1 + factors, 1))
     coefficients[0] = np.log(base.heap_variance[stage])
-    return Noise(coefficients, np.eye(1), round(known.df), known.df)
+    spread = np.zeros((1 + factors, 1 + factors))
+    spread[0, 0] = 2.0 / known.df
+    return Noise(coefficients, spread, np.eye(1), round(known.df), known.df)
 
 
 def _signatures(settings: pd.DataFrame, found: Sensitivities) -> dict[str, pd.DataFrame]:
