@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +14,7 @@ from dem_warp import CaseResult, LiftedCylinder
 from dem_warp.device import resolve_device
 from experiments.benchmarks import columns as scene
 from experiments.benchmarks.columns import Columns
+from experiments.report import solid
 from experiments.studyfile import Study, load_study
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -26,6 +27,17 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     if missing:
         config.hook.pytest_deselected(items=missing)
         items[:] = [item for item in items if item not in missing]
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _small_pictures() -> Iterator[None]:
+    """Draw the picture that stands for a heap to be turned at a fifth of its width: most pages have one.
+
+    `report/test_solid.py` draws it as users get it.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(solid, "PIXELS", solid.PIXELS // 5)
+        yield
 
 
 SMALL_STUDY = Path(__file__).with_name("small.toml").read_text(encoding="utf-8")
