@@ -5,12 +5,14 @@ from __future__ import annotations
 import shutil
 import sys
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from dem_warp import CaseResult, LiftedCylinder
+from dem_warp.clump_fitting import fit_clump
 from dem_warp.device import resolve_device
 from experiments.benchmarks import columns as scene
 from experiments.benchmarks.columns import Columns
@@ -38,6 +40,13 @@ def _small_pictures() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(solid, "PIXELS", solid.PIXELS // 5)
         yield
+
+
+@pytest.fixture
+def _coarse_clumps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fit clumps with half the samples along a side, an eighth in all, where more would show no more."""
+    for module in ("shapes", "clump_search"):
+        monkeypatch.setattr(f"experiments.commands.{module}.fit_clump", partial(fit_clump, resolution=20))
 
 
 SMALL_STUDY = Path(__file__).with_name("small.toml").read_text(encoding="utf-8")
