@@ -5,10 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-import statsmodels.api as sm
 from numpy.typing import ArrayLike, NDArray
 from scipy import stats
-from statsmodels.regression.linear_model import RegressionResults
+from statsmodels.regression.linear_model import OLS, RegressionResults
 
 from doe.checks import checked_kind
 from doe.errors import DesignError
@@ -69,7 +68,7 @@ def least_squares(matrix: pd.DataFrame, response: pd.Series) -> RegressionResult
     if aliased:
         raise DesignError(f"the design cannot tell these terms apart: {'; '.join(aliased)}")
     with np.errstate(divide="ignore", invalid="ignore"):  # a saturated fit has no residual variance
-        return sm.OLS(response.to_numpy(), matrix).fit()
+        return OLS(response.to_numpy(), matrix).fit()
 
 
 def pure_error(coded: pd.DataFrame, response: ArrayLike, blocks: pd.Series | None = None) -> ErrorTerm:

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-import statsmodels.api as sm
 import statsmodels.formula.api as smf
 from numpy.typing import ArrayLike
 from statsmodels.regression.linear_model import RegressionResults
+from statsmodels.stats.anova import anova_lm
 
 from doe.analysis.coefficients import coefficient_table, significant_words, summary_text
 from doe.checks import checked_choice, checked_flag, checked_kind, checked_level, checked_map, real_array
@@ -46,7 +46,7 @@ class LinearFit:
     @cached_property
     def anova(self) -> pd.DataFrame:
         """Partial sums of squares (type II) by term: df, sum_sq, mean_sq, F, p."""
-        table = sm.stats.anova_lm(self.fit, typ=2)
+        table = anova_lm(self.fit, typ=2)
         table = table.rename(columns={"PR(>F)": "p"}).rename(index={"Residual": "residual"})
         table["mean_sq"] = table["sum_sq"] / table["df"]
         return table[["df", "sum_sq", "mean_sq", "F", "p"]].rename_axis("source")

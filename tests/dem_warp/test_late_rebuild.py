@@ -1,16 +1,26 @@
 """Neighbour lists that a grain outruns: its world takes the steps again, or ends with the reason."""
 
-import pytest
-from worlds import assert_same_result, run_batch, small_case
+from dataclasses import replace
 
-from dem_warp import batch, simulate, solver
+import pytest
+from worlds import SMALL_TUBE, assert_same_result, run_batch, small_case
+
+from dem_warp import Case, batch, simulate, solver
 from dem_warp.rollback import Rollback
+
+FEW = replace(SMALL_TUBE, grain_count=24)
+"""Three layers, of which grains outrun their lists in the rain and at the lift, two dozen times."""
+
+
+def few(seed: int = 1, **numerics: float) -> Case:
+    """A small case of few grains."""
+    return small_case(seed, FEW, **numerics)
 
 
 @pytest.fixture(scope="module")
 def heap():
     """The heap of a skin that nothing outruns."""
-    return simulate([small_case()], device="cpu", workers=1)[0]
+    return simulate([few()], device="cpu", workers=1)[0]
 
 
 @pytest.fixture
@@ -29,7 +39,7 @@ def restored(monkeypatch):
 def test_a_world_that_outran_its_lists_takes_its_steps_again(heap, restored, monkeypatch):
     # Cycles as long as the fastest grain takes for four skins: what falls outruns its list.
     monkeypatch.setattr(solver, "SKIN_PER_SERIAL_CYCLE", 4.0)
-    [result] = simulate([small_case()], device="cpu", workers=1)
+    [result] = simulate([few()], device="cpu", workers=1)
     assert len(restored) > 1
     assert_same_result(result, heap)
 
@@ -37,7 +47,7 @@ def test_a_world_that_outran_its_lists_takes_its_steps_again(heap, restored, mon
 def test_a_world_that_is_taken_back_changes_no_other(heap, restored, monkeypatch):
     # The wider skin is outrun less often: its world goes on while the other takes its steps again.
     monkeypatch.setattr(solver, "SKIN_PER_SERIAL_CYCLE", 4.0)
-    cases = [small_case(), small_case(seed=2, skin=2.5e-3)]
+    cases = [few(), few(seed=2, skin=2.5e-3)]
     results = run_batch(cases)
     assert restored.count(0) > restored.count(1)
     assert_same_result(results[0], heap)
@@ -46,7 +56,7 @@ def test_a_world_that_is_taken_back_changes_no_other(heap, restored, monkeypatch
 
 @pytest.mark.parametrize("skin", [3e-5, 1e-5, 1e-6])
 def test_no_skin_gives_another_heap(heap, skin):
-    [result] = simulate([small_case(skin=skin)], device="cpu", workers=1)
+    [result] = simulate([few(skin=skin)], device="cpu", workers=1)
     if result.status == "finished":
         assert_same_result(result, heap)
     else:
@@ -57,5 +67,5 @@ def test_no_skin_gives_another_heap(heap, skin):
 
 def test_a_skin_that_is_too_thin_is_never_finished():
     # 0.5 m/s times two steps of some microseconds is more than the grains may come.
-    [result] = simulate([small_case(skin=1e-6)], device="cpu", workers=1)
+    [result] = simulate([few(skin=1e-6)], device="cpu", workers=1)
     assert result.status == "failed"

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import shutil
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from dem_warp import CaseResult, LiftedCylinder
+from dem_warp.clump_fitting import fit_clump
 from dem_warp.device import resolve_device
 from experiments.benchmarks import columns as scene
 from experiments.benchmarks.columns import Columns
+from experiments.report import solid
 from experiments.studyfile import Study, load_study
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -26,6 +29,24 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     if missing:
         config.hook.pytest_deselected(items=missing)
         items[:] = [item for item in items if item not in missing]
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _small_pictures() -> Iterator[None]:
+    """Draw the picture that stands for a heap to be turned at a fifth of its width: most pages have one.
+
+    `report/test_solid.py` draws it as users get it.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(solid, "PIXELS", solid.PIXELS // 5)
+        yield
+
+
+@pytest.fixture
+def _coarse_clumps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fit clumps with half the samples along a side, an eighth in all, where more would show no more."""
+    for module in ("shapes", "clump_search"):
+        monkeypatch.setattr(f"experiments.commands.{module}.fit_clump", partial(fit_clump, resolution=20))
 
 
 SMALL_STUDY = Path(__file__).with_name("small.toml").read_text(encoding="utf-8")

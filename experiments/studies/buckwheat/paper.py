@@ -53,6 +53,17 @@ def printed(name: str) -> pd.DataFrame:
     ValueError
         If there is no such table.
     """
+    return _texts(name).copy()
+
+
+def published(name: str) -> pd.DataFrame:
+    """Return a published table with its numbers as numbers, nan where nothing is printed (see `printed`)."""
+    return _numbers(name).copy()
+
+
+@cache
+def _texts(name: str) -> pd.DataFrame:
+    """Table as it was read: whoever asks gets a copy, and may change it."""
     path = _FOLDER / f"{name}.csv"
     if not path.is_file():
         known = ", ".join(sorted(file.stem for file in _FOLDER.glob("*.csv")))
@@ -60,9 +71,9 @@ def printed(name: str) -> pd.DataFrame:
     return pd.read_csv(path, dtype=str, keep_default_na=False, index_col=0)
 
 
-def published(name: str) -> pd.DataFrame:
-    """Return a published table with its numbers as numbers, nan where nothing is printed (see `printed`)."""
-    table = printed(name).replace("", np.nan)
+@cache
+def _numbers(name: str) -> pd.DataFrame:
+    table = _texts(name).replace("", np.nan)
     table.index = _numbers_where_all(table.index.to_series())
     return table.apply(_numbers_where_all)
 

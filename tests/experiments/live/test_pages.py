@@ -218,11 +218,12 @@ def test_the_page_to_start_from_stands(
         check(browser, place)
 
 
+@pytest.mark.usefixtures("_coarse_clumps")
 def test_from_an_stl_to_a_heap_in_the_browser(workshop: tuple[Place, Path], tmp_path: Path) -> None:
     """Grain from an STL with its preview, test, ranges, study file, start, watch: by clicks alone."""
     place, folder = workshop
     stl = tmp_path / "grain.stl"
-    trimesh.creation.icosphere(subdivisions=2, radius=2.0).export(stl)
+    trimesh.creation.capsule(height=2.0, radius=1.5, count=(16, 16)).export(stl)
     with browsing(tmp_path / "profile", place.url) as browser:
         browser.wait(READY)
         browser.fill("#name", "rye")

@@ -140,6 +140,7 @@ def test_fields_are_read_as_a_file_would(text: str, value: object) -> None:
     assert plain_value(text) == value
 
 
+@pytest.mark.usefixtures("_coarse_clumps")
 def test_a_grain_from_an_stl_is_that_of_the_command(ask: Ask, upload: Callable, folder: Path) -> None:
     grain = trimesh.creation.icosphere(subdivisions=3, radius=3.0)
     assert upload("my grain.stl", grain.export(file_type="stl")) == {"file": "my grain.stl"}
@@ -158,6 +159,7 @@ def test_a_grain_from_an_stl_is_that_of_the_command(ask: Ask, upload: Callable, 
     assert np.abs(made["faces"]).max() == pytest.approx(3.0e-3, rel=1e-3)
 
 
+@pytest.mark.usefixtures("_coarse_clumps")
 def test_a_grain_from_dimensions_is_that_of_the_command(ask: Ask) -> None:
     made = ask("clump", source="ellipsoid:6.2x3.4x2.9", spheres="5")
     code, told, _ = dem_warp(*shlex.split(made["command"])[1:], "--json")

@@ -51,14 +51,20 @@ def numbers_of(page: str, heading: str) -> list[list[str]]:
     return [[cell.strip() for cell in row.strip("|").split("|")] for row in table[2:]]
 
 
-def test_the_committed_page_follows_from_the_committed_angles() -> None:
+@pytest.fixture(scope="module")
+def committed() -> Record:
+    """The record in the tree."""
+    return Record.read(paper_record.FOLDER)
+
+
+def test_the_committed_page_follows_from_the_committed_angles(committed: Record) -> None:
     page = (paper_record.FOLDER / PAGE).read_text(encoding="utf-8")
-    assert page == record_page(Record.read(paper_record.FOLDER))
+    assert page == record_page(committed)
 
 
-def test_the_committed_card_is_that_of_the_committed_campaign() -> None:
+def test_the_committed_card_is_that_of_the_committed_campaign(committed: Record) -> None:
     card = tomllib.loads((paper_record.FOLDER / CARD).read_text(encoding="utf-8"))
-    campaign = Record.read(paper_record.FOLDER).campaign
+    campaign = committed.campaign
     assert campaign is not None
     assert (card["fitted"]["outcome"], card["fitted"]["reason"]) == (campaign["outcome"], campaign["reason"])
     study = load_study(None, "paper")

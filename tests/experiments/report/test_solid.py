@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from dem_warp import CaseResult
-from experiments.report.solid import MOST_SPHERES, STEPS, SolidHeap
+from experiments.report import solid
+from experiments.report.solid import MOST_SPHERES, PIXELS, STEPS, SolidHeap
 
 
 def heap(grains: int, spheres: int = 9) -> CaseResult:
@@ -39,12 +40,14 @@ def test_spheres_come_back_as_they_were() -> None:
     np.testing.assert_array_equal(grains, result.sphere_grain)
 
 
-def test_a_heap_of_thousands_of_grains_takes_half_a_megabyte() -> None:
+def test_a_heap_of_thousands_of_grains_takes_half_a_megabyte(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(solid, "PIXELS", PIXELS)
     packed = SolidHeap.of("A heap.", heap(2490))
     assert packed is not None
     # Ten bytes a sphere, four letters for three bytes.
     letters = len(packed.spheres) + len(packed.grains)
     assert letters == pytest.approx(10 * 9 * 2490 * 4 / 3, rel=1e-3)
+    assert packed.picture.image.shape[1] > PIXELS
     assert letters + len(packed.picture.data_uri) < 0.6e6
 
 

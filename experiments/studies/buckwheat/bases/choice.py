@@ -72,13 +72,21 @@ class Misfits:
 
     def of(self, stages: Sequence[str], shift: FloatArray | float = 0.0) -> FloatArray:
         """Mean square over some tables [deg2], own noise out, angles shifted [deg]: each candidate's."""
-        seen = np.isin(self.stages, stages)
+        seen = self._within(stages)
         shifted = self.differences[:, seen] + np.reshape(shift, (-1, 1))
         return (shifted**2 - self.variances[:, seen]).mean(axis=1)
 
     def shift(self, stages: Sequence[str]) -> FloatArray:
         """Common shift [deg] that brings the mean over some tables to the published one: each candidate's."""
-        return -self.differences[:, np.isin(self.stages, stages)].mean(axis=1)
+        return -self.differences[:, self._within(stages)].mean(axis=1)
+
+    def _within(self, stages: Sequence[str]) -> NDArray[np.bool_]:
+        """Runs of some tables."""
+        return np.logical_or.reduce([self._runs_of[stage] for stage in stages])
+
+    @cached_property
+    def _runs_of(self) -> dict[str, NDArray[np.bool_]]:
+        return {stage: self.stages == stage for stage in DESIGNS}
 
     def drawn(self, rng: np.random.Generator) -> Misfits:
         """As many runs of each table, drawn with replacement."""

@@ -8,7 +8,8 @@ from functools import cached_property
 
 import numpy as np
 import pandas as pd
-import statsmodels.api as sm
+from statsmodels.regression.linear_model import OLS
+from statsmodels.tools import add_constant
 
 from doe import (
     Agreement,
@@ -167,10 +168,10 @@ class Replay:
         its standard error.
         """
         heaps = _course(self._of("composite"))
-        coded = sm.add_constant(paper.composite_design().select(heaps.index.tolist()).coded)
+        coded = add_constant(paper.composite_design().select(heaps.index.tolist()).coded)
         rows = {}
         for name in heaps:
-            plane = sm.OLS(heaps[name].to_numpy(), coded).fit()
+            plane = OLS(heaps[name].to_numpy(), coded).fit()
             rows[name] = {**plane.params[["E", "F"]], **plane.tvalues[["E", "F"]].add_suffix("_t")}
         return pd.DataFrame.from_dict(rows, orient="index").rename_axis("observable")
 
