@@ -27,7 +27,7 @@ from imaging.looks import other_looks, with_faint
 from imaging.outline import Outline, levelled
 from imaging.plate import PlateLine
 from imaging.reasons import Doubt
-from imaging.sighting import Sighting, refuse_brimful, sight, without_strays
+from imaging.sighting import Sighting, darker_below, refuse_brimful, sight, without_strays
 from imaging.view import View, level_angle
 
 NO_HEAP = 0.1
@@ -150,11 +150,16 @@ def find_heap(picture: Picture, given: PlateLine | None, view: View, place: str)
         raise PictureError(rule, f"no heap: an outline {best.crooked:.2f} of its height off two lines", place)
     if given is None:
         refuse_brimful(seen, best.sighting, best.ends, place)
+    doubts = list(best.sighting.doubts)
+    if given is None and darker_below(seen, best.sighting, best.ends):
+        doubts.append(
+            Doubt("shade", "it is darker below the whole heap than beside it: its shadow, or a dish?")
+        )
     shift = best.shift(tries)
-    if not best.clear or shift <= LARGEST_SHIFT:
-        return best.sighting
-    finding = f"the angle moves by {shift:.1f} degrees with the threshold, over {LARGEST_SHIFT:g}"
-    return replace(best.sighting, doubts=(*best.sighting.doubts, Doubt("threshold", finding)))
+    if best.clear and shift > LARGEST_SHIFT:
+        finding = f"the angle moves by {shift:.1f} degrees with the threshold, over {LARGEST_SHIFT:g}"
+        doubts.append(Doubt("threshold", finding))
+    return replace(best.sighting, doubts=tuple(doubts))
 
 
 def _tries(

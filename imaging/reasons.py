@@ -8,7 +8,7 @@ from imaging.errors import PictureError
 
 DOUBTS = (
     "lean", "error", "range", "elevation", "straightness", "foot", "step", "ends",
-    "tilt", "border", "plate", "threshold",
+    "tilt", "border", "plate", "threshold", "shade",
 )  # fmt: skip
 """Names of all doubts: of a fitted angle, and of the outline that it was fitted on."""
 

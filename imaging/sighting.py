@@ -215,7 +215,7 @@ def refuse_brimful(seen: Contrast, found: Sighting, ends: tuple[float, float], p
     place : str
         Names the picture in errors.
     """
-    least = max(BESIDE_NOISE * seen.noise, BESIDE_DIFFERENCE)
+    least = _least_difference(seen)
     columns = np.flatnonzero(np.isfinite(found.rows)).astype(np.float64)
     position, height = found.plate.level(columns, found.rows[columns.astype(np.intp)])
     span = float(np.ptp(position))
@@ -225,29 +225,69 @@ def refuse_brimful(seen: Contrast, found: Sighting, ends: tuple[float, float], p
         high = _sampled(seen, found.plate, across, float(height.max()) * np.linspace(0.1, 0.3, 8))
         if low is not None and high is not None and min(_differ(low, high), _differ(high, low)) > least:
             raise PictureError(BRIMFUL_RULE, "a dish, or an object of another colour below it", place)
+    strips = _beside(seen, found, ends)
+    if strips is None:
+        return
+    under, *sides = strips
+    if all(_differ(under, side) > least for side in sides):
+        raise PictureError(BRIMFUL_RULE, "a dish, or a narrow board", place)
     left, right = ends
     width = right - left
-    if width < LEAST_WIDTH:
-        return
-    middle = np.linspace(left + 0.3 * width, right - 0.3 * width, 60)
-    heights = -found.depth - np.linspace(0.02, 0.05, 8) * width - 1.0
-    under = _sampled(seen, found.plate, middle, heights)
-    sides = [
-        _sampled(seen, found.plate, np.linspace(end + 0.05 * step, end + 0.1 * step, 20), heights)
-        for end, step in ((left, -width), (right, width))
-    ]
-    if under is None or any(side is None for side in sides):
-        return
-    if all(side is not None and _differ(under, side) > least for side in sides):
-        raise PictureError(BRIMFUL_RULE, "a dish, or a narrow board", place)
     heights = -found.depth - np.linspace(0.1, 0.14, 8) * width
-    under = _sampled(seen, found.plate, middle, heights)
+    below = _sampled(seen, found.plate, _middle(ends), heights)
     corners = [
         _sampled(seen, found.plate, np.linspace(end - 0.04 * step, end, 20), heights)
         for end, step in ((left, -width), (right, width))
     ]
-    if under is not None and all(corner is not None and _differ(under, corner) > least for corner in corners):
+    if below is not None and all(corner is not None and _differ(below, corner) > least for corner in corners):
         raise PictureError(BRIMFUL_RULE, "a dish, round below", place)
+
+
+def darker_below(seen: Contrast, found: Sighting, ends: tuple[float, float]) -> bool:
+    """True if it is darker right below the foot than beside it, on both sides, as a shadow makes it.
+
+    Light from behind does that, and a dish in a darker shade of the wall's colour.
+
+    Parameters
+    ----------
+    seen : Contrast
+    found : Sighting
+    ends : (float, float)
+        Where the flanks' lines meet the plate [pixels along it].
+    """
+    strips = _beside(seen, found, ends)
+    if strips is None:
+        return False
+    under, *sides = strips
+    return all(float(np.median(_distance(under, side))) > _least_difference(seen) for side in sides)
+
+
+def _least_difference(seen: Contrast) -> float:
+    return max(BESIDE_NOISE * seen.noise, BESIDE_DIFFERENCE)
+
+
+def _distance(one: Layer, other: Layer) -> Layer:
+    return np.asarray(np.linalg.norm(one - other, axis=-1), dtype=np.float32)
+
+
+def _middle(ends: tuple[float, float]) -> FloatArray:
+    left, right = ends
+    return np.linspace(left + 0.3 * (right - left), right - 0.3 * (right - left), 60)
+
+
+def _beside(seen: Contrast, found: Sighting, ends: tuple[float, float]) -> tuple[Layer, Layer, Layer] | None:
+    """Colours right below the foot, and at the same level to the left and to the right; None if not shown."""
+    left, right = ends
+    width = right - left
+    if width < LEAST_WIDTH:
+        return None
+    heights = -found.depth - np.linspace(0.02, 0.05, 8) * width - 1.0
+    under = _sampled(seen, found.plate, _middle(ends), heights)
+    before, behind = (
+        _sampled(seen, found.plate, np.linspace(end + 0.05 * step, end + 0.1 * step, 20), heights)
+        for end, step in ((left, -width), (right, width))
+    )
+    return None if under is None or before is None or behind is None else (under, before, behind)
 
 
 def _sampled(seen: Contrast, plate: PlateLine, position: FloatArray, heights: FloatArray) -> Layer | None:

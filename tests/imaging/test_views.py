@@ -58,7 +58,7 @@ def test_the_plates_far_edge_is_not_taken_for_the_base(angle: float, elevation: 
     # The front of the base is an edge of a pixel in 260: its height is known to some tenths of a degree.
     assert measured.outline.elevation == pytest.approx(elevation, abs=0.6)
     assert measured.mean == pytest.approx(angle, abs=0.4)
-    assert measured.doubts == ()
+    assert [doubt.name for doubt in measured.doubts] == ["elevation"] * (elevation > 12.0)
     said = measure(raised(angle, elevation), view=View(distance=np.inf, elevation=elevation))
     assert said.mean == pytest.approx(angle, abs=0.3)
 
@@ -138,6 +138,16 @@ def test_a_heap_in_a_dish_is_refused() -> None:
     cv2.ellipse(picture, (350, 250), (200, 90), 0, 0, 180, (160, 90, 60), -1, cv2.LINE_AA)
     with pytest.raises(PictureError, match="a dish"):
         measure(picture)
+
+
+@pytest.mark.parametrize(("reach", "doubts"), [(0, ["shade"]), (300, [])])
+def test_what_is_darker_below_the_whole_heap_alone_is_doubted(reach: int, doubts: list[str]) -> None:
+    """A dish in a shade of the wall's colour may be the heap's shadow; on a darker table there is none."""
+    picture = np.full((420, 700, 3), WALL, np.uint8)
+    shade = tuple(0.75 * np.broadcast_to(WALL, 3))
+    cv2.fillPoly(picture, [np.array([[150, 250], [350, 150], [550, 250]])], GRAIN, cv2.LINE_AA)
+    cv2.ellipse(picture, (350, 250), (200 + reach, 90), 0, 0, 180, shade, -1, cv2.LINE_AA)
+    assert [doubt.name for doubt in measure(picture).doubts] == doubts
 
 
 def test_a_disc_is_no_heap() -> None:
