@@ -50,8 +50,8 @@ class Noise:
         inverse is n / (n - 2) times too large. A logarithm of variance v = 2 / n makes it exp(v).
         """
         planes = _planes(np.clip(theta, -1.0, 1.0))
-        open_ = np.einsum("...i,ij,...j->...", planes, self.spread, planes)
-        return np.asarray(np.exp(planes @ self.coefficients + open_[..., None]))
+        open_ = ((planes @ self.spread) * planes).sum(axis=-1, keepdims=True)
+        return np.asarray(np.exp(planes @ self.coefficients + open_))
 
     def covariance(self, theta: np.ndarray) -> np.ndarray:
         """Covariance of one run at one point, (observables, observables)."""
