@@ -231,22 +231,18 @@ def refuse_brimful(seen: Contrast, found: Sighting, ends: tuple[float, float], p
     under, *sides = strips
     if all(_differ(under, side) > least for side in sides):
         raise PictureError(BRIMFUL_RULE, "a dish, or a narrow board", place)
-    left, right = ends
-    width = right - left
-    heights = -found.depth - np.linspace(0.1, 0.14, 8) * width
-    below = _sampled(seen, found.plate, _middle(ends), heights)
-    corners = [
-        _sampled(seen, found.plate, np.linspace(end - 0.04 * step, end, 20), heights)
-        for end, step in ((left, -width), (right, width))
-    ]
-    if below is not None and all(corner is not None and _differ(below, corner) > least for corner in corners):
+    lower = _strips(seen, found, ends, np.linspace(0.1, 0.14, 8), np.linspace(-0.04, 0.0, 20))
+    if lower is None:
+        return
+    below, *corners = lower
+    if all(_differ(below, corner) > least for corner in corners):
         raise PictureError(BRIMFUL_RULE, "a dish, round below", place)
 
 
-def darker_below(seen: Contrast, found: Sighting, ends: tuple[float, float]) -> bool:
-    """True if it is darker right below the foot than beside it, on both sides, as a shadow makes it.
+def differs_below(seen: Contrast, found: Sighting, ends: tuple[float, float]) -> bool:
+    """True if what is right below the foot looks other than beside it, on both sides, be it by a shadow.
 
-    Light from behind does that, and a dish in a darker shade of the wall's colour.
+    Light from behind does that, a dish in a shade of the wall's colour, and a foot that hangs below its line.
 
     Parameters
     ----------
@@ -270,22 +266,33 @@ def _distance(one: Layer, other: Layer) -> Layer:
     return np.asarray(np.linalg.norm(one - other, axis=-1), dtype=np.float32)
 
 
-def _middle(ends: tuple[float, float]) -> FloatArray:
-    left, right = ends
-    return np.linspace(left + 0.3 * (right - left), right - 0.3 * (right - left), 60)
-
-
 def _beside(seen: Contrast, found: Sighting, ends: tuple[float, float]) -> tuple[Layer, Layer, Layer] | None:
     """Colours right below the foot, and at the same level to the left and to the right; None if not shown."""
+    if ends[1] - ends[0] < LEAST_WIDTH:
+        return None
+    return _strips(seen, found, ends, np.linspace(0.02, 0.05, 8), np.linspace(0.05, 0.1, 20), blur=1.0)
+
+
+def _strips(
+    seen: Contrast,
+    found: Sighting,
+    ends: tuple[float, float],
+    deep: FloatArray,
+    beyond: FloatArray,
+    blur: float = 0.0,
+) -> tuple[Layer, Layer, Layer] | None:
+    """Colours under the middle of a heap, and about its left and its right end; None if not shown.
+
+    Depths below the foot and distances beyond the ends count in the heap's widths; the depths begin so many
+    pixels lower.
+    """
     left, right = ends
     width = right - left
-    if width < LEAST_WIDTH:
-        return None
-    heights = -found.depth - np.linspace(0.02, 0.05, 8) * width - 1.0
-    under = _sampled(seen, found.plate, _middle(ends), heights)
-    before, behind = (
-        _sampled(seen, found.plate, np.linspace(end + 0.05 * step, end + 0.1 * step, 20), heights)
-        for end, step in ((left, -width), (right, width))
+    heights = -found.depth - deep * width - blur
+    middle = np.linspace(left + 0.3 * width, right - 0.3 * width, 60)
+    under, before, behind = (
+        _sampled(seen, found.plate, position, heights)
+        for position in (middle, left - beyond * width, right + beyond * width)
     )
     return None if under is None or before is None or behind is None else (under, before, behind)
 

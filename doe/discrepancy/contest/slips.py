@@ -37,7 +37,7 @@ class Slip:
 
     observables: tuple[str, ...]
     conditions: tuple[str, ...]
-    """Where it is; of a condition all observables, of a kind of observable all conditions."""
+    """Its place; of a condition all observables, of a kind of observable all conditions."""
     replicate: int | None
     """Number of the one measurement, from 1; None where it is all."""
     factor: float | None

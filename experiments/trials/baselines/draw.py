@@ -32,7 +32,7 @@ from experiments.trials.truth import Kind, Label
 
 SCALE = "bench"
 BEND = 0.3
-"""What no polynomial follows in the truth, in standard deviations of one run."""
+"""Standard deviation of the part of the truth that no polynomial follows, in those of one run."""
 REPLICATES = 8
 """Heaps a condition."""
 MULTIPLES = (2.0, 1.0, 3.0, 1.5, 0.5)
