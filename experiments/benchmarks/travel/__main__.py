@@ -15,7 +15,7 @@ from typing import Annotated
 
 import typer
 
-from experiments.benchmarks.travel.cards import CARDS, CODES, OWN_SEEDS, SEEDS
+from experiments.benchmarks.travel.cards import CARDS, CODES, FRESH_SEEDS, OWN_SEEDS, SEEDS
 from experiments.benchmarks.travel.heaps import run_theirs, simulate_ours, stored_heaps, take_up
 from experiments.benchmarks.travel.travel_page import write_page
 from experiments.commands.console import clear_errors
@@ -49,13 +49,23 @@ def theirs(
     code: Annotated[list[str], typer.Option(help="Code to run; may be repeated.")],
     card: Cards = None,
     seeds: Seeds = None,
+    fresh: Annotated[
+        bool, typer.Option(help="Fresh seeds, of a cell that the first have not shown.")
+    ] = False,
     workers: Annotated[int, typer.Option(min=1, help="Runs at once.")] = 1,
     programs: Annotated[Path | None, typer.Option(help="Folder with its programs, before the PATH.")] = None,
 ) -> None:
     """Run the exported cards in other codes, all cards of a seed before the next."""
     take_up(RECORD, out)
     with clear_errors():
-        run_theirs(out, _known(code, CODES), _known(card, CARDS), SEEDS[:seeds], workers, programs)
+        run_theirs(
+            out,
+            _known(code, CODES),
+            _known(card, CARDS),
+            (FRESH_SEEDS if fresh else SEEDS)[:seeds],
+            workers,
+            programs,
+        )
 
 
 @app.command()

@@ -35,6 +35,8 @@ CODES = {"liggghts": "liggghts", "lammps": "lammps", "yade": "yade", "deme": "de
 
 SEEDS = (1, 2, 3, 4, 5)
 """Of the heaps in each code."""
+FRESH_SEEDS = tuple(range(6, 21))
+"""Of the heaps on both sides that alone decide a cell that `SEEDS` have not shown."""
 OWN_SEEDS = tuple(range(1, 21))
 """Of ours: they cost little, and their mean should not blur the comparison."""
 

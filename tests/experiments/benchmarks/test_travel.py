@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 
 from experiments.benchmarks.travel import heaps as travel
-from experiments.benchmarks.travel.cards import CARDS, CODES, FRICTIONS, SHAPES, VOLUME
+from experiments.benchmarks.travel.cards import CARDS, CODES, FRESH_SEEDS, FRICTIONS, SEEDS, SHAPES, VOLUME
 from experiments.benchmarks.travel.heaps import OURS, Heap, run_theirs, stored_heaps, take_up
 from experiments.benchmarks.travel.travel_page import compare_cells, write_page
 from experiments.errors import InputError
@@ -69,6 +69,24 @@ def test_equal_means_are_equivalent_and_shifted_ones_are_not(tmp_path: Path) -> 
     assert "10 of its 10 cells have not been run" in page
     assert "- lammps sphere-low 9: no heap" in page
     assert len(pd.read_csv(tmp_path / "cells.csv")) == 40
+
+
+def test_fresh_heaps_alone_decide_a_cell_once_all_are_made() -> None:
+    rng = np.random.default_rng(5)
+
+    def heaps(code: str, seeds: tuple[int, ...], mean: float) -> list[Heap]:
+        return [heap(code, "lammps", "rod-high", seed, mean + 0.5 * rng.normal()) for seed in seeds]
+
+    made = heaps(OURS, SEEDS, 20.0) + heaps("lammps", SEEDS, 21.5)
+    fresh = heaps(OURS, FRESH_SEEDS, 20.0) + heaps("lammps", FRESH_SEEDS, 20.0)
+    verdicts = [
+        compare_cells(found).set_index(["code", "card"]) for found in (made, made + fresh[:-1], made + fresh)
+    ]
+    first, begun, ended = (cells.loc["lammps"].loc["rod-high"] for cells in verdicts)
+    assert (first["seeds"], first["n"], first["equivalent"]) == ("first", 5, "not shown")
+    # heaps that are looked at as they come would find the means equal sooner or later
+    assert (begun["seeds"], begun["n"], begun["equivalent"]) == ("first", 5, "not shown")
+    assert (ended["seeds"], ended["n"], ended["n_own"], ended["equivalent"]) == ("fresh", 15, 15, "yes")
 
 
 def test_heaps_of_a_record_are_taken_up(tmp_path: Path) -> None:
