@@ -5,8 +5,8 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
-import math
 import shutil
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -252,7 +252,7 @@ def _read_result(path: Path) -> dict[str, Any]:
         told = json.loads(path.read_text(encoding="utf-8"))
     except OSError:
         raise AnswerError(f"the program wrote no {path.name}") from None
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise AnswerError(f"{path.name}: must be JSON: {error}") from None
     if not isinstance(told, dict):
         raise AnswerError(f"{path.name}: must be a JSON object, got {_shown(told)}")
@@ -265,7 +265,11 @@ def _observables(told: object, known: list[str]) -> dict[str, float]:
     for name, value in told.items():
         if name not in known:
             raise AnswerError(f"{RESULT}: observables.{name}: must be one of {', '.join(known)}")
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        if (
+            isinstance(value, bool)
+            or not isinstance(value, int | float)
+            or not abs(value) <= sys.float_info.max
+        ):
             raise AnswerError(f"{RESULT}: observables.{name}: must be a finite number, got {_shown(value)}")
     return {name: float(value) for name, value in told.items()}
 

@@ -116,3 +116,6 @@ def _check(result: CaseResult) -> None:
         raise ValueError(f"its grains have other shapes than its {shapes}")
     if not (isinstance(result.status, str) and isinstance(result.observables, dict)):
         raise ValueError("its status or its observables are none")
+    places = (result.positions, result.orientations, result.sizes, result.clumps)
+    if result.status == "finished" and not all(np.isfinite(values).all() for values in places):
+        raise ValueError("it has finished, and some of its places and sizes are no finite numbers")

@@ -130,6 +130,19 @@ def test_a_flipped_bit_is_found(tmp_path: Path, cone: Cone) -> None:
     assert not store.has("k")
 
 
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_what_has_finished_has_finite_places(tmp_path: Path, cone: Cone, value: float) -> None:
+    store = Store(tmp_path)
+    whole = cone()
+    positions = whole.positions.copy()
+    positions[0, 2] = value
+    store.save("k", dataclasses.replace(whole, positions=positions))
+    assert "no finite numbers" in (store.damage("k") or "")
+    diverged = dataclasses.replace(whole, positions=positions, status="diverged", reason="too fast")
+    store.save("k", diverged)
+    assert store.has("k")
+
+
 def test_a_file_under_another_cases_name_is_not_read(tmp_path: Path, cone: Cone) -> None:
     store = Store(tmp_path)
     store.save("k", cone())

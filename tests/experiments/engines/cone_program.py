@@ -52,6 +52,11 @@ def main(way=""):
             told["observables"] = {"grain_cuont": 3}
         case "infinite":
             told["observables"] = {"grain_count": float("inf")}
+        case "huge":
+            told["observables"] = {"grain_count": 10**400}
+        case "deep":
+            Path("result.json").write_text("[" * 100_000, encoding="utf-8")
+            return
     Path("result.json").write_text(json.dumps(told), encoding="utf-8")
 
 

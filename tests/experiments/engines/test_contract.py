@@ -146,6 +146,8 @@ def test_several_cases_run_at_once_and_come_back_in_order(small_study: Study, tm
         ),
         ("observable", NO_ANSWER, "result.json: observables.grain_cuont: must be one of"),
         ("infinite", NO_ANSWER, "result.json: observables.grain_count: must be a finite number, got inf"),
+        ("huge", NO_ANSWER, "result.json: observables.grain_count: must be a finite number, got 1000"),
+        ("deep", NO_ANSWER, "result.json: must be JSON: maximum recursion depth"),
         ("diverged", "diverged", "a grain was too fast"),
     ],
 )
