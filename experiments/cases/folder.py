@@ -42,7 +42,7 @@ def locked(folder: Path, resume: bool = False) -> Iterator[None]:
         resume. Nothing is written then.
     """
     _require_usable(folder, resume)
-    lock, made = FileLock(folder / LOCK, timeout=0), not folder.exists()
+    lock, made = FileLock(folder / LOCK, timeout=0), not os.path.lexists(folder)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         lock.acquire()
@@ -107,7 +107,8 @@ def open_folder(folder: Path, study: Study, resume: bool = False) -> tuple[Store
 
 def is_used(folder: Path) -> bool:
     """Tell that a folder, or a file of that name, holds something."""
-    if not folder.is_dir():
+    # pathlib raises where a name is too long for the system
+    if not os.path.isdir(folder):
         return os.path.lexists(folder)
     return any(path.name not in (LOCK, JOURNAL) for path in folder.iterdir())
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import logging
+import os
 import shlex
 import signal
 import subprocess
@@ -49,6 +50,7 @@ WAYS_OUT = {
     errno.EACCES: "see to the permissions, close the program that has it open, or name another place",
     errno.EPERM: "see to the permissions, or name another place",
     errno.EROFS: "name a place that can be written to",
+    errno.ENAMETOOLONG: "choose a shorter name",
     errno.ENOENT: "see to it that nothing is moved or removed while a command runs",
 }
 """Advice for errors of the system by their number."""
@@ -110,7 +112,8 @@ class Attempt:
 
     def __str__(self) -> str:
         """Say how to go on."""
-        begun = (self.folder / MANIFEST).is_file()
+        # pathlib raises where a name is too long for the system
+        begun = os.path.isfile(self.folder / MANIFEST)
         return f"Resume with: {self.command} --resume" if begun else f"Begin again with: {self.command}"
 
 

@@ -97,7 +97,7 @@ def test_a_strange_folder_is_named_as_it_is(calibrate: Callable[..., tuple[int, 
     assert "\u202e" not in err
 
 
-@pytest.mark.parametrize("place", ["link", "file/out"])
+@pytest.mark.parametrize("place", ["link", "file/out", "o" * 300])
 def test_a_folder_that_cannot_be_made_is_refused(
     calibrate: Callable[..., tuple[int, str]], tmp_path: Path, place: str
 ) -> None:
