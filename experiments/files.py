@@ -38,6 +38,10 @@ def replacing(path: Path) -> Iterator[Path]:
         with temporary.open("rb+") as file:
             os.fsync(file.fileno())
         temporary.replace(path)
+    except OSError as error:
+        # that of a full disk names no file
+        error.filename = str(path) if error.filename is None else error.filename
+        raise
     finally:
         temporary.unlink(missing_ok=True)
 

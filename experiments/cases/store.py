@@ -88,7 +88,8 @@ class Store:
         """
         path = self.path(key)
         if not path.is_file():
-            raise StoreError("a stored case must stay until the run has ended", "no such file", str(path))
+            rule = "a stored case must stay until the run has ended: --resume simulates it again"
+            raise StoreError(rule, "no such file", str(path))
         try:
             values = _read_values(path)
             found = (values.pop("key"), values.pop("format"))

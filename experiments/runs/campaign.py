@@ -22,6 +22,7 @@ from experiments.calibrate.export import jsonable
 from experiments.calibrate.results import StageResult
 from experiments.cases import Store, Workers, open_folder, run_cases
 from experiments.cases.key import engine_identity
+from experiments.cases.manifest import MANIFEST, write_manifest
 from experiments.cases.outputs import publishing
 from experiments.cases.workers.own import THIS_MACHINE, watched_by
 from experiments.errors import StudyError
@@ -101,6 +102,9 @@ class Desk:
         before, started = len(self.store), time.perf_counter()
         with watching(title, self.watch, self.journal) as progress:
             cases = run_cases(self.study, table, self.store, self.workers, progress, self.journal)
+        if not (self.folder / MANIFEST).exists():
+            # someone removed the folder meanwhile: what comes now can be gone on from
+            write_manifest(self.folder, self.study)
         if simulated := len(self.store) - before:
             self._note_wall_time(title, simulated, time.perf_counter() - started)
         return cases

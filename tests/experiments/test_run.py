@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -126,6 +127,28 @@ def test_an_interrupted_campaign_goes_on_and_repeats_nothing(
     assert same_findings(resumed, whole)
     assert len(engine.seeds) == total
     assert len(set(engine.seeds)) == total
+
+
+@pytest.mark.usefixtures("_without_report")
+def test_a_run_goes_on_in_a_folder_that_was_removed_meanwhile(
+    study: Study, engine: Engine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole, folder = run_campaign(study, tmp_path / "whole"), tmp_path / "out"
+
+    def removing(cases: Sequence[Case], **rest: Any) -> list[CaseResult]:
+        if len(list(folder.glob("cases/*"))) > 7:
+            shutil.rmtree(folder)
+            monkeypatch.setattr(own, "simulate", engine)
+            engine.stop_after = total - 1
+        return engine(cases, **rest)
+
+    total, engine.seeds = len(engine.seeds), []
+    monkeypatch.setattr(own, "simulate", removing)
+    with pytest.raises(KeyboardInterrupt):
+        run_campaign(study, folder)
+    engine.stop_after, engine.seeds = math.inf, []
+    assert same_findings(run_campaign(study, folder, resume=True), whole)
+    assert 8 < len(engine.seeds) < total, "what came after the folder was removed is there"
 
 
 @pytest.mark.usefixtures("_without_report", "engine")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import errno
 from collections.abc import Callable
 from pathlib import Path
 
@@ -163,6 +164,18 @@ def test_an_interrupted_write_leaves_the_older_file(tmp_path: Path) -> None:
         write_half()
     assert path.read_text(encoding="utf-8") == "old"
     assert files_of(tmp_path) == ["value.txt"]
+
+
+def test_the_error_of_a_full_disk_names_the_file(tmp_path: Path) -> None:
+    path = tmp_path / "value.txt"
+
+    def write_half() -> None:
+        with replacing(path):
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+    with pytest.raises(OSError, match="No space left") as caught:
+        write_half()
+    assert caught.value.filename == str(path)
 
 
 def test_a_used_folder_is_refused_untouched(tmp_path: Path, small_study: Study) -> None:
