@@ -98,6 +98,8 @@ def focal_length(path: str | Path) -> float | None:
     """
     from PIL import Image, UnidentifiedImageError
 
+    if not os.path.isfile(path):  # to open a pipe is to wait for whoever writes
+        return None
     try:
         with warnings.catch_warnings(action="ignore"), Image.open(path) as image:
             tags = image.getexif().get_ifd(CAMERA_TAGS)

@@ -34,6 +34,7 @@ from experiments.report.companion import Replay, companion_of
 from experiments.report.kit.markdown import WALL_TIMES
 from experiments.report.writer import library_versions
 from experiments.studyfile import Study
+from experiments.studyfile.campaign import scenes_of
 
 Watch = Callable[[str], AbstractContextManager[Callable[[Progress], None] | None]]
 """Opens the display of one batch, named by its stages, and hands out what its progress is reported to."""
@@ -202,6 +203,8 @@ def check_runs(study: Study, campaign: bool = True, paper: bool = False) -> Stud
     for note in notes:
         _log.warning("The measurements: %s", note)
     check_calibration(study)
+    for scene in scenes_of(study.target.fitted):
+        study.case({}, 0, scene)  # the noise floor's, that cannot begin without it
     return study
 
 

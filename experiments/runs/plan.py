@@ -221,6 +221,20 @@ def _plan(
     waves: Sequence[_Wave],
     stored: float,
 ) -> Plan:
+    try:
+        return _sized_plan(study, resources, speed, waves, stored)
+    except ValueError as error:
+        # a run has it as the reason of a case that could not begin
+        raise StudyError(str(error), study.scale or "this study", str(study.file)) from error
+
+
+def _sized_plan(
+    study: Study,
+    resources: Resources,
+    speed: Speed,
+    waves: Sequence[_Wave],
+    stored: float,
+) -> Plan:
     on_gpu = resources.on_gpu
     planned = tuple(_wave(*wave, resources, speed) for wave in waves)
     cases = [case for _, some, *_ in waves for case in some]

@@ -40,6 +40,10 @@ FactorValues = Annotated[dict[str, float], BeforeValidator(_in_natural_units)]
 """Values by factor name."""
 
 
+MOST = 1000
+"""Most of whatever a campaign counts: replicates, steps, runs."""
+
+
 class SeedSettings(Section):
     """Roots of the seeds of all cases; each case has its own."""
 
@@ -58,7 +62,7 @@ class SeedSettings(Section):
 class NoiseFloorSettings(Section):
     """Stage (a): replicates with every factor at its middle."""
 
-    replicates: int = Field(default=5, ge=2)
+    replicates: int = Field(default=5, ge=2, le=MOST)
     """Cases at the centre."""
     confidence: float = Field(default=0.95, gt=0.0, lt=1.0)
     """Level of the interval of the standard deviation."""
@@ -69,11 +73,11 @@ class ScreeningSettings(Section):
 
     design: str = "plackett-burman"
     """Name of the design; packages from outside add further ones."""
-    runs: int | None = Field(default=None, ge=4, multiple_of=4)
+    runs: int | None = Field(default=None, ge=4, le=MOST, multiple_of=4)
     """Runs of the design; left out: the fewest that leave ``dummies`` columns free."""
-    dummies: int = Field(default=3, ge=0)
+    dummies: int = Field(default=3, ge=0, le=MOST)
     """Dummy columns wanted when ``runs`` is left out: each is one degree of freedom of the error."""
-    replicates: int = Field(default=1, ge=1)
+    replicates: int = Field(default=1, ge=1, le=MOST)
     """Cases of each run."""
 
 
@@ -101,15 +105,15 @@ class SelectionSettings(Section):
 class ClimbSettings(Section):
     """Stage (d): the path of steepest ascent in the kept factors."""
 
-    replicates: int = Field(default=2, ge=1)
+    replicates: int = Field(default=2, ge=1, le=MOST)
     """Cases of each step."""
-    steps: int = Field(default=6, ge=2)
+    steps: int = Field(default=6, ge=2, le=MOST)
     """Points of the first batch."""
     start: FactorValues | None = None
     """First point; left out: the low end of the line through the centre along the effects."""
     step: FactorValues | None = None
     """Move per step; left out: along the effects, so that ``steps`` points span the stated range."""
-    extensions: int = Field(default=1, ge=0)
+    extensions: int = Field(default=1, ge=0, le=MOST)
     """Further batches of up to ``steps`` points when the target was not crossed."""
     reach: float = Field(default=2.0, ge=1.0)
     """Farthest that the climb may go from the middle, in half-ranges (hard limits hold in any case)."""
@@ -142,9 +146,9 @@ class SurfaceSettings(Section):
     too short to fit a slope)."""
     alpha: Literal["rotatable", "spherical", "face"] | float = "rotatable"
     """Distance of the axial points in half-ranges."""
-    center_points: int = Field(default=5, ge=2)
+    center_points: int = Field(default=5, ge=2, le=MOST)
     """Replicates at the centre: the pure error."""
-    replicates: int = Field(default=1, ge=1)
+    replicates: int = Field(default=1, ge=1, le=MOST)
     """Cases of each factorial and axial run."""
     drop: tuple[str, ...] | None = None
     """Terms to leave out of the reduced surface ("F^2", "E:F"); left out: backward elimination."""
@@ -168,7 +172,7 @@ class OptimumSettings(Section):
 class VerificationSettings(Section):
     """Stage (h): fresh cases at the optimum against the target."""
 
-    replicates: int = Field(default=5, ge=2)
+    replicates: int = Field(default=5, ge=2, le=MOST)
     """Fresh cases at the chosen point."""
     margin: Angle | None = Field(default=None, gt=0.0)
     """Equivalence margin of the leading response, an angle; left out: by ``margin_sds``."""

@@ -15,6 +15,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 from dem_warp import Case, ClumpShape, GrainPopulation, Numerics, ShapeMixture, WallPart
 from dem_warp.laws.mechanism import check_forms
 from dem_warp.population import FRACTION_TOLERANCE, size_of_mean_mass
+from dem_warp.scenes.poured_scene import PouredScene
 from experiments.studyfile.generated import section_for
 from experiments.studyfile.mechanisms import MechanismsSection, mechanisms_section
 from experiments.studyfile.proportions import narrowness
@@ -26,6 +27,9 @@ from experiments.studyfile.wall_sections import InteractionSection, MaterialSect
 
 LEAST_SIZE, LARGEST_SIZE = 1e-6, 1e6
 """Sizes of grains, as multiples of their shape, whose cubes are numbers of the machine."""
+
+MOST_GRAINS = 20_000_000
+"""Grains of a case: more fill a GPU of 140 GB."""
 
 
 class ShapeSection(Section):
@@ -234,8 +238,8 @@ class Physics(Section):
         return narrowness(getattr(scene, "diameter", None), grains.shape, size)
 
     def build_case(self, seed: int) -> Case:
-        """Build one case of the engine."""
-        return Case(
+        """Build one case of the engine; a ValueError tells what it cannot be."""
+        case = Case(
             scene=self.scene.scene(self.wall.material()),
             grains=self.grain.population(),
             grain_grain=self.contact.grain_grain.interaction(),
@@ -246,6 +250,12 @@ class Physics(Section):
             laws=self.solver.laws,
             wall_parts=self.wall_parts(),
         )
+        if isinstance(case.scene, PouredScene) and (grains := case.scene.supply(case)) > MOST_GRAINS:
+            rule = (
+                f"a case has at most {MOST_GRAINS:,} grains: lower grain_count, or make the container smaller"
+            )
+            raise ValueError(f"{rule}, got {grains:,}")
+        return case
 
     def wall_parts(self) -> tuple[WallPart, ...]:
         """Build the engine's parts of the walls, in the order of their names."""

@@ -10,7 +10,7 @@ from pydantic import Field
 from doe import Sample
 from experiments.errors import StudyError
 from experiments.measurement.observables import ANGLE, DIMENSIONS, PROFILES, Observable, observables_of
-from experiments.studyfile.campaign import TARGET_SCENE, FactorValues, Response, Target, Twin
+from experiments.studyfile.campaign import MOST, TARGET_SCENE, FactorValues, Response, Target, Twin
 from experiments.studyfile.places import KeyPath, Places
 from experiments.studyfile.scene_sections import SceneSection
 from experiments.studyfile.schema import RawQuantity, Section
@@ -28,7 +28,7 @@ class TwinSection(Section):
 
     truth: FactorValues = Field(min_length=1)
     """Hidden factor values; the factors not named are at their middle."""
-    replicates: int = Field(default=5, ge=2)
+    replicates: int = Field(default=5, ge=2, le=MOST)
     """Cases of the target in every scene."""
 
 

@@ -21,10 +21,11 @@ from experiments.discover.outcome_table import OutcomeTable
 from experiments.errors import InputError, StudyError
 from experiments.measurement.target import with_measurements
 from experiments.rows import read_rows
+from experiments.runs.campaign import check_runs
 from experiments.studyfile import load_study
 from experiments.studyfile.units import Quantity
 from experiments.toml_files import read_toml
-from imaging import PictureError
+from imaging import PictureError, measure_photograph
 from imaging.pictures import read_picture
 
 WriteStudy = Callable[..., Path]
@@ -35,6 +36,7 @@ READERS: dict[str, Callable[[Path], object]] = {
     "a.txt": ClumpShape.read,
     "a.stl": read_mesh,
     "a.png": read_picture,
+    "a.jpg": lambda path: measure_photograph(path, "flank"),
     "a.npz": load_bank,
     "study.json": lambda path: read_manifest(path.parent),
     "a.sqlite": lambda path: OutcomeTable(path).load(["a"]),
@@ -89,6 +91,9 @@ def test_quantities_are_read_as_before(text: str) -> None:
         ("[a" + ".a" * 100_000 + "]\n", "few levels"),
         ("n = " + "1" * 5000 + "\n", "valid TOML"),
         (f"[numerics]\nskin = {10**400}\n", "64 bits"),
+        ("[campaign.noise_floor]\nreplicates = 1000000000\n", "replicates.*equal to 1000"),
+        ("[campaign.climb]\nsteps = 1000000000\n", "steps.*equal to 1000"),
+        ("[campaign.surface]\ncenter_points = 1000000000\n", "center_points.*equal to 1000"),
     ],
 )
 def test_an_excessive_study_is_refused(write_study: WriteStudy, line: str, said: str) -> None:
@@ -96,6 +101,19 @@ def test_an_excessive_study_is_refused(write_study: WriteStudy, line: str, said:
     path = write_study((measurement, ""), ("[numerics]\nmodulus_scale = 400.0\n", ""), add=line)
     with pytest.raises(StudyError, match=said):
         load_study(path)
+
+
+@pytest.mark.parametrize(
+    ("count", "said"), [(10**8, "at most 20,000,000 grains"), (10**9, "at most 134,217,728 grains")]
+)
+def test_a_case_that_no_memory_holds_is_refused_before_it_is_made(
+    write_study: WriteStudy, count: int, said: str
+) -> None:
+    study = load_study(write_study(("grain_count = 30", f"grain_count = {count}")))
+    with pytest.raises(StudyError, match=said):
+        study.case({}, 1)
+    with pytest.raises(StudyError, match=said):
+        check_runs(study)
 
 
 def test_a_clump_has_a_limit_of_spheres(tmp_path: Path) -> None:

@@ -137,6 +137,12 @@ def test_a_plan_reads_well(write_study: Write, tmp_path: Path) -> None:
     assert "Speed measured on 2026-01-02, 2 workers" in " ".join(out.split())
 
 
+def test_cases_that_cannot_begin_have_no_plan(write_study: Write) -> None:
+    study = write_study(("grain_count = 30", 'grain_count = 30\nrain_rate = "1e12 1/s"'))
+    code, _, err = dem_warp("calibrate", study, "--device", "cpu", "--workers", 2, "--dry-run")
+    assert (code, "the rain finds no free place" in err) == (2, True), err
+
+
 def test_a_search_is_planned(tmp_path: Path) -> None:
     plan = planned("discover", TRIAL, "--scale", "bench", TRIAL.with_name("tilted-bench.csv"))
     assert [wave["name"] for wave in plan["waves"]] == ["fresh runs"], "the bank ships with the study"
