@@ -16,6 +16,10 @@ from typing import Any
 from doe.errors import RuleError
 
 
+MOST = 100_000
+"""Most of whatever is counted: more fill memory and time before anything runs."""
+
+
 @dataclass(frozen=True)
 class Settings:
     """Levels, margins and numbers of runs."""
@@ -76,6 +80,8 @@ class Settings:
         for name, value in least.items():
             if getattr(self, name) < value:
                 raise RuleError(f"must be at least {value}", getattr(self, name), f"Settings.{name}")
+            if getattr(self, name) > MOST:
+                raise RuleError(f"must be at most {MOST:,}", getattr(self, name), f"Settings.{name}")
         for name in ("least_ratio", "pair_ratio", "tie_margin", "systematic", "shortlist_share"):
             if not getattr(self, name) >= 0.0:
                 raise RuleError("must not be negative", getattr(self, name), f"Settings.{name}")
