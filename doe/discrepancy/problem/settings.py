@@ -10,6 +10,7 @@ import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
+from numbers import Integral
 from pathlib import Path
 from typing import Any
 
@@ -78,6 +79,8 @@ class Settings:
         least |= {"shortlist": 1, "refinement_points": 2, "refinement_repeats": 2, "refinement_rounds": 1}
         least |= {"finish_points": 0, "pair_candidates": 0, "direct_runs": 2}
         for name, value in least.items():
+            if not isinstance(getattr(self, name), Integral):
+                raise RuleError("must be a whole number", getattr(self, name), f"Settings.{name}")
             if getattr(self, name) < value:
                 raise RuleError(f"must be at least {value}", getattr(self, name), f"Settings.{name}")
             if getattr(self, name) > MOST:
