@@ -18,6 +18,7 @@ MAXIMUM_PIXELS = 120_000_000
 """Larger pictures are not read: 360 MB in memory; a file of a few kilobytes may claim as many."""
 LARGEST_FILE = 500_000_000
 """Bytes of the largest file that is read."""
+PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 HEIC_ENDINGS = (".heic", ".heif")
 FILM_DIAGONAL = math.hypot(36.0, 24.0)
 """Of the film that cameras' focal lengths are converted to [mm]."""
@@ -44,11 +45,11 @@ def read_picture(path: str | Path) -> Picture:
     if (length := file.stat().st_size) > LARGEST_FILE:
         raise PictureError(f"a picture has at most {LARGEST_FILE:,} bytes", f"{length:,}", str(path))
     # a file that does not tell its size is not decoded: it may have any
-    size, picture = _claimed_size(file), None
-    if size is not None:
+    size, picture, content = _claimed_size(file), None, file.read_bytes()
+    if size is not None and _holds_its_chunks(content):
         _check_size(size, str(path))
         with suppress(cv2.error):
-            picture = cv2.imdecode(np.frombuffer(file.read_bytes(), dtype=np.uint8), cv2.IMREAD_COLOR)
+            picture = cv2.imdecode(np.frombuffer(content, dtype=np.uint8), cv2.IMREAD_COLOR)
     if picture is None:
         raise PictureError("the file is a picture that OpenCV can read", f"{length} bytes", str(path))
     return picture.astype(np.uint8, copy=False)
@@ -89,6 +90,22 @@ def _claimed_size(file: Path) -> tuple[int, int] | None:
         raise PictureError(rule, "several times as many", str(file)) from None
     except (UnidentifiedImageError, OSError, ValueError, SyntaxError):
         return None
+
+
+def _holds_its_chunks(content: bytes) -> bool:
+    """Tell that no chunk of a PNG claims more bytes than there are: OpenCV makes room for all of them.
+
+    It decodes no such file. True of every other format.
+    """
+    if not content.startswith(PNG_SIGNATURE):
+        return True
+    at = len(PNG_SIGNATURE)
+    while at + 8 <= len(content):
+        length, kind = int.from_bytes(content[at : at + 4]), content[at + 4 : at + 8]
+        at += 12 + length  # length, kind, content, checksum
+        if kind == b"IEND":
+            break
+    return at <= len(content)
 
 
 def focal_length(path: str | Path) -> float | None:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from dem_warp import Case, LiftedCylinder
+from dem_warp import Case, DrawDown, LiftedCylinder
 from dem_warp.device import resolve_device
 from dem_warp.laws.contact_law import memory_size
 from dem_warp.room import neighbour_room
@@ -25,6 +25,10 @@ SLOPE = math.tan(math.radians(35.0))
 
 FALL, CALM, REST = 0.25, 0.1, 0.35
 """Time that the last grain of a counted rain takes to lie still, a bed to be at rest, and a heap [s]."""
+
+TRICKLE = 1.4
+"""Time that the last grains of a draw-down take to trickle down and to rest, beyond its flow [s]: 0.7 to 2.2
+in seven runs, with balls of 2.5 to 4 mm radius and slots of 36 to 60 mm."""
 
 IDLE_SPHERES = 100.0
 """Spheres that cost as much as a step without any."""
@@ -76,7 +80,8 @@ def _duration(case: Case[Any], grains: int) -> float:
     else:
         fill = grains / scene.rain_rate + FALL
     if not isinstance(scene, LiftedCylinder):
-        return fill + CALM + _own_phases(_Test(scene, case))
+        trickle = TRICKLE if isinstance(scene, DrawDown) else 0.0
+        return fill + CALM + _own_phases(_Test(scene, case)) + trickle
     if scene.duration is not None:
         return max(scene.duration, fill + CALM)
     bulk = min(grains * _grain_volume(case) / BULK_FRACTION, scene.volume)

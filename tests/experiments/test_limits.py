@@ -151,6 +151,22 @@ def test_a_small_picture_that_claims_much_is_refused(tmp_path: Path) -> None:
         read_picture(path)
 
 
+def test_a_chunk_of_a_picture_that_claims_much_is_not_decoded(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "grey.png"
+    cv2.imwrite(str(path), np.full((60, 80, 3), 128, np.uint8))
+    whole = path.read_bytes()
+    path.write_bytes(whole + b"what follows the end is not looked at")
+    assert read_picture(path).shape == (60, 80, 3)
+    at = whole.index(b"IDAT") - 4
+    path.write_bytes(whole[:at] + (2**31 - 1).to_bytes(4) + whole[at + 4 :])
+    # OpenCV would take two gigabytes for it, and then refuse it
+    monkeypatch.setattr(cv2, "imdecode", lambda *_: pytest.fail("it was decoded"))
+    with pytest.raises(PictureError, match="a picture that OpenCV can read"):
+        read_picture(path)
+
+
 def test_a_mesh_names_no_other_file(tmp_path: Path) -> None:
     for kind in ("3mf", "zip", "gltf", "glb", "dae"):
         path = tmp_path / f"a.{kind}"

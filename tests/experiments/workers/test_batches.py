@@ -13,6 +13,7 @@ from dem_warp import Case, CaseResult, Progress, simulate
 from dem_warp.batch import Batch
 from dem_warp.rollback import Rollback
 from experiments.benchmarks.roofline import memory_bytes
+from experiments.benchmarks.scenes import SKETCHES, sketch_case
 from experiments.cases import OwnWorkers
 from experiments.cases.cost import cost_of, device_bytes, relative_costs
 from experiments.cases.workers import batches, own
@@ -58,6 +59,17 @@ def test_steps_are_predicted_within_a_half(small_study: Study) -> None:
     taken = sum(phase["steps"] for phase in result.phases)
     assert 1 / 1.5 < cost_of(case).steps / taken < 1.5
     assert cost_of(case).grains == result.observables["grain_count"] == 30
+
+
+def test_the_last_grains_of_a_draw_down_are_counted_in() -> None:
+    sketch = SKETCHES["draw-down"]
+    # half as deep and with large balls: some hundred grains
+    small = sketch._replace(scene=replace(sketch.scene, slot=0.06, depth=0.018, fill_depth=0.04))
+    case = sketch_case(small, 0.004)
+    [result] = simulate([case], "cpu", 1)
+    taken = sum(phase["steps"] for phase in result.phases)
+    assert result.status == "finished"
+    assert 1 / 1.5 < cost_of(case).steps / taken < 1.5
 
 
 def test_a_case_costs_what_its_steps_and_spheres_do(write_study: Write) -> None:
