@@ -16,7 +16,6 @@ from typing import Any
 
 from doe.errors import RuleError
 
-
 MOST = 100_000
 """Most of whatever is counted: more fill memory and time before anything runs."""
 
