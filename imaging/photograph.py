@@ -27,7 +27,7 @@ from imaging.looks import other_looks, with_faint
 from imaging.outline import Outline, levelled
 from imaging.plate import PlateLine
 from imaging.reasons import Doubt
-from imaging.sighting import Sighting, differs_below, refuse_brimful, sight, without_strays
+from imaging.sighting import Sighting, darker_below, refuse_brimful, sight, without_strays
 from imaging.view import View, level_angle
 
 NO_HEAP = 0.1
@@ -151,9 +151,9 @@ def find_heap(picture: Picture, given: PlateLine | None, view: View, place: str)
     if given is None:
         refuse_brimful(seen, best.sighting, best.ends, place)
     doubts = list(best.sighting.doubts)
-    if given is None and differs_below(seen, best.sighting, best.ends):
+    if given is None and darker_below(seen, best.sighting, best.ends):
         doubts.append(
-            Doubt("shade", "what is below the whole heap looks other than beside it: its shadow, or a dish?")
+            Doubt("shade", "what is below the whole heap is darker than beside it: its shadow, or a dish?")
         )
     shift = best.shift(tries)
     if best.clear and shift > LARGEST_SHIFT:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imaging.background import Contrast, unshaded
-from imaging.doubts import LARGEST_UNSEEN_TILT
+from imaging.doubts import END_WIDTH, LARGEST_UNSEEN_TILT, LEAST_END
 from imaging.errors import PictureError
 from imaging.foot import Base, below_plate, front_of_base, joined_foot
 from imaging.geometry import FloatArray, Layer
@@ -31,6 +31,8 @@ LEAST_WIDTH = 100.0
 BRIMFUL_RULE = "the heap stands on a plate wider than itself"
 BESIDE_NOISE, BESIDE_DIFFERENCE = 6.0, 24.0
 """Multiple of the wall's noise, and difference [of 255], from which on two sides differ: twice a cloth's."""
+LOW_END = 0.08
+"""Height of an outline's lower end over the heap's, from which on its ground may be a board's underside."""
 VIEW_FROM_ABOVE = 0.5
 """Depth of the base over its half width: from here on, a camera 30 degrees up, flanks are hidden."""
 
@@ -59,7 +61,8 @@ def sight(seen: Contrast, threshold: float, given: PlateLine | None, view: View,
         near = cv2.dilate(heap.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
         plate, body, heap = _on_plate(near & (contrast > threshold), seen, threshold, given, view, place)
         rows = refine_thin(top_edge(heap, contrast, threshold), heap, contrast, plate)
-        return _seen_whole(rows, body, plate, contrast, threshold, place)
+        found = _seen_whole(rows, body, plate, contrast, threshold, place)
+        return found if given is not None else _doubted_on_board(seen, found)
     if given is not None:
         return Sighting(top_edge(heap, contrast, threshold), plate, 0.0, 0.0, ())
     return _on_seen_plate(seen, threshold, plate, body, heap, place)
@@ -187,6 +190,31 @@ def _on_seen_plate(
     return Sighting(rows, level_line, elevation, elevation_se, tuple(doubts), depth)
 
 
+def _doubted_on_board(seen: Contrast, found: Sighting) -> Sighting:
+    """The same heap, doubted where both of its ends stand high on a band that differs from what is above it.
+
+    So does a board with its heap, seen a little from above: its ends slant, and show no straight edge beside
+    the heap; its underside is then taken for the ground, and its slanting ends for the feet of the flanks.
+    """
+    columns = np.flatnonzero(np.isfinite(found.rows)).astype(np.float64)
+    position, height = found.plate.level(columns, found.rows[columns.astype(np.intp)])
+    size = max(3, round(END_WIDTH * len(height)))
+    end = float(min(np.median(height[:size]), np.median(height[-size:])))
+    share = end / max(float(height.max()), 1.0)
+    if share <= LOW_END or end <= LEAST_END:
+        return found
+    across = float(position.min()) + np.linspace(0.3, 0.7, 60) * float(np.ptp(position))
+    band, above = (
+        _sampled(seen, found.plate, across, end * np.linspace(*part, 8)) for part in ((0.25, 0.7), (1.4, 2.0))
+    )
+    if band is None or above is None:
+        return found
+    if float(np.linalg.norm(np.median(band, axis=0) - np.median(above, axis=0))) <= _least_difference(seen):
+        return found
+    finding = f"both ends stand {share:.2f} heights high, in another colour than what is above: a board?"
+    return replace(found, doubts=(*found.doubts, Doubt("plate", finding)))
+
+
 def without_strays(found: Sighting) -> Sighting:
     """The same heap without what lies beyond a gap in its outline: grains that rolled off."""
     height = found.plate.rows_at(np.arange(len(found.rows))) - found.rows
@@ -239,10 +267,11 @@ def refuse_brimful(seen: Contrast, found: Sighting, ends: tuple[float, float], p
         raise PictureError(BRIMFUL_RULE, "a dish, round below", place)
 
 
-def differs_below(seen: Contrast, found: Sighting, ends: tuple[float, float]) -> bool:
-    """True if what is right below the foot looks other than beside it, on both sides, be it by a shadow.
+def darker_below(seen: Contrast, found: Sighting, ends: tuple[float, float]) -> bool:
+    """True if what is right below the foot is darker than beside it, on both sides.
 
-    Light from behind does that, a dish in a shade of the wall's colour, and a foot that hangs below its line.
+    Light from behind does that, a dish in a shade of the wall's colour, and a dark foot that hangs below its
+    line. Light from one side does not: it leaves one side darker, the other one brighter.
 
     Parameters
     ----------
@@ -255,7 +284,12 @@ def differs_below(seen: Contrast, found: Sighting, ends: tuple[float, float]) ->
     if strips is None:
         return False
     under, *sides = strips
-    return all(float(np.median(_distance(under, side))) > _least_difference(seen) for side in sides)
+    least = _least_difference(seen)
+    return all(
+        float(np.median(_distance(under, side))) > least
+        and float(np.median((under - side).mean(axis=-1))) < 0.0
+        for side in sides
+    )
 
 
 def _least_difference(seen: Contrast) -> float:
