@@ -26,6 +26,8 @@ class Contender:
     """Fresh runs that correct it."""
     centre: np.ndarray | None = None
     """Centre of the last of them, (parameters,); None where there is none."""
+    rounds: int = 0
+    """Times that it was run."""
 
     @property
     def simulated(self) -> bool:
@@ -55,8 +57,9 @@ def simulate_again(
 ) -> Generator[list[Point], Outcomes, Contenders]:
     """Correct by fresh runs the models that may fit and may lead, half as many in every next round.
 
-    Then every rival of a leader that fits is heard that no run stands behind: the leader has gained by its
-    own. At last the leader runs against those that might still overtake it.
+    Then a leader that fits and all its rivals are heard, run until their optima stay: the leader has gained
+    by its own runs, and on an emulator of a few runs a rival's optimum may lie anywhere. At last the leader
+    runs against those that might still overtake it.
 
     Parameters
     ----------
@@ -73,7 +76,12 @@ def simulate_again(
     for number in range(settings.refinement_rounds):
         chosen = _worth_running(contenders, settings, error, max(1, settings.shortlist >> number))
         contenders = yield from _run(contenders, chosen, points, laboratory, settings, number)
-    while unheard := _unheard(contenders, settings, is_rival):
+    called: list[tuple[str, ...]] = []
+    while True:
+        called += [names for names in _rivals(contenders, settings, is_rival) if names not in called]
+        unheard = [names for names in called if names in contenders and _unheard(contenders[names], settings)]
+        if not unheard:
+            break
         contenders = yield from _run(
             contenders, unheard, points, laboratory, settings, settings.refinement_rounds
         )
@@ -112,7 +120,8 @@ def _updated(contender: Contender, fresh: Runs) -> Contender:
     before = contender.fitted
     runs = fresh if contender.runs is None else contender.runs.joined(fresh)
     corrected = correct(before.model, runs, before.x)
-    return Contender(fit(Stack(corrected, before.stack.blocks), before.x, count=2), runs, before.x)
+    refitted = fit(Stack(corrected, before.stack.blocks), before.x, count=2)
+    return Contender(refitted, runs, before.x, contender.rounds + 1)
 
 
 def _worth_running(
@@ -137,16 +146,22 @@ def _worth_running(
     return [names for names in near if not names] + others[:count]
 
 
-def _unheard(contenders: Contenders, settings: Settings, is_rival: Rivalry) -> list[tuple[str, ...]]:
-    """Rivals of the leader that were not run, where the leader was and is within the noise."""
+def _rivals(contenders: Contenders, settings: Settings, is_rival: Rivalry) -> list[tuple[str, ...]]:
+    """The leader, if it was run and is within the noise, and its rivals; none without."""
     leader = min((one.fitted for names, one in contenders.items() if names), key=_score, default=None)
     if leader is None or not contenders[leader.mechanisms].simulated or not _fits(leader, settings):
         return []
-    return [
+    rivals = [
         names
         for names, one in contenders.items()
-        if names and not one.simulated and _fits(one.fitted, settings) and is_rival(one.fitted, leader)
+        if names and one.fitted is not leader and _fits(one.fitted, settings) and is_rival(one.fitted, leader)
     ]
+    return [leader.mechanisms, *rivals] if rivals else []
+
+
+def _unheard(contender: Contender, settings: Settings) -> bool:
+    """Say if a model was not run around its optimum, nor as often as a leader may be."""
+    return not contender.settled and contender.rounds < settings.refinement_rounds
 
 
 def _score(fitted: Fitted) -> float:
