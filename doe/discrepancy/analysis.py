@@ -17,7 +17,7 @@ from doe.discrepancy.contest.gap import OF_A_CANDIDATE, OF_THE_BASE, GapTest, Qu
 from doe.discrepancy.contest.held_out import held_out_gain
 from doe.discrepancy.contest.laboratory import Laboratory, Request
 from doe.discrepancy.contest.power import Effects, Power, powers, shown_apart
-from doe.discrepancy.contest.rivals import is_open, lag, parting, refitted_q, telling_apart
+from doe.discrepancy.contest.rivals import certain, is_open, lag, parting, telling_apart
 from doe.discrepancy.contest.rounds import Contender, Contenders, simulate_again
 from doe.discrepancy.contest.signatures import Signatures, signatures
 from doe.discrepancy.contest.slips import find_slips, without
@@ -242,7 +242,7 @@ class _Parts:
     def is_rival(self, base: _Base, one: Fitted, leader: Fitted) -> bool:
         """Say if it stays open which of two models is right."""
         whole, best, margin = self.whole(one), self.whole(leader), self.settings.tie_margin
-        behind = lag(whole.score - best.score, refitted_q(whole) - refitted_q(best), margin)
+        behind = lag(whole.score - best.score, certain(whole) - certain(best), margin)
         apart = self.apart(base, leader).get(one.mechanisms[0], math.inf)
         return is_open(behind, apart, margin, parting(whole, best))
 

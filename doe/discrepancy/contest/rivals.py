@@ -56,25 +56,30 @@ def telling_apart(margin: float, power: float) -> float:
     return float((z + (z**2 + _margin_of_alike(margin)) ** 0.5) ** 2)
 
 
-def lag(score: float, q: float, margin: float) -> float:
+def lag(score: float, certain: float, margin: float) -> float:
     """By how much a model is behind the best in minus twice the log-likelihood.
 
     The likelihood of a model suffers where its predictions are uncertain, as they are before it has been run
     enough, and that of the best gains by every run of it: that says how much is known of a model, and
-    nothing of the data. It counts for half a tie at most: a model that is named is ahead in Q, too.
+    nothing of the data. It counts for half a tie at most: a model that is named is ahead without it, too.
 
     Parameters
     ----------
-    score, q : float
-        Differences to the best of minus twice the log-likelihood, and of Q.
+    score, certain : float
+        Differences to the best of minus twice the log-likelihood, and of `certain`.
     margin : float
     """
-    return min(score, q + margin / 2.0)
+    return min(score, certain + margin / 2.0)
 
 
-def refitted_q(fitted: Fitted) -> float:
-    """Compute the sum of squares that a refit to all means leaves, linearised at the optimum."""
-    return float(np.sum((projector(fitted.sensitivities) @ fitted.residuals) ** 2))
+def certain(fitted: Fitted) -> float:
+    """Compute minus twice the log-likelihood, refitted, as if its predictions were certain.
+
+    That is Q with the logarithm of the determinant of the noise alone. Q without it favours mechanisms under
+    which heaps scatter more.
+    """
+    q = float(np.sum((projector(fitted.sensitivities) @ fitted.residuals) ** 2))
+    return q + float(np.linalg.slogdet(_shared(fitted))[1])
 
 
 def parting(one: Fitted, other: Fitted) -> float:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from doe.discrepancy.contest.gap import Answer, GapTest, Question
-from doe.discrepancy.contest.rivals import is_open, lag, parting
+from doe.discrepancy.contest.rivals import certain, is_open, lag, parting
 from doe.discrepancy.fitting.fit import Fitted, Interval
 from doe.discrepancy.problem.settings import Settings
 from doe.discrepancy.verdict.before_after import BeforeAfter
@@ -112,7 +112,10 @@ def conclude(assessments: Sequence[Assessment], settings: Settings) -> Conclusio
     order = sorted(range(len(assessments)), key=lambda index: assessments[index].score)
     best = assessments[order[0]]
     margin = settings.tie_margin
-    by = [lag(one.score - best.score, one.gap.q - best.gap.q, margin) for one in assessments]
+    sure = certain(best.whole)
+    # rivals that fit were run: of the others an emulator says little, and whatever is measured is within that
+    known = [certain(one.whole) - sure if one.simulated else math.inf for one in assessments]
+    by = [lag(one.score - best.score, at, margin) for one, at in zip(assessments, known, strict=True)]
     close = [i for i in order if _is_close(assessments[i], best, by[i], margin)]
     passing = [i for i in close if not objections(assessments[i], settings)]
     failed = objections(best, settings)
