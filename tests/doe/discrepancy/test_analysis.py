@@ -68,8 +68,8 @@ def test_a_hidden_mechanism_is_named_with_its_size() -> None:
 
 
 def test_the_numbers_of_an_analysis_stay() -> None:
-    # Since variances are known from all conditions, and noise is taken off distances (the last detectable size);
-    # rounding differs from host to host.
+    # Since variances are known from all conditions and noise is taken off distances (last detectable size).
+    # Rounding differs from host to host.
     found, _ = _named()
     assert found.base is not None
     assert found.chosen is not None
