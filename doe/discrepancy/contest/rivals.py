@@ -76,7 +76,7 @@ def certain(fitted: Fitted) -> float:
     """Compute minus twice the log-likelihood, refitted, as if its predictions were certain.
 
     That is Q with the logarithm of the determinant of the noise alone. Q without it favours mechanisms under
-    which heaps scatter more.
+    which the observations scatter more.
     """
     q = float(np.sum((projector(fitted.sensitivities) @ fitted.residuals) ** 2))
     return q + float(np.linalg.slogdet(_shared(fitted))[1])
