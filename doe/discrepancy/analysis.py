@@ -6,15 +6,18 @@ run with any simulator, and hundreds side by side with all their waves in one ba
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from doe.discrepancy.contest.gap import OF_A_CANDIDATE, OF_THE_BASE, GapTest, Question, find_gap
 from doe.discrepancy.contest.held_out import held_out_gain
 from doe.discrepancy.contest.laboratory import Laboratory, Request
-from doe.discrepancy.contest.power import Effects, Power, alike, powers
+from doe.discrepancy.contest.power import Effects, Power, powers, shown_apart
+from doe.discrepancy.contest.rivals import certain, is_open, lag, parting, telling_apart
 from doe.discrepancy.contest.rounds import Contender, Contenders, simulate_again
 from doe.discrepancy.contest.signatures import Signatures, signatures
 from doe.discrepancy.contest.slips import find_slips, without
@@ -32,7 +35,6 @@ from doe.discrepancy.verdict.conclusion import (
     Conclusion,
     conclude,
     explained_share,
-    telling_apart,
     withdrawn,
 )
 from doe.discrepancy.verdict.discovery import (
@@ -128,7 +130,9 @@ def _search(parts: _Parts, base: _Base) -> Analysis:
     settings = parts.settings
     contenders: Contenders = {(): Contender(base.fitted), **parts.contenders([(n,) for n in base.seen.names])}
     error = settings.shortlist_share * base.gap.excess
-    contenders = yield from simulate_again(contenders, parts.laboratory, settings, error)
+    contenders = yield from simulate_again(
+        contenders, parts.laboratory, settings, error, partial(parts.is_rival, base)
+    )
     base = parts.base(contenders[()].fitted)
     if not base.gap.found:
         reason = f"fresh runs at the optimum agree with the data within the noise (p = {base.gap.p:.2g})"
@@ -181,7 +185,9 @@ def _pairs(
         return []
     contenders: Contenders = parts.contenders(promising)
     error = parts.settings.shortlist_share * base.gap.excess
-    contenders = yield from simulate_again(contenders, parts.laboratory, parts.settings, error)
+    contenders = yield from simulate_again(
+        contenders, parts.laboratory, parts.settings, error, partial(parts.is_rival, base)
+    )
     return parts.assess(base, contenders)
 
 
@@ -223,9 +229,26 @@ class _Parts:
             fitted, gap, seen, effects, powers(effects, seen.shares, self.emulator.space, self.settings)
         )
 
+    def whole(self, fitted: Fitted) -> Fitted:
+        """Weigh a fit on all conditions: those that it was fitted to, and those that it forecasts."""
+        return weigh(Stack(fitted.model, (*self.evidence.training, *self.evidence.held_out)), fitted.x)
+
+    def apart(self, base: _Base, fitted: Fitted) -> dict[str, float]:
+        """By other mechanism, how far in Q it was shown to be from a single one of this size."""
+        if len(fitted.mechanisms) != 1:
+            return {}
+        return shown_apart(base.effects, fitted.mechanisms[0], float(fitted.coded_sizes[0]))
+
+    def is_rival(self, base: _Base, one: Fitted, leader: Fitted) -> bool:
+        """Say if it stays open which of two models is right."""
+        whole, best, margin = self.whole(one), self.whole(leader), self.settings.tie_margin
+        behind = lag(whole.score - best.score, certain(whole) - certain(best), margin)
+        apart = self.apart(base, leader).get(one.mechanisms[0], math.inf)
+        return is_open(behind, apart, margin, parting(whole, best))
+
     def _gap(self, fitted: Fitted, level: float, questions: Sequence[Question]) -> GapTest:
-        """Test a model on all conditions: those that it was fitted to, and those that it forecasts."""
-        whole = weigh(Stack(fitted.model, (*self.evidence.training, *self.evidence.held_out)), fitted.x)
+        """Test a model on all conditions."""
+        whole = self.whole(fitted)
         return find_gap(whole, signatures(whole), level, self.settings.draws, self.seed, questions)
 
     def assess(self, base: _Base, contenders: Contenders) -> list[Assessment]:
@@ -235,11 +258,9 @@ class _Parts:
             gap = self._gap(one.fitted, settings.fit_level, OF_A_CANDIDATE)
             gain = held_out_gain(base.fitted, one.fitted, self.evidence.held_out, settings.draws, self.seed)
             share = explained_share(base.gap, gap)
-            same = frozenset[str]()
-            if len(names) == 1:
-                same = alike(base.effects, names[0], float(one.fitted.coded_sizes[0]), settings.tie_margin)
             may = settings.resolvable is None or set(names) <= set(settings.resolvable)
-            out.append(Assessment(one.fitted, gap, gain, share, one.simulated, may, same))
+            whole, apart = self.whole(one.fitted), self.apart(base, one.fitted)
+            out.append(Assessment(one.fitted, gap, gain, share, one.simulated, may, whole, apart))
         return sorted(out, key=lambda one: one.score)
 
     def discovery(

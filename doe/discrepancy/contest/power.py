@@ -39,6 +39,8 @@ class Effects:
     chance: np.ndarray
     """Part of the noise of the bank in the squared visible lengths: where a mechanism does nothing, the
     emulator still shows something, (mechanisms, sizes)."""
+    unknown: np.ndarray
+    """Part in them of all that the bank leaves open of the mechanism's addition, (mechanisms, sizes)."""
     correlations: np.ndarray
     """Between visible signatures, (mechanisms, mechanisms)."""
 
@@ -53,7 +55,7 @@ class Effects:
         shape = (len(seen.names), len(KNOTS), len(fitted.covariance))
         if not seen.names:  # none does anything, or all were left out
             none = np.empty((0, len(CODED_SIZES)))
-            return cls((), np.empty((*none.shape, shape[-1])), none, none, seen.correlations)
+            return cls((), np.empty((*none.shape, shape[-1])), none, none, none, seen.correlations)
         extra = np.reshape(
             [secants(stack.model, stack.blocks, theta, name, KNOTS) for name in seen.names], shape
         )
@@ -64,26 +66,37 @@ class Effects:
         left = (targets - stack.predict(x)).reshape(shape)
         white = (each @ fitted.whitening.T for each in (left, extra))
         visible, whole = (interp1d(KNOTS, each, axis=1)(CODED_SIZES) for each in white)
-        chance = interp1d(KNOTS, _chance(fitted, seen.names, theta), axis=1)(CODED_SIZES)
-        return cls(seen.names, visible, (whole**2).sum(axis=2), chance, seen.correlations)
+        chance, unknown = interp1d(KNOTS, _errors(fitted, seen.names, theta), axis=2)(CODED_SIZES)
+        return cls(seen.names, visible, (whole**2).sum(axis=2), chance, unknown, seen.correlations)
 
     @property
     def squares(self) -> np.ndarray:
         """Squared lengths, (mechanisms, sizes)."""
         return np.asarray((self.visible**2).sum(axis=2))
 
-    def apart(self, index: int) -> np.ndarray:
+    def apart(self, index: int, errors: np.ndarray) -> np.ndarray:
         """Squared distance of a mechanism of every size from each other one, (mechanisms, sizes).
 
-        The other has the size in its range that is nearest, or none. Those whose signatures correlate by
-        `SAME` or more are one to an emulator; of the mechanism itself nothing is nearest.
+        The other has the size in its range that is nearest, or none. Each was fitted to runs of its own: two
+        that do the same are as far apart as the errors of both, so these are taken off. Those whose
+        signatures correlate by `SAME` or more are one to an emulator; of the mechanism itself nothing is
+        nearest.
+
+        Parameters
+        ----------
+        index : int
+        errors : (mechanisms, sizes) array
+            Parts in the squared visible lengths: `chance` for the likely distance, `unknown` for what the
+            bank has shown of it.
         """
-        squares = self.squares
+        squares, sizes = self.squares, np.arange(len(CODED_SIZES))
         out = np.repeat(squares[index][None], len(self.names), axis=0)
         for rival in range(len(self.names)):
             if rival != index:
                 products = self.visible[index] @ self.visible[rival].T
-                nearest = (squares[index][:, None] + squares[rival] - 2.0 * products).min(axis=1)
+                squared = squares[index][:, None] + squares[rival] - 2.0 * products
+                at = squared.argmin(axis=1)
+                nearest = squared[sizes, at] - errors[index] - errors[rival][at]
                 same = self.correlations[index, rival] >= SAME
                 out[rival] = 0.0 if same else np.clip(nearest, 0.0, squares[index])
         return out
@@ -102,38 +115,46 @@ class Effects:
         """
         trusted = np.maximum(self.squares - (1.0 - TRUSTED) ** 2 * self.whole - self.chance, 0.0)
         found = stats.norm.cdf(np.sqrt(trusted) - settings.least_ratio)
-        nearest = np.array([self.apart(index).min(axis=0) for index in range(len(self.names))])
+        nearest = np.array([self.apart(index, self.chance).min(axis=0) for index in range(len(self.names))])
         nearest = np.maximum(nearest, LEAST_LENGTH**2).reshape(found.shape)
         told = stats.norm.cdf((nearest - settings.tie_margin) / (2.0 * np.sqrt(nearest)))
         return np.minimum(found, told)
 
 
-def _chance(fitted: Fitted, names: Sequence[str], theta: np.ndarray) -> np.ndarray:
-    """See `Effects`, at the coded `KNOTS`, (mechanisms, knots)."""
+def _errors(fitted: Fitted, names: Sequence[str], theta: np.ndarray) -> np.ndarray:
+    """Parts of errors in squared visible lengths, at the coded `KNOTS`, (2, mechanisms, knots).
+
+    Of chance, and of all that is open; see `Effects`.
+    """
     left = projector(fitted.sensitivities) @ fitted.whitening
     terms = added(np.repeat(theta[None], len(KNOTS), axis=0), KNOTS)
-    out = np.zeros((len(names), len(KNOTS)))
+    out = np.zeros((2, len(names), len(KNOTS)))
     start = 0
     for block in fitted.stack.blocks:
         end = start + len(block.columns)
         metric = left[:, start:end].T @ left[:, start:end]
-        for own, name in zip(out, names, strict=True):
+        for number, name in enumerate(names):
             part = fitted.model.emulator.surfaces[block.condition].additions[name]
             seen = np.sum(metric * part.covariance[np.ix_(block.columns, block.columns)])
-            own += np.einsum("ks,st,kt->k", terms, part.chance, terms) * seen
+            for own, error in zip(out[:, number], (part.chance, part.gram_inverse), strict=True):
+                own += np.einsum("ks,st,kt->k", terms, error, terms) * seen
         start = end
     return out
 
 
-def alike(effects: Effects, name: str, coded_size: float, margin: float) -> frozenset[str]:
-    """Mechanisms whose Q, refitted, would be less than the margin above that of one of a coded size.
+def shown_apart(effects: Effects, name: str, coded_size: float) -> dict[str, float]:
+    """Compute by how much Q of every other mechanism, refitted, is above that of one of a coded size.
 
-    What fresh runs then show between them is their own noise.
+    So much of it as is beyond the errors of the bank's emulator.
+
+    Returns
+    -------
+    dict
+        By the other's name.
     """
     index = effects.names.index(name)
-    apart = effects.apart(index)[:, np.abs(CODED_SIZES - coded_size).argmin()]
-    others = (rival for rival in range(len(effects.names)) if rival != index)
-    return frozenset(effects.names[rival] for rival in others if apart[rival] < margin)
+    apart = effects.apart(index, effects.unknown)[:, np.abs(CODED_SIZES - coded_size).argmin()]
+    return {other: float(apart[rival]) for rival, other in enumerate(effects.names) if rival != index}
 
 
 @dataclass(frozen=True)

@@ -121,8 +121,8 @@ class Model:
         freed = self.emulator.surfaces[block.condition].noise.inverse_bias(len(block.columns))
         return block.noise(run, excess) * freed
 
-    def error(self, x: np.ndarray, block: Block) -> np.ndarray:
-        """Covariance of the error of the prediction of a block, with what is systematic, (k, k)."""
+    def open_error(self, x: np.ndarray, block: Block) -> np.ndarray:
+        """Covariance of what bank and fresh runs leave open of the prediction of a block, (k, k)."""
         surfaces = self.emulator.surfaces[block.condition]
         if block.condition in self.corrections:
             error = self.corrections[block.condition].error(x)
@@ -131,9 +131,13 @@ class Model:
         if self.is_directed:
             turn = self.turn(block.condition)
             error = error * np.outer(turn, turn)
+        return np.asarray(error[np.ix_(block.columns, block.columns)])
+
+    def error(self, x: np.ndarray, block: Block) -> np.ndarray:
+        """Covariance of the error of the prediction of a block, with what is systematic, (k, k)."""
         theta = x[: len(self.emulator.space.factors)]
-        own = self.systematic**2 * surfaces.noise.variance(theta)
-        return np.asarray((error + np.diag(own))[np.ix_(block.columns, block.columns)])
+        own = self.systematic**2 * self.emulator.surfaces[block.condition].noise.variance(theta)
+        return np.asarray(self.open_error(x, block) + np.diag(own[block.columns]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,6 +168,10 @@ class Stack:
         """Covariance of measured less predicted means at one row of coded parameters, (means, means)."""
         own = self.noise(x) + _blocks(self.model.error(x, block) for block in self.blocks)
         return own + self.common.T @ self.common
+
+    def open_error(self, x: np.ndarray) -> np.ndarray:
+        """Covariance of what is open of the predictions at one row of coded parameters, (means, means)."""
+        return _blocks(self.model.open_error(x, block) for block in self.blocks)
 
     @cached_property
     def common(self) -> np.ndarray:

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
-from scipy import stats
 
 from doe.discrepancy.contest.gap import Answer, GapTest, Question
+from doe.discrepancy.contest.rivals import certain, is_open, lag, parting
 from doe.discrepancy.fitting.fit import Fitted, Interval
 from doe.discrepancy.problem.settings import Settings
 from doe.discrepancy.verdict.before_after import BeforeAfter
 from doe.discrepancy.verdict.discovery import Verdict
-
-CHANCE = 1.645
-"""Standard deviations that a normal number passes upwards in one case of twenty."""
 
 WORSE = 4.0
 """Rise of the held-out Q of fresh runs with which a name is withdrawn: two standard deviations, squared."""
@@ -39,8 +37,10 @@ class Assessment:
     """True if fresh runs around its optimum stand behind it."""
     declared: bool
     """True if all its mechanisms may be named by what was declared."""
-    alike: frozenset[str] = frozenset()
-    """Mechanisms that these data cannot tell from it at its size."""
+    whole: Fitted
+    """The same, weighed on all conditions."""
+    apart: Mapping[str, float] = field(default_factory=dict)
+    """By other mechanism, how far in Q it was shown to be from a single one of its size."""
 
     @property
     def mechanisms(self) -> tuple[str, ...]:
@@ -95,46 +95,6 @@ def objections(assessment: Assessment, settings: Settings) -> list[str]:
     return found
 
 
-def is_open(behind: float, are_alike: bool, margin: float) -> bool:
-    """Say if it stays open which of two models is right, one of which is so much behind.
-
-    Of models d standard deviations apart the wrong one is behind by d^2 +- 2 d. Two that should look the
-    same, their d^2 being below the margin, are told apart where chance does so in one case of twenty at most.
-
-    Parameters
-    ----------
-    behind : float
-        In Q, held-out conditions included.
-    are_alike : bool
-        Whether they should look the same.
-    margin : float
-    """
-    return behind < (_margin_of_alike(margin) if are_alike else margin)
-
-
-def _margin_of_alike(margin: float) -> float:
-    return margin + 2.0 * CHANCE * margin**0.5
-
-
-def telling_apart(margin: float, power: float) -> float:
-    """Compute the Q between two models at which they are told apart with so much power (`is_open`).
-
-    The wrong one is behind by d^2 +- 2 d, which passes the margin of models that look the same.
-    """
-    z = float(stats.norm.ppf(power))
-    return float((z + (z**2 + _margin_of_alike(margin)) ** 0.5) ** 2)
-
-
-def lag(one: Assessment, best: Assessment, margin: float) -> float:
-    """By how much a model is behind the best in minus twice the log-likelihood.
-
-    The likelihood of a model suffers where its predictions are uncertain, as they are before it has been run
-    enough. That counts for half a tie at most: a model that is named is ahead in Q, too.
-    """
-    plain = one.gap.q - best.gap.q + margin / 2.0 if one.simulated else np.inf
-    return min(one.score - best.score, plain)
-
-
 def conclude(assessments: Sequence[Assessment], settings: Settings) -> Conclusion:
     """Choose among candidates of equally many mechanisms.
 
@@ -152,8 +112,11 @@ def conclude(assessments: Sequence[Assessment], settings: Settings) -> Conclusio
     order = sorted(range(len(assessments)), key=lambda index: assessments[index].score)
     best = assessments[order[0]]
     margin = settings.tie_margin
-    by = [lag(assessment, best, margin) for assessment in assessments]
-    close = [i for i in order if is_open(by[i], set(assessments[i].mechanisms) <= best.alike, margin)]
+    sure = certain(best.whole)
+    # rivals that fit were run: of the others an emulator says little, and whatever is measured is within that
+    known = [certain(one.whole) - sure if one.simulated else math.inf for one in assessments]
+    by = [lag(one.score - best.score, at, margin) for one, at in zip(assessments, known, strict=True)]
+    close = [i for i in order if _is_close(assessments[i], best, by[i], margin)]
     passing = [i for i in close if not objections(assessments[i], settings)]
     failed = objections(best, settings)
     titles = ", ".join(_title(assessments[i]) for i in close)
@@ -171,6 +134,11 @@ def conclude(assessments: Sequence[Assessment], settings: Settings) -> Conclusio
     if passing:
         failed = ["it was declared that such data cannot tell it from others"]
     return Conclusion(Verdict.UNKNOWN, (), f"{_title(best)} comes closest, but {failed[0]}", None)
+
+
+def _is_close(one: Assessment, best: Assessment, behind: float, margin: float) -> bool:
+    apart = best.apart.get(one.mechanisms[0], math.inf)
+    return one is best or is_open(behind, apart, margin, parting(one.whole, best.whole))
 
 
 def withdrawn(conclusion: Conclusion, compared: Sequence[BeforeAfter]) -> Conclusion:

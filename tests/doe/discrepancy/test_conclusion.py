@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from synthetic import emulator, measure
 
-from doe.discrepancy.verdict.conclusion import is_open, lag, telling_apart
+from doe.discrepancy.contest.rivals import certain, is_open, lag, parting, telling_apart
+from doe.discrepancy.fitting.evidence import gather
+from doe.discrepancy.fitting.fit import fit, whiten
+from doe.discrepancy.fitting.model import Model, Stack
 
 MARGIN = 6.0
 DRAWS = 100_000
@@ -20,28 +23,64 @@ def test_models_that_look_the_same_are_told_apart_by_chance_in_one_case_of_twent
     data = rng.standard_normal((DRAWS, 12))
     other = np.full(12, np.sqrt(MARGIN / 12.0))
     behind = ((data - other) ** 2).sum(axis=1) - (data**2).sum(axis=1)
-    apart = np.mean([not is_open(value, True, MARGIN) for value in behind])
+    apart = np.mean([not is_open(value, 0.999 * MARGIN, MARGIN) for value in behind])
     # The share's standard error is sqrt(0.05 * 0.95 / 1e5) = 0.0007; four of them.
     assert apart == pytest.approx(0.05, abs=0.0028)
 
 
 def test_models_that_do_not_look_the_same_are_open_within_the_margin() -> None:
-    assert is_open(MARGIN - 1e-9, False, MARGIN)
-    assert not is_open(MARGIN, False, MARGIN)
-
-
-def _candidate(score: float, q: float, simulated: bool = True) -> Any:
-    return SimpleNamespace(score=score, gap=SimpleNamespace(q=q), simulated=simulated)
+    assert is_open(MARGIN - 1e-9, MARGIN, MARGIN)
+    assert not is_open(MARGIN, MARGIN, MARGIN)
+    assert not is_open(MARGIN, np.inf, MARGIN, 100.0)
 
 
 def test_a_model_is_not_behind_for_predicting_uncertainly_alone() -> None:
-    best = _candidate(0.0, 50.0)
-    assert lag(_candidate(5.0, 90.0), best, MARGIN) == 5.0
-    assert lag(_candidate(90.0, 70.0), best, MARGIN) == 20.0 + MARGIN / 2.0
-    fits_better = _candidate(90.0, 40.0)
-    assert is_open(lag(fits_better, best, MARGIN), False, MARGIN)
-    # The emulator alone predicts everything uncertainly.
-    assert lag(_candidate(90.0, 40.0, simulated=False), best, MARGIN) == 90.0
+    assert lag(5.0, 40.0, MARGIN) == 5.0
+    assert lag(90.0, 20.0, MARGIN) == 20.0 + MARGIN / 2.0
+    assert is_open(lag(90.0, -10.0, MARGIN), np.inf, MARGIN)
+
+
+@pytest.mark.parametrize("apart", [0.0, MARGIN, 4.0 * MARGIN])
+def test_of_models_known_badly_the_right_one_is_dismissed_in_one_case_of_twenty_at_most(apart: float) -> None:
+    rng = np.random.default_rng(3)
+    # 50 means: the data err by one, each of the two emulators by another, and each Q is weighed by both. The
+    # wrong model is so far off, weighed so.
+    data, errors = rng.standard_normal((20_000, 50)), rng.standard_normal((2, 20_000, 50))
+    off = np.full(50, np.sqrt(2.0 * apart / 50.0))
+    right = ((data + errors[0]) ** 2).sum(axis=1) / 2.0
+    wrong = ((data + errors[1] - off) ** 2).sum(axis=1) / 2.0
+    # of each Q the variance is 100; what the data bring to both is half of their residuals
+    between = np.sqrt(2.0 * 100.0 - 4.0 * 50.0 / 4.0)
+    lost = np.mean([not is_open(behind, apart, MARGIN, between) for behind in right - wrong])
+    # Four standard errors, and the tail of chi2 is a little longer than the normal one's.
+    assert lost < 0.05 + 4.0 * (0.05 * 0.95 / 20_000) ** 0.5 + 0.003
+    if apart == 0.0:
+        # without what is open of the predictions it is dismissed in one case of four
+        assert np.mean([not is_open(behind, np.inf, MARGIN) for behind in right - wrong]) > 0.25
+
+
+def test_qs_of_two_models_part_by_what_is_open_of_their_predictions() -> None:
+    model = Model(emulator().without("twin"), ("delta",), 0.2)
+    fitted = fit(Stack(model, gather(measure({"delta": 0.6}, 3), model.emulator).training))
+    rng, left = np.random.default_rng(4), fitted.stack.open_error(fitted.x)
+    shared = np.linalg.inv(whiten(fitted.covariance - left)) @ rng.standard_normal((len(left), 4000))
+    own = [np.linalg.inv(whiten(left)) @ rng.standard_normal((len(left), 4000)) for _ in range(2)]
+    slopes = fitted.sensitivities
+    project = np.eye(len(left)) - slopes @ np.linalg.pinv(slopes)
+    qs = [((project @ fitted.whitening @ (shared + error)) ** 2).sum(axis=0) for error in own]
+    # of a standard deviation from n draws the standard error is 1 / sqrt(2 n) of it; four of them
+    assert parting(fitted, fitted) == pytest.approx(np.std(qs[0] - qs[1]), rel=4.0 / 8000**0.5)
+
+
+def test_a_model_gains_nothing_by_what_is_open_of_it_nor_by_scatter_that_nobody_saw() -> None:
+    model = Model(emulator().without("twin"), ("delta",), 0.2)
+    fitted = fit(Stack(model, gather(measure({"delta": 0.6}, 3), model.emulator).training))
+    # the same residuals beside four times the noise: Q falls to a quarter, and the determinant takes it back
+    open_ = fitted.stack.open_error(fitted.x)
+    wide = 4.0 * (fitted.covariance - open_) + open_
+    wider = replace(fitted, covariance=wide, whitening=whiten(wide))
+    assert np.sum(wider.residuals**2) < np.sum(fitted.residuals**2)
+    assert certain(wider) > certain(fitted) + np.linalg.slogdet(4.0 * np.eye(len(wide)))[1] - fitted.q
 
 
 def test_models_that_far_apart_are_told_apart_with_the_power() -> None:
@@ -49,5 +88,5 @@ def test_models_that_far_apart_are_told_apart_with_the_power() -> None:
     distance = telling_apart(MARGIN, 0.8) ** 0.5
     # the wrong one is behind by the squared distance and twice the distance times a normal number
     behind = distance**2 + 2.0 * distance * rng.standard_normal(DRAWS)
-    apart = np.mean([not is_open(value, True, MARGIN) for value in behind])
+    apart = np.mean([not is_open(value, 0.0, MARGIN) for value in behind])
     assert apart == pytest.approx(0.8, abs=4.0 * (0.8 * 0.2 / DRAWS) ** 0.5)

@@ -230,7 +230,7 @@ def test_of_a_large_effect_that_calibration_takes_up_a_small_rest_is_not_believe
     visible = 10.0 * CODED_SIZES[None, :, None]
     squares, nothing = (visible**2).sum(axis=2), stats.norm.cdf(-SETTINGS.least_ratio)
     for whole, chance, power in ((1.0, 0.0, 1.0), (30.0, 0.0, nothing), (1.0, 0.96, nothing)):
-        effects = Effects(("one",), visible, whole * squares, chance * squares, np.eye(1))
+        effects = Effects(("one",), visible, whole * squares, chance * squares, squares, np.eye(1))
         assert effects.power(SETTINGS)[0, -1] == pytest.approx(power, abs=1e-5)
 
 
