@@ -33,7 +33,7 @@ AZIMUTHS, FIT, PIXELS = 16, "flank", 400
 """Estimator of the angle, the same for all."""
 
 TAIL = 300
-"""Characters that are kept of what a program said last."""
+"""Characters that are kept of the last line that a program said."""
 
 DIGITS = 16
 """Hexadecimal digits of the hash of what a heap was made from."""
@@ -193,8 +193,9 @@ def _run_one(folder: Path, programs: Path | None, code: str, card: str, seed: in
     if (place / translation.heap).is_file():
         heap = _measured(made, card, read_dump(place / translation.heap))
     else:
-        said = (place / "screen.log").read_text(encoding="utf-8", errors="replace")[-TAIL:]
-        heap = made(angle=None, grain_count=0, height=0.0, reason=f"no heap: {said}")
+        lines = (place / "screen.log").read_text(encoding="utf-8", errors="replace").split("\n")
+        said = next((line.strip() for line in reversed(lines) if line.strip()), "the program said nothing")
+        heap = made(angle=None, grain_count=0, height=0.0, reason=f"no heap: {said[-TAIL:]}")
     heap.write(folder)
     told = heap.reason or f"{heap.angle:.2f} degrees"
     print(f"{code} {card} {seed}: {told}, {seconds:.0f} s", flush=True)

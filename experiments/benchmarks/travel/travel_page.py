@@ -136,7 +136,7 @@ def write_page(heaps: Sequence[Heap], folder: Path) -> Path:
     parts += [CELLS, markdown_table(cells.round(2))]
     if failed:
         parts.append("## Heaps without an angle")
-        parts.append("\n".join(f"- {heap.code} {heap.card} {heap.seed}: {heap.reason}" for heap in failed))
+        parts.append("\n".join(f"- {_where(heap)} {heap.card} {heap.seed}: {heap.reason}" for heap in failed))
     if causes.is_file():
         parts.append(causes.read_text(encoding="utf-8"))
     write_text(folder / PAGE, markdown_page(*parts))
@@ -144,6 +144,10 @@ def write_page(heaps: Sequence[Heap], folder: Path) -> Path:
     table = pd.DataFrame([asdict(heap) for heap in sorted(heaps, key=lambda heap: heap.job)])
     write_text(folder / HEAPS, table.to_csv(index=False, float_format="%.6g"))
     return folder / PAGE
+
+
+def _where(heap: Heap) -> str:
+    return heap.code if heap.code == heap.laws else f"{heap.code}, laws of {heap.laws},"
 
 
 def _verdict(cells: pd.DataFrame) -> str:
