@@ -150,6 +150,15 @@ def test_what_is_darker_below_the_whole_heap_alone_is_doubted(reach: int, doubts
     assert [doubt.name for doubt in measure(picture).doubts] == doubts
 
 
+@pytest.mark.parametrize("light", [0.3, -0.3])
+def test_light_from_one_side_is_no_shadow_below_the_heap(light: float) -> None:
+    """The ground is darker on one side of the heap's middle and brighter on the other."""
+    picture = np.full((420, 700, 3), WALL, np.float64)
+    cv2.fillPoly(picture, [np.array([[150, 250], [350, 150], [550, 250]])], GRAIN, cv2.LINE_AA)
+    lit = 0.8 * picture * (1.0 + light * np.linspace(-0.5, 0.5, 700))[None, :, None]
+    assert measure(np.rint(lit).astype(np.uint8)).doubts == ()
+
+
 def test_a_disc_is_no_heap() -> None:
     picture = np.full((420, 700, 3), WALL, np.uint8)
     cv2.circle(picture, (350, 220), 120, GRAIN, -1, cv2.LINE_AA)
