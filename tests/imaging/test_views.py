@@ -150,37 +150,13 @@ def test_what_is_darker_below_the_whole_heap_alone_is_doubted(reach: int, doubts
     assert [doubt.name for doubt in measure(picture).doubts] == doubts
 
 
-def on_a_board(angle: float, elevation: float) -> np.ndarray:
-    """Draw a smooth cone from afar on a board hardly wider than it, whose ends slant away from the camera."""
-    fine, half, turn, middle, foot = 4, 220.0, np.radians(elevation), 420.0, 330.0
-    image = np.full((fine * 520, fine * 840, 3), WALL, np.uint8)
-    near, far, low = foot + 1.25 * half * np.sin(turn), foot - 1.25 * half * np.sin(turn), 60.0
-    sides = np.array(
-        [
-            [-240.0, near],
-            [-130.0, far],
-            [130.0, far],
-            [240.0, near],
-            [234.0, near + low],
-            [-234.0, near + low],
-        ]
-    )
-    cv2.fillPoly(image, [np.rint(fine * (sides + np.array([middle, 0.0]))).astype(np.int32)], (150, 140, 130))
-    around = np.linspace(0.0, 2.0 * np.pi, 721)
-    base = np.column_stack([half * np.cos(around), half * np.sin(turn) * np.sin(around)])
-    tip = [[0.0, -half * np.tan(np.radians(angle)) * np.cos(turn)]]
-    hull = cv2.convexHull(
-        np.rint(fine * (np.vstack([base, tip]) + np.array([middle, foot]))).astype(np.int32)
-    )
-    cv2.fillPoly(image, [hull], GRAIN)
-    small = cv2.resize(image, (840, 520), interpolation=cv2.INTER_AREA).astype(float)
-    noise = np.random.default_rng(0).normal(0.0, 4.0, small.shape)
-    return np.clip(small + noise, 0, 255).astype(np.uint8)
-
-
-def test_a_boards_underside_is_not_taken_for_the_ground_without_a_mark() -> None:
-    """The slanting ends of a board are no feet of flanks: with them this cone is a degree too steep."""
-    assert "plate" in [doubt.name for doubt in measure(on_a_board(30.0, 6.0)).doubts]
+@pytest.mark.parametrize("light", [0.3, -0.3])
+def test_light_from_one_side_is_no_shadow_below_the_heap(light: float) -> None:
+    """The ground is darker on one side of the heap's middle and brighter on the other."""
+    picture = np.full((420, 700, 3), WALL, np.float64)
+    cv2.fillPoly(picture, [np.array([[150, 250], [350, 150], [550, 250]])], GRAIN, cv2.LINE_AA)
+    lit = 0.8 * picture * (1.0 + light * np.linspace(-0.5, 0.5, 700))[None, :, None]
+    assert measure(np.rint(lit).astype(np.uint8)).doubts == ()
 
 
 def test_a_disc_is_no_heap() -> None:
