@@ -56,8 +56,8 @@ def telling_apart(margin: float, power: float) -> float:
     return float((z + (z**2 + _margin_of_alike(margin)) ** 0.5) ** 2)
 
 
-def lag(score: float, certain: float, margin: float) -> float:
-    """By how much a model is behind the best in minus twice the log-likelihood.
+def lag(score: float, sure: float, margin: float) -> float:
+    """Distance of a model behind the best in minus twice the log-likelihood.
 
     The likelihood of a model suffers where its predictions are uncertain, as they are before it has been run
     enough, and that of the best gains by every run of it: that says how much is known of a model, and
@@ -65,11 +65,11 @@ def lag(score: float, certain: float, margin: float) -> float:
 
     Parameters
     ----------
-    score, certain : float
+    score, sure : float
         Differences to the best of minus twice the log-likelihood, and of `certain`.
     margin : float
     """
-    return min(score, certain + margin / 2.0)
+    return min(score, sure + margin / 2.0)
 
 
 def certain(fitted: Fitted) -> float:
