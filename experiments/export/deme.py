@@ -86,5 +86,5 @@ DEME = Exporter(
     contact_terms,
     translate,
     CONVENTIONS,
-    "This program has made one heap of spheres in DEM-Engine 3.0.19, on a GPU, and none of clumps yet.",
+    "With clumps it has not been run in DEM-Engine yet, which needs a GPU; of spheres it has made one heap.",
 )
