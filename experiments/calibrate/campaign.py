@@ -80,7 +80,7 @@ class _Record:
         self.stages: dict[str, Any] = {}
         self.tables: list[pd.DataFrame] = []
         self.responses = tuple(responses)
-        """What is matched."""
+        """Responses that are matched."""
         self._runner, self._on_stage = runner, on_stage
 
     def run(self, table: pd.DataFrame) -> pd.DataFrame:

@@ -1,1 +1,1 @@
-"""How much more outlines of heaps pin down than their angles, on twin data."""
+"""Gain of outlines of heaps over their angles in what they pin down, on twin data."""

@@ -81,7 +81,7 @@ class Surfaces:
 
 
 def strengths(found: Surfaces) -> pd.DataFrame:
-    """How far each factor moves the angle and the outline's directions, over the scatter of one heap."""
+    """Distance by which a factor moves the angle and the outline's directions, over a heap's scatter."""
     groups = [rows for _, rows in found.runs.groupby("run")]
     scatter = np.sqrt(np.mean([rows[ANGLE].var() for rows in groups]))
     rows = [dict(zip(found.names, found.change_of(found.runs[ANGLE].to_numpy()) / scatter, strict=True))]

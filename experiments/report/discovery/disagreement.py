@@ -1,4 +1,4 @@
-"""What a model misses, in words: which observable, where, by how much; what looks the same; likely slips."""
+"""Misses of a model, in words: which observable, where, by how much; what looks the same; likely slips."""
 
 from __future__ import annotations
 

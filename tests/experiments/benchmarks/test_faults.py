@@ -1,4 +1,4 @@
-"""What the fault benchmarks conclude from what they saw; the faults themselves are done by the benchmarks."""
+"""Conclusions of the fault benchmarks from what they saw; the faults are done by the benchmarks."""
 
 from __future__ import annotations
 
