@@ -202,8 +202,12 @@ def _run_one(folder: Path, programs: Path | None, code: str, card: str, seed: in
 
 
 def _input_key(translation: Translation) -> str:
-    """Hash of all files of an input and of the command, without the head that names the version."""
-    text = json.dumps([dict(translation.files), translation.command], sort_keys=True)
+    """Hash of all files of an input and of the command, without comments: words change no heap."""
+    files = {
+        name: "\n".join(line for line in text.split("\n") if not line.startswith("#"))
+        for name, text in translation.files.items()
+    }
+    text = json.dumps([files, translation.command], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:DIGITS]
 
 
