@@ -14,6 +14,7 @@ from dem_warp.laws.micro_slip import MicroSlip
 from experiments.verification import __main__ as verification
 from experiments.verification.problems import chung_ooi
 from experiments.verification.problems.contact_ode import solve_impact
+from experiments.verification.problems.deme_contacts import deme_contacts
 from experiments.verification.problems.energy import column, unaccounted, watched
 from experiments.verification.problems.energy_account import EnergyAccount
 from experiments.verification.problems.impact import Impact, Partner, simulate_impacts
@@ -210,3 +211,17 @@ def test_a_failing_row_ends_the_command_with_1(tmp_path: Path, monkeypatch):
 def test_an_unknown_problem_is_refused(tmp_path: Path):
     with pytest.raises(typer.BadParameter, match="a problem is one of elastic-impact, "):
         verification.main(only=["elastic"], out=tmp_path)
+
+
+def test_dem_engine_is_followed_where_its_source_says_so():
+    rows = deme_contacts("cpu").rows
+    judged = {row.case: row for row in rows if row.tolerance is not None}
+    assert all(row.passed for row in rows if row.tolerance is not None)
+    assert {"pair, rolling", "plate, rolling", "plate, twisting", "plate, normal"} <= set(judged)
+    # without the second order of the circle of overlap the impact is off by more than ten times as much
+    [without] = [
+        row.error
+        for row in rows
+        if row.case == "plate, normal" and row.quantity.startswith("velocities") and row.tolerance is None
+    ]
+    assert without > 10.0 * judged["plate, normal"].error
