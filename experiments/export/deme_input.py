@@ -26,6 +26,11 @@ _ROWS = (
     Translated(
         "integration", "velocities, then places", "the same: `centered_difference`; velocities in float32"
     ),
+    Translated(
+        "start",
+        "",
+        "compiles for a minute or more; a file named by `DEME_PERSISTENT_JITIFY_CACHE` shortens later starts",
+    ),
 )
 
 

@@ -158,8 +158,8 @@ def _verdict(cells: pd.DataFrame) -> str:
     whole = int((shown["n"] >= len(SEEDS)).sum())
     lines = [
         f"**{of[EQUIVALENT]} of {len(cells)} cells are shown to be equivalent**, {whole} of them "
-        f"with all {len(SEEDS)} heaps there. Tested are {tested}; "
-        f"{of[FEW]} have too few heaps for a test, and {of[NOT_RUN]} have not been run."
+        f"with all {len(SEEDS)} heaps there. Tested: {tested}; too few heaps for a test: {of[FEW]}; "
+        f"not run: {of[NOT_RUN]}."
     ]
     for code, why in WAITING.items():
         group = cells[cells["code"] == code]
