@@ -5,7 +5,7 @@ Every path starts in mid-air or at rest on the plate, so that neither code knows
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -89,6 +89,8 @@ class PathSetup:
     grain: Material = GRAIN
     pair: tuple[float, float] = RADII
     """Radii of two spheres [m]; one alone on the plate has the first."""
+    start: np.ndarray | None = None
+    """Centres at the start [m], (spheres, 3), where a code rounds them; None: as the path says."""
 
     @property
     def time_step(self) -> float:
@@ -130,6 +132,8 @@ class PathSetup:
     @property
     def positions(self) -> np.ndarray:
         """Centres at the start [m], (spheres, 3)."""
+        if self.start is not None:
+            return self.start
         if not self.path.has_plate:
             half = (sum(self.pair) + 1e-6) / 2.0
             return np.array([[0.0, 0.0, -half], [0.0, 0.0, half]])
@@ -174,6 +178,11 @@ class PathSetup:
         return replace(made, forms=self.laws.forms)
 
 
+def every_path(laws: ContactLaws) -> list[PathSetup]:
+    """Set up every path under some laws."""
+    return [PathSetup(path, laws) for path in PATHS]
+
+
 Follow = Callable[[PathSetup, Path], Trajectory]
 """Runs a path in another code, with its files in a folder."""
 
@@ -201,17 +210,16 @@ def _longest(vectors: np.ndarray) -> float:
 
 def compare_paths(
     code: str,
-    laws: ContactLaws,
+    setups: Iterable[PathSetup],
     follow: Follow,
     folder: Path,
     device: str,
     explained: Sequence[str] = (),
-    pair: tuple[float, float] = RADII,
 ) -> tuple[list[Row], list[Plot]]:
-    """Follow every path in both codes; one whose difference is `explained` is only stated."""
+    """Follow paths in both codes; one whose difference is `explained` is only stated."""
     rows, plots = [], []
-    for path in PATHS:
-        setup = PathSetup(path, laws, pair=pair)
+    for setup in setups:
+        path, laws = setup.path, setup.laws
         place = folder / path.name.replace(", ", "-")
         place.mkdir(parents=True, exist_ok=True)
         ours, theirs = setup.ours(device), follow(setup, place)

@@ -17,6 +17,7 @@ from experiments.verification.problems.contact_paths import (
     Trajectory,
     compare_paths,
     difference,
+    every_path,
     result_of,
 )
 from experiments.verification.result import Result, Row, relative_row
@@ -73,7 +74,7 @@ def lammps_contacts(device: str) -> Result:
         When LAMMPS is not installed.
     """
     with tempfile.TemporaryDirectory() as folder:
-        part = compare_paths("LAMMPS", PRESETS["lammps"], follow, Path(folder), device, EXPLAINED)
+        part = compare_paths("LAMMPS", every_path(PRESETS["lammps"]), follow, Path(folder), device, EXPLAINED)
         falls = [_falls(path, Path(folder), device) for path in PATHS if path.name in EXPLAINED]
     return result_of("LAMMPS", TEXT, [part, (falls, [])])
 

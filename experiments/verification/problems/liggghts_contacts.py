@@ -13,6 +13,7 @@ from experiments.verification.problems.contact_paths import (
     PathSetup,
     Trajectory,
     compare_paths,
+    every_path,
     result_of,
 )
 from experiments.verification.problems.setups import STEEL
@@ -57,7 +58,7 @@ def liggghts_contacts(device: str) -> Result:
     """
     with tempfile.TemporaryDirectory() as folder:
         parts = [
-            compare_paths("LIGGGHTS", PRESETS[name], follow, Path(folder) / name, device)
+            compare_paths("LIGGGHTS", every_path(PRESETS[name]), follow, Path(folder) / name, device)
             for name in ("liggghts", "liggghts-cdt")
         ]
     return result_of("LIGGGHTS", TEXT, parts)

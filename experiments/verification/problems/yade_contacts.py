@@ -10,7 +10,13 @@ from pathlib import Path
 
 from dem_warp import PRESETS
 from experiments.export.yade import contact_terms, material_terms
-from experiments.verification.problems.contact_paths import PathSetup, Trajectory, compare_paths, result_of
+from experiments.verification.problems.contact_paths import (
+    PathSetup,
+    Trajectory,
+    compare_paths,
+    every_path,
+    result_of,
+)
 from experiments.verification.problems.contact_programs import path_numbers, program_text, trajectory_of
 from experiments.verification.result import Result
 
@@ -37,7 +43,7 @@ def yade_contacts(device: str) -> Result:
         When Yade is not installed.
     """
     with tempfile.TemporaryDirectory() as folder:
-        part = compare_paths("Yade", PRESETS["yade"], follow, Path(folder), device)
+        part = compare_paths("Yade", every_path(PRESETS["yade"]), follow, Path(folder), device)
     return result_of("Yade", TEXT, [part])
 
 
