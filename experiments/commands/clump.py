@@ -61,10 +61,11 @@ def clump(
     """Make a grain of spheres from a mesh or measured dimensions: volume, mass, inertia, spheres."""
     with clear_errors():
         from experiments.commands.clump_picture import require_picture
-        from experiments.commands.shapes import ClumpRequest, make_clump, require_new, write_clump
+        from experiments.commands.shapes import ClumpRequest, make_clump, write_clump
+        from experiments.files import require_new_file
 
         if out:
-            require_new(out)
+            require_new_file(out, "a clump")
         if picture:
             require_picture(picture)
         request = ClumpRequest(
