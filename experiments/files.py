@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import re
 import shutil
 import stat
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from experiments.errors import InputError
@@ -24,6 +25,10 @@ def is_device_name(name: str) -> bool:
     return name.partition(".")[0].rstrip(" ").casefold() in DEVICES
 
 
+def _temporary(path: Path) -> Path:
+    return path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
+
+
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
     """Name a temporary file beside a file, and rename it over the file when the block ends without an error.
@@ -32,7 +37,7 @@ def replacing(path: Path) -> Iterator[Path]:
     replaced, and after a crash the file itself is whole or absent.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
+    temporary = _temporary(path)
     try:
         yield temporary
         with temporary.open("rb+") as file:
@@ -44,6 +49,55 @@ def replacing(path: Path) -> Iterator[Path]:
         raise
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def require_new_file(path: Path, what: str) -> None:
+    """Refuse a file that exists, or that cannot be made; nothing stays of the attempt.
+
+    Raises
+    ------
+    InputError
+        When it is one of these; the rule says what it was to be, as ``a picture``.
+    OSError
+        When the disk is full.
+    """
+    # pathlib raises where a name is too long for the system
+    if os.path.lexists(path):
+        raise InputError(f"{what} never overwrites a file", "one that exists", str(path))
+    _require_place(path, path)
+
+
+def require_folder(path: Path) -> None:
+    """Refuse a folder that cannot be made or written to; nothing stays of the attempt.
+
+    Raises
+    ------
+    InputError
+        When it is one of these.
+    OSError
+        When the disk is full.
+    """
+    _require_place(path / "trial", path)
+
+
+def _require_place(file: Path, shown: Path) -> None:
+    """Make the temporary file that `replacing` would, and the folders that it needs, and take them away."""
+    made = [folder for folder in file.parents if not os.path.lexists(folder)]
+    temporary = _temporary(file)
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        temporary.touch()
+        temporary.unlink()
+    except OSError as error:
+        if error.errno in (errno.ENOSPC, errno.EDQUOT):
+            raise
+        rule = "must be a place that can be made and written to"
+        raise InputError(rule, error.strerror or "none", str(shown)) from error
+    finally:
+        # the innermost first; another run may write there just now
+        for folder in made:
+            with suppress(OSError):
+                folder.rmdir()
 
 
 def remove_leftovers(folder: Path) -> None:

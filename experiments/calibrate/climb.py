@@ -127,12 +127,15 @@ def require_crossing(study: Study, result: ClimbResult, target: TargetResult) ->
             f"{named(study, result.kept)}, raise climb.reach or climb.extensions, or keep further factors; "
             "if the ranges are physical, the model lacks a mechanism.",
         )
-    turned = result.end is ClimbEnd.TURNED
-    course = "turned before" if turned else "does not change beyond the noise and never meets"
+    if result.end is ClimbEnd.TURNED:
+        course, advice = "turned before", f"More of {named(study, result.kept)} does not help: keep"
+    else:
+        course = "does not change beyond the noise and never meets"
+        advice = "More cases (climb.replicates, noise_floor.replicates) show smaller changes; else keep"
     raise StageEnd(
         Outcome.PLATEAU,
-        f"The {response.name} {course} the target: {best}. More of {named(study, result.kept)} does "
-        "not help: keep further factors, or look for a mechanism that the model lacks.",
+        f"The {response.name} {course} the target: {best}. {advice} further factors, or look for a mechanism "
+        "that the model lacks.",
     )
 
 

@@ -7,7 +7,7 @@ from contextlib import suppress
 
 import numpy as np
 
-from doe import Goal, JointFit, Region, Surface, TargetError, joint_fit
+from doe import Goal, JointFit, Region, Sample, Surface, TargetError, joint_fit
 from experiments.calibrate.cases import StageEnd, middle
 from experiments.calibrate.joint import choose_jointly, joint_decisions
 from experiments.calibrate.results import (
@@ -34,9 +34,9 @@ STAGE = "optimum"
 
 
 def find_optimum(study: Study, surface: SurfaceResult, target: TargetResult) -> OptimumResult:
-    """Choose a point on the target contour and map the compatible region.
+    """Choose a point on the target contour, or else nearest to the target, and map the compatible region.
 
-    StageEnd where the surface of a single response does not reach the target in what the design explored.
+    StageEnd where the surface of a single response contradicts the target in all that the design explored.
     """
     settings, fit, sample = study.campaign.optimum, surface.leading.reduced, target.leading
     reach = float(surface.design.coded.abs().to_numpy().max())
@@ -45,7 +45,7 @@ def find_optimum(study: Study, surface: SurfaceResult, target: TargetResult) -> 
     joint = joint_fit(goals, alpha=1.0 - settings.confidence) if len(goals) > 1 else None
     if joint is None:
         # The box of the two-level part first: inside it the fit is at its best. Axial points reach further.
-        point, rule, extent = _choose(study, surface, sample.mean, sorted({1.0, reach}))
+        point, rule, extent = _choose(study, surface, sample, sorted({1.0, reach}))
         region = fit.compatible_region(sample, alpha=1.0 - settings.confidence, extent=extent)
     else:
         (point, rule), extent, region = choose_jointly(joint, settings), joint.extent, joint.region()
@@ -85,7 +85,7 @@ def find_optimum(study: Study, surface: SurfaceResult, target: TargetResult) -> 
 
 
 def _choose(
-    study: Study, surface: SurfaceResult, target: float, extents: list[float]
+    study: Study, surface: SurfaceResult, target: Sample, extents: list[float]
 ) -> tuple[dict[str, float], str, float]:
     """Return the chosen point, the rule that chose it, and the extent that holds it."""
     fit = surface.leading.reduced
@@ -96,18 +96,42 @@ def _choose(
     radius = float(np.linalg.norm(surface.design.points.to_numpy(), axis=1).max())
     for extent in extents:
         try:
-            point = {str(name): float(value) for name, value in fit.nearest(target, extent=extent).items()}
+            point = {
+                str(name): float(value) for name, value in fit.nearest(target.mean, extent=extent).items()
+            }
         except TargetError as error:
             missed = str(error)
             continue
         if np.linalg.norm(_coded(fit, point)) <= radius * (1.0 + 1e-9):
             return point, rule, extent
         missed = f"the target contour lies beyond the design's runs, nearest at {worded(study, point)}"
+    alpha = 1.0 - study.campaign.optimum.confidence
+    if closest := _closest(fit, target, extents[-1], radius, alpha):
+        rule = (
+            "No point of the design's region gives the target: the chosen one comes closest, by no more than "
+            "the errors of fit and target together explain."
+        )
+        return closest, rule, extents[-1]
     raise StageEnd(
         Outcome.NO_CONTOUR,
         f"No point of the composite design's region gives the target: {missed}. Fix surface.center nearer to "
         "the contour, widen surface.half_range, or replicate the climb so that its crossing is better known.",
     )
+
+
+def _closest(
+    fit: Surface, target: Sample, extent: float, radius: float, alpha: float
+) -> dict[str, float] | None:
+    """Return the compatible point among the runs whose fit is closest to the target, None where none is."""
+    region = fit.compatible_region(target, alpha=alpha, extent=extent)
+    distance = np.linalg.norm(region.coded.to_numpy(), axis=1)
+    cells = np.flatnonzero(region.mask & (distance <= radius))
+    if not len(cells):
+        return None
+    gap = np.abs(fit.evaluate(region.coded.iloc[cells].to_numpy())[0] - target.mean)
+    # of cells that are as close, the one nearest to the centre
+    best = cells[np.lexsort((distance[cells], gap.round(9)))[0]]
+    return {str(name): float(value) for name, value in region.natural.iloc[best].items()}
 
 
 def _coded(fit: Surface, point: Mapping[str, float]) -> np.ndarray:

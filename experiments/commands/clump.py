@@ -60,13 +60,9 @@ def clump(
 ) -> None:
     """Make a grain of spheres from a mesh or measured dimensions: volume, mass, inertia, spheres."""
     with clear_errors():
-        from experiments.commands.clump_picture import require_picture
-        from experiments.commands.shapes import ClumpRequest, make_clump, require_new, write_clump
+        from experiments.commands.shapes import ClumpRequest, make_clump, write_clump
 
-        if out:
-            require_new(out)
-        if picture:
-            require_picture(picture)
+        _require_new(out, picture)
         request = ClumpRequest(
             shape, spheres, share(tolerance, "--tolerance") if tolerance else None,
             _reach(protrusion, tolerance), unit,
@@ -83,6 +79,17 @@ def clump(
     else:
         print_clump(made.to_dict(mass_density))
     _print_remarks(made, shape)
+
+
+def _require_new(out: Path | None, picture: Path | None) -> None:
+    """Refuse what cannot be written before anything is fitted."""
+    from experiments.commands.clump_picture import require_picture
+    from experiments.files import require_new_file
+
+    if out:
+        require_new_file(out, "a clump")
+    if picture:
+        require_picture(picture)
 
 
 def _print_remarks(made: Clump, source: str) -> None:

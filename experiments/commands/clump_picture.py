@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from experiments.errors import InputError
-from experiments.files import replacing
+from experiments.files import replacing, require_new_file
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
@@ -20,20 +20,19 @@ SUBDIVISIONS = 3
 
 
 def require_picture(path: Path) -> None:
-    """Refuse a picture that exists, or whose ending names no kind of picture.
+    """Refuse a picture whose ending names no kind of picture; further errors as by `require_new_file`.
 
     Raises
     ------
     InputError
-        When it is one of these.
+        When it does not.
     """
     from matplotlib.figure import Figure
 
-    if path.exists():
-        raise InputError("a picture never overwrites a file", "one that exists", str(path))
     known = Figure().canvas.get_supported_filetypes()
     if path.suffix.removeprefix(".").lower() not in known:
         raise InputError(f"must be a kind of picture ({', '.join(known)})", path.suffix or "none", str(path))
+    require_new_file(path, "a picture")
 
 
 def draw_clump(path: Path, spheres: np.ndarray, solid: Trimesh | None) -> None:

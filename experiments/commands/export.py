@@ -49,6 +49,7 @@ def export(
         from experiments.cases import require_unused
         from experiments.commands.leaving import exported_test, study_of
         from experiments.export import export_input, write_export
+        from experiments.files import require_folder
         from experiments.runs.choices import default_folder
         from experiments.studyfile.campaign import TARGET_SCENE
 
@@ -58,6 +59,7 @@ def export(
         translation = export_input(test, to, approximate)
         folder = out or default_folder(study, to)
         require_unused(folder)
+        require_folder(folder)
         files = write_export(test, to, translation, folder)
     for warning in translation.warnings:
         messages.print(f"Not the same there: {warning}")

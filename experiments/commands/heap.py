@@ -77,6 +77,7 @@ def heap(
         from experiments.cases.heap import filmed_by
         from experiments.cases.movie import MOVIES, require_movie
         from experiments.cases.workers.own import watched_by
+        from experiments.files import require_folder
         from experiments.live.trail.journal import Journal
         from experiments.runs.campaign import watching
         from experiments.runs.choices import chosen_resources, chosen_study, default_folder, resources_for
@@ -92,6 +93,7 @@ def heap(
         if dry_run:
             show_heap(chosen, resources, case, as_json)
         require_unused(folder)
+        require_folder(folder)
         print_narrowness(chosen)
         with live_page(folder, live, messages.print), open_workers(resources) as crew:
             if frames is not None:

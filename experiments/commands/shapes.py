@@ -15,7 +15,7 @@ from dem_warp.solids import parse_solid, read_mesh
 from experiments.commands.clump_picture import draw_clump
 from experiments.commands.clump_search import Trial, fit_by_volume, fit_within
 from experiments.errors import InputError
-from experiments.files import replacing
+from experiments.files import replacing, require_new_file
 from experiments.sphere_files import format_of, length_unit, read_clump
 from experiments.sphere_files.clump_file import GRAIN_SIZES, check_grain_size
 
@@ -175,26 +175,8 @@ def _mesh(path: Path, unit: str | None) -> Trimesh:
     return mesh
 
 
-def require_new(path: Path) -> None:
-    """Refuse a file that exists.
-
-    Raises
-    ------
-    InputError
-        When it does.
-    """
-    if path.exists():
-        raise InputError("a clump never overwrites a file", "one that exists", str(path))
-
-
 def write_clump(shape: ClumpShape, path: Path) -> None:
-    """Write a clump's file of spheres.
-
-    Raises
-    ------
-    InputError
-        When the file exists.
-    """
-    require_new(path)
+    """Write a clump's file of spheres; errors as by `require_new_file`."""
+    require_new_file(path, "a clump")
     with replacing(path) as temporary:
         shape.write(temporary)

@@ -9,8 +9,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from experiments.errors import InputError
-from experiments.files import write_text
+from experiments.files import require_new_file, write_text
 from experiments.measurement.measured_file import COLUMNS
 from experiments.measurement.readings import CLOGGED_ROW
 from experiments.studyfile import Condition, Study
@@ -61,8 +60,7 @@ def write_measured_template(study: Study, folder: Path | None = None) -> Path:
         When the file exists.
     """
     path = (folder or Path()) / f"{study.file.stem}-measured.csv"
-    if path.exists():
-        raise InputError("a new file never overwrites another", "one that exists", str(path))
+    require_new_file(path, "a new file")
     head = _HEAD.format(
         study=study.file.name,
         file=path.name,

@@ -162,7 +162,8 @@ class OptimumSettings(Section):
     """Stage (g): the chosen point and the compatible region."""
 
     point: FactorValues | None = None
-    """The chosen point; left out: the point of the target contour nearest to the centre (coded units)."""
+    """The chosen point; left out: the point of the target contour nearest to the centre (coded units), or,
+    without a contour, the compatible point that comes closest to the target."""
     confidence: float = Field(default=0.95, gt=0.0, lt=1.0)
     """Level of the compatible region."""
     unidentified_span: float = Field(default=0.5, gt=0.0, le=1.0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from experiments.errors import InputError
-from experiments.files import is_device_name, write_text
+from experiments.files import is_device_name, require_new_file, write_text
 
 TEMPLATE = Path(__file__).parents[1] / "studies" / "template.toml"
 
@@ -33,6 +33,5 @@ def new_study_path(name: str, folder: Path | None = None) -> Path:
         rule = "a name has no blank at its ends, and is none of a device of Windows (con, nul, com1, ...)"
         raise InputError(rule, repr(name), "NAME")
     path = (folder or Path()) / f"{name}.toml"
-    if path.exists():
-        raise InputError("a new study never overwrites a file", "one that exists", str(path))
+    require_new_file(path, "a new study")
     return path

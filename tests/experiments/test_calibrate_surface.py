@@ -81,6 +81,22 @@ def test_a_contour_beyond_the_runs_is_no_optimum_although_the_box_reaches_it() -
     assert end.value.outcome is Outcome.NO_CONTOUR
 
 
+# 2 is the farthest that the circle of the runs reaches, and five values tell the target to 1.24 of their
+# standard deviation. 2.05 is missed by .15 degrees; 3, which is beyond the box of the axial points too, by 3.
+@pytest.mark.parametrize(("line", "sd"), [(2.05, 0.2), (3.0, 3.0)])
+def test_a_target_that_the_surface_misses_within_their_errors_has_its_closest_point(
+    line: float, sd: float
+) -> None:
+    target = TargetResult({"angle": Sample(20.0 + 3.0 * line, sd, 5)}, None, None, ())
+    optimum = find_optimum(PlaneStudy(), explored(3.0), target)
+    # Cells of the region are .007 apart, 400 over 2 sqrt(2): 3 x 2 x .007 / 2 degrees. Along the circle the
+    # plane falls by the square of the angle, 3 degrees a unit of it: as little within .12.
+    assert optimum.prediction["mean"] == pytest.approx(26.0, abs=0.021 + 10 * NOISE)
+    assert optimum.point == pytest.approx(at_coded(1.0, 1.0), abs=0.12 * HALF_RANGE)
+    assert "comes closest" in optimum.decisions[0].rule
+    assert optimum.region.mask.any()
+
+
 @pytest.mark.parametrize(
     ("truth", "inside", "compatible"),
     [
