@@ -11,6 +11,7 @@ import pandas as pd
 
 from doe.discrepancy import Discovery, Interval, Verdict
 from experiments.files import replacing
+from experiments.measurement.observables import NAMES, OUTLINE, PHOTOGRAPHED
 from experiments.trials.lockstep import Crash
 
 EVERYTHING = "everything"
@@ -19,7 +20,8 @@ EVERYTHING = "everything"
 PHOTOGRAPHS = "photographs"
 """View of an analysis that has only what a photograph shows."""
 
-VIEWS = (EVERYTHING, PHOTOGRAPHS)
+VIEWS = {EVERYTHING: NAMES, PHOTOGRAPHS: (*PHOTOGRAPHED, *(each.name for each in OUTLINE))}
+"""Observables that an analysis has, by its view; a bank without outlines knows the others of them."""
 
 CRASH = "crash"
 """Stands for the verdict of an analysis that raised."""
