@@ -15,13 +15,14 @@ from experiments.measurement.observables import NAMES, OUTLINE, PHOTOGRAPHED
 from experiments.trials.lockstep import Crash
 
 EVERYTHING = "everything"
-"""View of an analysis that has every observable."""
+"""View of an analysis that has every number that is measured of a heap, and no outline."""
 
 PHOTOGRAPHS = "photographs"
 """View of an analysis that has only what a photograph shows."""
 
 VIEWS = {EVERYTHING: NAMES, PHOTOGRAPHS: (*PHOTOGRAPHED, *(each.name for each in OUTLINE))}
-"""Observables that an analysis has, by its view; a bank without outlines knows the others of them."""
+"""Observables that an analysis has, by its view. What is strong is counted in what the first shows, so it stays
+as it was in all trials; of a bank without outlines the second has the others."""
 
 CRASH = "crash"
 """Stands for the verdict of an analysis that raised."""
