@@ -21,8 +21,8 @@ PHOTOGRAPHS = "photographs"
 """View of an analysis that has only what a photograph shows."""
 
 VIEWS = {EVERYTHING: NAMES, PHOTOGRAPHS: (*PHOTOGRAPHED, *(each.name for each in OUTLINE))}
-"""Observables that an analysis has, by its view. What is strong is counted in what the first shows, so it stays
-as it was in all trials; of a bank without outlines the second has the others."""
+"""Observables that an analysis has, by its view. What is strong is counted in what the first shows, as in all
+trials so far; of a bank without outlines the second has the others."""
 
 CRASH = "crash"
 """Stands for the verdict of an analysis that raised."""
