@@ -25,8 +25,6 @@ from doe.discrepancy import (
 from doe.discrepancy.contest.power import CODED_SIZES
 from doe.factors import Factor
 from experiments.errors import InputError
-from experiments.measurement.observables import BY_NAME, NAMES, OUTLINE, PHOTOGRAPHED
-from experiments.trials.camera import Camera
 from experiments.trials.declaration import (
     Declaration,
     declared_effect,
@@ -36,7 +34,7 @@ from experiments.trials.declaration import (
 )
 from experiments.trials.desk import Desk, OutOfTime, TimedSimulator, job_name, keep
 from experiments.trials.drawing import STRONG, Declared, Plan, draw
-from experiments.trials.findings import EVERYTHING, PHOTOGRAPHS, VIEWS, read_findings
+from experiments.trials.findings import EVERYTHING, PHOTOGRAPHS, read_findings
 from experiments.trials.folder import Folder
 from experiments.trials.heaps import cases_of
 from experiments.trials.lockstep import Crash, LocalCrew, Step, in_step, process_crew
@@ -51,7 +49,6 @@ from experiments.trials.truth import (
     write_labels,
     write_sealed,
 )
-from imaging.profile import profile_heights
 
 FACTORS = (Factor("mu", 0.2, 0.6), Factor("e", 0.1, 0.5))
 LIBRARY = (
@@ -165,60 +162,6 @@ def test_cases_of_a_trial_have_seeds_of_their_own() -> None:
     assert [point.condition for point in points] == ["base"] * 8 + ["fast"] * 8
     assert len({point.seed for point in points}) == 16
     assert points == cases_of(label, ("base", "fast"), replicates=8)
-
-
-class Steady(np.random.Generator):
-    """Draws no errors."""
-
-    def __init__(self) -> None:
-        super().__init__(np.random.PCG64(0))
-
-    def standard_normal(self, size: int) -> np.ndarray:  # type: ignore[override]
-        return np.zeros(size)
-
-
-def test_a_rolled_camera_leans_a_straight_heap() -> None:
-    """A drawn triangle, rolled, against the closed form of the camera."""
-    angle, roll = np.radians(25.0), 0.01
-    apex = np.tan(angle)  # of a heap of half width 1
-    left, right = 1.0 + roll * apex, 1.0 - roll * apex
-    names = [*NAMES, *(each.name for each in OUTLINE)]
-    heap = np.ones((1, len(names)))
-    heap[0, [names.index("flank_angle"), names.index("asymmetry")]] = 25.0, 0.0
-    seen = Camera(scale=1.02, roll=roll).read(heap, names, Steady())
-    assert seen[0, names.index("asymmetry")] == pytest.approx((right - left) / (right + left))
-    for column, name in enumerate(names):
-        if BY_NAME[name].unit == "m":
-            assert seen[0, column] == pytest.approx(1.02 if BY_NAME[name].by_photograph else 1.0)
-        elif name != "asymmetry":
-            assert seen[0, column] == heap[0, column]
-
-
-def test_a_camera_does_to_an_outline_what_its_heights_say() -> None:
-    """A drawn triangle, turned and enlarged: heights grow as lengths, and a roll moves them by its square."""
-    angle, roll, scale = np.radians(25.0), 0.005, 1.02
-    corners = np.array([[-1.0, 0.0], [0.0, np.tan(angle)], [1.0, 0.0]])
-    apex = scale * (corners[1] + roll * np.array([corners[1, 1], 0.0]))
-    level = profile_heights(*corners.T)
-    seen = profile_heights(*np.array([scale * corners[0], apex, scale * corners[2]]).T)
-    np.testing.assert_allclose(seen, scale * level, atol=roll**2)
-
-
-def test_photographs_show_every_height_of_the_outline_and_nothing_of_a_balance() -> None:
-    shown = {name for name, each in BY_NAME.items() if each.by_photograph and name == each.name}
-    assert set(VIEWS[PHOTOGRAPHS]) == shown
-    assert set(PHOTOGRAPHED) < shown
-    # the shipped banks know no outline, and all else stays in the other view
-    assert VIEWS[EVERYTHING] == NAMES
-
-
-def test_what_is_seen_less_of_is_declared_from_a_larger_size_on() -> None:
-    known, settings = synthetic.emulator(), Settings(draws=500)
-    whole = declared_effects(known, settings, 8)
-    pictures = declared_effects(known, settings, 8, VIEWS[PHOTOGRAPHS])
-    assert any(one.resolvable for one in pictures)
-    for less, more in zip(pictures, whole, strict=True):
-        assert less.detectable >= more.detectable
 
 
 @dataclass
