@@ -124,9 +124,12 @@ def make(
     """Make a bank of all that the trial study sees, outlines included."""
     with clear_errors("Resume with the same command."):
         search = Search.of(load_study(STUDY, scale or None))
-        given = {"bank_points": points, "bank_mechanism_points": mechanism_points}
-        numbers = {name: number for name, number in given.items() if number is not None}
-        search = replace(search, settings=replace(search.settings, **numbers))
+        numbers = search.settings
+        if points is not None:
+            numbers = replace(numbers, bank_points=points)
+        if mechanism_points is not None:
+            numbers = replace(numbers, bank_mechanism_points=mechanism_points)
+        search = replace(search, settings=numbers)
         table = OutcomeTable(file.with_suffix(".sqlite"))
         with (
             open_workers(Resources(device, workers)) as simulators,
