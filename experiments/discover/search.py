@@ -89,6 +89,8 @@ class Search:
         if "condition" in document:  # from where heaps are looked at changes none
             told = document["condition"].items()
             document["condition"] = {n: {k: v for k, v in each.items() if k != "camera"} for n, each in told}
+        if "measurement" in document:  # outlines are more to see of the same heaps
+            document["measurement"] = {k: v for k, v in document["measurement"].items() if k != "outline"}
         if self.study.solver.laws == EDEM:
             document.pop("solver", None)  # as from before laws had names
         engine = engine_of(self.study)

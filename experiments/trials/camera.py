@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.measurement.observables import OBSERVABLES, PHOTOGRAPHED
+from experiments.measurement.observables import BY_NAME
 
 SCALE_ERROR = 0.002
 """Relative standard deviation of the scale, one for all pictures of a trial: a millimetre on half a metre."""
@@ -31,20 +32,20 @@ class Camera:
         """Set up a camera as well as people do."""
         return cls(scale=1.0 + SCALE_ERROR * rng.standard_normal(), roll=ROLL * rng.standard_normal())
 
-    def read(self, heaps: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    def read(self, heaps: np.ndarray, names: Sequence[str], rng: np.random.Generator) -> np.ndarray:
         """Read pictures of heaps; what no photograph shows stays.
 
         A roll by a small angle w moves the apex of a heap of height h by w h and leaves its base, so that the
-        area right of the apex less that left of it changes by w h^2, the lean by w tan(flank angle); the mean
-        of both flanks changes in second order only. Heaps are rows, (n, observables), in the order of
-        `OBSERVABLES`; NaN stays.
+        area right of the apex less that left of it changes by w h^2, the lean by w tan(flank angle); means of
+        both flanks, angles and the outline's heights, change in second order only. These heights stand at
+        places of the outline's own size: a scale takes them as any length. Heaps are rows, (n, observables),
+        in the order of the names; NaN stays.
         """
-        seen = heaps.copy()
-        names = [observable.name for observable in OBSERVABLES]
-        lean, angle = names.index("asymmetry"), names.index("flank_angle")
+        seen, known = heaps.copy(), list(names)
+        lean, angle = known.index("asymmetry"), known.index("flank_angle")
         seen[:, lean] -= self.roll * np.tan(np.radians(heaps[:, angle]))
-        for column, observable in enumerate(OBSERVABLES):
-            if observable.name in PHOTOGRAPHED:
+        for column, observable in enumerate(BY_NAME[name] for name in known):
+            if observable.by_photograph:
                 scale = self.scale if observable.unit == "m" else 1.0
                 errors = READING[observable.unit] * rng.standard_normal(len(heaps))
                 seen[:, column] = scale * seen[:, column] + errors

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -21,6 +21,7 @@ from doe.discrepancy.fitting.model import Model, Stack
 from doe.discrepancy.fitting.scatter import NOTHING
 from experiments.errors import InputError
 from experiments.files import write_text
+from experiments.measurement.observables import NAMES
 from experiments.trials.drawing import Declared, Plan
 
 KIN = 0.9
@@ -86,16 +87,20 @@ def _effect(record: dict[str, Any]) -> Declared:
     return Declared(**record | {"detectable": detectable, "kin": tuple(record["kin"])})
 
 
-def declared_effects(emulator: Emulator, settings: Settings, replicates: int) -> tuple[Declared, ...]:
+def declared_effects(
+    emulator: Emulator, settings: Settings, replicates: int, observables: Collection[str] = NAMES
+) -> tuple[Declared, ...]:
     """Declare what so many replicates of every condition should show of each mechanism of the library.
 
+    They show the observables that are named: a bank may know more, as outlines.
     The power is the mean over the ranges of the factors, as truths are drawn from all of them. A mechanism
     is told apart that the end of its range shows nearly everywhere in them.
     """
     space = emulator.space
     drawn, correlations = [], []
     for theta in 2.0 * sobol_points(THETAS, len(space.factors), seed=0) - 1.0:
-        stack = Stack(Model(emulator, (), settings.systematic), perfect_means(emulator, theta, replicates))
+        means = perfect_means(emulator, theta, replicates, observables)
+        stack = Stack(Model(emulator, (), settings.systematic), means)
         fitted = weigh(stack, theta)
         effects = Effects.of(fitted, signatures(fitted))
         drawn.append(effects.power(settings))
@@ -121,14 +126,15 @@ def with_names(settings: Settings, library: Sequence[Declared]) -> Settings:
     return replace(settings, resolvable=tuple(effect.name for effect in library if effect.resolvable))
 
 
-def perfect_means(emulator: Emulator, theta: np.ndarray, replicates: int) -> tuple[Block, ...]:
+def perfect_means(
+    emulator: Emulator, theta: np.ndarray, replicates: int, observables: Collection[str]
+) -> tuple[Block, ...]:
     """Means of so many replicates in every training condition that are exactly the model's at coded theta."""
-    count = len(emulator.observables)
-    numbers, weights = np.arange(count), np.full((count, count), 1.0 / replicates)
+    numbers = np.flatnonzero(np.isin(emulator.observables, list(observables)))
+    count = len(numbers)
+    weights, nothing = np.full((count, count), 1.0 / replicates), np.zeros((2, count))
     return tuple(
-        Block(
-            condition, numbers, surfaces.predict(theta[None], ())[0], weights, NOTHING, np.zeros((2, count))
-        )
+        Block(condition, numbers, surfaces.predict(theta[None], ())[0][numbers], weights, NOTHING, nothing)
         for condition, surfaces in emulator.surfaces.items()
         if not emulator.space.is_held_out(condition)
     )

@@ -27,9 +27,8 @@ from experiments.calibrate.export import jsonable
 from experiments.errors import InputError
 from experiments.files import write_text
 from experiments.measurement.measured_file import read_measured
-from experiments.measurement.observables import PHOTOGRAPHED
 from experiments.studyfile import Study
-from experiments.trials.findings import PHOTOGRAPHS, Finding, findings_table, read_findings, write_findings
+from experiments.trials.findings import VIEWS, Finding, findings_table, read_findings, write_findings
 from experiments.trials.folder import Folder
 from experiments.trials.lockstep import Crash
 from experiments.trials.truth import Sealed
@@ -87,9 +86,7 @@ class Desk:
     def __call__(self, job: str) -> Analysis:
         """Begin an analysis."""
         trial, view = parted(job)
-        measured = self.measured[trial]
-        if view == PHOTOGRAPHS:
-            measured = measured.only(PHOTOGRAPHED)
+        measured = self.measured[trial].only(VIEWS[view])
         emulator = self.emulator.without(*self.withheld[trial])
         return analyse(measured, emulator, self.settings, zlib.crc32(job.encode()))
 

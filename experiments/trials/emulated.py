@@ -15,6 +15,7 @@ from collections.abc import Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from typing import Annotated
 
 import numpy as np
@@ -24,12 +25,11 @@ import typer
 from doe import Factor
 from doe.discrepancy import Emulator, Settings, analyse, drive, fit_emulator
 from experiments.discover.search import Search
-from experiments.measurement.observables import NAMES, PHOTOGRAPHED
 from experiments.studyfile import load_study
 from experiments.trials.declaration import declared_effects, with_names
 from experiments.trials.drawing import Declared, Plan, draw
 from experiments.trials.emulated_simulator import EmulatedSimulator, emulated_heaps, redrawn_bank
-from experiments.trials.findings import EVERYTHING, Finding, findings_table
+from experiments.trials.findings import EVERYTHING, PHOTOGRAPHS, VIEWS, Finding, findings_table
 from experiments.trials.generate import STUDY, bank_beside
 from experiments.trials.score import aims, confusion, scored
 from experiments.trials.truth import Label, Sealed
@@ -102,6 +102,7 @@ def size_errors(table: pd.DataFrame) -> pd.Series:
 
 def main(
     scale: Annotated[str, typer.Option(help="Scale of the trial study; left out: as written.")] = "",
+    bank: Annotated[Path | None, typer.Option(help="Bank of the trial study; left out: its own.")] = None,
     photographs: Annotated[bool, typer.Option("--photographs", help="With photographs only.")] = False,
     count: Annotated[int, typer.Option(help="Trials of each mechanism with every bank.")] = 1,
     banks: Annotated[int, typer.Option(help="Banks that are drawn.")] = 4,
@@ -111,8 +112,8 @@ def main(
 ) -> None:
     """Try the decision rules on banks drawn from the emulator of the trial study."""
     search = Search.of(load_study(STUDY, scale or None))
-    truth = EmulatedSimulator(fit_emulator(search.read_bank(bank_beside(scale))), bend)
-    seen, tables = PHOTOGRAPHED if photographs else NAMES, []
+    truth = EmulatedSimulator(fit_emulator(search.read_bank(bank or bank_beside(scale))), bend)
+    seen, tables = VIEWS[PHOTOGRAPHS if photographs else EVERYTHING], []
     with ProcessPoolExecutor(workers) as pool:
         for number in range(seed, seed + banks):
             world = World.of(truth, search.settings, number)

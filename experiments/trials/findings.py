@@ -11,15 +11,18 @@ import pandas as pd
 
 from doe.discrepancy import Discovery, Interval, Verdict
 from experiments.files import replacing
+from experiments.measurement.observables import NAMES, OUTLINE, PHOTOGRAPHED
 from experiments.trials.lockstep import Crash
 
 EVERYTHING = "everything"
-"""View of an analysis that has every observable."""
+"""View of an analysis that has every number that is measured of a heap, and no outline."""
 
 PHOTOGRAPHS = "photographs"
 """View of an analysis that has only what a photograph shows."""
 
-VIEWS = (EVERYTHING, PHOTOGRAPHS)
+VIEWS = {EVERYTHING: NAMES, PHOTOGRAPHS: (*PHOTOGRAPHED, *(each.name for each in OUTLINE))}
+"""Observables that an analysis has, by its view. What is strong is counted in what the first shows, as in all
+trials so far; of a bank without outlines the second has the others."""
 
 CRASH = "crash"
 """Stands for the verdict of an analysis that raised."""

@@ -1,11 +1,13 @@
 """The generator of the trials, apart from the analysis: it draws and seals truths, and simulates their heaps.
 
-    python -m experiments.trials.generate seal out/trials
+    python -m experiments.trials.generate bank out/trials/bank.npz --device cuda
+    python -m experiments.trials.generate seal out/trials --bank out/trials/bank.npz
     python -m experiments.trials.generate measure out/trials --part alone --device cuda
 
-The first writes what is known beforehand (``declared.json``, ``sealed.csv``) into FOLDER/record, to be
-published before the second runs, and the labels into FOLDER/hidden, where no analysis looks. The second
-writes the file of measured heaps of every trial into FOLDER/data; interrupted, it goes on where it was.
+The first makes a bank that knows outlines, which the shipped ones do not. The second writes what is known
+beforehand (``declared.json``, ``sealed.csv``) into FOLDER/record, to be published before the third runs, and
+the labels into FOLDER/hidden, where no analysis looks. The third writes the file of measured heaps of every
+trial into FOLDER/data; interrupted, each goes on where it was.
 """
 
 from __future__ import annotations
@@ -13,20 +15,24 @@ from __future__ import annotations
 import secrets
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 import typer
 
+from dem_warp.version import source_commit
 from doe.discrepancy import Bank, Simulator, fit_emulator
 from experiments.cases import Resources, open_workers
 from experiments.commands.console import clear_errors
 from experiments.discover.engine import EngineSimulator
 from experiments.discover.library import library_for
+from experiments.discover.maker import maker_of_today
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.search import Search
 from experiments.errors import InputError
+from experiments.files import replacing
 from experiments.studyfile import Study, load_study
 from experiments.toml_files import read_toml
 from experiments.trials.declaration import Declaration, declared_effects, read_declaration, with_names
@@ -103,7 +109,36 @@ def measure_trials(
     conditions = [condition.name for condition in load_study(STUDY, declaration.scale or None).conditions]
     waves = [cases_of(label, conditions, declaration.plan.replicates) for label in labels]
     for label, wave, outcomes in zip(labels, waves, dealt(waves, simulator), strict=True):
-        write_heaps(folder.measured(label.trial), label, wave, outcomes)
+        write_heaps(folder.measured(label.trial), label, wave, outcomes, simulator.observables)
+
+
+@app.command(name="bank")
+def make(
+    file: Annotated[Path, typer.Argument(help="File of the bank; its cases are kept beside it.")],
+    scale: Annotated[str, typer.Option(help="Scale of the trial study; left out: as written.")] = "",
+    points: Annotated[int | None, typer.Option(help="Of the base; left out: as the study says.")] = None,
+    mechanism_points: Annotated[int | None, typer.Option(help="Of each effect; left out: so, too.")] = None,
+    device: Annotated[str | None, typer.Option(help="cpu, cuda, or several GPUs, as cuda:0,cuda:1.")] = None,
+    workers: Annotated[int | None, typer.Option(help="Processes.")] = None,
+) -> None:
+    """Make a bank of all that the trial study sees, outlines included."""
+    with clear_errors("Resume with the same command."):
+        search = Search.of(load_study(STUDY, scale or None))
+        numbers = search.settings
+        if points is not None:
+            numbers = replace(numbers, bank_points=points)
+        if mechanism_points is not None:
+            numbers = replace(numbers, bank_mechanism_points=mechanism_points)
+        search = replace(search, settings=numbers)
+        table = OutcomeTable(file.with_suffix(".sqlite"))
+        with (
+            open_workers(Resources(device, workers)) as simulators,
+            EngineSimulator(search.study, search.library, table, simulators) as simulator,
+        ):
+            made = search.make_bank(simulator, maker_of_today(source_commit()))
+        with replacing(file) as temporary:
+            made.save(temporary)
+        print(f"{len(made.reasons)} cases, {int((~made.finished).sum())} of them failed: {file}")
 
 
 @app.command()

@@ -14,7 +14,7 @@ from doe.discrepancy import Outcomes, Point
 from experiments.errors import InputError
 from experiments.files import replacing
 from experiments.measurement.calibration import CALIBRATION, NONE
-from experiments.measurement.observables import OBSERVABLES
+from experiments.measurement.observables import BY_NAME
 from experiments.trials.camera import Camera
 from experiments.trials.folder import Folder
 from experiments.trials.truth import Label, read_sealed
@@ -37,16 +37,22 @@ def cases_of(label: Label, conditions: Sequence[str], replicates: int) -> list[P
 
 
 def write_heaps(
-    path: Path, label: Label, points: Sequence[Point], outcomes: Outcomes, calibrated: bool = True
+    path: Path,
+    label: Label,
+    points: Sequence[Point],
+    outcomes: Outcomes,
+    observables: Sequence[str],
+    calibrated: bool = True,
 ) -> None:
     """Photograph and measure the heaps of a trial, and write them as a file of measured heaps.
 
+    The outcomes have a column for each of the observables, by their names.
     A tube that held its grains is written down as clogged; a case that failed in another way leaves no row,
     as a test that went wrong in a laboratory. The label's seed draws the camera. The file says that nothing
     is off in all conditions alike, or, of what is not `calibrated`, nothing of it, as most files do.
     """
     rng = np.random.default_rng([label.seed, 1])
-    values = Camera.drawn(rng).read(outcomes.values, rng)
+    values = Camera.drawn(rng).read(outcomes.values, observables, rng)
     replicates: dict[str, int] = {}
     with replacing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
@@ -57,9 +63,9 @@ def write_heaps(
         for point, row, reason in zip(points, values, outcomes.reasons, strict=True):
             replicate = replicates[point.condition] = replicates.get(point.condition, 0) + 1
             if not reason:
-                for observable, value in zip(OBSERVABLES, row, strict=True):
-                    unit = "" if observable.unit == "1" else observable.unit
-                    writer.writerow((point.condition, replicate, observable.name, f"{value:.8g}", unit))
+                for name, value in zip(observables, row, strict=True):
+                    unit = "" if BY_NAME[name].unit == "1" else BY_NAME[name].unit
+                    writer.writerow((point.condition, replicate, name, f"{value:.8g}", unit))
             elif CLOGGED in reason:
                 writer.writerow((point.condition, replicate, CLOGGED, "", ""))
 

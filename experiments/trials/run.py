@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -42,7 +42,7 @@ UNFINISHED = 3
 """Exit code while analyses have not ended."""
 
 
-def open_jobs(folder: Folder, trials: Sequence[Sealed], views: Sequence[str]) -> dict[str, Sealed]:
+def open_jobs(folder: Folder, trials: Sequence[Sealed], views: Collection[str]) -> dict[str, Sealed]:
     """Analyses of trials that have not ended, by name."""
     ended = read_findings([folder.findings] if folder.findings.exists() else [])
     done = {job_name(row.trial, row.view) for row in ended.itertuples()}
@@ -54,7 +54,7 @@ def run_trials(
     folder: Folder,
     trials: Sequence[Sealed],
     bank: Path | None = None,
-    views: Sequence[str] = VIEWS,
+    views: Collection[str] = VIEWS,
     device: str | None = None,
     workers: int | None = None,
     seconds: float = math.inf,

@@ -135,7 +135,9 @@ def measure_in_time(
             rule = f"at most {MISSING:.0%} of a trial's heaps may fail"
             raise InputError(rule, f"{failed} of {len(wave)}", f"{label.trial}: {max(outcomes.reasons)}")
         # a stranger's clock and balance: the analysis allows for what is usual
-        write_heaps(folder.measured(label.trial), label, wave, outcomes, calibrated=False)
+        write_heaps(
+            folder.measured(label.trial), label, wave, outcomes, simulator.observables, calibrated=False
+        )
         lacking = f", {failed} of {len(wave)} heaps failed" if failed else ""
         print(f"{label.trial} measured{lacking}; {len(waiting) - done - 1} left", flush=True)
     return 0

@@ -15,7 +15,7 @@ from experiments.discover.library import FORMER_NAMES
 from experiments.discover.maker import maker_of_today
 from experiments.discover.search import Search
 from experiments.errors import InputError, StudyError
-from experiments.measurement.observables import NAMES, OBSERVABLES
+from experiments.measurement.observables import NAMES, OBSERVABLES, OUTLINE
 from experiments.report.discovery import Terms, verdict_line, write_discovery
 from experiments.studyfile import Study, load_study
 
@@ -123,6 +123,15 @@ def test_what_changes_no_heap_leaves_the_bank_in_use(bank: Path) -> None:
     assert kept.space.names == Search.of(trial()).space.names
     with pytest.raises(InputError, match="looked for"):
         Search.of(trial(discover={"mechanisms": ["shape"]})).read_bank(bank)
+
+
+def test_a_bank_without_outlines_serves_a_study_that_sees_them(bank: Path) -> None:
+    """They are more to see of the same heaps; fresh runs have them in further columns."""
+    with_them, without = Search.of(trial()), Search.of(trial(measurement={"outline": False}))
+    assert len(with_them.study.measurable) == len(without.study.measurable) + len(OUTLINE)
+    assert with_them.fingerprint == without.fingerprint
+    assert with_them.read_bank(bank).observables == NAMES
+    assert Search.of(trial(measurement={"pixels": 300})).fingerprint != without.fingerprint
 
 
 def test_an_older_study_and_its_bank_may_call_a_mechanism_as_it_was(tmp_path: Path) -> None:

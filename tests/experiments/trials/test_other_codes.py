@@ -21,7 +21,7 @@ from experiments.cases import OwnWorkers
 from experiments.cases.program import AnswerError
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.errors import InputError
-from experiments.measurement.observables import NAMES
+from experiments.measurement.observables import NAMES, OUTLINE
 from experiments.studyfile import load_study
 from experiments.trials.drawing import Plan
 from experiments.trials.generate import STUDY
@@ -315,13 +315,13 @@ def observed(code: str, folder: Path, *sizes: tuple[tuple[str, float], ...]) -> 
     with OtherCodeSimulator(study, code, SETTINGS[code], table, OwnWorkers("cpu", 1)) as simulator:
         outcomes = simulator(points)
     assert outcomes.reasons == ("",) * len(points)
-    return [dict(zip(NAMES, row, strict=True)) for row in outcomes.values]
+    return [dict(zip(simulator.observables, row, strict=True)) for row in outcomes.values]
 
 
 @with_programs
 def test_a_code_makes_a_heap_that_our_functions_read(code: str, tmp_path: Path) -> None:
     [seen] = observed(code, tmp_path, ())
-    assert set(seen) == set(NAMES)
+    assert set(seen) == {*NAMES, *(each.name for each in OUTLINE)}
     assert np.isfinite(list(seen.values())).all()
     scene = case_of().scene
     assert 0.0 < seen["t75"] < seen["t55"] < scene.lift_time

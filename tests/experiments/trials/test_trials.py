@@ -25,8 +25,6 @@ from doe.discrepancy import (
 from doe.discrepancy.contest.power import CODED_SIZES
 from doe.factors import Factor
 from experiments.errors import InputError
-from experiments.measurement.observables import OBSERVABLES, PHOTOGRAPHED
-from experiments.trials.camera import Camera
 from experiments.trials.declaration import (
     Declaration,
     declared_effect,
@@ -164,33 +162,6 @@ def test_cases_of_a_trial_have_seeds_of_their_own() -> None:
     assert [point.condition for point in points] == ["base"] * 8 + ["fast"] * 8
     assert len({point.seed for point in points}) == 16
     assert points == cases_of(label, ("base", "fast"), replicates=8)
-
-
-class Steady(np.random.Generator):
-    """Draws no errors."""
-
-    def __init__(self) -> None:
-        super().__init__(np.random.PCG64(0))
-
-    def standard_normal(self, size: int) -> np.ndarray:  # type: ignore[override]
-        return np.zeros(size)
-
-
-def test_a_rolled_camera_leans_a_straight_heap() -> None:
-    """A drawn triangle, rolled, against the closed form of the camera."""
-    angle, roll = np.radians(25.0), 0.01
-    apex = np.tan(angle)  # of a heap of half width 1
-    left, right = 1.0 + roll * apex, 1.0 - roll * apex
-    heap = np.ones((1, len(OBSERVABLES)))
-    names = [observable.name for observable in OBSERVABLES]
-    heap[0, [names.index("flank_angle"), names.index("asymmetry")]] = 25.0, 0.0
-    seen = Camera(scale=1.02, roll=roll).read(heap, Steady())
-    assert seen[0, names.index("asymmetry")] == pytest.approx((right - left) / (right + left))
-    for column, observable in enumerate(OBSERVABLES):
-        if observable.unit == "m":
-            assert seen[0, column] == pytest.approx(1.02 if observable.name in PHOTOGRAPHED else 1.0)
-        elif observable.name != "asymmetry":
-            assert seen[0, column] == heap[0, column]
 
 
 @dataclass

@@ -11,7 +11,7 @@ from experiments.discover.engine import EngineSimulator
 from experiments.discover.library import library_for
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.search import Search
-from experiments.measurement.observables import NAMES
+from experiments.measurement.observables import NAMES, OUTLINE
 from experiments.studyfile import load_study
 from experiments.trials.declaration import Declaration
 from experiments.trials.desk import Desk, read_data
@@ -51,9 +51,10 @@ def test_the_generator_has_its_own_time_step_and_camera() -> None:
 
 
 def test_heaps_of_a_trial_come_back_as_they_were_measured(measured: dict[str, Measured]) -> None:
+    names = (*NAMES, *(each.name for each in OUTLINE))
     for heaps in measured.values():
-        assert heaps.observables == NAMES
-        assert all(rows.shape == (REPLICATES, len(NAMES)) for rows in heaps.values.values())
+        assert heaps.observables == names
+        assert all(rows.shape == (REPLICATES, len(names)) for rows in heaps.values.values())
         assert all(np.isfinite(rows).all() for rows in heaps.values.values())
 
 
