@@ -28,6 +28,12 @@ ARC_ROUNDS = 12
 """Rounds of reweighting of the arc, which leave single grains aside."""
 CORE = 0.95
 """Part of the half width over which the arc is fitted: at its ends it is upright."""
+ROW_SHARE = 0.8
+"""Part of a body's width over which its heap rises where the body ends with it: but for a grain or two."""
+ROW_DEPTH = 0.07
+"""Depth of the lowest row of grains, in the heap's widths: that of a heap of fourteen grains across."""
+LEAST_RISE = 4.0
+"""A heap rises where it is this high over the line [pixels]: a blurred edge and a lens make less."""
 LEAST_ARC = 3.0
 """A foot is seen where it is this many of its standard errors deep, and as many pixels."""
 
@@ -102,6 +108,38 @@ def _told_apart(
         return unshaded(below, own, reach), typical
     typical = float(np.median(np.linalg.norm(colors[heap] - near, axis=1)))
     return np.linalg.norm(below - own, axis=2), typical
+
+
+def is_lowest_row(
+    colors: Layer, heap: NDArray[np.bool_], body: NDArray[np.bool_], plate: PlateLine, least: float
+) -> bool:
+    """Tell if what was taken for a plate is the heap's lowest row of grains, whose tops lie on a line too.
+
+    It is no wider than the heap on it, a grain deep, and of the heap's colours, but for their shade.
+
+    Parameters
+    ----------
+    colors, heap, body, plate
+        As for `below_plate`.
+    least : float
+        Difference of colours [of 255] from which on two are not alike.
+    """
+    covered = np.flatnonzero(body.any(axis=0))
+    width = float(np.ptp(covered))
+    below = np.arange(len(body))[:, None] - plate.rows_at(np.arange(body.shape[1]))
+    rising = np.flatnonzero((heap & (below < -LEAST_RISE)).any(axis=0))
+    if len(rising) == 0 or np.ptp(rising) < ROW_SHARE * width:
+        return False
+    lowest = np.where(body, below, -np.inf).max(axis=0)[covered]
+    # Most columns, not all: a grain may lie before the others.
+    if float(np.quantile(lowest, 0.95)) > ROW_DEPTH * width:
+        return False
+    row = colors[body & (below > 0.0)][None]
+    above = colors[heap & (below > -ROW_DEPTH * width)]
+    if row.size == 0 or above.size == 0:
+        return False
+    own = np.broadcast_to(np.median(above, axis=0), row.shape).astype(np.float32)
+    return float(np.median(unshaded(row, own, 0))) <= least
 
 
 def joined_foot(heap: NDArray[np.bool_], level: Layer, plate: PlateLine) -> NDArray[np.bool_]:

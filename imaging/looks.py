@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import cv2
@@ -28,20 +27,13 @@ def with_faint(seen: Contrast) -> Contrast:
     return replace(seen, thresholds=tuple(dict.fromkeys((*seen.thresholds, faint))))
 
 
-def other_looks(seen: Contrast) -> Iterator[Contrast]:
-    """Without shadows, with grains of all colours together, and apart from a board's colours."""
-    yield _without_shadows(seen)
-    yield _grains_together(seen)
-    yield _apart_from_plate(seen)
-
-
-def _without_shadows(seen: Contrast) -> Contrast:
+def without_shadows(seen: Contrast) -> Contrast:
     """The same picture with only what no shadow makes of its wall."""
     values = unshaded(seen.colors, seen.background, _grain_reach(seen))
     return replace(seen, values=values, thresholds=_cuts(values, seen.noise))
 
 
-def _grains_together(seen: Contrast) -> Contrast:
+def grains_together(seen: Contrast) -> Contrast:
     """The same picture with grains as light as the wall, between darker and lighter ones, filled up."""
     size = 2 * _grain_reach(seen) + 1
     # the running sums of a blur may fall below zero by their rounding
@@ -49,7 +41,7 @@ def _grains_together(seen: Contrast) -> Contrast:
     return replace(seen, values=values, thresholds=_cuts(values, seen.noise))
 
 
-def _apart_from_plate(seen: Contrast) -> Contrast:
+def apart_from_plate(seen: Contrast) -> Contrast:
     """The same picture with only what differs from a board as well, whose colours its ends show.
 
     A board seen from above has ends that slant, and no straight edge behind the heap; but it has two colours

@@ -23,7 +23,7 @@ from imaging.errors import PictureError
 from imaging.fits import FitSettings
 from imaging.flanks import fit_flanks
 from imaging.geometry import FloatArray, Picture
-from imaging.looks import other_looks, with_faint
+from imaging.looks import apart_from_plate, grains_together, with_faint, without_shadows
 from imaging.outline import Outline, levelled
 from imaging.plate import PlateLine
 from imaging.reasons import Doubt
@@ -36,6 +36,8 @@ CROOKED = 0.03
 """Misfit of the flanks' shape, in heights, that another look at the picture may better."""
 NEARLY = 2.0
 """Factor between misfits beyond which the better one shows the heap, and the other something beside it."""
+WELL = 0.5
+"""Misfit up to which a heap is well shown, whatever shows it better: half of what is doubted."""
 AS_GOOD = 1.3
 """Factor between misfits that are about the same: two thresholds on one heap differ by as much."""
 LEAST_STEP = 15.0
@@ -132,19 +134,7 @@ def find_heap(picture: Picture, given: PlateLine | None, view: View, place: str)
     disagree on its angle, there is one.
     """
     seen = contrast_with_background(picture, place, np.float32)
-    tries, errors = _tries(with_faint(seen), given, view, place)
-    best = _first_of_best(tries)
-    if best is None or not best.clear or best.crooked > CROOKED or best.shift(tries) > LARGEST_SHIFT:
-        others = [judged for look in other_looks(seen) for judged in _tries(look, given, view, place)[0]]
-        # Another look counts where it leaves fewer doubts, none where the plain ones refuse, or where these
-        # disagree.
-        if best is None:
-            others = [judged for judged in others if judged.clear]
-        if best is None or best.clear or any(len(other.doubts) < len(best.doubts) for other in others):
-            tries += others
-            best = _first_of_best(tries)
-    if best is None:
-        raise errors[0]
+    best, finding = _best_seen(seen, given, view, place)
     if best.crooked > NO_HEAP:
         rule = "two straight flanks meet at the tip of a heap"
         raise PictureError(rule, f"no heap: an outline {best.crooked:.2f} of its height off two lines", place)
@@ -155,11 +145,62 @@ def find_heap(picture: Picture, given: PlateLine | None, view: View, place: str)
         doubts.append(
             Doubt("shade", "what is below the whole heap is darker than beside it: its shadow, or a dish?")
         )
-    shift = best.shift(tries)
-    if best.clear and shift > LARGEST_SHIFT:
-        finding = f"the angle moves by {shift:.1f} degrees with the threshold, over {LARGEST_SHIFT:g}"
+    if best.clear and finding:
         doubts.append(Doubt("threshold", finding))
     return replace(best.sighting, doubts=tuple(doubts))
+
+
+def _best_seen(seen: Contrast, given: PlateLine | None, view: View, place: str) -> tuple[Judged, str]:
+    """The heap that shows best, and what speaks against where its edge is, if anything does.
+
+    Another look counts where it leaves fewer doubts than the plain one, none where this refuses, or where its
+    thresholds disagree.
+    """
+    tries, errors = _tries(with_faint(seen), given, view, place)
+    plain = [judged for judged in tries if judged.clear]
+    best = _first_of_best(tries)
+    filled: list[Judged] = []
+    if best is None or not best.steady(plain) or best.crooked > CROOKED:
+        shadowless, _ = _tries(without_shadows(seen), given, view, place)
+        others = list(shadowless)
+        if best is None or not best.clear or best.crooked > CROOKED or best.shift(plain) > LARGEST_SHIFT:
+            filled, _ = _tries(grains_together(seen), given, view, place)
+            others += filled + _tries(apart_from_plate(seen), given, view, place)[0]
+            if best is None:
+                others = [judged for judged in others if judged.clear]
+            if best is None or best.clear or any(len(other.doubts) < len(best.doubts) for other in others):
+                tries = tries + others
+                best = _first_of_best(tries)
+            if best is None:
+                raise errors[0]
+        else:
+            tries = tries + others
+        if best.clear and best.shift(tries) > LARGEST_SHIFT:
+            best, tries = _without_its_shadow(best, plain, shadowless, tries)
+    if any(best is judged for judged in filled) and not best.confirmed(tries):
+        return best, "no other threshold shows a heap like this, of grains in part as light as the wall"
+    shift = best.shift(tries)
+    if shift > LARGEST_SHIFT:
+        return best, f"the angle moves by {shift:.1f} degrees with the threshold, over {LARGEST_SHIFT:g}"
+    return best, ""
+
+
+def _without_its_shadow(
+    best: Judged, plain: list[Judged], shadowless: list[Judged], tries: list[Judged]
+) -> tuple[Judged, list[Judged]]:
+    """The best one, and what it has to agree with, where a shadow alone moves the edge with the threshold.
+
+    That is so where the look without shadows shows one edge at both of its thresholds, and so does one of the
+    plain ones, or there is only one of them, without any to confirm it.
+    """
+    if len(shadowless) < 2 or not all(judged.clear for judged in shadowless):
+        return best, tries
+    firm = min(shadowless, key=lambda judged: judged.misfit)
+    if not firm.steady(shadowless) or firm.misfit > max(NEARLY * best.misfit, WELL):
+        return best, tries
+    if len(plain) > 1 and not any(firm.like(judged) for judged in plain):
+        return best, tries
+    return best if firm.like(best) else firm, shadowless
 
 
 def _tries(
@@ -196,9 +237,22 @@ class Judged:
         """There is no doubt."""
         return not self.doubts
 
+    def like(self, other: Judged) -> bool:
+        """The angles are the same within what a threshold may change."""
+        return abs(other.mean - self.mean) <= LARGEST_SHIFT
+
+    def confirmed(self, others: Sequence[Judged]) -> bool:
+        """Another one, doubtful or not, has about the same angle."""
+        return any(self.like(other) for other in others if other is not self)
+
+    def steady(self, others: Sequence[Judged]) -> bool:
+        """There is no doubt, another one confirms it, and none of `others` disagrees."""
+        return self.clear and self.confirmed(others) and self.shift(others) <= LARGEST_SHIFT
+
     def shift(self, others: Sequence[Judged]) -> float:
-        """Greatest change of the angle [degrees] among others without a doubt that fit nearly as well."""
-        rivals = [other for other in others if other.clear and other.misfit <= NEARLY * self.misfit]
+        """Greatest change of the angle [degrees] among others without a doubt that fit well or nearly so."""
+        limit = max(NEARLY * self.misfit, WELL)
+        rivals = [other for other in others if other.clear and other.misfit <= limit]
         return max((abs(other.mean - self.mean) for other in rivals), default=0.0)
 
 

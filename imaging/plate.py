@@ -78,7 +78,7 @@ class PlateLine:
         return position * cosine + height * sine, self.row + position * sine - height * cosine
 
 
-def find_plate(top: FloatArray, bottom: FloatArray, place: str) -> PlateLine:
+def find_plate(top: FloatArray, bottom: FloatArray, place: str, shelf: bool = True) -> PlateLine:
     """Find the plate from the upper and lower edge of what stands out of the background.
 
     Where a plate stands out together with the heap, the outermost parts of the upper edge lie on one line,
@@ -91,6 +91,8 @@ def find_plate(top: FloatArray, bottom: FloatArray, place: str) -> PlateLine:
         Rows of the two edges in consecutive columns; NaN outside the body.
     place : str
         Names the picture in errors.
+    shelf : bool
+        Look for a plate that stands out together with the heap.
 
     Raises
     ------
@@ -103,7 +105,8 @@ def find_plate(top: FloatArray, bottom: FloatArray, place: str) -> PlateLine:
         raise PictureError(rule, len(columns), place)
     upper, lower = top[columns], bottom[columns]
     spanning = len(columns) == len(top)
-    line = _shelf(columns, upper, lower, spanning) or _underside(columns, upper, lower)
+    line = _shelf(columns, upper, lower, spanning) if shelf else None
+    line = line or _underside(columns, upper, lower)
     if abs(line.tilt) > MAXIMUM_TILT:
         rule = f"the plate is level within {MAXIMUM_TILT:g} degrees"
         raise PictureError(rule, f"{line.tilt:.1f} degrees", place)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from imaging.background import Contrast, unshaded
 from imaging.doubts import END_WIDTH, LARGEST_UNSEEN_TILT, LEAST_END
 from imaging.errors import PictureError
-from imaging.foot import Base, below_plate, front_of_base, joined_foot
+from imaging.foot import Base, below_plate, front_of_base, is_lowest_row, joined_foot
 from imaging.geometry import FloatArray, Layer
 from imaging.outline import bottom_edge, inner_contrast, largest_pieces, refine_thin, top_edge
 from imaging.plate import PLATE_CLEARANCE, PlateLine, find_plate
@@ -55,11 +55,19 @@ class Sighting:
 def sight(seen: Contrast, threshold: float, given: PlateLine | None, view: View, place: str) -> Sighting:
     """The heap among what stands out of the wall by a threshold."""
     contrast = seen.values
-    plate, body, heap = _on_plate(contrast > threshold, seen, threshold, given, view, place)
+    front = contrast > threshold
+    plate, body, heap = _on_plate(front, seen, threshold, given, view, place)
+    if (
+        given is None
+        and plate.visible
+        and is_lowest_row(seen.colors, heap, body, plate, _least_difference(seen))
+    ):
+        plate, body, heap = _on_plate(front, seen, threshold, given, view, place, shelf=False)
     if not plate.visible:
         threshold = 0.5 * inner_contrast(heap, contrast)
         near = cv2.dilate(heap.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
-        plate, body, heap = _on_plate(near & (contrast > threshold), seen, threshold, given, view, place)
+        front = near & (contrast > threshold)
+        plate, body, heap = _on_plate(front, seen, threshold, given, view, place, shelf=False)
         rows = refine_thin(top_edge(heap, contrast, threshold), heap, contrast, plate)
         found = _seen_whole(rows, body, plate, contrast, threshold, place)
         return found if given is not None else _doubted_on_board(seen, found)
@@ -75,12 +83,16 @@ def _on_plate(
     given: PlateLine | None,
     view: View,
     place: str,
+    shelf: bool = True,
 ) -> tuple[PlateLine, NDArray[np.bool_], NDArray[np.bool_]]:
-    """The plate, the largest piece of what stands out of the wall, and what of it stands on the plate."""
+    """The plate, the largest piece of what stands out of the wall, and what of it stands on the plate.
+
+    Without `shelf` no plate's edge is looked for beside the heap.
+    """
     if not front.any():
         raise PictureError("a heap stands out of the background", "nothing that does", place)
     body, _ = largest_pieces(front)
-    plate = _plate_of(body, seen, threshold, place) if given is None else given
+    plate = _plate_of(body, seen, threshold, place, shelf) if given is None else given
     above = plate.above(front)
     if not above.any():
         raise PictureError("a heap stands on the plate", "nothing above the plate line", place)
@@ -102,9 +114,11 @@ def _on_plate(
     return plate, body, heap
 
 
-def _plate_of(body: NDArray[np.bool_], seen: Contrast, threshold: float, place: str) -> PlateLine:
+def _plate_of(
+    body: NDArray[np.bool_], seen: Contrast, threshold: float, place: str, shelf: bool = True
+) -> PlateLine:
     upper, lower = (edge(body, seen.values, threshold) for edge in (top_edge, bottom_edge))
-    return find_plate(upper, lower, place)
+    return find_plate(upper, lower, place, shelf)
 
 
 def _floats(heap: NDArray[np.bool_], plate: PlateLine) -> bool:

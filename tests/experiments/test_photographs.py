@@ -97,3 +97,17 @@ def test_a_boards_underside_is_not_taken_for_the_ground() -> None:
     # 95 % of the pictures are within 0.8 degrees.
     assert seen.mean == pytest.approx(shot.truth.mean, abs=0.8)
     assert seen.doubts == ()
+
+
+def test_a_threshold_that_only_a_shadow_moves_is_no_doubt() -> None:
+    """Without shadows both thresholds show one edge, and so does one of the plain ones."""
+    shot = photograph(700254)
+    angle = measure(shot.picture)
+    assert angle.doubts == ()
+    # Two of its standard errors, .35.
+    assert angle.mean == pytest.approx(shot.truth.mean, abs=0.7)
+
+
+def test_what_one_threshold_alone_shows_of_grains_like_the_wall_is_doubted() -> None:
+    shot = photograph(700097)
+    assert "threshold" in [doubt.name for doubt in measure(shot.picture).doubts]

@@ -9,6 +9,7 @@ from imaging.synthetic import Camera, DrawnHeap, draw
 from imaging.view import level_angle, level_error, seen_angle
 
 WALL, PLATE, GRAIN = (235, 235, 230), (120, 110, 100), (45, 70, 95)
+BLUE = (170, 110, 60)
 
 
 @pytest.mark.parametrize("angle", [15.0, 30.0, 42.0])
@@ -181,3 +182,50 @@ def test_a_large_picture_is_measured_as_well_as_a_small_one() -> None:
     # Its edge is refined at full size: the same to a few hundredths of a pixel of the small one.
     assert (big.left, big.right) == pytest.approx((small.left, small.right), abs=0.15)
     assert np.ptp(big.outline.position) == pytest.approx(5.0 * np.ptp(small.outline.position), rel=0.01)
+
+
+def shaded_heap(hue: tuple[float, float, float]) -> np.ndarray:
+    """A heap of 30 degrees on a table; a soft patch about its feet changes the colours of the wall."""
+    heap = draw(DrawnHeap(30, 30, grain=14), Camera(heap=GRAIN, background=WALL, plate=BLUE)).astype(float)
+    table = int(np.flatnonzero(heap[:, 0, 2] < 0.5 * (WALL[2] + BLUE[2]))[0])
+    wall = np.linalg.norm(heap - GRAIN, axis=2) / np.linalg.norm(np.subtract(WALL, GRAIN))
+    wall[table:] = 0.0
+    middle = heap.shape[1] // 2
+    patch = np.zeros(heap.shape[:2], np.uint8)
+    corners = [[middle - 250, table], [middle, table - 115], [middle + 250, table]]
+    cv2.fillPoly(patch, [np.array(corners)], 255)
+    soft = wall * cv2.GaussianBlur(patch, (0, 0), 12.0) / 255.0
+    heap *= 1.0 - soft[:, :, None] * (1.0 - np.array(hue))
+    noise = np.random.default_rng(0).normal(0.0, 1.0, heap.shape)
+    return np.clip(np.rint(heap + noise), 0, 255).astype(np.uint8)
+
+
+@pytest.mark.parametrize("hue", [(0.8, 0.8, 0.8), (0.6, 0.9, 0.9)])
+def test_what_moves_the_edge_with_the_threshold_is_doubted(hue: tuple[float, float, float]) -> None:
+    """A shadow's smooth edge fits two lines better than grains do, and is not believed for that."""
+    measured = measure(shaded_heap(hue))
+    assert abs(measured.mean - 30.0) > 3.0
+    assert "threshold" in [doubt.name for doubt in measured.doubts]
+
+
+def on_a_row(color: tuple[int, int, int]) -> np.ndarray:
+    """A heap of 30 degrees on a row as high as a grain of a heap of 20 grains across, and hardly wider."""
+    picture = np.full((420, 700, 3), WALL, np.uint8)
+    cv2.fillPoly(picture, [np.array([[150, 280], [350, 165], [550, 280]])], GRAIN, cv2.LINE_AA)
+    cv2.rectangle(picture, (135, 280), (565, 300), color, -1)
+    return picture
+
+
+@pytest.mark.parametrize("shade", [1.0, 0.85])
+def test_the_lowest_row_of_grains_is_no_plate(shade: float) -> None:
+    """Their tops lie on a line, as a board's do, but they are a part of the heap, in its colours."""
+    angle = measure(on_a_row(tuple(round(shade * channel) for channel in GRAIN)))
+    assert not angle.outline.plate.visible
+    assert angle.doubts == ()
+    # Beside the heap 15 columns of the row, level, count among the 215 of a flank.
+    assert angle.mean == pytest.approx(30.0, abs=0.7)
+
+
+def test_a_board_hardly_wider_than_the_heap_is_refused() -> None:
+    with pytest.raises(PictureError, match="narrow board"):
+        measure(on_a_row((160, 90, 60)))
