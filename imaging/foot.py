@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from imaging.background import unshaded
+from imaging.background import unevenness, unshaded
 from imaging.geometry import FloatArray, Layer
 from imaging.plate import PlateLine
 
@@ -30,8 +30,10 @@ CORE = 0.95
 """Part of the half width over which the arc is fitted: at its ends it is upright."""
 ROW_SHARE = 0.8
 """Part of a body's width over which its heap rises where the body ends with it: but for a grain or two."""
-ROW_DEPTH = 0.07
-"""Depth of the lowest row of grains, in the heap's widths: that of a heap of fourteen grains across."""
+ROW_DEPTH = 0.065
+"""Depth of the lowest row of grains, in the heap's widths: that of a heap of some sixteen grains across."""
+ROW_UNEVENNESS = 0.5
+"""Unevenness of the lowest row over that of the grains above it: a board is even."""
 LEAST_RISE = 4.0
 """A heap rises where it is this high over the line [pixels]: a blurred edge and a lens make less."""
 LEAST_ARC = 3.0
@@ -115,7 +117,7 @@ def is_lowest_row(
 ) -> bool:
     """Tell if what was taken for a plate is the heap's lowest row of grains, whose tops lie on a line too.
 
-    It is no wider than the heap on it, a grain deep, and of the heap's colours, but for their shade.
+    It is no wider than the heap, a grain deep, of the heap's colours but for their shade, and as uneven.
 
     Parameters
     ----------
@@ -131,15 +133,17 @@ def is_lowest_row(
     if len(rising) == 0 or np.ptp(rising) < ROW_SHARE * width:
         return False
     lowest = np.where(body, below, -np.inf).max(axis=0)[covered]
-    # Most columns, not all: a grain may lie before the others.
-    if float(np.quantile(lowest, 0.95)) > ROW_DEPTH * width:
+    # Half of the columns, not all: a grain may lie before the others.
+    if float(np.median(lowest)) > ROW_DEPTH * width:
         return False
-    row = colors[body & (below > 0.0)][None]
-    above = colors[heap & (below > -ROW_DEPTH * width)]
-    if row.size == 0 or above.size == 0:
+    row, above = body & (below > 0.0), heap & (below > -ROW_DEPTH * width)
+    if not row.any() or not above.any():
         return False
-    own = np.broadcast_to(np.median(above, axis=0), row.shape).astype(np.float32)
-    return float(np.median(unshaded(row, own, 0))) <= least
+    own = np.broadcast_to(np.median(colors[above], axis=0), colors[row][None].shape).astype(np.float32)
+    if float(np.median(unshaded(colors[row][None], own, 0))) > least:
+        return False
+    uneven = unevenness(colors, max(2, round(0.25 * float(np.median(lowest)))))
+    return float(np.median(uneven[row])) >= ROW_UNEVENNESS * float(np.median(uneven[above]))
 
 
 def joined_foot(heap: NDArray[np.bool_], level: Layer, plate: PlateLine) -> NDArray[np.bool_]:

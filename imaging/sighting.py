@@ -57,17 +57,11 @@ def sight(seen: Contrast, threshold: float, given: PlateLine | None, view: View,
     contrast = seen.values
     front = contrast > threshold
     plate, body, heap = _on_plate(front, seen, threshold, given, view, place)
-    if (
-        given is None
-        and plate.visible
-        and is_lowest_row(seen.colors, heap, body, plate, _least_difference(seen))
-    ):
-        plate, body, heap = _on_plate(front, seen, threshold, given, view, place, shelf=False)
     if not plate.visible:
         threshold = 0.5 * inner_contrast(heap, contrast)
         near = cv2.dilate(heap.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
         front = near & (contrast > threshold)
-        plate, body, heap = _on_plate(front, seen, threshold, given, view, place, shelf=False)
+        plate, body, heap = _on_plate(front, seen, threshold, given, view, place)
         rows = refine_thin(top_edge(heap, contrast, threshold), heap, contrast, plate)
         found = _seen_whole(rows, body, plate, contrast, threshold, place)
         return found if given is not None else _doubted_on_board(seen, found)
@@ -104,6 +98,9 @@ def _on_plate(
         heap = plate.above(heap)
         if not heap.any():
             raise PictureError("a heap stands on the plate", "nothing above the plate line", place)
+    sought = given is None and plate.visible
+    if sought and is_lowest_row(seen.colors, heap, body, plate, _least_difference(seen)):
+        return _on_plate(front, seen, threshold, given, view, place, shelf=False)
     for border, name in ((heap[:, 0], "left"), (heap[:, -1], "right"), (heap[0], "top")):
         if border.any():
             rule = "the whole heap is in the picture"
