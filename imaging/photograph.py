@@ -38,6 +38,8 @@ NEARLY = 2.0
 """Factor between misfits beyond which the better one shows the heap, and the other something beside it."""
 WELL = 0.5
 """Misfit up to which a heap is well shown, whatever shows it better: half of what is doubted."""
+APART = 1.5
+"""Factor between thresholds from which on one confirms the other: at nearer ones a shadow ends there too."""
 AS_GOOD = 1.3
 """Factor between misfits that are about the same: two thresholds on one heap differ by as much."""
 LEAST_STEP = 15.0
@@ -196,7 +198,7 @@ def _without_its_shadow(
     if len(shadowless) < 2 or not all(judged.clear for judged in shadowless):
         return best, tries
     firm = min(shadowless, key=lambda judged: judged.misfit)
-    if not firm.steady(shadowless) or firm.misfit > max(NEARLY * best.misfit, WELL):
+    if firm.shift(shadowless) > LARGEST_SHIFT or firm.misfit > max(NEARLY * best.misfit, WELL):
         return best, tries
     if len(plain) > 1 and not any(firm.like(judged) for judged in plain):
         return best, tries
@@ -211,7 +213,7 @@ def _tries(
     for threshold in seen.thresholds:
         try:
             found = without_strays(sight(seen, threshold, given, view, place))
-            tries.append(_judged(found, place))
+            tries.append(replace(_judged(found, place), threshold=threshold))
         except PictureError as error:
             errors.append(error)
     return tries, errors
@@ -222,7 +224,7 @@ class Judged:
     """A sighting with the angle of its whole flanks [degrees], what speaks against it, and its misfit.
 
         `crooked` is the misfit of its flanks alone, in heights (see `relative_misfit`); `ends` are where its
-    lines meet the plate.
+    lines meet the plate, `threshold` is where the contrast was cut.
     """
 
     sighting: Sighting
@@ -231,6 +233,7 @@ class Judged:
     misfit: float
     crooked: float
     ends: tuple[float, float]
+    threshold: float = 0.0
 
     @property
     def clear(self) -> bool:
@@ -246,8 +249,10 @@ class Judged:
         return any(self.like(other) for other in others if other is not self)
 
     def steady(self, others: Sequence[Judged]) -> bool:
-        """There is no doubt, another one confirms it, and none of `others` disagrees."""
-        return self.clear and self.confirmed(others) and self.shift(others) <= LARGEST_SHIFT
+        """There is no doubt, one at quite another threshold confirms it, and none of `others` disagrees."""
+        low, high = self.threshold / APART, self.threshold * APART
+        away = [other for other in others if not low < other.threshold < high]
+        return self.clear and self.confirmed(away) and self.shift(others) <= LARGEST_SHIFT
 
     def shift(self, others: Sequence[Judged]) -> float:
         """Greatest change of the angle [degrees] among others without a doubt that fit well or nearly so."""

@@ -31,6 +31,8 @@ LEAST_WIDTH = 100.0
 BRIMFUL_RULE = "the heap stands on a plate wider than itself"
 BESIDE_NOISE, BESIDE_DIFFERENCE = 6.0, 24.0
 """Multiple of the wall's noise, and difference [of 255], from which on two sides differ: twice a cloth's."""
+FADED = 0.5
+"""Darkness a tenth of a heap's width below its foot over that at its foot, under which it is a shadow's."""
 LOW_END = 0.08
 """Height of an outline's lower end over the heap's, from which on its ground may be a board's underside."""
 VIEW_FROM_ABOVE = 0.5
@@ -294,13 +296,24 @@ def darker_below(seen: Contrast, found: Sighting, ends: tuple[float, float]) -> 
     strips = _beside(seen, found, ends)
     if strips is None:
         return False
-    under, *sides = strips
     least = _least_difference(seen)
-    return all(
-        float(np.median(_distance(under, side))) > least
-        and float(np.median((under - side).mean(axis=-1))) < 0.0
+    if not all(far > least and darker > 0.0 for far, darker in _darkness(strips)):
+        return False
+    lower = _strips(seen, found, ends, np.linspace(0.08, 0.11, 8), np.linspace(0.05, 0.1, 20))
+    if lower is None:
+        return True
+    # What the heap hides of the light comes back away from its foot; a dish is as dark all over.
+    near, away = (np.mean([darker for _, darker in _darkness(each)]) for each in (strips, lower))
+    return bool(away > FADED * near)
+
+
+def _darkness(strips: tuple[Layer, Layer, Layer]) -> list[tuple[float, float]]:
+    """Difference of what is below from each side, and how much darker it is."""
+    under, *sides = strips
+    return [
+        (float(np.median(_distance(under, side))), -float(np.median((under - side).mean(axis=-1))))
         for side in sides
-    )
+    ]
 
 
 def _least_difference(seen: Contrast) -> float:

@@ -2,7 +2,8 @@
 
     python -m experiments.benchmarks.photographs.run --first 100000 --heaps 500 --others 200 --out record
 
-Seeds below 1000 were used while the rules were made; figures are for seeds from 100000 on.
+Seeds below 1000, 800000 to 800299 and those of earlier series were used while the rules were made; figures
+are for others. What a person notes in `notes.md` of the record's folder stands on its page.
 """
 
 from __future__ import annotations
@@ -178,21 +179,24 @@ def write(folder: Path, name: str, pairs: list[tuple[Row, Picture]]) -> None:
 
 
 def page(figures: str, chosen: argparse.Namespace) -> str:
-    """Page of a record."""
+    """Page of a record, with the notes that its folder has."""
     command = f"--first {chosen.first} --heaps {chosen.heaps} --others {chosen.others}"
+    file = chosen.out / "notes.md"
+    notes = f"\n{file.read_text(encoding='utf-8')}" if file.exists() else ""
     return f"""# Photograph-like pictures, measured
 
     python -m experiments.benchmarks.photographs.run {command} --out RECORD
 
 {figures}
 
-Seeds below 1000 were used while the rules were made; these are others. A *marked* angle is shown with its
-doubt and left out of a mean. Every picture has a row in `heaps.csv` or `others.csv`.
+Seeds below 1000, 800000 to 800299 and those of earlier series were used while the rules were made; these
+are others. A *marked* angle is shown with its doubt and left out of a mean. Every picture has a row in
+`heaps.csv` or `others.csv`.
 
 ![Some of the heaps; in brackets the true angle](heaps.jpg)
 
 ![Some of the pictures without a heap](others.jpg)
-"""
+{notes}"""
 
 
 def _short(value: Any) -> Any:
