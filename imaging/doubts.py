@@ -16,6 +16,8 @@ LARGEST_ERROR = 1.0
 """Standard error of the mean [degrees]: twice what a heap of twenty grains across has."""
 LARGEST_UNSEEN_TILT = 5.0
 """Tilt [degrees] that is believed without a plate in view: hands hold a phone level within 3 or 4."""
+LARGEST_TILT = 12.0
+"""Tilt [degrees] that is believed with one: nobody holds a camera so, and a sliver has any."""
 LEAST_ANGLE, GREATEST_ANGLE = 5.0, 60.0
 """Repose angles of dry grains [degrees] lie well within."""
 LARGEST_ELEVATION = 12.0
@@ -59,6 +61,8 @@ def doubts_of(left: FlankLine, right: FlankLine, mean: float, se: float, outline
         yield Doubt("error", f"a standard error of {se:.2f} degrees, over {LARGEST_ERROR:g}")
     if not LEAST_ANGLE <= mean <= GREATEST_ANGLE:
         yield Doubt("range", f"{mean:.1f} degrees, outside {LEAST_ANGLE:g} to {GREATEST_ANGLE:g}")
+    if abs(outline.plate.tilt) > LARGEST_TILT:
+        yield Doubt("tilt", f"{outline.plate.tilt:.1f} degrees, over {LARGEST_TILT:g}")
     if outline.elevation > LARGEST_ELEVATION:
         finding = f"the camera looks down by {outline.elevation:.0f} degrees, over {LARGEST_ELEVATION:g}"
         yield Doubt("elevation", finding)

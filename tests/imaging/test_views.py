@@ -98,6 +98,12 @@ def test_a_tilt_is_believed_where_the_plate_is_seen() -> None:
     assert names == [["tilt"], []]
 
 
+def test_a_slanting_sliver_is_doubted() -> None:
+    picture = np.full((420, 700, 3), WALL, np.uint8)
+    cv2.fillPoly(picture, [np.array([[150, 100], [340, 135], [470, 195]])], PLATE, cv2.LINE_AA)
+    assert "tilt" in [doubt.name for doubt in measure(picture).doubts]
+
+
 def two_heaps() -> np.ndarray:
     left, right = (draw(DrawnHeap(angle, angle), Camera(plate=PLATE)) for angle in (25, 35))
     taller = np.full((len(right) - len(left), left.shape[1], 3), Camera().background, np.uint8)
