@@ -34,6 +34,9 @@ LEAST_END = 3.0
 """Rise at an end [pixels] below which it is the blur of an edge."""
 LEAST_FOOT_SLOPE = 0.6
 """Slope of a flank's lowest third over the rest's, or the reverse: it lies within for 19 heaps of 20."""
+LARGEST_SHORTFALL = 0.08
+"""Part of the base by which one foot ends further before its line meets the plate than the other does: feet
+end alike (0.07 at most in 275 rendered heaps), and one in the shade may have the colour of the wall."""
 STEP_PARTS = 8
 LEAST_STEP_SLOPE = 0.35
 """Slope between parts of a flank over that of its line: where a board's top stands inside an outline it is at
@@ -78,6 +81,10 @@ def doubts_of(left: FlankLine, right: FlankLine, mean: float, se: float, outline
             yield Doubt(
                 "foot", f"{finding}, beyond a factor of {1.0 / LEAST_FOOT_SLOPE:.2g}: a board, a shadow?"
             )
+    short = foot_shortfall(left, right, outline)
+    if short > LARGEST_SHORTFALL:
+        finding = f"one foot ends {short:.2f} of the base further before its line does than the other"
+        yield Doubt("foot", f"{finding}, over {LARGEST_SHORTFALL:g}: is it in the shade?")
     flattest = min(step_slope(line, outline) for line in (left, right))
     if flattest < LEAST_STEP_SLOPE:
         finding = f"a part of a flank is {max(flattest, 0.0):.2f} times as steep as its line"
@@ -113,6 +120,13 @@ def foot_slope(line: FlankLine, outline: Outline) -> float:
         for a, b in ((x[:third], h[:third]), (x[third:], h[third:]))
     )
     return low / high if high > 0.0 else 0.0
+
+
+def foot_shortfall(left: FlankLine, right: FlankLine, outline: Outline) -> float:
+    """Part of the base by which one foot ends further before its line meets the plate than the other."""
+    feet = [-line.intercept / line.slope for line in (left, right)]
+    short = (outline.position.min() - feet[0], feet[1] - outline.position.max())
+    return float(max(short) - max(min(short), 0.0)) / (feet[1] - feet[0])
 
 
 def step_slope(line: FlankLine, outline: Outline) -> float:
