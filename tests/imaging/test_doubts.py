@@ -38,3 +38,14 @@ def test_a_hollow_heap_has_no_step() -> None:
     hollow = flat.height.max() * (0.7 * share + 0.3 * share**2)
     seen = Outline(flat.position, hollow + 1.0, flat.plate, photographed=True)
     assert "step" not in names(seen)
+
+
+@pytest.mark.parametrize(
+    ("left", "right", "expected"), [(0, 32, ["foot"]), (32, 0, ["foot"]), (16, 16, []), (0, 16, [])]
+)
+def test_a_foot_in_the_shade_ends_before_its_line_does(left: int, right: int, expected: list[str]) -> None:
+    # 32 of 300 columns of the base are more than the 0.08 of it that good heaps differ by, 16 are less
+    whole = outline(0.0)
+    seen = slice(left, len(whole.position) - right)
+    cut = Outline(whole.position[seen] - left, whole.height[seen], whole.plate, photographed=True)
+    assert [name for name in names(cut) if name == "foot"] == expected
