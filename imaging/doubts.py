@@ -123,10 +123,16 @@ def foot_slope(line: FlankLine, outline: Outline) -> float:
 
 
 def foot_shortfall(left: FlankLine, right: FlankLine, outline: Outline) -> float:
-    """Part of the base by which one foot ends further before its line meets the plate than the other."""
+    """Part of the base by which one foot ends further before its line meets the plate than the other.
+
+    It is 0 where the line is no higher there than an edge's blur.
+    """
     feet = [-line.intercept / line.slope for line in (left, right)]
-    short = (outline.position.min() - feet[0], feet[1] - outline.position.max())
-    return float(max(short) - max(min(short), 0.0)) / (feet[1] - feet[0])
+    short = np.array([outline.position.min() - feet[0], feet[1] - outline.position.max()])
+    worst = int(short.argmax())
+    if short[worst] * abs((left, right)[worst].slope) <= LEAST_END:
+        return 0.0
+    return float(short[worst] - max(short.min(), 0.0)) / (feet[1] - feet[0])
 
 
 def step_slope(line: FlankLine, outline: Outline) -> float:
