@@ -41,7 +41,7 @@ FINER_STEPS = {
     ("deme", "tetrapod-high"): 0.1,
 }
 """Time steps as parts of Rayleigh's time: the usual one, and by code and card where grains tremble in place
-for ever at it, as nothing damps their rolling. At a tenth they come to rest."""
+at it and do not come to rest. At a tenth they do."""
 
 SEEDS = (1, 2, 3, 4, 5)
 """Of the heaps in each code."""

@@ -1,4 +1,4 @@
-"""What an analysis of a trial sees: the camera's errors, and the observables of each view."""
+"""Views of a trial: the camera's errors, and the observables that an analysis has in each."""
 
 from __future__ import annotations
 
