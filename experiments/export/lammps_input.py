@@ -63,9 +63,10 @@ fix bodies all rigid/small molecule mol grains gravity weight"""
 
 _FILL_TO_RIM = """
 # until grains are heaped above the rim; what stands above it is struck off
+# no run is set up anew here: each set-up would pour at once, whatever the rate
 variable looks loop {fill_looks}
 label fill
-run {look}
+run {look} pre no post no
 if "${{heaped}} >= {heaped}" then "jump SELF full"
 next looks
 jump SELF fill
@@ -130,13 +131,18 @@ def _setup(lift: Lift, contacts: Sequence[str]) -> str:
     among, with_tube, with_plate = contacts
     half_width, _, bottom = scene.room(lift.reach)
     rain_top = lift.rain_bottom + lift.rain_height
-    gravity = sum(part**2 for part in scene.gravity) ** 0.5
+    gravity = _gravity(lift)
     plate = f"fix plate all wall/gran granular {with_plate} zplane 0 NULL"
     if scene.plate_diameter is not None:
+        radius, whole = scene.plate_diameter / 2, "" if lift.is_of_spheres else " molecule yes"
         plate = (
-            f"region plate cylinder z 0 0 {scene.plate_diameter / 2:.9g} {bottom / 2:.9g} 0 side out\n"
-            f"fix plate all wall/gran/region granular {with_plate} region plate"
+            f"region plate cylinder z 0 0 {radius:.9g} {bottom / 2:.9g} 0 side out\n"
+            f"fix plate all wall/gran/region granular {with_plate} region plate\n"
+            "# what falls off it is taken out whole: LAMMPS ends where a part of a body leaves the box\n"
+            f"region fallen block INF INF INF INF INF {bottom:.6g}\n"
+            f"fix fallen all evaporate {lift.steps(LOOK)} {lift.count} fallen {lift.seeds(2)[1]}{whole}"
         )
+        bottom -= LOOK * math.sqrt(scene.rain_speed**2 + 2.0 * gravity * rain_top) + lift.reach
     spheres, names = lift.is_of_spheres, " ".join(_file(n) for n in range(1, len(templates) + 1))
     shares = " ".join(written_shares([template.fraction for template in templates]))
     return _SETUP.format(
@@ -165,7 +171,7 @@ def _setup(lift: Lift, contacts: Sequence[str]) -> str:
         rain_top=rain_top,
         rain_seed=lift.seeds(1)[0],
         rain_speed=scene.rain_speed,
-        vol=_volume_fraction(lift, gravity),
+        vol=_volume_fraction(lift),
     ) + watched(lift)
 
 
@@ -181,21 +187,29 @@ def written_shares(fractions: Sequence[float]) -> list[str]:
     return [f"{fraction:.15g}" for fraction in (*fractions[:-1], 1.0 - sum(fractions[:-1]))]
 
 
-def _fall_time(lift: Lift, gravity: float) -> float:
+def _gravity(lift: Lift) -> float:
+    return sum(part**2 for part in lift.scene.gravity) ** 0.5
+
+
+def _fall_time(lift: Lift) -> float:
     """Time between two insertions [s]: that in which a grain falls through the space of the rain."""
-    speed = lift.scene.rain_speed
+    speed, gravity = lift.scene.rain_speed, _gravity(lift)
     return (math.sqrt(speed**2 + 2.0 * gravity * lift.rain_height) - speed) / gravity
 
 
-def _volume_fraction(lift: Lift, gravity: float) -> float:
+def grains_at_once(lift: Lift) -> int:
+    """Grains that LAMMPS puts in at once: whole ones, so that its rate is the asked one or less."""
+    return max(math.floor(lift.rain_rate * _fall_time(lift)), 1)
+
+
+def _volume_fraction(lift: Lift) -> float:
     """Volume fraction from which LAMMPS comes to as many grains an insertion as the rate asks for."""
     area = math.pi * (lift.rain_radius - lift.reach) ** 2
     if lift.is_of_spheres:
         one = sum(t.fraction * 4.0 / 3.0 * math.pi * t.radii[0] ** 3 for t in lift.templates)
     else:
         one = 4.0 / 3.0 * math.pi * max(_molecule_radius(t) for t in lift.templates) ** 3
-    grains = max(math.floor(lift.rain_rate * _fall_time(lift, gravity)), 1)
-    return (grains + 0.5) * one / (area * lift.rain_height)
+    return (grains_at_once(lift) + 0.5) * one / (area * lift.rain_height)
 
 
 def _molecule_radius(template: Template) -> float:
@@ -226,7 +240,8 @@ def molecule_text(template: Template, atom_type: int = 1) -> str:
 def _filling(lift: Lift) -> str:
     look, settle = lift.steps(LOOK), rest_loop(lift, "settle", lift.settle_limit, QUIT)
     if lift.scene.grain_count is not None:
-        time = lift.count / lift.rain_rate + 2.0 * lift.rain_period
+        insertions = math.ceil(lift.count / grains_at_once(lift))
+        time = max(lift.count / lift.rain_rate + 2.0 * lift.rain_period, insertions * _fall_time(lift))
         return _FILL_COUNT.format(steps=lift.steps(time)) + settle
     whole = "" if lift.is_of_spheres else " mol yes"
     fill = _FILL_TO_RIM.format(

@@ -35,6 +35,7 @@ from dem_warp.population import SIZE_VARIANCE
 from experiments.cli import app
 from experiments.errors import InputError
 from experiments.export import EXPORTERS, ExportedTest, case_terms, export_input, term_warnings, write_export
+from experiments.export.lammps_input import grains_at_once
 from experiments.export.lift import Lift, disc, prism
 from experiments.export.sizes import size_classes
 from experiments.studyfile import StudyError, load_card, load_study
@@ -298,11 +299,7 @@ def test_an_input_runs_and_leaves_the_heap(
     code: str, shape: ClumpShape, count: int | None, tmp_path: Path
 ) -> None:
     test = exported(code, shape, grain_count=count)
-    translation = export_input(test, code)
-    write_export(test, code, translation, tmp_path)
-    subprocess.run(translation.command, cwd=tmp_path, check=True, capture_output=True)
-    rows = (tmp_path / translation.heap).read_text().split("ITEM: ATOMS id type x y z radius")[1].splitlines()
-    spheres = np.array([row.split() for row in rows if row.strip()], dtype=float)
+    spheres = _heap_of(test, code, tmp_path)
     grains = len(spheres) / shape.sphere_count
     assert grains == count if count else COUNT < grains < Lift(test).count
     # sizes are those of the templates, and at rest on the plate no sphere sinks in by more than its weight's
@@ -312,6 +309,48 @@ def test_an_input_runs_and_leaves_the_heap(
     assert (spheres[:, 4] > 0.8 * spheres[:, 5]).all()
     # the tube has let go of them
     assert np.hypot(spheres[:, 2], spheres[:, 3]).max() > test.case.scene.diameter / 2
+
+
+@with_programs
+@pytest.mark.parametrize("shape", [SPHERE, ROD], ids=["spheres", "clumps"])
+def test_every_grain_is_poured_however_few_fall_at_once(code: str, shape: ClumpShape, tmp_path: Path) -> None:
+    # so narrow that LAMMPS, which puts in whole grains, pours at three quarters of the rate
+    diameter = 0.008 if shape is SPHERE else 0.011
+    test = exported(code, shape, grain_count=80, diameter=diameter, height=0.06)
+    assert len(_heap_of(test, code, tmp_path)) == 80 * shape.sphere_count
+
+
+@with_programs
+def test_grains_that_fall_off_a_plate_are_gone_whole(code: str, tmp_path: Path) -> None:
+    test = exported(code, ROD, plate_diameter=0.02)
+    spheres = _heap_of(test, code, tmp_path)
+    assert 0 < len(spheres) < COUNT * ROD.sphere_count
+    assert len(spheres) % ROD.sphere_count == 0
+    # who stays has its centre above the disc, of which it is no further than its reach
+    assert np.hypot(spheres[:, 2], spheres[:, 3]).max() < 0.01 + Lift(test).reach
+
+
+@pytest.mark.program("lmp")
+def test_lammps_pours_at_its_rate_up_to_the_rim(tmp_path: Path) -> None:
+    # each look at the grains is a run of its own, and LAMMPS would pour at the start of every one
+    test = exported("lammps", ROD, grain_count=None)
+    _heap_of(test, "lammps", tmp_path)
+    lift, text = Lift(test), (tmp_path / "log.lammps").read_text(encoding="utf-8")
+    rows = [line.split() for line in text.splitlines() if re.fullmatch(r" *\d+ +\d+( +[-+.\de]+){5} *", line)]
+    atoms = {int(row[0]): int(row[1]) for row in rows}
+    step = lift.steps(0.25)
+    fallen = max(count for at, count in atoms.items() if at <= step) / ROD.sphere_count
+    # one more insertion than the time has room for, as the first is at its beginning
+    assert 0 < fallen <= lift.rain_rate * 0.25 + grains_at_once(lift)
+
+
+def _heap_of(test: ExportedTest, code: str, folder: Path) -> np.ndarray:
+    """Run an exported test, and read its heap: id, type, x, y, z, radius."""
+    translation = export_input(test, code)
+    write_export(test, code, translation, folder)
+    subprocess.run(translation.command, cwd=folder, check=True, capture_output=True)
+    rows = (folder / translation.heap).read_text().split("ITEM: ATOMS id type x y z radius")[1].splitlines()
+    return np.array([row.split() for row in rows if row.strip()], dtype=float)
 
 
 FOLLOW = {"liggghts": liggghts_contacts.follow, "lmp": lammps_contacts.follow}
