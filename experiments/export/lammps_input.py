@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 from experiments.export.exporter import Translation
 from experiments.export.lift import LOOK, Lift, Template
@@ -117,7 +118,12 @@ def translate_lift(
     molecules = {_file(number): molecule_text(template) for number, template in enumerate(kinds, 1)}
     files = {INPUT: _setup(lift, contacts) + _filling(lift) + _lifting(lift), **molecules}
     tilted = ("scene tilt: LAMMPS pours along gravity alone; left out",) if lift.scene.tilt else ()
-    translated = (*laws, *lift_rows(lift, exact_tube=True), *_rows(lift))
+    upright = f"(0, 0, -{_gravity(lift):.4g}) m/s2"
+    rows = (
+        replace(row, there=upright) if tilted and row.subject == "gravity" else row
+        for row in lift_rows(lift, exact_tube=True)
+    )
+    translated = (*laws, *rows, *_rows(lift))
     command = ("lmp", "-in", INPUT)
     return Translation(files, INPUT, command, HEAP, translated, warnings + lift_warnings(lift) + tilted)
 

@@ -88,7 +88,9 @@ def _spheres(lift: Lift) -> list[tuple[str, ...]]:
     rows: list[tuple[str, ...]] = [("shape", "x", "y", "z", "radius", "unit")]
     for number, shape in enumerate(lift.case.grains.mixture.shapes, 1):
         for center, radius in zip(shape.centers, shape.radii, strict=True):
-            rows.append((f"{number}", *(f"{1e3 * value:.6f}" for value in (*center, radius)), "mm"))
+            # rounded first, so that no zero has a sign
+            written = (f"{round(1e3 * value, 6) + 0.0:.6f}" for value in (*center, radius))
+            rows.append((f"{number}", *written, "mm"))
     return rows
 
 
@@ -99,11 +101,19 @@ def _protocol(lift: Lift) -> str:
         if scene.grain_count
         else "pour until grains lie above the rim, then take away every grain whose centre is above it"
     )
+    wide = (
+        "an endless plate" if scene.plate_diameter is None else f"a disc of {1e3 * scene.plate_diameter:g} mm"
+    )
+    fractions = lift.case.grains.mixture.fractions
+    parts = ", ".join(f"{part:.4g} of shape {number}" for number, part in enumerate(fractions, 1))
+    mixed = f" By number they are {parts}." if len(fractions) > 1 else ""
+    gravity = ", ".join(f"{part:.4g}" for part in scene.gravity)
     steps = (
-        f"Stand a tube of {1e3 * scene.diameter:g} mm inner diameter and {1e3 * scene.height:g} mm height on "
-        "a plate; both have the wall's material.",
+        f"Stand a tube of {1e3 * scene.diameter:g} mm inner diameter and {1e3 * scene.height:g} mm height in "
+        f"the middle of {wide}; both have the wall's material.",
+        f"Set gravity to ({gravity}) m/s2, z being the tube's axis.",
         f"Create grains at random places and orientations {1e3 * lift.reach:.3g} mm above the rim, at "
-        f"{scene.rain_speed:g} m/s downwards, {lift.rain_rate:.4g} a second; {filling}.",
+        f"{scene.rain_speed:g} m/s downwards, {lift.rain_rate:.4g} a second; {filling}.{mixed}",
         f"Wait until the root mean square speed is below {scene.rest_speed:g} m/s for {scene.rest_time:g} s.",
         f"Lift the tube at {scene.lift_speed:g} m/s along its axis until it is clear of the heap.",
         "Wait for rest again, and export the spheres' centres and radii.",

@@ -178,6 +178,22 @@ def test_sheets_have_the_spheres_and_the_time_step() -> None:
         assert translation.command == ()
 
 
+def test_a_sheet_tells_the_whole_test() -> None:
+    mixture = ShapeMixture((SPHERE, ROD), (0.25, 0.75))
+    test = exported("edem", mixture, plate_diameter=0.05, tilt=math.radians(5.0))
+    text = export_input(test, "edem").files["values.md"]
+    for told in ("a disc of 50 mm", "0.25 of shape 1, 0.75 of shape 2", "gravity to (0.855, 0, -9.773) m/s2"):
+        assert told in text
+    assert "-0.000000" not in text
+
+
+def test_lammps_says_that_its_gravity_is_upright() -> None:
+    translation = export_input(exported("lammps", tilt=math.radians(5.0)), "lammps", approximate=True)
+    [gravity] = [row for row in translation.translated if row.subject == "gravity"]
+    assert gravity.here != gravity.there == "(0, 0, -9.81) m/s2"
+    assert "vector 0 0 -1" in translation.files["lift.in"]
+
+
 @pytest.mark.parametrize("laws", ["edem", "edem-rvd", "edem-c", "relative"])
 def test_a_sheet_for_edem_names_its_rolling_friction_with_its_ratio(laws: str) -> None:
     translation = export_input(exported(laws), "edem")
