@@ -66,6 +66,17 @@ def test_lammps_gets_both_springs_and_both_dampings(contacts: tuple[Contact, Con
         assert numbers == list(terms.values())
 
 
+@pytest.mark.parametrize("restitution", [1.0, 0.999, 0.5, 0.11, 0.1, 0.01])
+def test_lammps_comes_to_any_damping(contacts: tuple[Contact, Contact], restitution: float) -> None:
+    # LAMMPS takes any number for a restitution; its polynomial ends in 0 at 1 but for 3e-4
+    log = math.log(restitution)
+    damping = 2.0 * math.sqrt(5.0 / 6.0) * abs(log) / math.hypot(log, math.pi)
+    law = replace(contacts[0].coefficients, damping=damping)
+    terms = values(EXPORTERS["lammps"].contact_terms(replace(contacts[0], coefficients=law)))
+    assert np.polyval(TSUJI, terms["e"]) == pytest.approx(math.sqrt(1.5) * damping, abs=3.1e-4)
+    assert (terms["e"] < 0.0) is (restitution <= 0.11)
+
+
 def test_liggghts_and_yade_get_the_values_of_the_pair(contacts: tuple[Contact, Contact]) -> None:
     for contact in contacts:
         surface = contact.surface
