@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,7 +23,7 @@ from experiments.measurement.observables import observables_of
 from experiments.measurement.states import Observed, observe
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import TARGET_SCENE
-from imaging import HeapAngle, Snapshot, overlay, save_picture, snapshot
+from imaging import HeapAngle, PictureError, Snapshot, overlay, save_picture, snapshot
 
 
 @dataclass(frozen=True)
@@ -148,22 +149,27 @@ def write_heap(heap: Heap, folder: Path, movie: str = "gif") -> None:
 
     ``snapshot.png`` has the fitted flanks drawn on it; ``snapshot-clean.png``, the same picture without them,
     can be measured again. Frames, if there are any, come into the folder ``frames``, and as a film, of one of
-    `experiments.cases.movie.MOVIES`, beside it. Where no grain is left, as may be in a hopper, there is no
-    picture.
+    `experiments.cases.movie.MOVIES`, beside it. Where no grain is left, as may be in a hopper, or what a program
+    answered cannot be drawn, there is no picture.
     """
     if len(heap.result.positions):
         with replacing(folder / "heap.vtp") as temporary:
             write_spheres(temporary, heap.result)
-        clean = heap_snapshot(heap.study, heap.result, heap.angle)
-        annotated = overlay(clean, heap.angle.views[0]) if heap.angle else clean.image
-        for name, picture in (("snapshot-clean.png", clean.image), ("snapshot.png", annotated)):
-            with replacing(folder / name) as temporary:
-                save_picture(temporary, picture)
+        with suppress(PictureError):  # the heap's reason says as much
+            _write_pictures(heap, folder)
     if heap.film:
         write_frames(heap.film, folder / "frames")
         if movie != NO_MOVIE:
             write_movie(heap.film, folder / f"heap.{movie}")
     write_text(folder / "angle.json", json.dumps(heap.to_dict(), indent=1, allow_nan=False) + "\n")
+
+
+def _write_pictures(heap: Heap, folder: Path) -> None:
+    clean = heap_snapshot(heap.study, heap.result, heap.angle)
+    annotated = overlay(clean, heap.angle.views[0]) if heap.angle else clean.image
+    for name, picture in (("snapshot-clean.png", clean.image), ("snapshot.png", annotated)):
+        with replacing(folder / name) as temporary:
+            save_picture(temporary, picture)
 
 
 def write_spheres(path: Path, result: CaseResult) -> None:

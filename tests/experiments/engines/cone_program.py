@@ -44,6 +44,8 @@ def main(way=""):
             Path("heap.csv").write_text("x,y,z,r\n0,0,high,0.001\n", encoding="utf-8")
         case "columns":
             Path("heap.csv").write_text("x,y,z\n0,0,0\n", encoding="utf-8")
+        case "high":
+            Path("heap.csv").write_text("x,y,z,r\n0,0,0.1,0.001\n", encoding="utf-8")
         case "diverged":
             told = {"status": "diverged", "reason": "a grain was too fast"}
         case "status":

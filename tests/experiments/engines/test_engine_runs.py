@@ -163,3 +163,12 @@ def test_an_engine_that_is_not_there_ends_with_code_2_and_leaves_nothing(
     result = CliRunner().invoke(app, [command, str(study), "--out", str(out), "--device", "cpu", *words])
     assert (result.exit_code, out.exists()) == (2, False)
     assert said in " ".join(result.stderr.split())
+
+
+def test_a_heap_that_cannot_be_drawn_is_told_with_its_reason(write_study: Write, tmp_path: Path) -> None:
+    study, out = write_study(add=section("high")), tmp_path / "out"
+    result = CliRunner().invoke(app, ["heap", str(study), "--out", str(out), "--device", "cpu"])
+    assert result.exit_code == 1
+    assert "no heap" in result.stderr
+    assert (out / "heap.vtp").exists()
+    assert not (out / "snapshot.png").exists()
