@@ -149,8 +149,8 @@ def write_heap(heap: Heap, folder: Path, movie: str = "gif") -> None:
 
     ``snapshot.png`` has the fitted flanks drawn on it; ``snapshot-clean.png``, the same picture without them,
     can be measured again. Frames, if there are any, come into the folder ``frames``, and as a film, of one of
-    `experiments.cases.movie.MOVIES`, beside it. Where no grain is left, as may be in a hopper, or what a program
-    answered cannot be drawn, there is no picture.
+    `experiments.cases.movie.MOVIES`, beside it. Where no grain is left, as may be in a hopper, or a program's
+    answer cannot be drawn, there is no picture.
     """
     if len(heap.result.positions):
         with replacing(folder / "heap.vtp") as temporary:

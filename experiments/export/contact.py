@@ -29,6 +29,8 @@ class Contact:
     radius: float
     mass: float
     """Reduced ones [m], [kg], for codes whose resistance to rolling asks for them."""
+    normal_damping: str = "tsuji"
+    """Choice that the coefficients' damping is for: a number made of the restitution, or a rate [1/s]."""
 
     def __post_init__(self) -> None:
         if names := [mechanism.name for mechanism in self.coefficients.mechanisms]:
@@ -47,9 +49,10 @@ def contacts_of(case: Case[Any], radius: float, mass: float) -> tuple[Contact, C
     """
     grain, wall = case.grain_material, case.scene.wall_material
     among, with_wall = case.contacts(wall)
+    damping = case.laws.normal_damping
     return (
-        Contact(grain, grain, case.grain_grain, among, radius / 2, mass / 2),
-        Contact(grain, wall, case.grain_wall, with_wall, radius, mass),
+        Contact(grain, grain, case.grain_grain, among, radius / 2, mass / 2, damping),
+        Contact(grain, wall, case.grain_wall, with_wall, radius, mass, damping),
     )
 
 

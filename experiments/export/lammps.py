@@ -1,4 +1,4 @@
-"""LAMMPS: ``pair_style granular`` with Hertz, Mindlin's spring with history and Tsuji's damping."""
+"""LAMMPS: ``pair_style granular`` with Hertz, Mindlin's spring with history and any of its dampings."""
 
 from __future__ import annotations
 
@@ -19,7 +19,11 @@ CONVENTIONS = LawsOfCode(
     {
         "normal": {"hertz": "hertz/material"},
         "restitution": {"polynomial": "", "closed_form": "", "thornton": ""},
-        "normal_damping": {"tsuji": "damping tsuji"},
+        "normal_damping": {
+            "tsuji": "damping tsuji",
+            "mass_velocity": "damping mass_velocity",
+            "viscoelastic": "damping viscoelastic",
+        },
         "attraction": {"free": "", "clamped": "limit_damping"},
         "tangential_damping": {"normal": "", "tsuji": "", "none": "", "deme": ""},
         "tangential_history": {
@@ -60,20 +64,33 @@ def contact_terms(contact: Contact) -> tuple[Term, ...]:
     spring = 8.0 * law.shear_modulus
     rolling = law.rolling_spring or spring * contact.radius * math.sqrt(2.0 * ROLLING_OVERLAP)
     # the tangential damping is given as a multiple of the normal one
-    share = 2.0 * math.sqrt(law.shear_modulus / law.modulus) * law.tangential_damping
+    normal, share, multiple = _rate(contact), law.tangential_damping, "that of the laws"
+    if contact.normal_damping == "tsuji":
+        number = tsuji_restitution(law.damping)
+        normal = Term("e", number, "1", "polynomial(e) = sqrt(3/2) x damping", _SOURCE)
+        share, multiple = 2.0 * math.sqrt(law.shear_modulus / law.modulus) * share, "2 sqrt(G* / E*)"
     damping = law.rolling_dashpot or math.sqrt(rolling * contact.mass)
     stiffness = "8 G* R* sqrt(2 x overlap / R), at an overlap of 0.01 R"
     return (
         Term("E", 2.0 * law.modulus, "Pa", "2 E*", _SOURCE),
-        Term("e", tsuji_restitution(law.damping), "1", "polynomial(e) = sqrt(3/2) x damping", _SOURCE),
+        normal,
         Term("nu", 0.0, "1", "0", _SOURCE),
         Term("k_t", spring, "Pa", "8 G*", _SOURCE),
-        Term("x_gamma,t", share, "1", "2 sqrt(G* / E*)", _SOURCE),
+        Term("x_gamma,t", share, "1", multiple, _SOURCE),
         Term("mu_s", law.static_friction, "1", "mu", _SOURCE),
         Term("k_roll", rolling, "N/m", stiffness, _SOURCE),
         Term("gamma_roll", damping, "kg/s", "sqrt(k_roll m*), half the critical damping", _SOURCE),
         Term("mu_roll", law.rolling_friction, "1", "mu_r", _SOURCE),
     )
+
+
+def _rate(contact: Contact) -> Term:
+    """Rate of a damping that the restitution takes no part in."""
+    rate, source = contact.coefficients.damping, _SOURCE
+    if contact.normal_damping == "viscoelastic":
+        # ours is that of an area of 1 mm
+        return Term("eta_n0", 1e3 * rate, "1/(m s)", "damping_rate / 1 mm", source)
+    return Term("eta_n0", rate, "1/s", "damping_rate", source)
 
 
 def granular_words(
@@ -84,16 +101,17 @@ def granular_words(
     `words` are those for each law; left out, Mindlin's spring remembers its displacement and damping may
     attract. With a surface energy [J/m2] the contact adheres after Derjaguin, Muller and Toporov.
     """
-    words = words or {"tangential_history": "mindlin", "attraction": ""}
+    words = words or {"tangential_history": "mindlin", "attraction": "", "normal_damping": "damping tsuji"}
     terms = values(contact_terms(contact))
-    normal = f"hertz/material {terms['E']!r} {terms['e']!r} 0"
+    damping = terms["e"] if "e" in terms else terms["eta_n0"]
+    normal = f"hertz/material {terms['E']!r} {damping!r} 0"
     if surface_energy > 0.0:
-        normal = f"dmt {terms['E']!r} {terms['e']!r} 0 {surface_energy!r}"
+        normal = f"dmt {terms['E']!r} {damping!r} 0 {surface_energy!r}"
     return (
         f"{normal} "
         f"tangential {words['tangential_history']} {terms['k_t']!r} {terms['x_gamma,t']!r} {terms['mu_s']!r} "
         f"rolling sds {terms['k_roll']!r} {terms['gamma_roll']!r} {terms['mu_roll']!r} "
-        f"{words['attraction']} damping tsuji"
+        f"{words['attraction']} {words['normal_damping']}"
     ).replace("  ", " ")
 
 
@@ -140,7 +158,7 @@ def tsuji_restitution(damping: float) -> float:
 
 LAMMPS = Exporter(
     "LAMMPS",
-    "pair_style granular: hertz/material, tangential mindlin, rolling sds, damping tsuji",
+    "pair_style granular: hertz/material, tangential mindlin, rolling sds, damping",
     "Its resistance to rolling is a spring of its own with a slider; only the limit is the case's.",
     lambda material: (),  # LAMMPS has all terms by contact
     contact_terms,

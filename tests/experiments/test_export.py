@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from dem_warp import PRESETS
 from dem_warp.case import Case
+from dem_warp.laws.conventions import NormalDamping
 from experiments.export import EXPORTERS, Contact, contacts_of, values
-from experiments.export.lammps import TSUJI, granular_words
+from experiments.export.lammps import CONVENTIONS, TSUJI, granular_words
 from experiments.studyfile import load_study
+from experiments.verification.problems import lammps_contacts
+from experiments.verification.problems.contact_paths import PATHS, TOLERANCE, PathSetup, difference
 
 RADIUS, MASS = 1.5e-3, 2e-5
 
@@ -105,3 +110,17 @@ def test_what_no_other_code_has_is_refused(case: Case) -> None:
     with_more = load_study(scale="soft", changes=changes).case({}, 1)
     with pytest.raises(ValueError, match=r"terms for the base law alone, got \['micro_slip'\]"):
         contacts_of(with_more, RADIUS, MASS)
+
+
+@pytest.mark.program("lmp")
+@pytest.mark.parametrize(("damping", "rate"), [("mass_velocity", 300.0), ("viscoelastic", 3000.0)])
+def test_a_damping_that_is_lammps_own_goes_the_same_way_there(
+    damping: NormalDamping, rate: float, tmp_path: Path
+) -> None:
+    # a third of the speed is lost; the restitution takes no part
+    laws = replace(PRESETS["lammps"], normal_damping=damping, damping_rate=rate)
+    assert CONVENTIONS.warnings(laws) == ()
+    [path] = [path for path in PATHS if path.name == "pair, rolling"]
+    setup = PathSetup(path, laws)
+    apart = difference(setup, setup.ours("cpu"), lammps_contacts.follow(setup, tmp_path))
+    assert max(apart.values()) < TOLERANCE

@@ -122,7 +122,7 @@ class PathSetup:
             radius = self.pair[0] * self.pair[1] / sum(self.pair)
             mass = self.masses[0] * self.masses[1] / sum(self.masses)
         law = ContactCoefficients.of_pair(self.grain, partner, SURFACE, self.laws, (), radius, mass)
-        return Contact(self.grain, partner, SURFACE, law, radius, mass)
+        return Contact(self.grain, partner, SURFACE, law, radius, mass, self.laws.normal_damping)
 
     @property
     def gravity(self) -> float:
