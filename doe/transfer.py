@@ -229,9 +229,10 @@ def transfer(
     natural = {name: real_array(f"the runs' {name!r}", runs[name]) for name in source.design.names}
     table = coded_points(source.design.factors, pd.DataFrame(natural))
     points = pd.DataFrame(table)[source.design.names].to_numpy(dtype=np.float64)
-    if values.shape != (len(points),) or len(points) < LEAST_RUNS:
-        rule = f"a surface is carried over by {LEAST_RUNS} runs or more, each with one response"
-        raise DesignError(f"{rule}: received {len(points)} runs and responses of shape {values.shape}")
+    if values.shape != (len(points),):
+        raise DesignError(f"{len(points)} runs need one response each, received the shape {values.shape}")
+    if len(points) < LEAST_RUNS:
+        raise DesignError(f"a surface is carried over by {LEAST_RUNS} runs or more, received {len(points)}")
     if not (np.isfinite(values).all() and np.isfinite(points).all()):
         raise DesignError("runs and responses must be finite, received others")
     distance = np.abs(checked_number("the level", level) - values).max()

@@ -18,6 +18,9 @@ from experiments.errors import InputError
 from experiments.export import EXPORTERS, ExportedTest, Translation, export_input
 from experiments.files import write_text
 
+APPROXIMATE = "[engine] approximate = true (bridge: --approximate)"
+"""How a person asks for the nearest of what a code lacks."""
+
 
 @dataclass(frozen=True)
 class Driver:
@@ -56,7 +59,7 @@ class Driver:
 
     def _translation(self, case: Case) -> Translation:
         test = ExportedTest(self.name, case, "the case")
-        translation = export_input(test, self.name, self.approximate)
+        translation = export_input(test, self.name, self.approximate, APPROXIMATE)
         if not (translation.command and translation.heap):
             raise InputError("must be a code whose input can be run here", self.name, "engine")
         return translation

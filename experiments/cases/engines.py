@@ -11,7 +11,7 @@ from experiments.cases.contract import command_program
 from experiments.cases.driver import Driver
 from experiments.cases.engine import Engine
 from experiments.cases.program import ProgramEngine
-from experiments.errors import InputError, StudyError
+from experiments.errors import InputError, Problem, StudyError
 from experiments.studyfile import Study
 from experiments.studyfile.engine_section import EngineSection, quoted
 
@@ -76,6 +76,10 @@ def engine_of(study: Study) -> Engine | None:
     if check is not None:
         try:
             check(study.case({}, seed=0))
+        except InputError as error:
+            # each on its own line: a code may lack more than one message holds
+            found = (Problem(problem.rule, problem.value, place) for problem in error.problems)
+            raise StudyError.of(found) from None
         except ValueError as error:
             raise StudyError(f"{section.name} cannot run this study: {error}", section.name, place) from None
     return engine

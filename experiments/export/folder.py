@@ -16,7 +16,9 @@ README = "README.md"
 """File that says what was translated how."""
 
 
-def export_input(test: ExportedTest, to: str, approximate: bool = False) -> Translation:
+def export_input(
+    test: ExportedTest, to: str, approximate: bool = False, option: str = "--approximate"
+) -> Translation:
     """Translate a test into the input of another code.
 
     Parameters
@@ -27,6 +29,8 @@ def export_input(test: ExportedTest, to: str, approximate: bool = False) -> Tran
         Name of the code, a key of `EXPORTERS`.
     approximate
         Take the nearest for what the code lacks, with a warning at the top of the input.
+    option
+        Words by which a person says so, for the message.
 
     Raises
     ------
@@ -39,9 +43,7 @@ def export_input(test: ExportedTest, to: str, approximate: bool = False) -> Tran
         raise InputError(f"must be one of {', '.join(known)}", to, "--to")
     translation = known[to](test)
     if translation.warnings and not approximate:
-        rule = (
-            f"{EXPORTERS[to].code} must have all of the test, or --approximate takes the nearest that it has"
-        )
+        rule = f"{EXPORTERS[to].code} must have all of the test, or {option} takes the nearest that it has"
         raise InputError.of(Problem(rule, warning, test.source) for warning in translation.warnings)
     return translation
 
