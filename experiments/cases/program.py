@@ -177,7 +177,9 @@ class _Crew:
         except AnswerError as error:
             reason = str(error) + self._put_aside(folder)
             return empty_result(NO_ANSWER, reason, {"engine": program.name})
-        made_by = {"engine": program.name, "seconds": _ending(folder)["seconds"]}
+        # the laws that were asked for; an engine's name says whether the nearest may stand for them
+        asked = {"laws": case.laws.to_dict()}
+        made_by = {"engine": program.name, "seconds": _ending(folder)["seconds"]} | asked
         return replace(result, provenance=result.provenance | made_by)
 
     def _run_afresh(self, case: Case, folder: Path) -> None:

@@ -126,6 +126,7 @@ def test_several_cases_run_at_once_and_come_back_in_order(small_study: Study, tm
     # A cone laid out on half a millimetre: a degree.
     assert angles == pytest.approx([21.0 + noise, 27.0 + noise, 33.0 + noise], abs=1.0)
     assert results[0].provenance["program"] == "cones 1.0"
+    assert results[0].provenance["laws"] == small_study.case({}, 1).laws.to_dict()
 
 
 # ---- every way to fail -------------------------------------------------------------------------------------
