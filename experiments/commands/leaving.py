@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
-from experiments.export import ExportedTest
+from experiments.export import ExportedTest, Translation
 from experiments.studyfile import Study, load_card, load_study
 from experiments.studyfile.campaign import TARGET_SCENE
 from experiments.studyfile.card import is_card
+from experiments.toml_files import read_toml
 
 
 def study_of(path: Path | None, scale: str | None) -> Study:
@@ -22,6 +24,22 @@ def study_of(path: Path | None, scale: str | None) -> Study:
     if path is not None and scale is None and is_card(path):
         return load_card(path)
     return load_study(path, scale)
+
+
+def corrected_for(path: Path | None) -> str:
+    """Name of the solver that a bridge has corrected a card for; empty for any other file."""
+    if path is None:
+        return ""
+    bridge = read_toml(path)[1].get("bridge")
+    return str(bridge.get("engine", "")) if isinstance(bridge, Mapping) and is_card(path) else ""
+
+
+def told_of_bridge(translation: Translation, engine: str, to: str) -> Translation:
+    """Warn of values that a bridge has corrected for another solver than the one that they leave for."""
+    if engine in ("", to):
+        return translation
+    warning = f"the card was corrected for {engine} by a bridge: its values hold there alone"
+    return replace(translation, warnings=(*translation.warnings, warning))
 
 
 def exported_test(

@@ -66,6 +66,10 @@ def test_a_card_is_corrected_for_another_solver_and_verified_there(card: Path, t
     assert bridge(out / "material.toml", "--command", COMMAND)[0] == 2, (
         "a corrected card is not corrected again"
     )
+    leaving = ["export", str(out / "material.toml"), "--to", "edem", "--out", str(tmp_path / "sheet")]
+    assert CliRunner().invoke(app, leaving).exit_code == 0
+    head = (tmp_path / "sheet" / "values.md").read_text().splitlines()[:4]
+    assert any("WARNING: the card was corrected for" in line for line in head), "it holds in the other solver"
 
     log = out / "cases" / "runs.txt"
     before = log.read_text()
