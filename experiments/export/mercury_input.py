@@ -33,7 +33,7 @@ _ROWS = (
     Translated(
         "this driver",
         "",
-        "written for MercuryDPM 1.0.0 alpha of July 2024, run there, and in no record: put this folder "
+        "written for MercuryDPM 1.0.0 alpha of July 2024; no run there is on record. Put this folder "
         "beside `Drivers/Clump/ClumpHeaders`, and build lift.cpp as the drivers there are",
     ),
     Translated(
