@@ -33,6 +33,11 @@ class Lamp:
     """Share of the light that a flank turned away from the lamp lacks."""
     uneven: float = 0.0
     """Change of the light across the picture, relative."""
+    near: tuple[tuple[float, float, float], ...] = ()
+    """Places of small lamps before the heap, in heap radii. The shadows are then those that the grains throw
+    from there, with edges as sharp as `softness` leaves them."""
+    cast: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Share of the light in each channel that a shadow lacks more: other lamps have other colours."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +91,7 @@ def render(
         Height of the cone that casts the shadow.
     """
     rng = np.random.default_rng(phone.seed)
-    fine = _surroundings(surroundings, lamp, camera, heap_height, rng)
+    fine = _surroundings(surroundings, lamp, camera, (heap_height, *spheres), rng)
     _draw_grains(fine, spheres, surroundings, lamp, camera, rng)
     size = (camera.columns, camera.rows)
     image: Layer = np.asarray(cv2.resize(fine, size, interpolation=cv2.INTER_AREA), dtype=np.float32)
@@ -107,9 +112,16 @@ def stored(image: Layer, phone: Phone, rng: np.random.Generator) -> Picture:
 
 
 def _surroundings(
-    around: Surroundings, lamp: Lamp, camera: PhoneCamera, heap_height: float, rng: np.random.Generator
+    around: Surroundings,
+    lamp: Lamp,
+    camera: PhoneCamera,
+    heap: tuple[float, FloatArray, FloatArray],
+    rng: np.random.Generator,
 ) -> Layer:
-    """Wall, table top and table front, with the heap's shadow, as fine pixels."""
+    """Wall, table top and table front, with the heap's shadow, as fine pixels.
+
+    `heap` is the height of its cone with the centres and radii of its grains.
+    """
     ray = camera.rays(FINE)
     x0, y0, z0 = (np.float32(value) for value in camera.place)
     down = np.minimum(ray[..., 2], -1e-6)
@@ -131,7 +143,12 @@ def _surroundings(
         image *= (1.0 + around.texture * _pattern(image.shape[:2], rng))[..., None]
     reach = np.where(top, to_top, np.where(front, to_front, to_wall))
     place = ray * reach[..., None] + np.array([x0, y0, z0], dtype=np.float32)
-    image *= (1.0 - lamp.shadow * _shadow(place, lamp, heap_height, camera))[..., None]
+    if lamp.near:
+        lacks = lamp.shadow + np.array(lamp.cast, dtype=np.float32)
+        for source in lamp.near:
+            image *= 1.0 - _sharp_shadow(place, source, lamp.softness, heap[1:], camera)[..., None] * lacks
+    else:
+        image *= (1.0 - lamp.shadow * _shadow(place, lamp, heap[0], camera))[..., None]
     foot = np.hypot(top_x, top_y)
     near_heap = np.where(top, np.clip(1.0 - (foot - 1.0) / 0.12, 0.0, 1.0), 0.0)
     return np.asarray(image * (1.0 - 0.25 * near_heap**2)[..., None], dtype=np.float32)
@@ -151,6 +168,42 @@ def _shadow(place: Layer, lamp: Lamp, heap_height: float, camera: PhoneCamera) -
     pixels = 0.5 * camera.share * camera.columns * FINE / 4.0
     soft = cv2.GaussianBlur(hidden, (0, 0), max(lamp.softness * pixels, 0.7))
     return np.asarray(cv2.resize(soft, place.shape[1::-1], interpolation=cv2.INTER_LINEAR))
+
+
+def _sharp_shadow(
+    place: Layer,
+    source: tuple[float, float, float],
+    softness: float,
+    spheres: tuple[FloatArray, FloatArray],
+    camera: PhoneCamera,
+) -> Layer:
+    """Share of a small lamp, 0 to 1, that the grains hide from each place beside the heap.
+
+    The grains are drawn as the lamp sees them; each place looks there whether one is in its way.
+    """
+    centers, radii = spheres
+    lamp = np.array(source)
+    ahead = -lamp / np.linalg.norm(lamp)
+    right = np.cross(ahead, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    axes = np.stack([right, np.cross(ahead, right), ahead])
+    pixels = 0.5 * camera.share * camera.columns * FINE * float(np.linalg.norm(lamp))
+    seen = (centers - lamp) @ axes.T
+    flat, depth = seen[:, :2] / seen[:, 2:], seen[:, 2]
+    margin = 2.0 * float((radii / depth).max()) + 8.0 * softness / float(np.linalg.norm(lamp))
+    low = flat.min(axis=0) - margin
+    columns, rows = np.ceil((flat.max(axis=0) + margin - low) * pixels).astype(int)
+    view = np.zeros((rows, columns), np.uint8)
+    fixed = pixels * 2**SUBPIXEL_BITS
+    for middle, size in zip(np.rint((flat - low) * fixed).astype(int), radii / depth, strict=True):
+        cv2.circle(view, middle.tolist(), round(size * fixed), 255, -1, cv2.LINE_AA, SUBPIXEL_BITS)
+    blur = max(softness * 0.5 * camera.share * camera.columns * FINE, 0.5)
+    hidden = cv2.GaussianBlur(view, (0, 0), blur).astype(np.float32) / 255.0
+    turned = ((place - lamp.astype(np.float32)) @ axes.T.astype(np.float32)).astype(np.float32)
+    # What lies beside the lamp or behind it sees no heap in its way.
+    before = np.maximum(turned[..., 2:], 0.1)
+    at = ((turned[..., :2] / before - low) * pixels).astype(np.float32)
+    return np.asarray(cv2.remap(hidden, at[..., 0], at[..., 1], cv2.INTER_LINEAR), dtype=np.float32)
 
 
 def _pattern(shape: tuple[int, int], rng: np.random.Generator) -> Layer:

@@ -35,12 +35,25 @@ class Photograph:
 
 def photograph(seed: int) -> Photograph:
     """Draw the photograph of a seed: always the same for the same seed."""
-    rng = np.random.default_rng([21, seed])
+    return _shot(np.random.default_rng([21, seed]), seed)
+
+
+def photograph_in_hard_light(seed: int) -> Photograph:
+    """Draw a photograph whose heap casts a sharp shadow on the near wall and the plate, beside a flank."""
+    return _shot(np.random.default_rng([22, seed]), seed, hard=True)
+
+
+def _shot(rng: np.random.Generator, seed: int, hard: bool = False) -> Photograph:
     heap = _heap(rng, seed)
     setting = str(rng.choice(SETTINGS, p=(0.35, 0.4, 0.25)))
     camera = _camera(rng, heap)
     around = _surroundings(rng, setting)
-    lamp = _lamp(rng)
+    if hard:
+        behind = rng.uniform(1.1, 2.0)
+        around = replace(around, wall_distance=behind, far=min(around.far, behind))
+        lamp = _hard_lamp(rng, heap, behind)
+    else:
+        lamp = _lamp(rng)
     phone = Phone(
         blur=rng.uniform(0.4, 1.4),
         noise=rng.uniform(0.5, 6.0),
@@ -135,6 +148,30 @@ def _lamp(rng: np.random.Generator) -> Lamp:
         softness=rng.uniform(0.03, 0.3),
         shade=rng.uniform(0.1, 0.5),
         uneven=float(rng.normal(0.0, 0.15)),
+    )
+
+
+def _hard_lamp(rng: np.random.Generator, heap: GrainHeap, behind: float) -> Lamp:
+    """One or two flashes or bare bulbs, each throwing the tip's shadow on the wall to one side of the heap."""
+    tip = np.array([0.0, 0.0, heap.height])
+    side = float(rng.choice([-1.0, 1.0]))
+    places = []
+    for turned in (side, -side)[: 1 + int(rng.uniform() < 0.25)]:
+        aside, level = turned * rng.uniform(0.1, 0.8), rng.uniform(0.4, 1.2)
+        back = tip - np.array([aside, behind, level * heap.height])
+        place = tip + np.exp(rng.uniform(np.log(3.0), np.log(20.0))) * back / np.linalg.norm(back)
+        places.append((float(place[0]), float(place[1]), max(float(place[2]), 0.1)))
+    lacks = rng.uniform(0.2, 0.7)
+    blue, green, red = lacks * (rng.uniform(0.0, 0.08) * rng.uniform(-1.0, 1.0, 3))
+    across, away, up = np.array(places[0]) / np.linalg.norm(places[0])
+    return Lamp(
+        direction=(float(across), float(away), float(up)),
+        shadow=float(lacks),
+        softness=rng.uniform(0.0, 0.02),
+        shade=rng.uniform(0.1, 0.5),
+        uneven=float(rng.normal(0.0, 0.15)),
+        near=tuple(places),
+        cast=(float(blue), float(green), float(red)),
     )
 
 
