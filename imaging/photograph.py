@@ -27,6 +27,7 @@ from imaging.looks import apart_from_plate, grains_together, with_faint, without
 from imaging.outline import Outline, levelled
 from imaging.plate import PlateLine
 from imaging.reasons import Doubt
+from imaging.shade import MOST_SHADED, shaded_share, without_sharp_shadows
 from imaging.sighting import Sighting, darker_below, refuse_brimful, sight, without_strays
 from imaging.view import View, level_angle
 
@@ -140,6 +141,9 @@ def find_heap(picture: Picture, given: PlateLine | None, view: View, place: str)
     if best.crooked > NO_HEAP:
         rule = "two straight flanks meet at the tip of a heap"
         raise PictureError(rule, f"no heap: an outline {best.crooked:.2f} of its height off two lines", place)
+    share = shaded_share(seen, best.sighting.rows, best.sighting.plate)
+    if share > MOST_SHADED and (lit := _without_sharp_shadow(seen, best, given, view, place)):
+        best, finding, share = lit, "", 0.0
     if given is None:
         refuse_brimful(seen, best.sighting, best.ends, place)
     doubts = list(best.sighting.doubts)
@@ -147,6 +151,9 @@ def find_heap(picture: Picture, given: PlateLine | None, view: View, place: str)
         doubts.append(
             Doubt("shade", "what is below the whole heap is darker than beside it: its shadow, or a dish?")
         )
+    if share > MOST_SHADED:
+        found = f"{share:.2f} of a flank's edge has wall below it, darker, and no grains: a sharp shadow?"
+        doubts.append(Doubt("shade", found))
     if best.clear and finding:
         doubts.append(Doubt("threshold", finding))
     return replace(best.sighting, doubts=tuple(doubts))
@@ -203,6 +210,21 @@ def _without_its_shadow(
     if len(plain) > 1 and not any(firm.like(judged) for judged in plain):
         return best, tries
     return best if firm.like(best) else firm, shadowless
+
+
+def _without_sharp_shadow(
+    seen: Contrast, best: Judged, given: PlateLine | None, view: View, place: str
+) -> Judged | None:
+    """The heap within a sharp shadow's edge, where both thresholds show one without a doubt, and no shadow."""
+    width = int(np.isfinite(best.sighting.rows).sum())
+    tries, _ = _tries(without_sharp_shadows(seen, width), given, view, place)
+    firm = _first_of_best(tries)
+    if firm is None or len(tries) < 2 or not all(judged.clear for judged in tries):
+        return None
+    if firm.shift(tries) > LARGEST_SHIFT:
+        return None
+    shaded = shaded_share(seen, firm.sighting.rows, firm.sighting.plate)
+    return firm if shaded <= MOST_SHADED else None
 
 
 def _tries(
