@@ -142,8 +142,10 @@ def find_heap(picture: Picture, given: PlateLine | None, view: View, place: str)
         rule = "two straight flanks meet at the tip of a heap"
         raise PictureError(rule, f"no heap: an outline {best.crooked:.2f} of its height off two lines", place)
     share = shaded_share(seen, best.sighting.rows, best.sighting.plate)
-    if share > MOST_SHADED and (lit := _without_sharp_shadow(seen, best, given, view, place)):
-        best, finding, share = lit, "", 0.0
+    if share > MOST_SHADED:
+        width = int(np.isfinite(best.sighting.rows).sum())
+        if lit := _without_sharp_shadow(seen, width, given, view, place):
+            best, finding, share = lit, "", 0.0
     if given is None:
         refuse_brimful(seen, best.sighting, best.ends, place)
     doubts = list(best.sighting.doubts)
@@ -213,10 +215,9 @@ def _without_its_shadow(
 
 
 def _without_sharp_shadow(
-    seen: Contrast, best: Judged, given: PlateLine | None, view: View, place: str
+    seen: Contrast, width: int, given: PlateLine | None, view: View, place: str
 ) -> Judged | None:
-    """The heap within a sharp shadow's edge, where both thresholds show one without a doubt, and no shadow."""
-    width = int(np.isfinite(best.sighting.rows).sum())
+    """The heap, about so wide, within a sharp shadow's edge, where both thresholds show it without a doubt."""
     tries, _ = _tries(without_sharp_shadows(seen, width), given, view, place)
     firm = _first_of_best(tries)
     if firm is None or len(tries) < 2 or not all(judged.clear for judged in tries):

@@ -21,8 +21,8 @@ DARKEST, LIGHTEST = 0.2, 0.95
 HUE_NOISE, HUE_DIFFERENCE = 4.0, 8.0
 """Multiple of the wall's noise, and difference [of 255], within which a hue is the wall's: a second lamp's
 colour tints a shadow by as much."""
-CALM_SHARE = 0.01
-"""Radius of a window that holds parts of several grains, in the heap's widths."""
+CALM_SHARE = 0.006
+"""Radius of a window that holds parts of some grains, in the heap's widths."""
 WALL_CALM = 0.9
 """Part of the wall that is no more uneven than what counts as even."""
 CALM = 1.3
@@ -35,8 +35,11 @@ tenths of a degree."""
 MOST_SHADED = 0.1
 """Share of a flank's columns with such a band from which on the edge is a shadow's: black grains leave some
 windows even."""
-WHOLLY = 0.9
-"""Share of a heap's middle from which on a powder without texture has the wall's hue, and tells nothing."""
+PARTLY = 0.5
+"""Share of a heap's middle with the wall's hue and no grains from which on it is a grey powder, whose edge is
+no shadow's where it is as light as the middle."""
+SAME_LIGHT = 1.25
+"""Factor within which two parts of a powder are as light as one another: a lamp leaves one flank darker."""
 CORE = 0.15
 """Half of the middle's width, in widths."""
 LOWER_CUT = 0.6
@@ -48,7 +51,7 @@ SPECK = 5
 def shaded_share(seen: Contrast, rows: FloatArray, plate: PlateLine) -> float:
     """Share of a flank's edge below which lies a band of shaded wall, of the flank that has more of it.
 
-    It is 0 where the whole heap is like that: a grey powder before a white wall is as even as its shadow.
+    A grey powder before a white wall is as even as its shadow; there only what is less or more light counts.
 
     Parameters
     ----------
@@ -60,18 +63,29 @@ def shaded_share(seen: Contrast, rows: FloatArray, plate: PlateLine) -> float:
     columns = np.flatnonzero(np.isfinite(rows))
     edge, ground = rows[columns], np.minimum(plate.rows_at(columns), len(seen.values))
     height = np.maximum(ground - edge, 0.0)
+    dimming = _dimming(seen)[:, columns]
     like = _like_wall(seen, len(columns))[:, columns]
     row = np.arange(len(like))[:, None]
     tip, tallest = int(height.argmax()), float(height.max())
     middle = slice(max(tip - round(CORE * len(columns)), 0), tip + round(CORE * len(columns)) + 1)
     inner = ((row >= edge + 0.25 * height) & (row < ground - 0.1 * height))[:, middle]
-    if not inner.any() or float(like[:, middle][inner].mean()) > WHOLLY:
+    if not inner.any():
         return 0.0
+    alike = float(like[:, middle][inner].mean())
+    within = float(np.median(dimming[:, middle][inner])) if alike > PARTLY else None
     first = np.ceil(edge) + EDGE
     other = (~like & (row >= first)) | (row >= ground)
     depth = np.where(other.any(axis=0), other.argmax(axis=0), len(like)) - first
     deep = depth > BAND * tallest
-    return float(max((flank.mean() for flank in (deep[:tip], deep[tip:]) if len(flank)), default=0.0))
+    shares = [0.0]
+    for flank in (slice(None, tip), slice(tip, None)):
+        if not deep[flank].any():
+            continue
+        band = (row >= first) & (row <= first + BAND * tallest) & deep
+        light = float(np.median(dimming[:, flank][band[:, flank]]))
+        if within is None or not 1.0 / SAME_LIGHT < light / within < SAME_LIGHT:
+            shares.append(float(deep[flank].mean()))
+    return max(shares)
 
 
 def without_sharp_shadows(seen: Contrast, width: int) -> Contrast:

@@ -19,7 +19,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from experiments.benchmarks.photographs.sampling import photograph
+from experiments.benchmarks.photographs.sampling import Photograph, photograph, photograph_in_hard_light
 from experiments.benchmarks.photographs.without import picture_without_heap
 from imaging import PictureError, ReposeAngle, measure, overlay, read_picture, save_picture
 from imaging.geometry import Picture
@@ -47,7 +47,15 @@ def measured(picture: Picture) -> tuple[str, ReposeAngle | None, str]:
 
 def with_heap(seed: int) -> tuple[Row, Picture]:
     """Row of a photograph of a heap, with what is to be shown of it."""
-    shot = photograph(seed)
+    return _row_of(photograph(seed), seed)
+
+
+def in_hard_light(seed: int) -> tuple[Row, Picture]:
+    """The same for a heap that throws a sharp shadow on the wall beside it."""
+    return _row_of(photograph_in_hard_light(seed), seed)
+
+
+def _row_of(shot: Photograph, seed: int) -> tuple[Row, Picture]:
     outcome, angle, why = measured(shot.picture)
     row: Row = {
         "kind": shot.setting,
@@ -113,30 +121,37 @@ def contact_sheet(tiles: list[tuple[str, Picture]]) -> Picture:
     return np.asarray(np.vstack(rows), dtype=np.uint8)
 
 
-def summary(heaps: list[Row], others: list[Row]) -> str:
+def summary(heaps: list[Row], others: list[Row], hard: list[Row]) -> str:
     """The figures, as lines of Markdown."""
+    silent = Counter(row["outcome"] for row in others)
+    table = {f"pictures of heaps{name}": value for name, value in _figures(heaps).items()}
+    table["pictures without a heap"] = len(others)
+    counts = ", ".join(str(silent[outcome]) for outcome in ("refused", "marked", "measured"))
+    table["of these refused, marked, measured"] = counts
+    if hard:
+        table |= {
+            f"heaps with a sharp shadow on the wall{name}": value for name, value in _figures(hard).items()
+        }
+    lines = [f"| {name} | {value} |" for name, value in table.items()]
+    return "\n".join(["| | |", "|---|---|", *lines])
+
+
+def _figures(heaps: list[Row]) -> dict[str, Any]:
     clear = [row for row in heaps if row["outcome"] == "measured"]
     errors = np.abs([row["error"] for row in clear])
     marked = [abs(row["error"]) for row in heaps if row["outcome"] == "marked"]
     count = Counter(row["outcome"] for row in heaps)
-    silent = Counter(row["outcome"] for row in others)
     quantiles = f"{np.median(errors):.2f}, {np.quantile(errors, 0.95):.2f}, {errors.max():.2f}"
     outcomes = f"{count['measured']}, {count['marked']}, {count['refused']}"
     far = f"{len(marked)}, {int((np.array(marked) > 1.0).sum())}"
-    table = {
-        "pictures of heaps": len(heaps),
-        "measured, marked as doubtful, refused": outcomes,
-        "error of the measured: median, 95th percentile, greatest [degrees]": quantiles,
-        "measured and wrong by more than 2 degrees": int((errors > 2.0).sum()),
-        "marked, of these wrong by more than 1 degree": far,
-        "95 % intervals that hold the truth [%]": f"{100.0 * np.mean([row['covered'] for row in clear]):.1f}",
-        "pictures without a heap": len(others),
-        "of these refused, marked, measured": ", ".join(
-            str(silent[outcome]) for outcome in ("refused", "marked", "measured")
-        ),
+    return {
+        "": len(heaps),
+        ": measured, marked as doubtful, refused": outcomes,
+        ": error of the measured: median, 95th percentile, greatest [degrees]": quantiles,
+        ": measured and wrong by more than 2 degrees": int((errors > 2.0).sum()),
+        ": marked, of these wrong by more than 1 degree": far,
+        ": 95 % intervals that hold the truth [%]": f"{100.0 * np.mean([row['covered'] for row in clear]):.1f}",
     }
-    lines = [f"| {name} | {value} |" for name, value in table.items()]
-    return "\n".join(["| | |", "|---|---|", *lines])
 
 
 def main() -> None:
@@ -145,21 +160,24 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=100_000, help="first seed")
     parser.add_argument("--heaps", type=int, default=500)
     parser.add_argument("--others", type=int, default=200)
+    parser.add_argument("--hard", type=int, default=60, help="heaps with a sharp shadow on the wall")
     parser.add_argument("--folder", type=Path, help="more pictures without a heap")
     parser.add_argument("--workers", type=int, help="processes; left out: one a core")
     parser.add_argument("--out", type=Path, required=True)
     chosen = parser.parse_args()
     chosen.out.mkdir(parents=True, exist_ok=True)
     found = sorted(chosen.folder.iterdir()) if chosen.folder else []
-    seeds = range(chosen.first, chosen.first + max(chosen.heaps, chosen.others))
+    seeds = range(chosen.first, chosen.first + max(chosen.heaps, chosen.others, chosen.hard))
     tasks: dict[str, list[Task]] = {
         "heaps": [(with_heap, seed) for seed in seeds[: chosen.heaps]],
         "others": [(without_heap, source) for source in (*seeds[: chosen.others], *found)],
+        "hard": [(in_hard_light, seed) for seed in seeds[: chosen.hard]],
     }
     with ProcessPoolExecutor(chosen.workers) as pool:
         seen = {name: list(pool.map(one, each, chunksize=4)) for name, each in tasks.items()}
     for name, pairs in seen.items():
-        write(chosen.out, name, pairs)
+        if pairs:
+            write(chosen.out, name, pairs)
     figures = summary(*([row for row, _ in pairs] for pairs in seen.values()))
     (chosen.out / "README.md").write_text(page(figures, chosen), encoding="utf-8")
     print(figures)
@@ -180,7 +198,7 @@ def write(folder: Path, name: str, pairs: list[tuple[Row, Picture]]) -> None:
 
 def page(figures: str, chosen: argparse.Namespace) -> str:
     """Page of a record, with the notes that its folder has."""
-    command = f"--first {chosen.first} --heaps {chosen.heaps} --others {chosen.others}"
+    command = f"--first {chosen.first} --heaps {chosen.heaps} --others {chosen.others} --hard {chosen.hard}"
     file = chosen.out / "notes.md"
     notes = f"\n{file.read_text(encoding='utf-8')}" if file.exists() else ""
     return f"""# Photograph-like pictures, measured
@@ -191,11 +209,13 @@ def page(figures: str, chosen: argparse.Namespace) -> str:
 
 Seeds below 1000, 800000 to 800299 and those of earlier series were used while the rules were made; these
 are others. A *marked* angle is shown with its doubt and left out of a mean. Every picture has a row in
-`heaps.csv` or `others.csv`.
+`heaps.csv`, `others.csv` or `hard.csv`.
 
 ![Some of the heaps; in brackets the true angle](heaps.jpg)
 
 ![Some of the pictures without a heap](others.jpg)
+
+![Some of the heaps in hard light](hard.jpg)
 {notes}"""
 
 
