@@ -217,7 +217,7 @@ def _without_its_shadow(
 def _without_sharp_shadow(
     seen: Contrast, width: int, given: PlateLine | None, view: View, place: str
 ) -> Judged | None:
-    """The heap, about so wide, within a sharp shadow's edge, where both thresholds show it without a doubt."""
+    """The heap, about so wide, without its sharp shadow, where both thresholds show it without a doubt."""
     tries, _ = _tries(without_sharp_shadows(seen, width), given, view, place)
     firm = _first_of_best(tries)
     if firm is None or len(tries) < 2 or not all(judged.clear for judged in tries):

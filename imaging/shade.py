@@ -1,6 +1,6 @@
 """Sharp shadows on the wall beside a heap: the wall's own colour and texture, with less light.
 
-A shadow's edge is as sharp as the heap's under a flash or a bare bulb, so that no threshold moves it. But what
+Under a flash or a bare bulb a shadow's edge is as sharp as the heap's, and no threshold moves it. But what
 lies within it is the wall: its hue, and no grains.
 """
 

@@ -146,7 +146,7 @@ def _surroundings(
     if lamp.near:
         lacks = lamp.shadow + np.array(lamp.cast, dtype=np.float32)
         for source in lamp.near:
-            image *= 1.0 - _sharp_shadow(place, source, lamp.softness, heap[1:], camera)[..., None] * lacks
+            image *= 1.0 - sharp_shadow(place, source, lamp.softness, heap[1:], camera)[..., None] * lacks
     else:
         image *= (1.0 - lamp.shadow * _shadow(place, lamp, heap[0], camera))[..., None]
     foot = np.hypot(top_x, top_y)
@@ -170,16 +170,29 @@ def _shadow(place: Layer, lamp: Lamp, heap_height: float, camera: PhoneCamera) -
     return np.asarray(cv2.resize(soft, place.shape[1::-1], interpolation=cv2.INTER_LINEAR))
 
 
-def _sharp_shadow(
+def sharp_shadow(
     place: Layer,
     source: tuple[float, float, float],
     softness: float,
     spheres: tuple[FloatArray, FloatArray],
     camera: PhoneCamera,
 ) -> Layer:
-    """Share of a small lamp, 0 to 1, that the grains hide from each place beside the heap.
+    """Share of a small lamp, 0 to 1, that the grains hide from each place beside the heap or behind it.
 
     The grains are drawn as the lamp sees them; each place looks there whether one is in its way.
+
+    Parameters
+    ----------
+    place : (rows, columns, 3) array
+        Places on table and wall, in heap radii.
+    source : (float, float, float)
+        Place of the lamp.
+    softness : float
+        Blur of the shadow's edge.
+    spheres
+        Centres (n, 3) and radii (n,).
+    camera : PhoneCamera
+        Tells how finely to draw.
     """
     centers, radii = spheres
     lamp = np.array(source)

@@ -144,13 +144,14 @@ def _figures(heaps: list[Row]) -> dict[str, Any]:
     quantiles = f"{np.median(errors):.2f}, {np.quantile(errors, 0.95):.2f}, {errors.max():.2f}"
     outcomes = f"{count['measured']}, {count['marked']}, {count['refused']}"
     far = f"{len(marked)}, {int((np.array(marked) > 1.0).sum())}"
+    held = 100.0 * np.mean([row["covered"] for row in clear])
     return {
         "": len(heaps),
         ": measured, marked as doubtful, refused": outcomes,
         ": error of the measured: median, 95th percentile, greatest [degrees]": quantiles,
         ": measured and wrong by more than 2 degrees": int((errors > 2.0).sum()),
         ": marked, of these wrong by more than 1 degree": far,
-        ": 95 % intervals that hold the truth [%]": f"{100.0 * np.mean([row['covered'] for row in clear]):.1f}",
+        ": 95 % intervals that hold the truth [%]": f"{held:.1f}",
     }
 
 

@@ -152,7 +152,7 @@ def _lamp(rng: np.random.Generator) -> Lamp:
 
 
 def _hard_lamp(rng: np.random.Generator, heap: GrainHeap, behind: float) -> Lamp:
-    """One or two flashes or bare bulbs, each throwing the tip's shadow on the wall to one side of the heap."""
+    """One or two flashes or bare bulbs, each throwing the tip's shadow on the wall beside the heap."""
     tip = np.array([0.0, 0.0, heap.height])
     side = float(rng.choice([-1.0, 1.0]))
     places = []

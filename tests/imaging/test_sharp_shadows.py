@@ -1,0 +1,78 @@
+"""Sharp shadows that a flash throws on the wall beside a heap: taken off, or doubted, never believed."""
+
+import cv2
+import numpy as np
+import pytest
+
+from imaging import measure
+from imaging.synthetic import Camera, DrawnHeap, draw
+
+WALL, PLATE, STRAW, COAL = (235, 235, 230), (120, 110, 100), (45, 70, 95), (60, 62, 64)
+ANGLE, WIDTH = 30.0, 400.0
+
+
+def in_hard_light(
+    keeps: float,
+    aside: float,
+    sides: tuple[int, ...] = (1, -1),
+    color: tuple[int, int, int] = STRAW,
+    grain: float = 0.0,
+    texture: float = 0.0,
+) -> np.ndarray:
+    """A heap of 30 degrees whose shadow, 0.9 of its height, keeps a share of the wall's light.
+
+    It lies `aside` of the heap's half width to the right (side 1), to the left (-1), or on both sides.
+    """
+    camera = Camera(heap=color, background=WALL, plate=PLATE, texture=texture, margin=0.4)
+    picture = draw(DrawnHeap(ANGLE, ANGLE, WIDTH, grain=grain), camera).astype(float)
+    away = np.linalg.norm(picture - WALL, axis=2)
+    table = int(np.flatnonzero(away[:, 0] > 30.0)[0])
+    wall = np.clip(1.0 - away / np.linalg.norm(np.subtract(WALL, color)), 0.0, 1.0)
+    wall[table:] = 0.0
+    shadow = np.zeros(picture.shape[:2], np.uint8)
+    half, height = 0.5 * WIDTH, 0.5 * WIDTH * np.tan(np.radians(ANGLE))
+    for side in sides:
+        tip = 0.5 * picture.shape[1] + side * aside * half
+        corners = [[tip - half, table], [tip, table - 0.9 * height], [tip + half, table]]
+        cv2.fillPoly(shadow, [np.rint(16.0 * np.array(corners)).astype(np.int32)], 255, cv2.LINE_AA, 4)
+    picture *= 1.0 - (1.0 - keeps) * (wall * shadow / 255.0)[:, :, None]
+    noise = np.random.default_rng(0).normal(0.0, 2.0, picture.shape)
+    return np.clip(np.rint(picture + noise), 0, 255).astype(np.uint8)
+
+
+@pytest.mark.parametrize("sides", [(1,), (-1,), (1, -1)], ids=["right", "left", "both"])
+@pytest.mark.parametrize("aside", [0.2, 0.3])
+@pytest.mark.parametrize("keeps", [0.3, 0.45, 0.6])
+def test_a_sharp_shadow_is_no_part_of_the_heap(keeps: float, aside: float, sides: tuple[int, ...]) -> None:
+    """Taken for the heap's on both sides, it makes the angle 4 degrees flatter at 0.2, and 6 at 0.3."""
+    angle = measure(in_hard_light(keeps, aside, sides))
+    assert angle.doubts == ()
+    # The promise for smooth heaps of 400 pixels.
+    assert angle.mean == pytest.approx(ANGLE, abs=0.3)
+
+
+@pytest.mark.parametrize("keeps", [0.3, 0.6])
+def test_a_sharp_shadow_hardly_moves_the_angle_of_grains(keeps: float) -> None:
+    lit = measure(in_hard_light(1.0, 0.3, grain=14.0, texture=0.15))
+    angle = measure(in_hard_light(keeps, 0.3, grain=14.0, texture=0.15))
+    assert angle.doubts == ()
+    # Two thirds of the standard error of such grains, .3 degrees.
+    assert angle.mean == pytest.approx(lit.mean, abs=0.2)
+
+
+@pytest.mark.parametrize("keeps", [0.45, 0.6])
+@pytest.mark.parametrize("aside", [0.2, 0.3])
+def test_a_shadow_beside_grains_of_the_walls_hue_is_doubted(keeps: float, aside: float) -> None:
+    """Coal before a white wall: only its light, .26 of the wall's, tells it from its shadow."""
+    angle = measure(in_hard_light(keeps, aside, color=COAL, grain=14.0, texture=0.15))
+    assert angle.mean < ANGLE - 2.0
+    assert "shade" in [doubt.name for doubt in angle.doubts]
+
+
+@pytest.mark.parametrize("texture", [0.0, 0.15])
+def test_a_powder_of_the_walls_hue_is_no_shadow(texture: float) -> None:
+    """As even as a shadow, and darker than the wall: but its edge is as light as its middle."""
+    angle = measure(in_hard_light(1.0, 0.0, color=COAL, grain=14.0 if texture else 0.0, texture=texture))
+    assert angle.doubts == ()
+    # Two standard errors of flanks of 14 grains.
+    assert angle.mean == pytest.approx(ANGLE, abs=0.64)
