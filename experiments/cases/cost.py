@@ -4,34 +4,35 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
-from dem_warp import Case, DrawDown, LiftedCylinder
+from dem_warp import Case
 from dem_warp.device import resolve_device
 from dem_warp.laws.contact_law import memory_size
 from dem_warp.room import neighbour_room
-from dem_warp.scenes.poured_scene import PouredScene
-from dem_warp.solver import CHUNK
-
-BULK_FRACTION = 0.55
-"""Solid fraction of a poured bed, roughly."""
-
-SLOPE = math.tan(math.radians(35.0))
-"""Slope of a heap while the tube still leads it, roughly: its top is what the tube must clear."""
-
-FALL, CALM, REST = 0.25, 0.1, 0.35
-"""Time that the last grain of a counted rain takes to lie still, a bed to be at rest, and a heap [s]."""
-
-TRICKLE = 1.4
-"""Time that the last grains of a draw-down take to trickle down and to rest, beyond its flow [s]: 0.7 to 2.2
-in seven runs, with balls of 2.5 to 4 mm radius and slots of 36 to 60 mm."""
+from dem_warp.scenes.poured_scene import PouredScene, default_skin
+from dem_warp.walls import Mesh
+from experiments.cases.course import BULK_FRACTION, expected_course
 
 IDLE_SPHERES = 100.0
 """Spheres that cost as much as a step without any."""
+
+LAW_COSTS = {"jkr": 1.55, "capillary_bridge": 1.2}
+"""Times that a law makes the grains of a step dearer, by its name: the reference cases of `workers.speed`
+with it over those without, on one core; the other mechanisms that were timed lie within 1.1 of 1."""
+
+APART = 0.9
+"""Least distance of two spheres of different grains, over the sum of their radii, roughly."""
+
+POINTS = (0.5 + np.arange(2048)[:, None] * 1.2207440846057596 ** np.array([-1.0, -2.0, -3.0])) % 1.0
+"""Points that fill a unit cube evenly, (n, 3): Roberts' sequence, whose ratio solves x^4 = x + 1."""
+
+SKIN_STEP = 0.05
+"""Step of the logarithm of the skin at which neighbours are counted."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,15 @@ class Cost:
     """Their spheres."""
     steps: float
     """Time steps from the first grain to rest."""
+    present: float = 1.0
+    """Part of the grains that is there, the mean over the steps."""
+    looked: float = 0.0
+    """Skins that the fastest grain uses up in a step, times the entries of all neighbour lists, the mean over
+    the steps: the lists are looked through whenever a part of the skin is used up."""
+    law: float = 1.0
+    """Times that the contact law makes a grain's step dearer than the base law."""
+    meshed: bool = False
+    """A wall is a mesh: the kernels that know meshes are slower, whatever touches."""
 
     @property
     def sphere_steps(self) -> float:
@@ -57,7 +67,23 @@ def cost_of(case: Case[Any]) -> Cost:
     if not isinstance(scene, PouredScene):
         return Cost(1000 // case.grains.sphere_count, 1000, 1.0 / case.time_step)
     grains = scene.supply(case)
-    return Cost(grains, grains * case.grains.sphere_count, _duration(case, grains) / case.time_step)
+    course = expected_course(case, grains)
+    time = sum(stage.time for stage in course)
+    skin = case.numerics.skin or default_skin(case)
+    each = grains * listed_entries(case, skin) * case.time_step / skin
+
+    def mean(values: Sequence[float]) -> float:
+        return sum(value * stage.time for value, stage in zip(values, course, strict=True)) / time
+
+    return Cost(
+        grains,
+        grains * case.grains.sphere_count,
+        time / case.time_step,
+        mean([stage.present for stage in course]),
+        each * mean([stage.pace * stage.present for stage in course]),
+        float(np.prod([LAW_COSTS.get(law.name, 1.0) for law in case.mechanisms])),
+        any(isinstance(wall, Mesh) for wall in scene.walls(case.grains.grain_reach)),
+    )
 
 
 def relative_costs(cases: Sequence[Case[Any]]) -> np.ndarray:
@@ -72,42 +98,50 @@ def relative_costs(cases: Sequence[Case[Any]]) -> np.ndarray:
     return np.array(costs, dtype=np.float64)
 
 
-def _duration(case: Case[Any], grains: int) -> float:
-    """Simulated time of a poured test [s]."""
-    scene = case.scene
-    if scene.grain_count is None:
-        fill = grains / scene.rain_rate * BULK_FRACTION / scene.densest_fill + CALM
-    else:
-        fill = grains / scene.rain_rate + FALL
-    if not isinstance(scene, LiftedCylinder):
-        trickle = TRICKLE if isinstance(scene, DrawDown) else 0.0
-        return fill + CALM + _own_phases(_Test(scene, case)) + trickle
-    if scene.duration is not None:
-        return max(scene.duration, fill + CALM)
-    bulk = min(grains * _grain_volume(case) / BULK_FRACTION, scene.volume)
-    height = (3.0 * bulk * SLOPE**2 / math.pi) ** (1.0 / 3.0)
-    lift = max(height / scene.lift_speed, scene.vibration_time) + REST
-    return fill + CALM + lift
+def listed_entries(case: Case[Any], skin: float) -> float:
+    """Entries of the neighbour list of a grain in a bed, where the earlier of two grains lists the other.
+
+    Notes
+    -----
+    Spheres of other grains are spread evenly over the space that a grain and the gap around it leave them; an
+    entry is a sphere of the grain with one that is nearer to it than the skin.
+    """
+    return case.grains.mean(
+        lambda shape: _entries(_Spheres.of(shape), _rounded(skin / case.grains.size_mean))
+    )
 
 
-def _grain_volume(case: Case[Any]) -> float:
-    return float(case.grains.mean(lambda shape: shape.volume)) * case.grains.size_mean**3
+def _rounded(length: float) -> float:
+    return math.exp(SKIN_STEP * round(math.log(length) / SKIN_STEP))
 
 
 @dataclass(frozen=True)
-class _Test:
-    """A test whose phases take as long for every case of it."""
+class _Spheres:
+    """Spheres of a shape, to look results up by."""
 
-    scene: Any
-    case: Any = field(compare=False)
+    centers: bytes
+    radii: bytes
+    volume: float
+
+    @classmethod
+    def of(cls, shape: Any) -> _Spheres:
+        centers, radii = (np.asarray(each, dtype=np.float64) for each in (shape.centers, shape.radii))
+        return cls(centers.tobytes(), radii.tobytes(), float(shape.volume))
 
 
-@lru_cache(maxsize=256)
-def _own_phases(test: _Test) -> float:
-    """Time that a test expects of its phases after the filling [s]."""
-    [setup] = test.scene.prepare([test.case], resolve_device(None))
-    phases = test.scene.controller(test.case, setup, CHUNK).phases
-    return float(sum(phase.expected for name, phase in phases.items() if name not in ("fill", "settle")))
+@lru_cache(maxsize=1024)
+def _entries(spheres: _Spheres, skin: float) -> float:
+    radii = np.frombuffer(spheres.radii)
+    centers = np.frombuffer(spheres.centers).reshape(-1, 3)
+    other = float(radii.mean())
+    reach = radii + other + skin
+    low, high = (centers - reach[:, None]).min(axis=0), (centers + reach[:, None]).max(axis=0)
+    points = low + (high - low) * POINTS
+    away = np.linalg.norm(points[:, None] - centers, axis=2)
+    free = (away >= APART * (radii + other)).all(axis=1)
+    near = (away < reach).sum(axis=1)
+    density = BULK_FRACTION * len(radii) / spheres.volume
+    return float(0.5 * density * np.prod(high - low) * (near * free).mean())
 
 
 # ---- memory ------------------------------------------------------------------------------------------------

@@ -139,7 +139,4 @@ def _dask() -> Finding:
 def _speed_text(speed: Speed | None) -> str:
     if speed is None:
         return "never measured: --measure does, and so does the first --dry-run"
-    return (
-        f"{1e6 * speed.step:.3g} us a step, {1e9 * speed.grain_step:.3g} ns a grain and "
-        f"{1e9 * speed.sphere_step:.3g} ns a sphere beyond, {speed.start:.2g} s to start; measured {speed.on}"
-    )
+    return f"{speed.text}; measured {speed.on}"

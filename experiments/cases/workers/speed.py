@@ -9,7 +9,7 @@ import os
 import platform
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ from dem_warp import (
     Case,
     CaseResult,
     ClumpShape,
+    DrawDown,
     GrainPopulation,
     Interaction,
     LiftedCylinder,
@@ -55,14 +56,32 @@ class Speed:
     """Day and number of workers of the measurement; empty: it was never measured."""
     grain_step: float = 0.0
     """Of a grain in a step, beyond that and its spheres [s]."""
+    look_step: float = 0.0
+    """Of a neighbour list's entry, for each skin that the fastest grain uses up [s]; see `Cost.looked`."""
+    mesh: float = 1.0
+    """Times that a step of grains takes where a wall is a mesh."""
+
+    @property
+    def text(self) -> str:
+        """Its numbers, as a phrase."""
+        sphere, look = 1e9 * self.sphere_step, 1e9 * self.look_step
+        more = f"{look:.3g} ns a neighbour and skin" if look > 0.0 else f"{sphere:.3g} ns a sphere"
+        return (
+            f"{1e6 * self.step:.3g} us a step, {1e9 * self.grain_step:.3g} ns a grain and {more} beyond, "
+            f"{self.mesh:.3g} times that where walls are meshes, {self.start:.2g} s to start"
+        )
 
     def seconds(self, cost: Cost) -> float:
         """Wall time of a case on a worker of its own [s]."""
-        each = self.grain_step * cost.grains + self.sphere_step * cost.spheres
-        return cost.steps * (self.step + each)
+        each = self.grain_step * cost.grains * cost.present + self.look_step * cost.looked
+        dearer = cost.law * (self.mesh if cost.meshed else 1.0)
+        return cost.steps * (self.step + dearer * (each + self.sphere_step * cost.spheres))
 
 
-TYPICAL = {False: Speed(1.6e-5, 5.0e-8, 3.0, grain_step=2.7e-7), True: Speed(1.0e-5, 1.0e-10, 5.0)}
+TYPICAL = {
+    False: Speed(1.0e-5, 0.0, 3.0, grain_step=2.5e-7, look_step=7.0e-7, mesh=1.8),
+    True: Speed(1.0e-5, 1.0e-10, 5.0),
+}
 """Speeds of a core and of a large GPU, where none was measured: a first guess of the time left."""
 
 
@@ -72,9 +91,10 @@ def user_folder() -> Path:
 
 
 def stored_speed(machine: str) -> Speed | None:
-    """Speed that was measured of a machine; None where it never was."""
+    """Speed that was measured of a machine; None where it never was, or before meshes were."""
     try:
-        return Speed(**_stored()[machine])
+        stored = _stored()[machine]
+        return Speed(**stored) if "mesh" in stored else None
     except (KeyError, TypeError):
         return None
 
@@ -104,7 +124,9 @@ def wave_seconds(costs: Sequence[Cost], speed: Speed, workers: int, on_gpu: bool
         launches = max(math.ceil(grains / FULL_GRAINS), math.ceil(len(costs) / WORLDS), 1)
         rounds, longest = math.ceil(launches / workers), max(cost.steps for cost in costs)
         share = max(launches, min(workers, len(costs)))
-        launch = Cost(math.ceil(grains / share), math.ceil(spheres / share), longest)
+        dearest, meshed = max(cost.law for cost in costs), any(cost.meshed for cost in costs)
+        size = math.ceil(grains / share), math.ceil(spheres / share)
+        launch = Cost(*size, longest, law=dearest, meshed=meshed)
         return speed.start + rounds * speed.seconds(launch)
     alone = np.array([speed.seconds(cost) for cost in costs])
     return speed.start + max(float(alone.sum()) / workers, float(alone.max()))
@@ -130,18 +152,22 @@ def cpu_name(workers: int) -> str:
 
 
 BALLS, CLUMPS = (250, 1), (100, 9)
-"""Grains of the reference cases that tell what a grain costs and what a sphere, and spheres of each."""
+"""Grains of the reference cases that tell what a grain costs and what its neighbours, and spheres of each."""
+
+BALLS_LOOKED, CLUMPS_LOOKED, BOX_LOOKED = 17.7, 64.1, 43.1
+"""`Cost.looked` of these and of the box, counted in a run; the same on every machine, as the cases are."""
 
 FEW = 30
 """Balls of the case whose steps cost least."""
 
 
 def measure_speed(workers: Workers, clock: Clock = time.perf_counter) -> Speed:
-    """Measure workers by four waves of reference cases, as many as there are workers or fill them.
+    """Measure workers by five waves of reference cases, as many as there are workers or fill them.
 
     A few balls for short and for long give the start of a wave and the step; waves of many balls and of
-    clumps of nine spheres give what a grain costs and what a sphere. Another clock than that of the wall
-    gives times of its own.
+    clumps of nine spheres give what a grain costs, and what its neighbours (on a GPU its spheres); a box of
+    balls whose walls are meshes gives what those cost. Another clock than that of the wall gives times of its
+    own.
     """
     count = workers.count
     few, long = few_spheres(), _reference(FEW, 1, duration=12.0)
@@ -150,37 +176,41 @@ def measure_speed(workers: Workers, clock: Clock = time.perf_counter) -> Speed:
     long_seconds, long_steps = _timed(workers, [long] * count, clock)
     least = max((long_seconds - short_seconds) / max(long_steps - short_steps, 1), 1e-7)
     start = max(short_seconds - short_steps * least, 0.0)
-    steps = []
-    for grains, spheres in (BALLS, CLUMPS):
-        copies = min(math.ceil(FULL_GRAINS / grains), WORLDS) if workers.on_gpu else 1
-        case = _reference(grains, spheres)
+    sizes, taken = [(float(FEW), FEW if workers.on_gpu else 0.0)], [least]
+    references = {BALLS_LOOKED: _reference(*BALLS), CLUMPS_LOOKED: _reference(*CLUMPS), BOX_LOOKED: _box()}
+    for looked, case in references.items():
+        cost = cost_of(case)
+        copies = min(math.ceil(FULL_GRAINS / cost.grains), WORLDS) if workers.on_gpu else 1
         workers.simulate([case])
-        seconds, taken = _timed(workers, [case] * (count * copies), clock)
-        steps.append((copies, (seconds - start) / taken))
-    step, grain_step, sphere_step = split_costs(least, *steps)
+        seconds, steps = _timed(workers, [case] * (count * copies), clock)
+        third = cost.spheres if workers.on_gpu else looked
+        sizes.append((copies * cost.grains * cost.present, copies * third))
+        taken.append((seconds - start) / steps)
+    step, grain, third = split_costs(sizes[:3], taken[:3])
+    mesh = (taken[3] - step) / max(grain * sizes[3][0] + third * sizes[3][1], 1e-9)
     day = time.strftime("%Y-%m-%d")
     on = f"{day}, {count} {'worker' if count == 1 else 'workers'}"
-    return Speed(step, sphere_step, start, on, grain_step)
+    sphere, look = (third, 0.0) if workers.on_gpu else (0.0, third)
+    return Speed(step, sphere, start, on, grain, look, max(mesh, 1.0))
 
 
-def split_costs(
-    least: float, balls: tuple[int, float], clumps: tuple[int, float]
-) -> tuple[float, float, float]:
-    """Split times of a step into that of any step, of a grain and of a sphere; none is negative.
+def split_costs(sizes: Sequence[tuple[float, float]], taken: Sequence[float]) -> tuple[float, float, float]:
+    """Split times of a step into that of any step, of a grain and of another size; none is negative.
 
     Parameters
     ----------
-    least
-        Step of `FEW` balls [s].
-    balls, clumps
-        Copies of the case of `BALLS` and of that of `CLUMPS`, and the step of them together [s].
+    sizes
+        Grains that a step moved, and another size of it, of each reference.
+    taken
+        Time of its step [s].
     """
-    (ball_copies, ball_step), (clump_copies, clump_step) = balls, clumps
-    ball = max((ball_step - least) / (ball_copies * BALLS[0] - FEW), 0.0)
-    step = max(least - FEW * ball, 1e-7)
-    clump = max((clump_step - step) / (clump_copies * CLUMPS[0]), 0.0)
-    sphere = min(max((clump - ball) / (CLUMPS[1] - 1), 0.0), ball)
-    return step, ball - sphere, sphere
+    from scipy.optimize import nnls
+
+    seconds = np.array(taken)
+    shares = np.column_stack([np.ones(len(seconds)), np.array(sizes, dtype=np.float64)]) / seconds[:, None]
+    scale = np.linalg.norm(shares, axis=0)
+    step, grain, other = nnls(shares / scale, np.ones(len(seconds)))[0] / scale
+    return max(float(step), 1e-7), float(grain), float(other)
 
 
 def _timed(workers: Workers, cases: Sequence[Case], clock: Clock) -> tuple[float, int]:
@@ -216,3 +246,9 @@ def _reference(grains: int, spheres: int, duration: float | None = None) -> Case
         # grains move as far in a step, and lists are made anew as often, as in studies
         numerics=Numerics(modulus_scale=400.0 if grains == FEW else 200.0),
     )
+
+
+def _box() -> Case[DrawDown]:
+    """Case of a small box of balls with a slot, whose walls are meshes."""
+    like = _reference(*BALLS)
+    return replace(like, scene=DrawDown(0.04, 0.016, 0.02, 0.024, 0.03, like.scene.wall_material))
