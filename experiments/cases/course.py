@@ -28,9 +28,9 @@ FALL, CALM, CALM_FULL, REST = 0.25, 0.1, 0.2, 0.35
 that was struck off while the rain still fell, and a heap [s]."""
 
 TRICKLE, TRICKLE_ANGULAR, TRICKLE_BIN = 1.4, 0.5, 0.7
-"""Time that the last grains take to trickle down and to rest, beyond the flow [s]: of a draw-down, with grains
-that roll (0.7 to 2.2 in eight runs, with balls of 2.5 to 4 mm radius and slots of 36 to 60 mm) and with others
-(0.3 in one), and of a bin (0.1 to 1.4 in three: a slope that stood for a while may slide at last)."""
+"""Time that the last grains take to trickle down and to rest, beyond the flow [s]: of a draw-down, with
+grains that roll (0.7 to 2.2 in eight runs, balls of 2.5 to 4 mm radius and slots of 36 to 60 mm) and with
+others (0.3 in one), and of a bin (0.1 to 1.4 in three: a slope that stood for a while may slide at last)."""
 
 LEFT = 0.2
 """Part of the grains that trickles out of a bin, or stays in its corners, roughly."""
@@ -44,7 +44,7 @@ BEVERLOO = 0.58, 1.4
 """C and k of Beverloo's law for a round hole: a flow of C (bulk density) sqrt(g) (D - k d)^(5/2)."""
 
 ROLLS = 2.0
-"""Times that a grain rolls the length of a tilted plate before all are at rest: some start late."""
+"""Times that a rod rolls the length of a tilted plate before all are at rest: some start late."""
 
 
 class Stage(NamedTuple):
@@ -71,10 +71,12 @@ def expected_course(case: Case[Any], grains: int) -> list[Stage]:
     ]
     if not isinstance(scene, LiftedCylinder):
         return [*stages, *_own_stages(case, share)]
-    lift = _lift(case, grains)
+    lift = [stage._replace(present=share * stage.present) for stage in _lift(case, grains)]
     if scene.duration is not None:
-        lift = Stage(max(scene.duration - sum(stage.time for stage in stages), 0.0), lift.pace, share)
-    return [*stages, lift._replace(present=share)]
+        given = max(scene.duration - sum(stage.time for stage in stages), 0.0)
+        taken = sum(stage.time for stage in lift)
+        lift = [stage._replace(time=given * stage.time / taken) for stage in lift]
+    return [*stages, *lift]
 
 
 def _own_stages(case: Case[Any], share: float) -> list[Stage]:
@@ -84,7 +86,7 @@ def _own_stages(case: Case[Any], share: float) -> list[Stage]:
         return [Stage(_flow_time(case), pace, 0.5 * share), Stage(TRICKLE_BIN, pace, LEFT * share)]
     stages = [Stage(_own_phases(_Test(scene, case)), pace, share)]
     if isinstance(scene, DrawDown):
-        rolls = any(map(_is_round, case.grains.mixture.shapes))
+        rolls = min(map(_directions, case.grains.mixture.shapes)) <= 1
         stages.append(Stage(TRICKLE if rolls else TRICKLE_ANGULAR, pace, share))
     return stages
 
@@ -97,40 +99,43 @@ def _flow_time(case: Case[Hopper]) -> float:
     return float(scene.volume / (rate * math.sqrt(GRAVITY) * opening**2.5))
 
 
-def _lift(case: Case[LiftedCylinder], grains: int) -> Stage:
-    """From the start of the lift to rest."""
+def _lift(case: Case[LiftedCylinder], grains: int) -> list[Stage]:
+    """From the start of the lift to rest, of all the grains that were filled in."""
     scene = case.scene
     bulk = min(grains * grain_volume(case) / BULK_FRACTION, scene.volume)
     height = (3.0 * bulk * SLOPE**2 / math.pi) ** (1.0 / 3.0)
-    moved = max(height / scene.lift_speed, scene.vibration_time)
-    pace = HEAPING * scene.top_speed
+    moved, pace = max(height / scene.lift_speed, scene.vibration_time), HEAPING * scene.top_speed
     if hangs_on_walls(case):
         # taken away with the tube at a height; what hangs on its rim, where the world ends
-        ceiling = scene.brim + scene.rain_speed * grains / scene.rain_rate
-        moved = max(moved, 0.5 * (GONE * scene.height + max(ceiling, GONE * scene.height)) / scene.lift_speed)
+        leaves = GONE * scene.height
+        ceiling = max(scene.brim + scene.rain_speed * grains / scene.rain_rate, leaves)
+        moved = max(moved, 0.5 * (leaves + ceiling) / scene.lift_speed)
     elif (way := _roll(case)) is not None:
-        moved += ROLLS * way.time
-        pace = max(pace, way.pace)
-    return Stage(moved + REST, pace, 1.0)
+        return [Stage(moved, pace, 1.0), way]
+    return [Stage(moved + REST, pace, 1.0)]
 
 
 def _roll(case: Case[LiftedCylinder]) -> Stage | None:
-    """Way of a grain that rolls down a tilted plate; None where grains do not, or stay where they fall."""
+    """Grains that roll down a tilted plate; None where they do not, or stay where they fall."""
     scene = case.scene
+    if scene.tilt == 0.0:
+        return None
     load = math.cos(scene.tilt) + pull_on_walls(case)
     drive = math.sin(scene.tilt) - case.grain_wall.rolling_friction * load
-    if scene.tilt == 0.0 or drive <= 0.0 or not any(map(_is_round, case.grains.mixture.shapes)):
+    directions = min(map(_directions, case.grains.mixture.shapes))
+    if drive <= 0.0 or directions > 1:
         return None
     length = scene.room(0.0)[0] if scene.plate_diameter is None else scene.plate_diameter / 2
     time = math.sqrt(2.0 * length / (5.0 / 7.0 * GRAVITY * drive))
-    # its top moves twice as fast as a grain that rolls
-    return Stage(time, 2.0 * length / time, 1.0)
+    pace = 2.0 * length / time  # the top of a grain that rolls moves twice as fast as it
+    # a heap of balls rolls away altogether, grain after grain; rods lie across, and most of them stay
+    return Stage(time, pace, 0.5) if directions == 0 else Stage(ROLLS * time + REST, pace, 1.0)
 
 
-def _is_round(shape: Any) -> bool:
-    """Tell that a shape rolls: a ball, or spheres on one line."""
+def _directions(shape: Any) -> int:
+    """Directions that the spheres of a shape lie in: none of a ball, one of a rod; both can roll."""
     centers = np.asarray(shape.centers) - np.mean(shape.centers, axis=0)
-    return bool(np.linalg.matrix_rank(centers, tol=0.1 * float(shape.radii.mean())) <= 1)
+    return int(np.linalg.matrix_rank(centers, tol=0.1 * float(shape.radii.mean())))
 
 
 def grain_volume(case: Case[Any]) -> float:

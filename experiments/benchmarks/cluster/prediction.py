@@ -10,6 +10,7 @@ time of the processor, in the measurement and in the waves. Neither counts the s
 
 from __future__ import annotations
 
+import math
 import os
 import time
 from pathlib import Path
@@ -70,7 +71,9 @@ def _row(name: str, cases: list[Case], workers: OwnWorkers, speed: Speed, clock:
     started = clock()
     results = workers.simulate(cases)
     took = clock() - started
-    steps = sum(phase["steps"] for result in results for phase in result.phases) / len(results)
+    # a failed case does not tell the steps of its last phase
+    ends = [result.phases for result in results if result.status == "finished"]
+    steps = sum(phase["steps"] for phases in ends for phase in phases) / len(ends) if ends else math.nan
     told = wave_seconds(costs, speed, workers.count, on_gpu=False)
     row = {
         "study": name,

@@ -95,6 +95,9 @@ def tried(each: int) -> dict[str, list[Case]]:
         "nine-sphere clumps, draw-down": _case(
             DrawDown(0.06, 0.02, 0.03, 0.035, 0.045, STEEL), nine, size=1.5
         ),
+        "balls of 3 mm, tilt of 8 degrees, relative laws": _case(
+            replace(_tube(0.04, 0.06), tilt=math.radians(8.0)), ClumpShape.sphere(3.0e-3), laws=RELATIVE
+        ),
         "balls of 4 mm, deep slot": _case(
             DrawDown(0.14, 0.05, 0.07, 0.06, 0.09, STEEL), ClumpShape.sphere(4.0e-3)
         ),
@@ -131,10 +134,13 @@ def fresh(each: int) -> dict[str, list[Case]]:
         "nine-sphere clumps, vibrated plate": _case(
             replace(tube, grain_count=150, vibration_amplitude=2.0e-4, vibration_frequency=40.0), nine
         ),
-        "balls of 3 mm, tilt of 8 degrees, relative laws": _case(
-            replace(_tube(0.04, 0.06), tilt=math.radians(8.0)), ClumpShape.sphere(3.0e-3), laws=RELATIVE
-        ),
         "balls of 2 mm, LIGGGHTS' laws": _case(tube, ball, laws=laws_named("liggghts")),
+        "balls of 2.5 mm, tilt of 12 degrees": _case(
+            replace(_tube(0.035, 0.05), tilt=math.radians(12.0)), ClumpShape.sphere(2.5e-3)
+        ),
+        "angular clumps, draw-down": _case(DrawDown(0.1, 0.03, 0.05, 0.05, 0.08, STEEL), four, size=1.8),
+        "angular clumps, wide bin": _case(Hopper(0.08, 0.05, 0.05, STEEL), four, size=1.8),
+        "balls of 2 mm, sticky": _case(few, ball, law=_law("linear_cohesion", 2.0e4)),
         "glass beads of 1.5 mm": _case(
             _tube(0.02, 0.05, lift_speed=0.03), ClumpShape.sphere(1.5e-3), density=2500.0, softened=200.0
         ),
@@ -155,7 +161,7 @@ def _buckwheat() -> ClumpShape:
 
 
 def _law(name: str, strength: float, **settings: Any) -> Mechanism:
-    kind = MECHANISMS[name]
+    kind: Any = MECHANISMS[name]
     return kind(**{kind.strength: strength}, **settings)
 
 

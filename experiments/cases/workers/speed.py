@@ -177,8 +177,12 @@ def measure_speed(workers: Workers, clock: Clock = time.perf_counter) -> Speed:
     least = max((long_seconds - short_seconds) / max(long_steps - short_steps, 1), 1e-7)
     start = max(short_seconds - short_steps * least, 0.0)
     sizes, taken = [(float(FEW), FEW if workers.on_gpu else 0.0)], [least]
-    references = {BALLS_LOOKED: _reference(*BALLS), CLUMPS_LOOKED: _reference(*CLUMPS), BOX_LOOKED: _box()}
-    for looked, case in references.items():
+    references: list[tuple[float, Case[Any]]] = [
+        (BALLS_LOOKED, _reference(*BALLS)),
+        (CLUMPS_LOOKED, _reference(*CLUMPS)),
+        (BOX_LOOKED, _box()),
+    ]
+    for looked, case in references:
         cost = cost_of(case)
         copies = min(math.ceil(FULL_GRAINS / cost.grains), WORLDS) if workers.on_gpu else 1
         workers.simulate([case])
@@ -250,5 +254,5 @@ def _reference(grains: int, spheres: int, duration: float | None = None) -> Case
 
 def _box() -> Case[DrawDown]:
     """Case of a small box of balls with a slot, whose walls are meshes."""
-    like = _reference(*BALLS)
+    like: Case[Any] = _reference(*BALLS)
     return replace(like, scene=DrawDown(0.04, 0.016, 0.02, 0.024, 0.03, like.scene.wall_material))
