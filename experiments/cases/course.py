@@ -35,10 +35,13 @@ others (0.3 in one), and of a bin (0.1 to 1.4 in three: a slope that stood for a
 LEFT = 0.2
 """Part of the grains that trickles out of a bin, or stays in its corners, roughly."""
 
-FALLING, LANDING, CALMING, HEAPING, FLOWING = 0.75, 0.45, 0.1, 0.25, 0.5
+FALLING, LANDING, CALMING, HEAPING, FLOWING = 0.75, 0.45, 0.1, 0.23, 0.5
 """Speed of the fastest grain over the scene's `top_speed`, in the mean over a rain, over a counted one with
 the time in which its last grains come to lie, over the rest of a bed, the making of a heap, and a flow: seen
 in eighteen runs of all tests, mostly the same within a third."""
+
+COLLAPSE = 4.0
+"""Diameters of a grain that the tube is lifted by when grains that roll flow out fastest, roughly."""
 
 BEVERLOO = 0.58, 1.4
 """C and k of Beverloo's law for a round hole: a flow of C (bulk density) sqrt(g) (D - k d)^(5/2)."""
@@ -86,16 +89,14 @@ def _own_stages(case: Case[Any], share: float) -> list[Stage]:
         return [Stage(_flow_time(case), pace, 0.5 * share), Stage(TRICKLE_BIN, pace, LEFT * share)]
     stages = [Stage(_own_phases(_Test(scene, case)), pace, share)]
     if isinstance(scene, DrawDown):
-        rolls = min(map(_directions, case.grains.mixture.shapes)) <= 1
-        stages.append(Stage(TRICKLE if rolls else TRICKLE_ANGULAR, pace, share))
+        stages.append(Stage(TRICKLE if _rolls(case) else TRICKLE_ANGULAR, pace, share))
     return stages
 
 
 def _flow_time(case: Case[Hopper]) -> float:
     """Time in which a bin runs out, after Beverloo, Leniger and van de Velde (1961) [s]."""
     scene, (rate, lost) = case.scene, BEVERLOO
-    diameter = 2.0 * (3.0 * grain_volume(case) / (4.0 * math.pi)) ** (1.0 / 3.0)
-    opening = max(scene.outlet - lost * diameter, diameter)
+    opening = max(scene.outlet - lost * _diameter(case), _diameter(case))
     return float(scene.volume / (rate * math.sqrt(GRAVITY) * opening**2.5))
 
 
@@ -112,7 +113,17 @@ def _lift(case: Case[LiftedCylinder], grains: int) -> list[Stage]:
         moved = max(moved, 0.5 * (leaves + ceiling) / scene.lift_speed)
     elif (way := _roll(case)) is not None:
         return [Stage(moved, pace, 1.0), way]
-    return [Stage(moved + REST, pace, 1.0)]
+    return [Stage(max(moved + REST, _run_out(case, pace)), pace, 1.0)]
+
+
+def _run_out(case: Case[LiftedCylinder], speed: float) -> float:
+    """Time at which grains that roll, out of the tube at a speed [m/s], are at rest on the plate [s]."""
+    scene = case.scene
+    if not _rolls(case):
+        return 0.0
+    braked = 5.0 / 7.0 * GRAVITY * case.grain_wall.rolling_friction * (1.0 + pull_on_walls(case))
+    leaves = scene.room(0.0)[0] / speed
+    return COLLAPSE * _diameter(case) / scene.lift_speed + min(speed / max(braked, 1.0e-9), leaves)
 
 
 def _roll(case: Case[LiftedCylinder]) -> Stage | None:
@@ -122,20 +133,30 @@ def _roll(case: Case[LiftedCylinder]) -> Stage | None:
         return None
     load = math.cos(scene.tilt) + pull_on_walls(case)
     drive = math.sin(scene.tilt) - case.grain_wall.rolling_friction * load
-    directions = min(map(_directions, case.grains.mixture.shapes))
-    if drive <= 0.0 or directions > 1:
+    if drive <= 0.0 or not _rolls(case):
         return None
     length = scene.room(0.0)[0] if scene.plate_diameter is None else scene.plate_diameter / 2
     time = math.sqrt(2.0 * length / (5.0 / 7.0 * GRAVITY * drive))
     pace = 2.0 * length / time  # the top of a grain that rolls moves twice as fast as it
     # a heap of balls rolls away altogether, grain after grain; rods lie across, and most of them stay
-    return Stage(time, pace, 0.5) if directions == 0 else Stage(ROLLS * time + REST, pace, 1.0)
+    balls = case.grains.sphere_count == 1
+    return Stage(time, pace, 0.5) if balls else Stage(ROLLS * time + REST, pace, 1.0)
+
+
+def _rolls(case: Case[Any]) -> bool:
+    """Tell that some grains of a case are balls or rods, which have no feet to stand on."""
+    return min(map(_directions, case.grains.mixture.shapes)) <= 1
 
 
 def _directions(shape: Any) -> int:
     """Directions that the spheres of a shape lie in: none of a ball, one of a rod; both can roll."""
     centers = np.asarray(shape.centers) - np.mean(shape.centers, axis=0)
     return int(np.linalg.matrix_rank(centers, tol=0.1 * float(shape.radii.mean())))
+
+
+def _diameter(case: Case[Any]) -> float:
+    """Diameter of a ball of a grain's volume [m]."""
+    return 2.0 * (3.0 * grain_volume(case) / (4.0 * math.pi)) ** (1.0 / 3.0)
 
 
 def grain_volume(case: Case[Any]) -> float:

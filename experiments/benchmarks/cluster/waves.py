@@ -11,6 +11,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from dem_warp import (
     EDEM,
     MECHANISMS,
@@ -102,11 +104,11 @@ def tried(each: int) -> dict[str, list[Case]]:
             DrawDown(0.14, 0.05, 0.07, 0.06, 0.09, STEEL), ClumpShape.sphere(4.0e-3)
         ),
     }
-    return {name: [case] * each for name, case in made.items()}
+    return {name: [case] * each for name, case in made.items()} | _tried_last(each)
 
 
-def fresh(each: int) -> dict[str, list[Case]]:
-    """Cases that were not run before the prediction had been mended."""
+def _tried_last(each: int) -> dict[str, list[Case]]:
+    """Cases that were run when all but the last of it was mended."""
     three, four, nine = _clump("elongated"), _clump("angular"), _buckwheat()
     ball, tube = ClumpShape.sphere(2.0e-3), _tube(0.028, 0.07)
     few, drum = replace(tube, grain_count=250), Drum(0.06, 0.02, STEEL, 0.5, 0.3, 0.25, 0.5)
@@ -146,6 +148,34 @@ def fresh(each: int) -> dict[str, list[Case]]:
         ),
     }
     return {name: [case] * each for name, case in made.items()}
+
+
+def fresh(each: int) -> dict[str, list[Case]]:
+    """Cases that were not run before the prediction was done."""
+    angular, outlines = (BENCHMARKS / name for name in ("bridge/angular.toml", "outlines/study.toml"))
+    wheat = STUDIES / "wheat_drums"
+    tilted = {"scene": {"lifted-cylinder": {"tilt": "4 deg", "lift_speed": "0.1 m/s", "grain_count": 300}}}
+    three, ball, tube = _clump("elongated"), ClumpShape.sphere(5.0e-3), _tube(0.032, 0.05)
+    pair = ClumpShape.from_spheres(1.5e-3 * np.array([[-1.0, 0, 0], [1.0, 0, 0]]), np.full(2, 2.0e-3))
+    made = {
+        "rods, hopper": _case(Hopper(0.07, 0.06, 0.05, STEEL), three, size=1.5),
+        "pairs, fast drum": _case(Drum(0.08, 0.02, STEEL, 1.0, 0.35, 0.5, 1.0), pair),
+        "balls of 5 mm, draw-down, relative laws": _case(
+            DrawDown(0.2, 0.04, 0.08, 0.08, 0.1, STEEL), ball, laws=RELATIVE
+        ),
+        "steel balls of 2 mm": _case(tube, ClumpShape.sphere(2.0e-3), density=7800.0, softened=10.0),
+        "pairs, liquid bridges": _case(tube, pair, law=_law("capillary_bridge", 0.05, bridge_volume=1.0e-11)),
+        "balls of 2.5 mm, plastic contacts": _case(
+            tube, ClumpShape.sphere(2.5e-3), law=_law("hysteretic_spring", 0.3)
+        ),
+    }
+    return {
+        "trial, as it stands": _middle(load_study(STUDIES / "trial" / "study.toml"), each),
+        "bridge: angular clumps": _middle(load_study(angular), each),
+        "outlines": _middle(load_study(outlines), each),
+        "wheat, heap": _middle(load_study(wheat / "heap.toml", "bench"), each),
+        "buckwheat, bench, tilted plate": _middle(load_study(None, "bench", tilted), each),
+    } | {name: [case] * each for name, case in made.items()}
 
 
 def _tube(diameter: float, height: float, **settings: Any) -> LiftedCylinder:

@@ -73,7 +73,7 @@ class Speed:
 
     def seconds(self, cost: Cost) -> float:
         """Wall time of a case on a worker of its own [s]."""
-        each = self.grain_step * cost.grains * cost.present + self.look_step * cost.looked
+        each = self.grain_step * cost.moved + self.look_step * cost.looked
         dearer = cost.law * (self.mesh if cost.meshed else 1.0)
         return cost.steps * (self.step + dearer * (each + self.sphere_step * cost.spheres))
 
@@ -188,7 +188,7 @@ def measure_speed(workers: Workers, clock: Clock = time.perf_counter) -> Speed:
         workers.simulate([case])
         seconds, steps = _timed(workers, [case] * (count * copies), clock)
         third = cost.spheres if workers.on_gpu else looked
-        sizes.append((copies * cost.grains * cost.present, copies * third))
+        sizes.append((copies * cost.moved, copies * third))
         taken.append((seconds - start) / steps)
     step, grain, third = split_costs(sizes[:3], taken[:3])
     mesh = (taken[3] - step) / max(grain * sizes[3][0] + third * sizes[3][1], 1e-9)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,7 @@ from commandline import dem_warp
 from dem_warp import Progress
 from experiments import api
 from experiments.cases import OwnWorkers
-from experiments.cases.cost import Cost
+from experiments.cases.cost import EMPTY, Cost
 from experiments.cases.workers.speed import (
     Speed,
     split_costs,
@@ -54,22 +55,33 @@ def test_a_wave_takes_what_its_workers_share_and_no_less_than_its_longest_case()
 
 
 def test_the_cost_of_a_step_is_split_into_what_it_was_made_of() -> None:
-    step, grain, sphere = 1.6e-5, 2.7e-7, 5.0e-8
-    least = step + 30 * (grain + sphere)
+    made = (4.0e-6, 1.8e-7, 4.4e-7)
     for copies in (1, 1024):
-        balls = (copies, step + 250 * copies * (grain + sphere))
-        clumps = (copies, step + 100 * copies * (grain + 9 * sphere))
-        assert split_costs(least, balls, clumps) == pytest.approx((step, grain, sphere))
-    # noise makes no cost negative
-    assert min(split_costs(least, (1, 0.5 * least), (1, 0.1 * least))) >= 0.0
-    case = Speed(step, sphere, 2.0, grain_step=grain).seconds(Cost(250, 250, 10.0))
-    assert case == pytest.approx(10.0 * (step + 250 * (grain + sphere)))
+        sizes = [(30.0, 0.0), (copies * 250.0, copies * 17.7), (copies * 100.0, copies * 64.1)]
+        taken = [made[0] + grains * made[1] + looked * made[2] for grains, looked in sizes]
+        assert split_costs(sizes, taken) == pytest.approx(made)
+        # noise makes no cost negative
+        assert min(split_costs(sizes, [taken[0], 0.5 * taken[0], 0.1 * taken[0]])) >= 0.0
+
+
+def test_a_step_costs_its_grains_and_neighbours_and_more_under_some_laws_and_beside_meshes() -> None:
+    speed = Speed(4.0e-6, 0.0, 2.0, grain_step=1.8e-7, look_step=4.4e-7, mesh=1.6)
+    case = Cost(250, 2250, 10.0, present=0.8, looked=30.0)
+    grains = (200 + 50 * EMPTY) * 1.8e-7 + 30.0 * 4.4e-7
+    assert speed.seconds(case) == pytest.approx(10.0 * (4.0e-6 + grains))
+    dear = replace(case, law=1.5, meshed=True)
+    assert speed.seconds(dear) == pytest.approx(10.0 * (4.0e-6 + 1.5 * 1.6 * grains))
 
 
 def test_speeds_are_stored_for_each_machine_and_a_damaged_file_is_none() -> None:
     store_speed("another", SPEED)
     assert stored_speed("another") == SPEED
     assert stored_speed("never seen") is None
+    # one that was measured before meshes were is measured anew
+    (user_folder() / "speeds.json").write_text(
+        '{"old": {"step": 1.0, "sphere_step": 1.0, "start": 1.0}}', encoding="utf-8"
+    )
+    assert stored_speed("old") is None
     (user_folder() / "speeds.json").write_text('{"another": {"step": 1}', encoding="utf-8")
     assert stored_speed("another") is None
 
