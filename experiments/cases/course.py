@@ -43,8 +43,9 @@ in eighteen runs of all tests, mostly the same within a third."""
 HANGING = 1.5
 """Speed of the fastest grain over the tube's, where grains hang on it and sway: 1 to 2 in a run."""
 
-COLLAPSE = 4.0
-"""Diameters of a grain that the tube is lifted by when grains that roll flow out fastest, roughly."""
+COLLAPSE, RUN_OUT = 4.0, 0.27
+"""Diameters of a grain that the tube is lifted by, but no more than the bed's height, when grains that roll
+flow out fastest; and their speed then, over that of a fall from the bed's height: as seen in two runs."""
 
 BEVERLOO = 0.58, 1.4
 """C and k of Beverloo's law for a round hole: a flow of C (bulk density) sqrt(g) (D - k d)^(5/2)."""
@@ -117,17 +118,19 @@ def _lift(case: Case[LiftedCylinder], grains: int) -> list[Stage]:
         return [Stage(moved, pace, 1.0), Stage(hanging + REST, HANGING * scene.lift_speed, 1.0)]
     if (way := _roll(case)) is not None:
         return [Stage(moved, pace, 1.0), way]
-    return [Stage(max(moved + REST, _run_out(case, pace)), pace, 1.0)]
+    return [Stage(max(moved + REST, _run_out(case, bulk)), pace, 1.0)]
 
 
-def _run_out(case: Case[LiftedCylinder], speed: float) -> float:
-    """Time at which grains that roll, out of the tube at a speed [m/s], are at rest on the plate [s]."""
+def _run_out(case: Case[LiftedCylinder], bulk: float) -> float:
+    """Time at which grains that roll out of a tube, of so much bulk [m3], are at rest on the plate [s]."""
     scene = case.scene
     if not _rolls(case):
         return 0.0
+    bed = bulk / scene.volume_below(1.0)
+    speed = RUN_OUT * math.sqrt(2.0 * GRAVITY * bed)
     braked = 5.0 / 7.0 * GRAVITY * case.grain_wall.rolling_friction * (1.0 + pull_on_walls(case))
-    leaves = scene.room(0.0)[0] / speed
-    return COLLAPSE * _diameter(case) / scene.lift_speed + min(speed / max(braked, 1.0e-9), leaves)
+    rolling = min(speed / max(braked, 1.0e-9), scene.room(0.0)[0] / speed)
+    return min(COLLAPSE * _diameter(case), bed) / scene.lift_speed + rolling
 
 
 def _roll(case: Case[LiftedCylinder]) -> Stage | None:

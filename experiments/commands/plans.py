@@ -66,7 +66,7 @@ def show_plan(resources: Resources, planned: Callable[[Speed], Plan], as_json: b
     from experiments.runs.plan import measured_speed
 
     if stored_speed(resources.machine) is None and not resources.submits_jobs:
-        messages.print(f"Measuring the speed of {resources}, once; a minute at most.")
+        messages.print(f"Measuring the speed of {resources}, once; a minute or two.")
     plan = planned(measured_speed(resources, measure=not resources.submits_jobs))
     if as_json:
         typer.echo(json.dumps(plan.to_dict(), allow_nan=False))
