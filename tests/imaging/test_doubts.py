@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from imaging import measure
+from imaging.doubts import LARGEST_CLIFF, highest_cliff
 from imaging.outline import Outline
 from imaging.plate import PlateLine
 
@@ -49,3 +50,24 @@ def test_a_foot_in_the_shade_ends_before_its_line_does(left: int, right: int, ex
     seen = slice(left, len(whole.position) - right)
     cut = Outline(whole.position[seen] - left, whole.height[seen], whole.plate, photographed=True)
     assert [name for name in names(cut) if name == "foot"] == expected
+
+
+@pytest.mark.parametrize("missed", [0.35, 0.15])
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_foot_that_is_missed_leaves_a_cliff(missed: float, side: int) -> None:
+    # the foot is not told from the wall behind it, and the outline follows the plate's far edge
+    whole = outline(0.0)
+    height = whole.height.copy()
+    reach = int(missed * len(height) / 2)
+    height[:reach] = 1.0
+    seen = Outline(whole.position, height[::side], whole.plate, photographed=True)
+    # the height there is in proportion to the distance from the foot; the blur of an edge is a pixel in 88
+    assert highest_cliff(seen) == pytest.approx(missed, abs=0.03)
+    assert any("missed" in str(doubt) for doubt in measure(seen).doubts) == (missed > LARGEST_CLIFF)
+
+
+def test_a_stray_column_is_no_cliff() -> None:
+    whole = outline(0.0)
+    height = whole.height.copy()
+    height[20] = height.max() / 2
+    assert highest_cliff(Outline(whole.position, height, whole.plate, photographed=True)) < 0.1
