@@ -8,10 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from experiments.bridge.result import Crossing
-from experiments.bridge.source import BRIDGE
 from experiments.files import copy_file, write_text
 from experiments.report.material_card import CARD, compatible_points, quantity_text, sample_table, short
-from experiments.studyfile.card import MATERIAL, SECTIONS, files_of
+from experiments.studyfile.card import BRIDGE, MATERIAL, SECTIONS, files_of
 from experiments.studyfile.factor_section import with_factor_values
 from experiments.toml_files import toml_text
 

@@ -9,13 +9,12 @@ from typing import Any
 from doe import DesignError, Sample, Surface
 from experiments.errors import StudyError
 from experiments.studyfile import Study, load_card
+from experiments.studyfile.card import BRIDGE
 from experiments.studyfile.card_surface import SURFACE, card_surfaces
 from experiments.studyfile.places import drop
+from experiments.studyfile.solver_section import CORRECTED_FOR
 from experiments.studyfile.units import Quantity
 from experiments.toml_files import read_toml
-
-BRIDGE = "bridge"
-"""Table of a card whose values a bridge has corrected."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +77,7 @@ def _target(facts: dict[str, Any], place: str) -> tuple[Sample, str]:
 def _with_factors(study: Study, card: dict[str, Any], surface: Surface) -> Study:
     """Free the factors of a surface in a card's study."""
     document, factors = study.document, []
+    drop(document, ["solver", CORRECTED_FOR])  # a bridge begins anew, wherever some values came from
     for factor in surface.design.factors:
         told = card["factor"][factor.name]
         parameters = [name.strip() for name in told["parameter"].split(",")]

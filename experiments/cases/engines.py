@@ -14,6 +14,7 @@ from experiments.cases.program import ProgramEngine
 from experiments.errors import InputError, Problem, StudyError
 from experiments.studyfile import Study
 from experiments.studyfile.engine_section import EngineSection, quoted
+from experiments.studyfile.solver_section import CARD_SOLVER, OWN_SOLVER
 
 
 def _check(name: str, engine: object, known: object) -> None:
@@ -61,17 +62,21 @@ def engine_of(study: Study) -> Engine | None:
     Raises
     ------
     StudyError
-        When there is none of its name, its program is not there, it cannot simulate the study's cases, or a
-        rule for programs is given to what is none.
+        When there is none of its name, its program is not there, it cannot simulate the study's cases, a rule
+        for programs is given to what is none, or the study's card was corrected for another solver.
     """
     section, place = study.engine, f"{study.file}: engine"
+    solver, solver_place = study.solver, f"{study.file}: solver.{CARD_SOLVER}"
     if section is None:
+        solver.check_solver(OWN_SOLVER, solver_place)
         return None
     if section.command is not None:
         more = (section.version, section.observables)
         command = command_program(section.command, study.file.parent, f"{place}.command", *more)
+        solver.check_solver(command.name, solver_place)
         return ProgramEngine(command, section.workers, section.time_limit)
     engine = _engine_named(section, place)
+    solver.check_solver(str(section.name), solver_place)
     check = getattr(engine, "check", None)
     if check is not None:
         try:

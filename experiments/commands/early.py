@@ -72,7 +72,7 @@ def _readable(path: Path | None, scale: str | None, engine: str | None) -> Study
     if not read:
         raise faults[0]
     study = read[0]
-    if engine is not None or study.engine is not None:
+    if engine is not None or study.engine is not None or study.solver.corrected_for is not None:
         from experiments.cases import engine_of, with_engine
 
         study = with_engine(study, engine)

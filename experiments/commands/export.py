@@ -47,7 +47,7 @@ def export(
     """
     with clear_errors():
         from experiments.cases import require_unused
-        from experiments.commands.leaving import corrected_for, exported_test, study_of, told_of_bridge
+        from experiments.commands.leaving import exported_test, study_of, told_of_bridge
         from experiments.export import export_input, write_export
         from experiments.files import require_folder
         from experiments.runs.choices import default_folder
@@ -56,7 +56,7 @@ def export(
         study = study_of(source, scale)
         values = study.natural_settings(assignments(settings or []), "--set")
         test = exported_test(study, values, seed, scene or TARGET_SCENE)
-        translation = told_of_bridge(export_input(test, to, approximate), corrected_for(source), to)
+        translation = told_of_bridge(export_input(test, to, approximate), study, to)
         folder = out or default_folder(study, to)
         require_unused(folder)
         require_folder(folder)

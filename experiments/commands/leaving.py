@@ -10,7 +10,6 @@ from experiments.export import ExportedTest, Translation
 from experiments.studyfile import Study, load_card, load_study
 from experiments.studyfile.campaign import TARGET_SCENE
 from experiments.studyfile.card import is_card
-from experiments.toml_files import read_toml
 
 
 def study_of(path: Path | None, scale: str | None) -> Study:
@@ -26,17 +25,10 @@ def study_of(path: Path | None, scale: str | None) -> Study:
     return load_study(path, scale)
 
 
-def corrected_for(path: Path | None) -> str:
-    """Name of the solver that a bridge has corrected a card for; empty for any other file."""
-    if path is None:
-        return ""
-    bridge = read_toml(path)[1].get("bridge")
-    return str(bridge.get("engine", "")) if isinstance(bridge, Mapping) and is_card(path) else ""
-
-
-def told_of_bridge(translation: Translation, engine: str, to: str) -> Translation:
+def told_of_bridge(translation: Translation, study: Study, to: str) -> Translation:
     """Warn of values that a bridge has corrected for another solver than the one that they leave for."""
-    if engine in ("", to):
+    engine = study.solver.corrected_for
+    if engine in (None, to):
         return translation
     warning = f"the card was corrected for {engine} by a bridge: its values hold there alone"
     return replace(translation, warnings=(*translation.warnings, warning))

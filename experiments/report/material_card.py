@@ -18,7 +18,7 @@ from experiments.studyfile.campaign import Response
 from experiments.studyfile.card import MATERIAL, SECTIONS
 from experiments.studyfile.card_surface import SURFACE, surface_table
 from experiments.studyfile.factor_section import with_factor_values
-from experiments.studyfile.solver_section import LAWS, written
+from experiments.studyfile.solver_section import CORRECTED_FOR, LAWS, SolverSection, written
 from experiments.toml_files import toml_text
 
 CARD = "material.toml"
@@ -50,7 +50,7 @@ def write_material_card(campaign: Campaign, study: Study, folder: Path) -> Path 
 def material_card(campaign: Campaign, optimum: OptimumResult, study: Study) -> dict[str, Any]:
     """Lay out a card as nested tables; clump files as the study names them."""
     chosen = with_factor_values(study.document, study.factor_sections, optimum.settings)
-    chosen["solver"] = {LAWS: written(study.solver.laws)}
+    chosen["solver"] = _solver(study.solver)
     return {
         "format": FORMAT,
         "name": study.name,
@@ -60,6 +60,12 @@ def material_card(campaign: Campaign, optimum: OptimumResult, study: Study) -> d
         SURFACE: _surfaces(campaign),
         MATERIAL: copy.deepcopy({key: chosen[key] for key in SECTIONS if key in chosen}),
     }
+
+
+def _solver(solver: SolverSection) -> dict[str, Any]:
+    """Say which laws the values hold for, and which solver, where a bridge corrected some for the study's."""
+    corrected = solver.corrected_for if solver.corrected_for != solver.card_solver else None
+    return {LAWS: written(solver.laws)} | ({CORRECTED_FOR: corrected} if corrected else {})
 
 
 def _fitted(campaign: Campaign, study: Study) -> dict[str, Any]:

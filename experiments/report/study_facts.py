@@ -32,6 +32,7 @@ def study_facts(study: Study) -> dict[str, str]:
         **measured,
         **walls,
         "Contact laws": _laws_text(study.solver.laws),
+        **({"Card": f"corrected for {solver} by a bridge"} if (solver := study.solver.corrected_for) else {}),
         "Shear modulus": softened,
         "Time step": f"{100.0 * numerics.time_step_fraction:g} % of the Rayleigh time",
         "Angle": f"“{measurement.fit}” fit, mean of {measurement.azimuths} views of a heap, both flanks",

@@ -15,14 +15,17 @@ from pydantic import ValidationError
 from experiments.errors import StudyError
 from experiments.studyfile.factor_section import merge
 from experiments.studyfile.places import drop
-from experiments.studyfile.solver_section import CARD_LAWS, LAWS, laws_of
+from experiments.studyfile.solver_section import CARD_LAWS, CORRECTED_FOR, LAWS, laws_of
 from experiments.toml_files import read_toml
 
 MATERIAL = "material"
 """Key of a study that names a card, and table of a card that holds the sections."""
 
+BRIDGE = "bridge"
+"""Table of a card whose values a bridge has corrected."""
+
 SECTIONS = ("grain", "wall", "contact", "mechanism", "solver")
-"""Sections of a study that describe a material, and the laws that its values hold for."""
+"""Sections of a study that describe a material, and the laws and the solver that its values hold for."""
 
 
 def with_material(document: Mapping[str, Any], folder: Path) -> dict[str, Any]:
@@ -73,7 +76,7 @@ def check_laws(document: Mapping[str, Any], sections: Mapping[str, Any], path: P
 
 
 def read_card(path: Path) -> dict[str, Any]:
-    """Read the sections of a card, its clump files by their whole path.
+    """Read the sections of a card, its clump files by their whole path, and the solver of its bridge.
 
     Raises
     ------
@@ -87,6 +90,9 @@ def read_card(path: Path) -> dict[str, Any]:
         raise StudyError(rule, sorted(card), str(path))
     for table, key in files_of(sections):
         table[key] = str(path.parent.resolve() / table[key])
+    bridge = card.get(BRIDGE)
+    if isinstance(bridge, Mapping) and "engine" in bridge:
+        sections = merge(sections, {"solver": {CORRECTED_FOR: bridge["engine"]}})
     return sections
 
 

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Self
 from pydantic import Field, ValidationError, ValidationInfo, model_validator
 
 from dem_warp import EDEM, PRESETS, ContactLaws
+from experiments.errors import StudyError
 from experiments.studyfile.generated import EngineSection, section_for
 from experiments.studyfile.schema import Generated, Section, nested_error
 from experiments.texts import nearest_name
@@ -17,7 +18,11 @@ BASE = "base"
 """Key of ``[solver.laws]`` that names the set of which its other keys change something."""
 
 LAWS, CARD_LAWS = "laws", "card_laws"
+CORRECTED_FOR, CARD_SOLVER = "corrected_for", "card_solver"
 """Keys of ``[solver]``."""
+
+OWN_SOLVER = "dem-warp"
+"""Name of the solver of a study without ``[engine]``."""
 
 UNNAMED = "edem"
 """Set of a study, and of a card, that names no laws: the only one while laws had no names."""
@@ -82,6 +87,27 @@ class SolverSection(Section):
     """Set of laws by the name of its code, or a table law by law; left out, the base law, ``"edem"``."""
     card_laws: str | None = Field(default=None)
     """Laws of the material card, where it was found with others than the study's: told, and taken."""
+    corrected_for: str | None = Field(default=None)
+    """Solver that a bridge has corrected the values for; a study takes it from its material card."""
+    card_solver: str | None = Field(default=None)
+    """That solver, where the study runs in another one: told, and the values taken as they are."""
+
+    def check_solver(self, name: str, place: str) -> None:
+        """Check that values corrected for one solver run in it, or that the study says which one it was.
+
+        Raises
+        ------
+        StudyError
+            When the solver of this name is another one, and the study does not say so.
+        """
+        if self.corrected_for in (None, name, self.card_solver):
+            return
+        solver = self.corrected_for
+        rule = (
+            f"the values of the card must run in {solver!r}, which a bridge has corrected them for: name it "
+            f'as [engine], or say {CARD_SOLVER} = "{solver}" under [solver] to take the values as they are'
+        )
+        raise StudyError(rule, name, place)
 
 
 def laws_of(solver: Mapping[str, Any]) -> ContactLaws:

@@ -7,9 +7,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
 from dem_warp import EDEM, PRESETS, RELATIVE, laws_named
+from experiments.cases import engine_of, engines, with_engine
 from experiments.cases.key import case_key
+from experiments.cli import app
 from experiments.discover.library import library_for
 from experiments.discover.search import Search
 from experiments.errors import StudyError
@@ -160,3 +163,81 @@ def test_a_card_from_before_laws_had_names_holds_for_the_base_law(write_study: W
     (path.parent / "card.toml").write_text(CARD.partition("\n\n")[0], encoding="utf-8")
     with pytest.raises(StudyError, match="hold for the laws 'edem'"):
         load_study(path)
+
+
+CORRECTED = f'{CARD}\n[bridge]\nengine = "other"\n'
+"""A card whose values a bridge has corrected for a solver of this name."""
+
+
+@pytest.fixture
+def corrected(write_study: WriteStudy, monkeypatch: pytest.MonkeyPatch) -> WriteStudy:
+    """Write a study with a corrected card; the solver that it is corrected for is installed, and one more."""
+    for name in ("other", "third"):
+        monkeypatch.setitem(engines._DRIVERS, name, lambda cases, **more: [])
+
+    def write(add: str = "") -> Path:
+        path = write_study(WITH_CARD, add=add)
+        (path.parent / "card.toml").write_text(CORRECTED, encoding="utf-8")
+        return path
+
+    return write
+
+
+@pytest.mark.parametrize(
+    ("add", "option", "received"),
+    [
+        ("", None, "dem-warp"),
+        ("", "third", "third"),
+        ('[engine]\nname = "third"\n', None, "third"),
+        ('[engine]\nname = "other"\n', "third", "third"),
+        ('[solver]\ncard_solver = "third"\n', None, "dem-warp"),
+    ],
+)
+def test_a_card_corrected_for_one_solver_is_refused_in_another(
+    corrected: WriteStudy, add: str, option: str | None, received: str
+) -> None:
+    study = with_engine(load_study(corrected(add)), option)
+    with pytest.raises(StudyError) as caught:
+        engine_of(study)
+    assert "must run in 'other'" in caught.value.rule
+    assert 'card_solver = "other"' in caught.value.rule
+    assert caught.value.value == received
+    assert caught.value.place == f"{study.file}: solver.card_solver"
+
+
+@pytest.mark.parametrize(
+    ("add", "option"),
+    [
+        ("", "other"),
+        ('[engine]\nname = "other"\n', None),
+        ('[solver]\ncard_solver = "other"\n', None),
+        ('[solver]\ncard_solver = "other"\n', "third"),
+    ],
+)
+def test_it_runs_in_its_solver_and_where_the_study_says_so(
+    corrected: WriteStudy, add: str, option: str | None
+) -> None:
+    study = with_engine(load_study(corrected(add)), option)
+    assert (engine_of(study) is None) == (option is None and "engine" not in add)
+    assert study_facts(study)["Card"] == "corrected for other by a bridge"
+    assert study.case({}, 1).laws == RELATIVE
+
+
+@pytest.mark.parametrize("command", ["heap", "calibrate", "discover"])
+def test_no_command_runs_a_card_of_another_solver(
+    corrected: WriteStudy, tmp_path: Path, command: str
+) -> None:
+    words = [command, str(corrected()), "--out", str(tmp_path / "out")]
+    refused = CliRunner().invoke(app, words)
+    assert refused.exit_code == 2
+    assert "must run in 'other'" in " ".join(refused.stderr.split())
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_export_warns_of_a_corrected_card_also_through_a_study(
+    corrected: WriteStudy, tmp_path: Path
+) -> None:
+    words = ["export", str(corrected()), "--to", "edem", "--approximate", "--out", str(tmp_path / "sheet")]
+    assert CliRunner().invoke(app, words).exit_code == 0
+    head = (tmp_path / "sheet" / "values.md").read_text().splitlines()[:6]
+    assert any("WARNING: the card was corrected for other" in line for line in head)

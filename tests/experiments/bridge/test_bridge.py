@@ -18,11 +18,21 @@ from experiments import api
 from experiments.bridge.crossing import cross
 from experiments.bridge.result import BridgeOutcome
 from experiments.bridge.source import Source, read_source
+from experiments.cases import engine_of
 from experiments.cli import app
 from experiments.studyfile import load_card, load_study
 
 CONES = Path(__file__).parents[1] / "engines" / "cone_program.py"
 COMMAND = f"'{sys.executable}' '{CONES}'"
+OTHER = """
+name = "other"
+material = "{card}"
+
+[scene.lifted-cylinder]
+diameter = "28 mm"
+height = "28 mm"
+grain_count = 30
+"""
 Write = Callable[..., Path]
 
 
@@ -70,6 +80,14 @@ def test_a_card_is_corrected_for_another_solver_and_verified_there(card: Path, t
     assert CliRunner().invoke(app, leaving).exit_code == 0
     head = (tmp_path / "sheet" / "values.md").read_text().splitlines()[:4]
     assert any("WARNING: the card was corrected for" in line for line in head), "it holds in the other solver"
+
+    other = tmp_path / "other.toml"
+    other.write_text(OTHER.format(card=(out / "material.toml").as_posix()), encoding="utf-8")
+    refused = CliRunner().invoke(app, ["heap", str(other), "--out", str(tmp_path / "heap")])
+    assert refused.exit_code == 2
+    assert f'card_solver = "{corrected["bridge"]["engine"]}"' in " ".join(refused.stderr.split())
+    there = load_study(other, changes={"engine": {"command": f"{COMMAND} flatter"}})
+    assert engine_of(there) is not None, "in the solver of the bridge the values hold"
 
     log = out / "cases" / "runs.txt"
     before = log.read_text()
