@@ -11,7 +11,7 @@ import subprocess
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -41,6 +41,9 @@ DIGITS = 16
 HEAPS = "heaps.csv"
 """Table of all heaps in a record."""
 
+NUMBER = "%.6g"
+"""Numbers in it."""
+
 
 @dataclass(frozen=True)
 class Heap:
@@ -68,6 +71,11 @@ class Heap:
     def job(self) -> tuple[str, str, str, int]:
         """Code, laws, card and seed."""
         return self.code, self.laws, self.card, self.seed
+
+    def as_recorded(self) -> Heap:
+        """Round the numbers as the table of a record has them."""
+        numbers = {"angle": self.angle, "height": self.height, "seconds": self.seconds}
+        return replace(self, **{name: x and float(NUMBER % x) for name, x in numbers.items()})
 
     @classmethod
     def read(cls, path: Path) -> Heap:

@@ -13,7 +13,7 @@ from scipy import stats
 
 from doe import DesignError, compare_means
 from experiments.benchmarks.travel.cards import CARDS, CODES, FRESH_SEEDS, GRAIN_COUNT, SEEDS, SOFTENING
-from experiments.benchmarks.travel.heaps import AZIMUTHS, FIT, HEAPS, OURS, Heap
+from experiments.benchmarks.travel.heaps import AZIMUTHS, FIT, HEAPS, NUMBER, OURS, Heap
 from experiments.files import write_text
 from experiments.report.kit.markdown import markdown_page, markdown_table
 
@@ -119,8 +119,10 @@ def summarise_codes(cells: pd.DataFrame, heaps: Sequence[Heap]) -> pd.DataFrame:
 def write_page(heaps: Sequence[Heap], folder: Path) -> Path:
     """Write the page, its table and every heap's numbers into a folder.
 
+    The page is that of the numbers as the folder's table has them, so that they give it again to the bit.
     Causes of what is not equivalent stand in the folder's `causes.md`, if it has one.
     """
+    heaps = [heap.as_recorded() for heap in heaps]
     cells, failed = compare_cells(heaps), [heap for heap in heaps if heap.angle is None]
     head = INTRODUCTION.format(
         count=GRAIN_COUNT,
@@ -142,7 +144,7 @@ def write_page(heaps: Sequence[Heap], folder: Path) -> Path:
     write_text(folder / PAGE, markdown_page(*parts))
     write_text(folder / TABLE, cells.to_csv(index=False, float_format="%.4g"))
     table = pd.DataFrame([asdict(heap) for heap in sorted(heaps, key=lambda heap: heap.job)])
-    write_text(folder / HEAPS, table.to_csv(index=False, float_format="%.6g"))
+    write_text(folder / HEAPS, table.to_csv(index=False, float_format=NUMBER))
     return folder / PAGE
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import stat
 import sys
 from dataclasses import replace
@@ -12,6 +13,7 @@ import pandas as pd
 import pytest
 
 from experiments.benchmarks.travel import heaps as travel
+from experiments.benchmarks.travel.__main__ import RECORD
 from experiments.benchmarks.travel.cards import CARDS, CODES, FRESH_SEEDS, FRICTIONS, SEEDS, SHAPES, VOLUME
 from experiments.benchmarks.travel.heaps import OURS, Heap, run_theirs, stored_heaps, take_up
 from experiments.benchmarks.travel.travel_page import compare_cells, write_page
@@ -96,6 +98,26 @@ def test_heaps_of_a_record_are_taken_up(tmp_path: Path) -> None:
     newer.write(tmp_path / "out")
     take_up(tmp_path / "record", tmp_path / "out")
     assert stored_heaps(tmp_path / "out") == [newer, made[1]]
+
+
+def test_a_record_gives_its_own_page_again(tmp_path: Path) -> None:
+    rng = np.random.default_rng(6)
+    made = [
+        heap(code, "yade", "egg-low", seed, rng.normal(12.0, 0.4))
+        for code in (OURS, "yade")
+        for seed in SEEDS
+    ]
+    for name, source, heaps in (("drawn", None, made), ("committed", RECORD, [])):
+        first, again = tmp_path / name, tmp_path / f"{name}-again"
+        if source:
+            shutil.copytree(source, first)
+        else:
+            write_page(heaps, first)
+        take_up(first, tmp_path / f"{name}-out")
+        shutil.copytree(first, again)
+        write_page(stored_heaps(tmp_path / f"{name}-out"), again)
+        for file in first.iterdir():
+            assert (again / file.name).read_bytes() == file.read_bytes(), file
 
 
 def test_a_run_is_measured_stored_and_not_repeated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
