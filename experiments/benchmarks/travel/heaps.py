@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -37,6 +38,11 @@ TAIL = 300
 
 DIGITS = 16
 """Hexadecimal digits of the hash of what a heap was made from."""
+
+INPUT_DIGITS, NOTHING = 9, 1e-15
+"""Digits of a number that make another input, and the size below which it is zero."""
+
+_FRACTION = re.compile(r"(?<![\w.])-?\d+(?:\.\d+(?:e[+-]?\d+)?|e[+-]?\d+)")
 
 HEAPS = "heaps.csv"
 """Table of all heaps in a record."""
@@ -210,13 +216,21 @@ def _run_one(folder: Path, programs: Path | None, code: str, card: str, seed: in
 
 
 def _input_key(translation: Translation) -> str:
-    """Hash of all files of an input and of the command, without comments: words change no heap."""
+    """Hash of all files of an input and of the command, without comments: words change no heap.
+
+    Nor do the last digits of a sum, which differ between processors.
+    """
     files = {
-        name: "\n".join(line for line in text.split("\n") if not line.startswith("#"))
+        name: _FRACTION.sub(_shortened, "\n".join(line for line in text.split("\n") if line[:1] != "#"))
         for name, text in translation.files.items()
     }
     text = json.dumps([files, translation.command], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:DIGITS]
+
+
+def _shortened(number: re.Match[str]) -> str:
+    value = float(number[0])
+    return f"{value:.{INPUT_DIGITS}g}" if abs(value) > NOTHING else "0"
 
 
 def _measured(heap: Callable[..., Heap], card: str, spheres: np.ndarray, reason: str = "") -> Heap:

@@ -18,6 +18,7 @@ from experiments.benchmarks.travel.cards import CARDS, CODES, FRESH_SEEDS, FRICT
 from experiments.benchmarks.travel.heaps import OURS, Heap, run_theirs, stored_heaps, take_up
 from experiments.benchmarks.travel.travel_page import compare_cells, write_page
 from experiments.errors import InputError
+from experiments.export import Translation
 
 PROGRAM = """\
 #!{python}
@@ -118,6 +119,20 @@ def test_a_record_gives_its_own_page_again(tmp_path: Path) -> None:
         write_page(stored_heaps(tmp_path / f"{name}-out"), again)
         for file in first.iterdir():
             assert (again / file.name).read_bytes() == file.read_bytes(), file
+
+
+def test_an_input_is_the_same_whatever_the_processor_rounds() -> None:
+    def key(text: str) -> str:
+        return travel._input_key(Translation({"lift.in": text}, "lift.in", ("lmp",), "heap.dump", ()))
+
+    told = key("pour 2000 5255741 0.233711711664793 -2.53984396e-20 1.5e6")
+    assert key("# a word\npour 2000 5255741 0.233711711664794 3e-21 1500000.0000000001") == told
+    for other in (
+        "2000 5255742 0.233711711664793",
+        "2000 5255741 0.2337118",
+        "2001 5255741 0.233711711664793",
+    ):
+        assert key(f"pour {other} -2.53984396e-20 1.5e6") != told
 
 
 def test_a_run_is_measured_stored_and_not_repeated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
