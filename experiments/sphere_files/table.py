@@ -3,12 +3,14 @@
 DEM-Engine's clumps have the columns ``x,y,z,r`` (``data/clumps/*.csv`` of its repository), its spheres
 ``X,Y,Z,r,...``. EDEM shows and takes its table of spheres as text with physical radius and position X, Y, Z,
 and its results as CSV under lines of text; columns are found by their names, so that either is read. No
-file of EDEM itself was at hand to test this with.
+file of EDEM itself was at hand to test this with. Sheets of ``dem-warp export`` have a column with the unit.
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +20,7 @@ from experiments.sphere_files.sphere_file import (
     LARGEST,
     Columns,
     Format,
+    Row,
     SphereFile,
     content_lines,
     spheres_of,
@@ -40,6 +43,8 @@ _NAMES = {
     "d": rf"{_SIZE}(?:diameter|d)",
     "body": "clumpid|idmultisphere|mol|grain|owner|particleid|clump",
 }
+SHEET_UNIT, SHEET_SHAPE = "unit", "shape"
+"""Columns of a sheet of ``dem-warp export``: the unit, and the shape that a sphere is part of."""
 _UNIT = re.compile(r"[(\[]\s*([^)\]]*?)\s*[)\]]")
 
 
@@ -80,16 +85,34 @@ def _read(path: Path) -> SphereFile:
     size = "r" if "r" in kinds else "d"
     x, y, z, r = (kinds.index(kind) for kind in ("x", "y", "z", size))
     columns = Columns(x, y, z, r, size == "d", kinds.index("body") if "body" in kinds else None)
-    rows = ((n, split(line, delimiter)) for n, line in content_lines(text) if n > header)
-    spheres, bodies = spheres_of(rows, columns, path, delimiter)
+    rows: Iterable[Row] = ((n, split(line, delimiter)) for n, line in content_lines(text) if n > header)
     sizes = [_unit_of(names[column], f"{path}, line {header}") for column in columns.needed()[:4]]
+    if SHEET_UNIT in names:
+        rows = list(rows)
+        sizes = [_unit_of_rows(rows, names.index(SHEET_UNIT), path)] * 4
+        if columns.body is None and SHEET_SHAPE in names:
+            columns = replace(columns, body=names.index(SHEET_SHAPE))
+    spheres, bodies = spheres_of(rows, columns, path, delimiter)
     told = f"table of spheres ({', '.join(names[column] for column in columns.needed())})"
     if not any(sizes):
         return SphereFile(told, spheres, bodies)
     if not all(sizes):
         rule = "either all of x, y, z and radius name their unit, or none does"
         raise InputError(rule, ", ".join(names), f"{path}, line {header}")
+    if len(set(sizes)) == 1:
+        return SphereFile(told, spheres, bodies, unit=sizes[0])
     return SphereFile(told, spheres * np.array(sizes, dtype=np.float64), bodies, unit=1.0)
+
+
+def _unit_of_rows(rows: Iterable[Row], column: int, path: Path) -> float:
+    """Size of the unit that every row of a sheet names [m]."""
+    first: str | None = None
+    for line, cells in rows:
+        name = cells[column] if len(cells) > column else ""
+        if name not in UNITS["length"] or name != (first := first or name):
+            rule = f"every row must name the same unit of length ({', '.join(UNITS['length'])})"
+            raise InputError(rule, name, f"{path}, line {line}")
+    return UNITS["length"][first or "m"]
 
 
 def _unit_of(name: str, place: str) -> float | None:

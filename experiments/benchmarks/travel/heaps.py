@@ -80,8 +80,9 @@ class Heap:
 
     def as_recorded(self) -> Heap:
         """Round the numbers as the table of a record has them."""
-        numbers = {"angle": self.angle, "height": self.height, "seconds": self.seconds}
-        return replace(self, **{name: x and float(NUMBER % x) for name, x in numbers.items()})
+        angle = None if self.angle is None else float(NUMBER % self.angle)
+        height, seconds = float(NUMBER % self.height), float(NUMBER % self.seconds)
+        return replace(self, angle=angle, height=height, seconds=seconds)
 
     @classmethod
     def read(cls, path: Path) -> Heap:

@@ -35,6 +35,7 @@ FILES = {
     "Sphere Position X [m],Sphere Position Y [m],Sphere Position Z [m],Sphere Radius [m]\n"
     "0,0,-0.0015,0.0012\n0,0,0,0.0015\n0,0,0.0015,0.0012\n",
     "german excel": "X (mm);Y (mm);Z (mm);Radius (mm)\r\n0;0;-1,5;1,2\r\n0;0;0;1,5\r\n0;0;1,5;1,2\r\n",
+    "sheet of an export": "shape,x,y,z,radius,unit\n1,0,0,-1.5,1.2,mm\n1,0,0,0,1.5,mm\n1,0,0,1.5,1.2,mm\n",
     "diameters": "x y z diameter\n0 0 -1.5 2.4\n0 0 0 3\n0 0 1.5 2.4\n",
     "xml": "<?xml version='1.0'?><particle units='mm'>"
     "<sphere><position x='0' y='0' z='-1.5'/><radius>1.2</radius></sphere>"
@@ -87,6 +88,27 @@ def test_a_clump_is_taken_from_a_dump_of_it(tmp_path: Path) -> None:
 def test_another_unit_than_the_file_names_is_refused() -> None:
     with pytest.raises(InputError, match="which the file names"):
         read_clump(DATA / "pellet.multisphere", "m")
+
+
+@pytest.mark.parametrize("name", ["sheet of an export", "edem table", "german excel"])
+def test_a_table_names_its_unit(tmp_path: Path, name: str) -> None:
+    path = tmp_path / "spheres.csv"
+    path.write_text(FILES[name], "utf-8")
+    assert read_clump(path, "mm").shape.volume == read_clump(path).shape.volume
+    with pytest.raises(InputError, match="which the file names"):
+        read_clump(path, "m")
+
+
+def test_a_sheet_of_two_shapes_or_two_units_is_no_clump(tmp_path: Path) -> None:
+    path, sheet = tmp_path / "spheres.csv", FILES["sheet of an export"]
+    head, last = sheet.rstrip().rsplit("\n", 1)
+    for row, rule in (
+        (f"2{last[1:]}", "holds one body"),
+        (last.replace("mm", "cm"), "the same unit of length"),
+    ):
+        path.write_text(f"{head}\n{row}\n", "utf-8")
+        with pytest.raises(InputError, match=rule):
+            read_clump(path)
 
 
 def test_a_file_without_a_unit_takes_the_one_given(tmp_path: Path) -> None:
