@@ -61,8 +61,8 @@ def test_the_angle_is_that_of_the_spheres_on_the_plate_of_the_script() -> None:
     assert "frame 2 of 2 (timestep 20000)" in found["source"]
 
 
-def test_the_unit_leaves_the_angle_and_scales_what_is_told() -> None:
-    [metres] = measured(DATA / "yade_clumps.txt", "--overlay", "drawn")
+def test_the_unit_leaves_the_angle_and_scales_what_is_told(tmp_path: Path) -> None:
+    [metres] = measured(DATA / "yade_clumps.txt", "--overlay", tmp_path / "drawn")
     assert Path(metres["overlay"]).stat().st_size > 1000
     [millimetres] = measured(DATA / "yade_clumps.txt", "--unit", "mm")
     assert millimetres["mean"] == pytest.approx(metres["mean"], abs=1e-6)
