@@ -29,6 +29,8 @@ DEEPEST_SHADOW = 0.4
 """Share of the light that a cast shadow keeps at the least: light comes from more than one lamp."""
 LEAST_NOISE = 1.0
 """Noise [of 255] below which a background counts as even: that of rounding and compression."""
+UNEVEN = 5.0
+"""Noise [of 255] from which on a heap must differ from its background by more than two greys do."""
 
 
 @dataclass(frozen=True)
@@ -89,8 +91,15 @@ def contrast_with_background(
         thresholds.append(threshold)
         values = values[values <= threshold]
     if not thresholds:
-        raise PictureError("a heap stands out of the background", "a picture without contrast", place)
+        raise PictureError("a heap stands out of the background", _why_none(noise), place)
     return Contrast(contrast, tuple(thresholds), noise, smooth, background)
+
+
+def _why_none(noise: float) -> str:
+    """Reason why nothing stands out: all is alike, or too uneven for anything to differ from it."""
+    if noise <= UNEVEN:
+        return "a picture without contrast"
+    return f"a background too uneven, by {noise:.0f} of 255, for a heap to differ from it"
 
 
 def unshaded(colors: Layer, own: Layer, reach: int) -> Layer:

@@ -18,6 +18,8 @@ from imaging.reasons import Doubt
 
 MINIMUM_HEAP_WIDTH = 16
 """A narrower heap [pixels] is not measured."""
+HIGHER_SIDE = 0.25
+"""Part of its height by which a piece that touches both sides is higher at the one that crops its heap."""
 THIN = 4.0
 """Columns up to this high [pixels] are measured by their area."""
 
@@ -65,6 +67,23 @@ def levelled(
         raise PictureError(f"a heap is at least {MINIMUM_HEAP_WIDTH} pixels wide", f"{width:.0f}", place)
     order = np.argsort(position, kind="stable")
     return position[order], np.maximum(height[order], 0.0)
+
+
+def cropping_borders(piece: NDArray[np.bool_]) -> str:
+    """Borders, but for the bottom one, that a piece touches, in words; empty if it touches none.
+
+    A plate that spans the picture touches both sides, its heap the one where the piece stands higher.
+    """
+    left, right, top = bool(piece[:, 0].any()), bool(piece[:, -1].any()), bool(piece[0].any())
+    if left and right:
+        first = piece.argmax(axis=0)[piece.any(axis=0)]
+        ends = float(first[0]), float(first[-1])
+        margin = HIGHER_SIDE * (max(ends) - float(first.min()))
+        left, right = ends[0] <= ends[1] + margin, ends[1] <= ends[0] + margin
+    names = [name for name, touched in (("left", left), ("right", right), ("top", top)) if touched]
+    if len(names) < 2:
+        return "".join(f"{name} border" for name in names)
+    return f"{', '.join(names[:-1])} and {names[-1]} borders"
 
 
 def top_edge(mask: NDArray[np.bool_], contrast: Layer, threshold: float) -> FloatArray:

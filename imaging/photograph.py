@@ -16,6 +16,7 @@ from imaging.doubts import (
     LARGEST_LEAN,
     LARGEST_MISFIT,
     LARGEST_SHIFT,
+    ROUGH_EDGE,
     doubts_of,
     relative_misfit,
 )
@@ -27,7 +28,7 @@ from imaging.looks import apart_from_plate, grains_together, with_faint, without
 from imaging.outline import Outline, levelled
 from imaging.plate import PlateLine
 from imaging.reasons import Doubt
-from imaging.shade import MOST_SHADED, shaded_share, without_sharp_shadows
+from imaging.shade import MOST_SHADED, WIDELY_SHADED, ShadedEdge, shaded_edge, without_sharp_shadows
 from imaging.sighting import Sighting, darker_below, refuse_brimful, sight, without_strays
 from imaging.view import View, level_angle
 
@@ -141,11 +142,12 @@ def find_heap(picture: Picture, given: PlateLine | None, view: View, place: str)
     if best.crooked > NO_HEAP:
         rule = "two straight flanks meet at the tip of a heap"
         raise PictureError(rule, f"no heap: an outline {best.crooked:.2f} of its height off two lines", place)
-    share = shaded_share(seen, best.sighting.rows, best.sighting.plate)
-    if share > MOST_SHADED:
+    shaded = shaded_edge(seen, best.sighting.rows, best.sighting.plate)
+    doubted = _doubt_of_shade(shaded, best, place)
+    if shaded.share > MOST_SHADED:
         width = int(np.isfinite(best.sighting.rows).sum())
         if lit := _without_sharp_shadow(seen, width, given, view, place):
-            best, finding, share = lit, "", 0.0
+            best, finding, doubted = lit, "", []
     if given is None:
         refuse_brimful(seen, best.sighting, best.ends, place)
     doubts = list(best.sighting.doubts)
@@ -153,9 +155,7 @@ def find_heap(picture: Picture, given: PlateLine | None, view: View, place: str)
         doubts.append(
             Doubt("shade", "what is below the whole heap is darker than beside it: its shadow, or a dish?")
         )
-    if share > MOST_SHADED:
-        found = f"{share:.2f} of a flank's edge has wall below it, darker, and no grains: a sharp shadow?"
-        doubts.append(Doubt("shade", found))
+    doubts += doubted
     if best.clear and finding:
         doubts.append(Doubt("threshold", finding))
     return replace(best.sighting, doubts=tuple(doubts))
@@ -224,8 +224,27 @@ def _without_sharp_shadow(
         return None
     if firm.shift(tries) > LARGEST_SHIFT:
         return None
-    shaded = shaded_share(seen, firm.sighting.rows, firm.sighting.plate)
-    return firm if shaded <= MOST_SHADED else None
+    shaded = shaded_edge(seen, firm.sighting.rows, firm.sighting.plate)
+    return firm if shaded.share <= MOST_SHADED else None
+
+
+def _doubt_of_shade(shaded: ShadedEdge, best: Judged, place: str) -> list[Doubt]:
+    """A doubt where bands of shaded wall lie along much of a flank, or the angle without them is another one.
+
+    Some windows between grains are as even as a shadow and of the wall's hue, above all before a wall whose
+    pattern widens what counts as its hue: so short, and so shallow, they make nothing of the angle.
+    """
+    if shaded.share <= MOST_SHADED:
+        return []
+    found = f"{shaded.share:.2f} of a flank's edge has wall below it, darker, and no grains: a sharp shadow?"
+    if shaded.share <= WIDELY_SHADED:
+        try:
+            below = _judged(replace(best.sighting, rows=shaded.rows), place)
+        except PictureError:
+            return [Doubt("shade", found)]
+        if best.like(below):
+            return []
+    return [Doubt("shade", found)]
 
 
 def _tries(
@@ -301,7 +320,8 @@ def _judged(sighting: Sighting, place: str) -> Judged:
     mean = 0.5 * (left.angle + right.angle)
     se = 0.5 * float(np.hypot(left.se, right.se))
     # An angle that no grain has does not say that another look would show the heap better.
-    found = (doubt for doubt in doubts_of(left, right, mean, se, outline) if doubt.name != "range")
+    judged = doubts_of(left, right, mean, se, outline, ROUGH_EDGE)
+    found = (doubt for doubt in judged if doubt.name != "range")
     doubts = (*sighting.doubts, *found)
     lean = abs(left.angle - right.angle) / LARGEST_LEAN
     crooked = relative_misfit(left, right, outline)

@@ -6,7 +6,7 @@ lies within it is the wall: its hue, and no grains.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -33,8 +33,11 @@ BAND = 0.04
 """Depth of a band along the edge, in heights, from which on it counts: along a whole flank it makes some
 tenths of a degree."""
 MOST_SHADED = 0.1
-"""Share of a flank's columns with such a band from which on the edge is a shadow's: black grains leave some
-windows even."""
+"""Share of a flank's columns with such a band from which on the edge may be a shadow's: black grains leave
+some windows even."""
+WIDELY_SHADED = 0.25
+"""The same from which on it is doubted whatever the bands make of the angle: a textured wall shows a shadow
+in parts, 0.4 of a flank at the least where one made 2 degrees."""
 PARTLY = 0.5
 """Share of a heap's middle with the wall's hue and no grains from which on it is a grey powder, whose edge is
 no shadow's where it is as light as the middle."""
@@ -48,8 +51,18 @@ SPECK = 5
 """Width [pixels] of what is left out: the rim of a shadow blends two colours and is uneven."""
 
 
-def shaded_share(seen: Contrast, rows: FloatArray, plate: PlateLine) -> float:
-    """Share of a flank's edge below which lies a band of shaded wall, of the flank that has more of it.
+@dataclass(frozen=True)
+class ShadedEdge:
+    """Bands of shaded wall below a heap's edge."""
+
+    share: float
+    """Share of a flank's edge with such a band below it, of the flank that has more of it."""
+    rows: FloatArray
+    """The edge below these bands; NaN beside the heap, shape (columns,)."""
+
+
+def shaded_edge(seen: Contrast, rows: FloatArray, plate: PlateLine) -> ShadedEdge:
+    """Look for bands of shaded wall below the upper edge of a heap.
 
     A grey powder before a white wall is as even as its shadow; there only what is less or more light counts.
 
@@ -70,22 +83,23 @@ def shaded_share(seen: Contrast, rows: FloatArray, plate: PlateLine) -> float:
     middle = slice(max(tip - round(CORE * len(columns)), 0), tip + round(CORE * len(columns)) + 1)
     inner = ((row >= edge + 0.25 * height) & (row < ground - 0.1 * height))[:, middle]
     if not inner.any():
-        return 0.0
+        return ShadedEdge(0.0, rows)
     alike = float(like[:, middle][inner].mean())
     within = float(np.median(dimming[:, middle][inner])) if alike > PARTLY else None
     first = np.ceil(edge) + EDGE
     other = (~like & (row >= first)) | (row >= ground)
     depth = np.where(other.any(axis=0), other.argmax(axis=0), len(like)) - first
     deep = depth > BAND * tallest
-    shares = [0.0]
+    share, lower = 0.0, rows.copy()
     for flank in (slice(None, tip), slice(tip, None)):
         if not deep[flank].any():
             continue
         band = (row >= first) & (row <= first + BAND * tallest) & deep
         light = float(np.median(dimming[:, flank][band[:, flank]]))
         if within is None or not 1.0 / SAME_LIGHT < light / within < SAME_LIGHT:
-            shares.append(float(deep[flank].mean()))
-    return max(shares)
+            share = max(share, float(deep[flank].mean()))
+            lower[columns[flank]] = np.where(deep, first + depth, edge)[flank]
+    return ShadedEdge(share, lower)
 
 
 def without_sharp_shadows(seen: Contrast, width: int) -> Contrast:

@@ -13,7 +13,14 @@ from imaging.doubts import END_WIDTH, LARGEST_UNSEEN_TILT, LEAST_END
 from imaging.errors import PictureError
 from imaging.foot import Base, below_plate, front_of_base, is_lowest_row, joined_foot
 from imaging.geometry import FloatArray, Layer
-from imaging.outline import bottom_edge, inner_contrast, largest_pieces, refine_thin, top_edge
+from imaging.outline import (
+    bottom_edge,
+    cropping_borders,
+    inner_contrast,
+    largest_pieces,
+    refine_thin,
+    top_edge,
+)
 from imaging.plate import PLATE_CLEARANCE, PlateLine, find_plate
 from imaging.reasons import Doubt
 from imaging.view import View
@@ -31,8 +38,9 @@ LEAST_WIDTH = 100.0
 BRIMFUL_RULE = "the heap stands on a plate wider than itself"
 BESIDE_NOISE, BESIDE_DIFFERENCE = 6.0, 24.0
 """Multiple of the wall's noise, and difference [of 255], from which on two sides differ: twice a cloth's."""
-FADED = 0.5
-"""Darkness a tenth of a heap's width below its foot over that at its foot, under which it is a shadow's."""
+FADED = 0.7
+"""Darkness a tenth of a heap's width below its foot over that at its foot, under which it is a shadow's: good
+heaps seen from above have up to 0.65, a dish 1."""
 LOW_END = 0.08
 """Height of an outline's lower end over the heap's, from which on its ground may be a board's underside."""
 VIEW_FROM_ABOVE = 0.5
@@ -103,10 +111,9 @@ def _on_plate(
     sought = given is None and plate.visible
     if sought and is_lowest_row(seen.colors, heap, body, plate, _least_difference(seen)):
         return _on_plate(front, seen, threshold, given, view, place, shelf=False)
-    for border, name in ((heap[:, 0], "left"), (heap[:, -1], "right"), (heap[0], "top")):
-        if border.any():
-            rule = "the whole heap is in the picture"
-            raise PictureError(rule, f"no heap, or one cropped by the {name} border", place)
+    if borders := cropping_borders(heap):
+        rule = "the whole heap is in the picture"
+        raise PictureError(rule, f"no heap, or one cropped by the {borders}", place)
     if not plate.visible and body[-1].any():
         rule = "the heap stands on its plate, its whole foot in the picture"
         raise PictureError(rule, "no heap, or one that goes on below the bottom border", place)

@@ -15,7 +15,7 @@ from experiments.sphere_files import format_of, length_unit, read_spheres
 from experiments.studyfile.study import MeasurementSection
 from experiments.studyfile.units import Quantity
 from imaging import Doubt, HeapAngle, heap_angle, overlay, snapshot
-from imaging.doubts import GREATEST_ANGLE, LARGEST_ERROR, LEAST_ANGLE
+from imaging.doubts import GREATEST_ANGLE, LEAST_ANGLE, ROUGH_EDGE
 from imaging.geometry import Picture, Spheres
 from imaging.ground import find_ground
 
@@ -140,5 +140,5 @@ def _doubts(angle: HeapAngle) -> Iterator[Doubt]:
     """Reasons to doubt an angle that need no camera."""
     if not LEAST_ANGLE <= angle.mean <= GREATEST_ANGLE:
         yield Doubt("range", f"{angle.mean:.1f} degrees, outside {LEAST_ANGLE:g} to {GREATEST_ANGLE:g}")
-    if angle.se > LARGEST_ERROR:
-        yield Doubt("error", f"a standard error of {angle.se:.2f} degrees, over {LARGEST_ERROR:g}")
+    if angle.se > ROUGH_EDGE:
+        yield Doubt("error", f"a standard error of {angle.se:.2f} degrees, over {ROUGH_EDGE:g}")

@@ -9,6 +9,7 @@ import pytest
 from experiments.benchmarks.photographs.camera import PhoneCamera
 from experiments.benchmarks.photographs.rendering import sharp_shadow
 from experiments.benchmarks.photographs.sampling import photograph, photograph_in_hard_light
+from experiments.benchmarks.photographs.without import picture_without_heap
 from experiments.commands import photographs
 from experiments.commands.photographs import drawn_names, mean_angle, measure_pictures
 from imaging import measure, save_picture
@@ -140,3 +141,28 @@ def test_a_sharp_shadow_on_the_wall_is_taken_off() -> None:
 @pytest.mark.parametrize("seed", [800021, 800034])
 def test_a_sharp_shadow_that_cannot_be_taken_off_is_doubted(seed: int) -> None:
     assert "shade" in [doubt.name for doubt in measure(photograph_in_hard_light(seed).picture).doubts]
+
+
+@pytest.mark.parametrize("seed", [940281, 940463])
+def test_a_few_even_windows_between_grains_are_no_shadow(seed: int) -> None:
+    """Along a sixth of a flank they have the hue of the wall, widened by its pattern; they make .4 degrees."""
+    shot = photograph(seed)
+    angle = measure(shot.picture)
+    assert angle.doubts == ()
+    # 95 % of the pictures are within 0.8 degrees.
+    assert angle.mean == pytest.approx(shot.truth.mean, abs=0.8)
+
+
+@pytest.mark.parametrize("seed", [940291, 940315])
+def test_a_shadow_that_fades_away_from_the_foot_is_no_dish(seed: int) -> None:
+    """From above the foot's shadow is seen on the plate: a tenth of the width below it half of it is left."""
+    shot = photograph(seed)
+    angle = measure(shot.picture)
+    assert angle.doubts == ()
+    assert angle.mean == pytest.approx(shot.truth.mean, abs=0.8)
+
+
+def test_a_dish_of_the_walls_hue_is_doubted() -> None:
+    kind, picture = picture_without_heap(940094)
+    assert kind == "dish"
+    assert "shade" in [doubt.name for doubt in measure(picture).doubts]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from imaging import measure
-from imaging.doubts import LARGEST_CLIFF, highest_cliff
+from imaging.doubts import LARGEST_CLIFF, LARGEST_ERROR, ROUGH_EDGE, doubts_of, highest_cliff
 from imaging.outline import Outline
 from imaging.plate import PlateLine
 
@@ -71,3 +71,16 @@ def test_a_stray_column_is_no_cliff() -> None:
     height = whole.height.copy()
     height[20] = height.max() / 2
     assert highest_cliff(Outline(whole.position, height, whole.plate, photographed=True)) < 0.1
+
+
+@pytest.mark.parametrize(
+    ("se", "shown", "looked"), [(0.7, [], []), (0.8, ["error"], []), (1.1, ["error"], ["error"])]
+)
+def test_an_angle_is_doubted_before_another_look_is_taken(
+    se: float, shown: list[str], looked: list[str]
+) -> None:
+    seen = outline(0.0)
+    angle = measure(seen)
+    for limit, expected in ((LARGEST_ERROR, shown), (ROUGH_EDGE, looked)):
+        found = doubts_of(angle.left_line, angle.right_line, angle.mean, se, seen, limit)
+        assert [doubt.name for doubt in found] == expected

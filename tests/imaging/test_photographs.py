@@ -58,9 +58,12 @@ def plate_without_heap() -> np.ndarray:
     ("picture", "reason"),
     [
         (np.full((300, 500, 3), 200, np.uint8), "without contrast"),
-        (noise_only(), "without contrast"),
+        # The median length of three normal deviates, 1.54, times 20, less the smoothing along rows.
+        (noise_only(), r"too uneven, by 2\d of 255"),
         (plate_without_heap(), r"nothing above the plate|without contrast"),
-        (draw(DrawnHeap(30, 30), SCENE)[:, :300], "cropped by the"),
+        (draw(DrawnHeap(30, 30), SCENE)[:, :300], "cropped by the right border"),
+        (draw(DrawnHeap(30, 30), SCENE)[:, -300:], "cropped by the left border"),
+        (draw(DrawnHeap(30, 30), SCENE)[:, 150:370], "cropped by the left and right borders"),
         (draw(DrawnHeap(30, 30))[:, :350], "cropped by the right border"),
         (draw(DrawnHeap(30, 30))[:, 120:], "cropped by the left border"),
         (draw(DrawnHeap(30, 30))[80:], "cropped by the top border"),
@@ -68,7 +71,20 @@ def plate_without_heap() -> np.ndarray:
         (np.zeros((4, 4, 3), np.uint8), "at least 16 rows"),
         (np.zeros((300, 500, 3)), "uint8"),
     ],
-    ids=["even", "noise", "plate alone", "scene", "right", "left", "top", "two heaps", "tiny", "floats"],
+    ids=[
+        "even",
+        "noise",
+        "plate alone",
+        "scene right",
+        "scene left",
+        "scene both",
+        "right",
+        "left",
+        "top",
+        "two heaps",
+        "tiny",
+        "floats",
+    ],
 )
 def test_picture_without_a_whole_heap_is_refused_with_its_reason(picture: np.ndarray, reason: str) -> None:
     with pytest.raises(PictureError, match=reason) as caught:

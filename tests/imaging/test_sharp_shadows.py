@@ -5,7 +5,11 @@ import numpy as np
 import pytest
 
 from imaging import measure
+from imaging.background import contrast_with_background
+from imaging.shade import MOST_SHADED, shaded_edge
+from imaging.sighting import sight
 from imaging.synthetic import Camera, DrawnHeap, draw
+from imaging.view import View
 
 WALL, PLATE, STRAW, COAL = (235, 235, 230), (120, 110, 100), (45, 70, 95), (60, 62, 64)
 ANGLE, WIDTH = 30.0, 400.0
@@ -76,3 +80,19 @@ def test_a_powder_of_the_walls_hue_is_no_shadow(texture: float) -> None:
     assert angle.doubts == ()
     # Two standard errors of flanks of 14 grains.
     assert angle.mean == pytest.approx(ANGLE, abs=0.64)
+
+
+def test_the_edge_below_a_shadow_is_the_heaps() -> None:
+    seen, lit = (
+        contrast_with_background(in_hard_light(keeps, 0.3, (1,)), "drawn", np.float32)
+        for keeps in (0.45, 1.0)
+    )
+    # Well under what the shadow differs by, .55 of the wall's 404.
+    found, bare = (sight(contrast, 60.0, None, View(), "drawn") for contrast in (seen, lit))
+    shaded = shaded_edge(seen, found.rows, found.plate)
+    assert shaded.share > MOST_SHADED
+    tip = seen.values.shape[1] // 2
+    middle = slice(tip, tip + round(0.4 * WIDTH))
+    assert np.median((bare.rows - found.rows)[middle]) > 10.0
+    # Two pixels are those of a blurred edge.
+    assert np.median(np.abs(bare.rows - shaded.rows)[middle]) < 2.5
