@@ -145,7 +145,7 @@ def test_a_sharp_shadow_that_cannot_be_taken_off_is_doubted(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", [940281, 940463])
 def test_a_few_even_windows_between_grains_are_no_shadow(seed: int) -> None:
-    """Along a sixth of a flank they have the hue of the wall, widened by its pattern; they make .4 degrees."""
+    """Along a sixth of a flank these have the hue of the wall, which its pattern widens: .4 degrees."""
     shot = photograph(seed)
     angle = measure(shot.picture)
     assert angle.doubts == ()
