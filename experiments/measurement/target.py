@@ -50,8 +50,7 @@ def with_measurements(study: Study) -> tuple[Study, tuple[str, ...]]:
     if section.fit is not None:
         require_same_fit(section.fit, study.measurement.fit, f"{place}.fit")
     if section.pictures is not None:
-        if section.observable != ANGLE or section.scene != TARGET_SCENE:
-            raise InputError("photographs give the angle of the study's own scene", section.title, place)
+        check_pictured(study)
         paths = find_pictures(section.pictures, study.file.parent, f"{place}.pictures")
         angles = measure_pictures(paths, study.measurement.fit)
         clear = {path: angle for path, angle in angles.items() if not angle.doubts}
@@ -78,6 +77,24 @@ def with_measurements(study: Study) -> tuple[Study, tuple[str, ...]]:
                     said.append(f"{condition}: {name} shows no scatter, so that it is not to be matched")
         return _given(study, found, f"file {section.file}"), tuple(said)
     return study, ()
+
+
+def check_pictured(study: Study) -> None:
+    """Check that photographs of heaps can be the target of a study, before any is looked for.
+
+    Raises
+    ------
+    InputError
+        When its test leaves no heap, or the target is another number than the heap's angle.
+    """
+    section, place = study.target_section, f"{study.file}: target.pictures"
+    if section is None or section.pictures is None:
+        return
+    if not study.scene.leaves_a_heap:
+        rule = "must be left out of a test that leaves no heap; of a drum give profiles"
+        raise InputError(rule, study.scene.kind.name, place)
+    if section.observable != ANGLE or section.scene != TARGET_SCENE:
+        raise InputError("photographs give the angle of the study's own scene", section.title, place)
 
 
 def target_tables(study: Study, measured: Iterable[Replicated]) -> dict[str, Any]:

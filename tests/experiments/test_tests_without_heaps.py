@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from commandline import dem_warp
 
 from dem_warp import Drum, Interaction, WallPart
 from doe.discrepancy import Point
@@ -103,6 +104,19 @@ def test_a_file_of_measurements_is_the_target_of_a_drum(write_study: WriteStudy,
     leading = study.target.leading
     assert (leading.observable, leading.unit) == ("dynamic_angle", "deg")
     assert (leading.measured.mean, leading.measured.sd, leading.measured.n) == (32.0, 1.0, 3)
+
+
+@pytest.mark.parametrize("observable", ["", 'observable = "dynamic_angle"\n'])
+def test_photographs_of_heaps_are_no_target_of_a_drum(
+    write_study: WriteStudy, tmp_path: Path, observable: str
+) -> None:
+    target = f'[target]\n{observable}pictures = "photos"\n'
+    path = write_study((TUBE, DRUM), (ANGLE, target))
+    with pytest.raises(InputError, match=r"target\.pictures: .*leaves no heap.*received drum"):
+        with_measurements(load_study(path))
+    code, _, said = dem_warp("calibrate", path, "--out", tmp_path / "out", "--dry-run")
+    assert code == 2
+    assert "target.pictures" in said
 
 
 SEVERAL = """
