@@ -29,6 +29,7 @@ from experiments.benchmarks.columns import CLUMP, reference_case
 from experiments.benchmarks.results import parse_counts, write_results
 from experiments.benchmarks.roofline import memory_bytes
 from experiments.benchmarks.timing import run_in, time_steps
+from experiments.commands.options import OneDevice
 from experiments.report.kit.figure import new_axes, save_figure
 from experiments.report.kit.machine import machine
 from experiments.verification.problems.setups import bodies
@@ -134,7 +135,7 @@ def draw_cost(table: pd.DataFrame, singles: int, title: str, path: Path) -> None
 
 
 def main(
-    device: Annotated[str, typer.Option(help="cpu or cuda.")] = "cpu",
+    device: OneDevice = "cpu",
     grains: Annotated[str, typer.Option(help="Grains of a single world.")] = GRAINS,
     worlds: Annotated[str, typer.Option(help="Numbers of worlds.")] = "1,2,4,8,16,32,64,128,256,512",
     world_grains: Annotated[int, typer.Option(help="Grains of each of these worlds.")] = 2600,

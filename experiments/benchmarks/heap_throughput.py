@@ -28,6 +28,7 @@ from experiments.benchmarks.peers.library import PEERS, PeerName
 from experiments.benchmarks.results import Part, parse_counts, write_results
 from experiments.benchmarks.roofline import Traffic, copy_bandwidth, step_traffic
 from experiments.benchmarks.timing import Timing, run_in, start, time_steps
+from experiments.commands.options import OneDevice
 from experiments.report.kit.machine import machine
 
 
@@ -75,7 +76,7 @@ def _speed_row(solver: Solver, timing: Timing, traffic: Traffic, bandwidth: floa
 
 def main(
     scale: Annotated[str, typer.Option(help="Scale of the buckwheat study: bench, soft or paper.")] = "soft",
-    device: Annotated[str, typer.Option(help="cpu or cuda.")] = "cpu",
+    device: OneDevice = "cpu",
     worlds: Annotated[str, typer.Option(help="Numbers of worlds to measure, such as 1,12,31,128.")] = "1",
     seeds: Annotated[int, typer.Option(help="Most columns to simulate beforehand.")] = 32,
     steps: Annotated[int, typer.Option(help="Steps of a stretch.")] = 2048,

@@ -19,6 +19,7 @@ from dem_warp.solver import Solver
 from experiments.benchmarks.columns import Columns
 from experiments.benchmarks.results import write_results
 from experiments.benchmarks.timing import run_in, start
+from experiments.commands.options import OneDevice
 from experiments.report.kit.machine import machine
 
 REPEATS = 20
@@ -53,7 +54,7 @@ def kernel_times(solver: Solver) -> pd.DataFrame:
 
 def main(
     scale: Annotated[str, typer.Option(help="Scale of the buckwheat study: bench, soft or paper.")] = "soft",
-    device: Annotated[str, typer.Option(help="cpu or cuda.")] = "cpu",
+    device: OneDevice = "cpu",
     worlds: Annotated[int, typer.Option(help="Number of worlds.")] = 1,
     columns: Annotated[Path, typer.Option(help="Folder of simulated columns.")] = Path("out/columns"),
     out: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("out/kernels"),

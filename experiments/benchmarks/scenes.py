@@ -29,6 +29,7 @@ from dem_warp.batch import Batch
 from dem_warp.device import resolve_device
 from dem_warp.view import WorldView
 from experiments.benchmarks.cut_pictures import View, draw_cut, layers, speeds, wall_section
+from experiments.commands.options import OneDevice
 from imaging import save_picture
 from imaging.geometry import Picture
 
@@ -128,7 +129,7 @@ def main(
     radius: Annotated[
         float, typer.Option(help="Mean radius of the balls [mm]; small ones want a GPU.")
     ] = 2.0,
-    device: Annotated[str | None, typer.Option(help="cpu or cuda.")] = None,
+    device: OneDevice = None,
     out: Annotated[Path, typer.Option(help="Folder of the pictures.")] = Path("out/scenes"),
 ) -> None:
     """Run every scene, print what it measures, and draw it."""

@@ -23,6 +23,13 @@ Device = Annotated[
         help="cpu, cuda, cuda:N or several GPUs, as cuda:0,cuda:1. Left out: the GPU if there is one."
     ),
 ]
+OneDevice = Annotated[
+    str | None,
+    typer.Option(
+        help="cpu, cuda or cuda:N. Left out: the GPU if there is one.",
+        callback=lambda name: present_device(name),
+    ),
+]
 Workers = Annotated[
     int | None,
     typer.Option(
@@ -62,6 +69,18 @@ DryRun = Annotated[
     typer.Option("--dry-run", help="Show cases, grains, steps, time, memory and disk, and run nothing."),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Write the result to standard output as JSON.")]
+
+
+def present_device(name: str | None) -> str | None:
+    """Refuse a device that is not there, before a script has written anything."""
+    if name is None:
+        return None
+    from dem_warp.device import resolve_device
+
+    try:
+        return resolve_device(name)
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from None
 
 
 def assignments(texts: list[str]) -> dict[str, str]:

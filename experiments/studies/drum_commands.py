@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from experiments.commands.console import clear_errors
+from experiments.commands.options import OneDevice
 from experiments.errors import InputError
 
 Out = Annotated[Path, typer.Option(help="Folder of the results.")]
@@ -31,7 +32,7 @@ def drum_commands(package: str, about: str, default: Path) -> typer.Typer:
     @app.command()
     def run(
         scale: Annotated[str, typer.Option(help="h200 or bench.")] = "h200",
-        device: Annotated[str | None, typer.Option(help="cpu, cuda or cuda:N.")] = None,
+        device: OneDevice = None,
         workers: Annotated[int | None, typer.Option(min=1, help="Processes on a CPU.")] = None,
         out: Out = default,
     ) -> None:

@@ -15,6 +15,7 @@ import typer
 import warp as wp
 
 from dem_warp.device import resolve_device
+from experiments.commands.options import OneDevice
 from experiments.verification.library import HEAVY, PROBLEMS
 from experiments.verification.result import Result
 from experiments.verification.verification_page import summary, write_result, write_verification
@@ -42,7 +43,7 @@ def main(
         Path | None,
         typer.Option(help="Folder; by default out/verification for named problems, otherwise the record."),
     ] = None,
-    device: Annotated[str, typer.Option(help="cpu or cuda.")] = "cpu",
+    device: OneDevice = "cpu",
     page_only: Annotated[
         bool, typer.Option("--page-only", help="Run nothing; write the page from the chapters in the folder.")
     ] = False,

@@ -9,12 +9,13 @@ is not simulated again.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 import pandas as pd
+import typer
 
 from doe import (
     Design,
@@ -31,6 +32,8 @@ from doe import (
 )
 from experiments.benchmarks.results import write_results
 from experiments.cases import OwnWorkers, Store, run_cases
+from experiments.commands.console import clear_errors
+from experiments.commands.options import OneDevice
 from experiments.measurement.observables import ANGLE, OUTLINE
 from experiments.studyfile import Study, load_study
 
@@ -154,20 +157,19 @@ def write(folder: Path, study: Study, design: Design, cases: pd.DataFrame) -> Pa
     return write_results(folder, "README", [("regions", said, table), ("strengths", moved, strengths(found))])
 
 
-def main() -> None:
-    """Run the benchmark as a command."""
-    parser = argparse.ArgumentParser(description="Compare outlines and angles on twin data.")
-    parser.add_argument("--study", type=Path, default=STUDY)
-    parser.add_argument("--device", default="cpu")
-    parser.add_argument("--workers", type=int, help="processes; left out: one a core")
-    parser.add_argument("--out", type=Path, required=True)
-    chosen = parser.parse_args()
-    study = load_study(chosen.study)
-    design = central_composite(study.factors, "face", CENTER_POINTS)
-    workers = OwnWorkers(chosen.device, chosen.workers)
-    cases = run_cases(study, plan(study, design), Store(chosen.out / "cases"), workers)
-    print(write(chosen.out, study, design, cases))
+def main(
+    out: Annotated[Path, typer.Option(help="Folder of the heaps and of the page.")],
+    study: Annotated[Path, typer.Option(help="Study of the heaps.")] = STUDY,
+    device: OneDevice = "cpu",
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes; left out: one a core.")] = None,
+) -> None:
+    """Compare outlines and angles on twin data."""
+    with clear_errors("What is stored is not simulated again."):
+        heaps = load_study(study)
+        design = central_composite(heaps.factors, "face", CENTER_POINTS)
+        cases = run_cases(heaps, plan(heaps, design), Store(out / "cases"), OwnWorkers(device, workers))
+        print(write(out, heaps, design, cases))
 
 
 if __name__ == "__main__":
-    main()
+    typer.run(main)

@@ -19,6 +19,7 @@ from experiments.benchmarks.travel.cards import CARDS, CODES, FRESH_SEEDS, OWN_S
 from experiments.benchmarks.travel.heaps import run_theirs, simulate_ours, stored_heaps, take_up
 from experiments.benchmarks.travel.travel_page import write_page
 from experiments.commands.console import clear_errors
+from experiments.commands.options import OneDevice
 
 app = typer.Typer(add_completion=False, help=__doc__)
 
@@ -35,7 +36,7 @@ def ours(
     code: Annotated[list[str] | None, typer.Option(help="Code whose laws hold; may be repeated.")] = None,
     card: Cards = None,
     seeds: Seeds = None,
-    device: Annotated[str, typer.Option(help="cpu or cuda.")] = "cpu",
+    device: OneDevice = "cpu",
     workers: Annotated[int | None, typer.Option(min=1, help="Processes on the CPU.")] = None,
 ) -> None:
     """Simulate the cards here, under the laws of each code."""

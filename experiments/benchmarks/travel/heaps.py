@@ -125,7 +125,7 @@ def simulate_ours(
     codes: Iterable[str],
     cards: Iterable[str],
     seeds: Iterable[int],
-    device: str,
+    device: str | None,
     workers: int | None,
 ) -> None:
     """Simulate here what is not stored yet, under the laws of the codes, one launch a code."""

@@ -13,6 +13,7 @@ import typer
 
 from doe import Design, climb_table
 from experiments.cases import OwnWorkers, Store, run_cases
+from experiments.commands.options import OneDevice
 from experiments.studyfile import load_study
 
 START = {"E": 0.30, "F": 0.15}
@@ -23,7 +24,7 @@ FIRST_SEED = 2000
 
 
 def main(
-    scale: str = "bench", target: float = 30.148, out: Path = Path("out/scripts"), device: str | None = None
+    scale: str = "bench", target: float = 30.148, out: Path = Path("out/scripts"), device: OneDevice = None
 ) -> None:
     """Climb and print the angle, and its error against the target, at every point."""
     study = load_study(scale=scale)

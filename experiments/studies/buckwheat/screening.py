@@ -11,6 +11,7 @@ import typer
 
 from doe import plackett_burman, screen
 from experiments.cases import OwnWorkers, Store, run_cases
+from experiments.commands.options import OneDevice
 from experiments.studyfile import load_study
 
 RUNS = 12  # eight factors and three dummy columns, which are the error
@@ -18,7 +19,7 @@ ALPHA = 0.10  # a factor is kept below this p value
 FIRST_SEED = 1000
 
 
-def main(scale: str = "bench", out: Path = Path("out/scripts"), device: str | None = None) -> None:
+def main(scale: str = "bench", out: Path = Path("out/scripts"), device: OneDevice = None) -> None:
     """Screen the study's factors and print their effects."""
     study = load_study(scale=scale)
     design = plackett_burman(study.factors, runs=RUNS)

@@ -11,6 +11,7 @@ import typer
 
 from doe import Factor, Sample, TargetError, central_composite, fit_surface
 from experiments.cases import OwnWorkers, Store, run_cases
+from experiments.commands.options import OneDevice
 from experiments.studyfile import load_study
 
 CENTER = {"E": 0.48, "F": 0.45}
@@ -25,7 +26,7 @@ def main(
     target_sd: float = 0.518,
     target_n: int = 5,
     out: Path = Path("out/scripts"),
-    device: str | None = None,
+    device: OneDevice = None,
 ) -> None:
     """Fit the surface; print its analysis of variance and the setting nearest to the center."""
     study = load_study(scale=scale)

@@ -12,6 +12,7 @@ import typer
 
 from doe import Sample, compare_means
 from experiments.cases import OwnWorkers, Store, run_cases
+from experiments.commands.options import OneDevice
 from experiments.studyfile import load_study
 
 POINT = {"E": 0.482, "F": 0.446}
@@ -26,7 +27,7 @@ def main(
     target_sd: float = 0.518,
     target_n: int = 5,
     out: Path = Path("out/scripts"),
-    device: str | None = None,
+    device: OneDevice = None,
 ) -> None:
     """Simulate fresh heaps; print the t-test and the equivalence test against the measurement."""
     study = load_study(scale=scale)

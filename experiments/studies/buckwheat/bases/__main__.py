@@ -16,6 +16,7 @@ from typing import Annotated
 
 import typer
 
+from experiments.commands.options import OneDevice
 from experiments.report.kit.markdown import markdown_table
 from experiments.studies.buckwheat.bases.choice import BaseChoice, written
 from experiments.studies.buckwheat.bases.choice_tables import choice_tables
@@ -37,7 +38,7 @@ def simulate_command(
         float | None, typer.Option(min=1.0, help="What the shear modulus is divided by.")
     ] = None,
     replicates: Annotated[int, typer.Option(min=1, help="Heaps of each run.")] = 1,
-    device: Annotated[str | None, typer.Option(help="cpu, cuda or cuda:N.")] = None,
+    device: OneDevice = None,
     out: Out = Path("out/bases"),
 ) -> None:
     """Simulate the 31 runs of bases that are not there yet, and keep their heaps."""

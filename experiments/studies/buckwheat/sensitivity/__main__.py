@@ -17,6 +17,7 @@ import pandas as pd
 import typer
 
 from experiments.cases import OwnWorkers, Store, run_cases
+from experiments.commands.options import OneDevice
 from experiments.files import write_text
 from experiments.studies.buckwheat.sensitivity.folder import open_settings
 from experiments.studies.buckwheat.sensitivity.sensitivities import Sensitivities
@@ -49,7 +50,7 @@ def main(
         float | None, typer.Option(min=1.0, help="What the shear modulus is divided by.")
     ] = None,
     replicates: Annotated[int, typer.Option(min=1, help="Heaps of each run.")] = 1,
-    device: Annotated[str | None, typer.Option(help="cpu, cuda or cuda:N.")] = None,
+    device: OneDevice = None,
     out: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("out/sensitivities"),
 ) -> None:
     """Simulate variants that are not there yet, and print how the angles shift."""
