@@ -194,7 +194,10 @@ def discover(
         chosen = chosen_study(study, scale, resources)
         folder = out or default_folder(chosen, "discover")
         if dry_run:
-            show_search(chosen, resources_for(chosen, resources), (measured, folder, bank), as_json)
+            from experiments.runs.search import Job
+
+            job = Job(chosen, measured, folder, bank, photographs_only, seed=seed)
+            show_search(job, resources_for(chosen, resources), as_json)
     go_on = Attempt.of(
         "discover", study, measured, out=folder, bank=bank, photographs_only=photographs_only, scale=scale,
         **asked, seed=seed, engine=engine, live=live, json=as_json,

@@ -14,12 +14,12 @@ from experiments.commands.console import duration, messages, plain
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from pathlib import Path
 
     from dem_warp import Case
     from experiments.cases import Resources
     from experiments.cases.workers.speed import Speed
     from experiments.runs.plan import Plan
+    from experiments.runs.search import Job
     from experiments.studyfile import Study
 
 
@@ -38,17 +38,17 @@ def show_calibration(
     raise typer.Exit
 
 
-def show_search(
-    study: Study, resources: Resources, files: tuple[Path | None, Path, Path | None], as_json: bool
-) -> NoReturn:
-    """Show the plan of a search, and end the command; files: measured heaps, folder, bank."""
+def show_search(job: Job, resources: Resources, as_json: bool) -> NoReturn:
+    """Show the plan of a search, and end the command; its data are read as a run reads them."""
+    from experiments.discover.fresh_cases import cases_for
+    from experiments.discover.search import Search
     from experiments.runs.plan import plan_search
-    from experiments.runs.search import Job, known_bank
+    from experiments.runs.search import known_bank, read_data
 
-    measured, folder, bank = files
-    known = known_bank(Job(study, measured, folder, bank)) is not None
-    analysed = measured is not None
-    show_plan(resources, partial(plan_search, study, resources, has_bank=known, analysed=analysed), as_json)
+    search, bank, measured = Search.of(job.study), known_bank(job), read_data(job)
+    fresh = None if measured is None else cases_for(search, measured, bank, job.seed)
+    planned = partial(plan_search, job.study, resources, has_bank=bank is not None, fresh=fresh)
+    show_plan(resources, planned, as_json)
     raise typer.Exit
 
 

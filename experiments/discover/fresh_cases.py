@@ -1,8 +1,10 @@
-"""Fresh cases that an analysis asks for, before its data are opened."""
+"""Fresh cases that an analysis asks for, before any of them has run."""
 
 from __future__ import annotations
 
-from doe.discrepancy import Settings
+from doe.discrepancy import Bank, Measured, Settings, fit_emulator
+from doe.discrepancy.contest.slips import find_slips
+from experiments.discover.search import Search
 
 _LIKELY_RIVALS = 2
 
@@ -19,3 +21,18 @@ def search_cases(settings: Settings, conditions: int) -> tuple[int, int]:
     most_rounds = (1 + 2 * sum(rounds)) * one_model + 2 * finish
     end = 2 * settings.direct_runs * conditions
     return (_LIKELY_RIVALS + 1) * one_model + end, most_rounds + end
+
+
+def cases_for(search: Search, measured: Measured, bank: Bank | None, seed: int) -> tuple[int, int]:
+    """Cases that an analysis of measured data asks for: likely, and at the most.
+
+    Where there is a bank, the analysis is begun: without a gap it asks for none, and where a value may be a
+    slip it goes through the data twice.
+    """
+    likely, most = search_cases(search.settings, len(search.study.conditions))
+    if bank is None:
+        return likely, most
+    if next(search.analysis(measured, bank, seed), None) is None:
+        return 0, 0
+    passes = 2 if find_slips(measured, fit_emulator(bank), search.settings) else 1
+    return passes * likely, passes * most

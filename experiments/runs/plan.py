@@ -20,7 +20,6 @@ from experiments.cases.cost import Cost, cost_of, device_bytes
 from experiments.cases.workers.batches import worlds_at_once
 from experiments.cases.workers.speed import Speed, measure_speed, store_speed, stored_speed, wave_seconds
 from experiments.discover.engine import EngineSimulator
-from experiments.discover.fresh_cases import search_cases
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.search import Search
 from experiments.errors import InputError, StudyError
@@ -165,8 +164,13 @@ def _campaign_waves(study: Study) -> list[_Wave]:
     ]
 
 
-def plan_search(study: Study, resources: Resources, speed: Speed, *, has_bank: bool, analysed: bool) -> Plan:
-    """Plan a search: the library waves where there is no bank, and fresh runs where heaps were measured."""
+def plan_search(
+    study: Study, resources: Resources, speed: Speed, *, has_bank: bool, fresh: tuple[int, int] | None
+) -> Plan:
+    """Plan a search: the library waves where there is no bank, and fresh runs where heaps were measured.
+
+    Of these likely so many, and at the most.
+    """
     search = Search.of(study)
     simulator = EngineSimulator(study, search.library, OutcomeTable(Path("none.sqlite")))
     points = bank_points(search.space, search.settings)
@@ -178,9 +182,8 @@ def plan_search(study: Study, resources: Resources, speed: Speed, *, has_bank: b
         except StudyError:
             continue
     waves = [] if has_bank else [("library waves", cases, len(points), len(points))]
-    if analysed:
-        likely, most = search_cases(search.settings, len(study.conditions))
-        waves.append(("fresh runs", cases, likely, most))
+    if fresh is not None:
+        waves.append(("fresh runs", cases, *fresh))
     return _plan(study, resources, speed, waves, OUTCOME_BYTES)
 
 

@@ -21,6 +21,7 @@ from experiments.discover.engine import EngineSimulator
 from experiments.discover.maker import fingerprint_of, maker_of_today
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.search import Search
+from experiments.errors import InputError
 from experiments.files import replacing
 from experiments.live.trail.journal import Journal
 from experiments.measurement.measured_file import read_measured
@@ -103,9 +104,7 @@ def run_search(job: Job, resume: bool = False, watch: Watch = lambda title: null
     companion, search = companion_of(job.study), Search.of(job.study)
     terms = Terms.of(search.library, job.study.measurable, job.study.factor_sections)
     bank = known_bank(job)
-    measured = _measured(job)
-    for note in measured.notes if measured else ():
-        _log.warning("The data: %s", note)
+    measured = read_data(job)
     device = str(job.workers.described.get("device", ""))
     with (
         locked(job.folder, resume),
@@ -202,12 +201,28 @@ def known_bank(job: Job) -> Bank | None:
     return next((search.read_bank(path) for path in (job.folder / BANK, beside) if path.is_file()), None)
 
 
-def _measured(job: Job) -> Measured | None:
+def read_data(job: Job) -> Measured | None:
+    """Read what was measured, as far as it is looked at, and say what is to be known about it.
+
+    None where only the library waves are wanted.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be read or breaks a rule.
+    """
     if job.measured is None:
         return None
     measured = read_measured(job.measured, job.study)
+    for note in measured.notes:
+        _log.warning("The data: %s", note)
+    if not job.photographs_only:
+        return measured
     shown = [each.name for each in job.study.measurable if each.instrument is Instrument.PHOTOGRAPH]
-    return measured.only(shown) if job.photographs_only else measured
+    if not set(shown) & set(measured.observables):
+        rule = f"a search on photographs only needs what they show: one of {', '.join(shown)}"
+        raise InputError(rule, ", ".join(measured.observables), str(job.measured))
+    return measured.only(shown)
 
 
 def _point(fit: Fit, condition: str, seed: int) -> Point:

@@ -51,6 +51,16 @@ def test_data_that_cannot_be_right_end_with_code_2_and_leave_nothing(
     assert not (tmp_path / "out").exists()
 
 
+def test_a_search_on_photographs_needs_what_they_show(tmp_path: Path) -> None:
+    data = tmp_path / "measured.csv"
+    data.write_text("condition,replicate,observable,value,unit\nbase,1,t75,400,ms\n", encoding="utf-8")
+    for more in ((), ("--dry-run",)):
+        code, _, err = discover(data, "--photographs-only", "--out", tmp_path / "out", *more)
+        assert code == 2
+        assert "measured.csv: a search on photographs only needs what they show: one of flank_angle" in err
+        assert "received t75" in err
+
+
 def test_a_folder_in_use_is_never_written_to(tmp_path: Path) -> None:
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "mine.txt").write_text("kept", encoding="utf-8")

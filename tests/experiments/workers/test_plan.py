@@ -161,6 +161,19 @@ def test_a_search_is_planned(tmp_path: Path) -> None:
     assert 0 < plan["cases"] < plan["most"]
 
 
+def test_the_plan_of_a_search_reads_the_data(tmp_path: Path) -> None:
+    heaps = Path(__file__).parents[1] / "discover" / "data" / "nothing-missing.csv"
+    plan = planned("discover", TRIAL, "--scale", "bench", heaps)
+    assert (plan["cases"], plan["most"]) == (0, 0), "heaps without a gap ask for no fresh run"
+    wrong = tmp_path / "measured.csv"
+    wrong.write_text("condition,replicate,observable,value\nnone,1,height,0.01\n", encoding="utf-8")
+    for file, said in ((wrong, "measured.csv:2: condition"), (tmp_path / "absent.csv", "absent.csv")):
+        words = ["discover", TRIAL, "--scale", "bench", file, "--device", "cpu", "--dry-run"]
+        code, out, err = dem_warp(*words)
+        assert (code, out) == (2, "")
+        assert said in err
+
+
 def test_a_heap_is_planned_with_its_settings(write_study: Write) -> None:
     plan = planned_heap(write_study())
     assert plan["cases"] == plan["most"] == 1
