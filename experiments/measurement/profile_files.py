@@ -25,6 +25,12 @@ COLUMNS = ("replicate", "view", "x", "z", "picture", "pixel")
 LEAST_STATIONS = 3
 """Stations of a drum that all profiles must span."""
 
+WIDEST_GAP = 0.25
+"""Between two neighbouring points of a drum's profile, over its radius: the stations are 0.2 apart."""
+
+MIRRORED = 5.0
+"""A drum's surface falls to the right; one that rises there by more than this is mirrored [deg]."""
+
 LEAST_POINTS = 8
 """Points of a heap's profile."""
 
@@ -58,7 +64,8 @@ def read_drum_profiles(path: Path, radius: float) -> Profiles:
     Raises
     ------
     InputError
-        When the file cannot be read, a point lies outside the drum, or the profiles span too few stations.
+        When the file cannot be read, a point lies outside the drum, the profiles span too few stations, or
+        one of them has a gap or is mirrored.
     """
     found: dict[str, dict[str, _Points]] = {}
     for row in read_rows(path, ("replicate", "x", "z"), COLUMNS[:4]):
@@ -75,6 +82,9 @@ def read_drum_profiles(path: Path, radius: float) -> Profiles:
     if len(kept) < LEAST_STATIONS:
         told = f"{1e3 * low:.4g} to {1e3 * high:.4g} mm, {len(kept)} stations"
         raise InputError(f"all profiles must span {LEAST_STATIONS} stations of the drum", told, str(path))
+    for each in found.values():
+        for view in each.values():
+            _check_surface(view, radius, f"{path}:{view.line}")
     heights = {name: [_between(view, places[kept]) for view in each] for name, each in views.items()}
     return _profiles(kept, heights)
 
@@ -133,6 +143,21 @@ def _label(row: Row) -> str:
 def _between(view: Mapping[float, float], places: np.ndarray) -> np.ndarray:
     x = sorted(view)
     return np.interp(places, x, [view[each] for each in x])
+
+
+def _check_surface(view: _Points, radius: float, place: str) -> None:
+    """Refuse a profile of a drum that has a gap, or rises where it must fall."""
+    x = np.array(sorted(view.heights))
+    z = np.array([view.heights[each] for each in x])
+    widest = int(np.argmax(np.diff(x)))
+    if x[widest + 1] - x[widest] > WIDEST_GAP * radius:
+        rule = f"a profile has no gap: points at most {1e3 * WIDEST_GAP * radius:.4g} mm apart in x"
+        told = f"none between {1e3 * x[widest]:.4g} and {1e3 * x[widest + 1]:.4g} mm"
+        raise InputError(rule, told, f"{place}: x")
+    rise = np.degrees(np.arctan(np.polyfit(x, z, 1)[0]))
+    if rise > MIRRORED:
+        rule = "the surface must be high on the left and fall to the right, z up: mirror x, or turn z over"
+        raise InputError(rule, f"rises by {rise:.1f} deg", f"{place}: x, z")
 
 
 def _drawn(view: _Points, place: str) -> np.ndarray:

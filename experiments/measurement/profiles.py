@@ -7,6 +7,7 @@ from typing import Any
 from dem_warp import Drum
 from doe import ProfileSample, scatter_of_views
 from doe.errors import RuleError
+from doe.profiles import LEAST_PROFILES
 from experiments.errors import InputError
 from experiments.measurement.observables import OUTLINE_PROFILE, PROFILES, SURFACE_PROFILE
 from experiments.measurement.profile_files import Profiles, read_drum_profiles, read_heap_profiles
@@ -74,6 +75,9 @@ def _made(study: Study, table: dict[str, Any], place: str) -> list[dict[str, Any
         found = read_drum_profiles(path, scene.diameter / 2)
     else:
         found = read_heap_profiles(path, study.measurement.fit)
+    if len(found.names) < LEAST_PROFILES:
+        rule = f"needs profiles of {LEAST_PROFILES} repeats or more, each with a replicate of its own"
+        raise InputError(rule, f"{len(found.names)}: {', '.join(found.names)}", f"{path}: replicate")
     try:
         sample = ProfileSample.of(found.heights, scatter_of_views(found.views))
     except RuleError as error:

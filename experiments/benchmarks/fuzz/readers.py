@@ -108,7 +108,7 @@ def measured(folder: Path) -> Reader:
 def profiles(folder: Path) -> Reader:
     """Profiles of drums and of heaps, these with a picture beside."""
     (folder / "heap.png").write_bytes(_picture(".png"))
-    rows = [f"{n},{x} mm,{0.3 * x + n:.1f} mm" for n in (1, 2, 3) for x in range(-18, 19, 6)]
+    rows = [f"{n},{x} mm,{n - 0.3 * x:.1f} mm" for n in (1, 2, 3) for x in range(-18, 19, 6)]
     heap = [f"1,,{x} mm,{max(9 - 0.5 * abs(x), 0):.1f} mm,," for x in range(-20, 21, 4)]
     texts = {
         "drum.csv": "\n".join(["replicate,x,z", *rows]),

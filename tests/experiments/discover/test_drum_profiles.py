@@ -135,13 +135,13 @@ def test_a_hidden_effect_is_named_from_surfaces_alone(study: Study, tmp_path: Pa
         ),
         ("slow,1,surface,31,deg,slow.csv", "measured.csv:2: profile: .*stands alone"),
         ("slow,1,surface,,,none.csv", "none.csv"),
-        ("slow,2,surface,,,slow.csv", "slow.csv:5: x, z: .*must lie in the drum, within 30 mm of its axis"),
+        ("slow,2,surface,,,slow.csv", "slow.csv:9: x, z: .*must lie in the drum, within 30 mm of its axis"),
     ],
 )
 def test_a_profile_that_is_none_of_the_drum_is_refused(
     study: Study, tmp_path: Path, row: str, rule: str
 ) -> None:
-    lines = [f"1,{x} mm,0 mm" for x in (-20, 0, 20)]
+    lines = [f"1,{x} mm,0 mm" for x in range(-18, 19, 6)]
     if row.startswith("slow,2"):
         lines += ["2,29 mm,20 mm"]
     (tmp_path / "slow.csv").write_text("replicate,x,z\n" + "\n".join(lines) + "\n", encoding="utf-8")

@@ -17,7 +17,7 @@ TUBE = '[scene.lifted-cylinder]\ndiameter = "28 mm"\nheight = "28 mm"\ngrain_cou
 ANGLE = '[target]\nmean = "30 deg"\nsd = "0.5 deg"\nn = 5\n'
 DRUM = '[scene.drum]\ndiameter = "60 mm"\nlength = "20 mm"\nrotation_rate = "30 1/min"\n'
 TARGET = '[target]\nobservable = "surface"\nprofiles = "p.csv"\n'
-LINE = "".join(f"1,{x} mm,{0.5 * x} mm\n" for x in range(-20, 21, 5))
+LINE = "".join(f"1,{x} mm,{-0.5 * x} mm\n" for x in range(-20, 21, 5))
 
 
 def file(folder: Path, text: str) -> Path:
@@ -30,7 +30,7 @@ def test_a_profile_is_read_at_the_stations_that_it_spans(tmp_path: Path) -> None
     _, kept, heights, _ = read_drum_profiles(file(tmp_path, LINE), 0.03)
     assert kept == [1, 2, 3, 4, 5, 6, 7]
     places = np.array([-0.8, -0.6, -0.4, -0.2, 0.0, 0.2, 0.4, 0.6, 0.8])[kept] * 0.03
-    assert heights[0] == pytest.approx(0.5 * places, abs=1e-12)
+    assert heights[0] == pytest.approx(-0.5 * places, abs=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -43,6 +43,14 @@ def test_a_profile_is_read_at_the_stations_that_it_spans(tmp_path: Path) -> None
         ("1,2 mm,3 mm\n1,2 mm,4 mm\n", r"p.csv:3: x: .*every place of a profile stands once"),
         ("1,0 mm,0 mm\n1,5 mm,1 mm\n", r"must span 3 stations of the drum \(received 0 to 5 mm, 1 stations"),
         ("", r"must span 3 stations"),
+        (
+            "".join(f"1,{x} mm,0 mm\n" for x in (-20, -14, -8, 0, 6, 12, 18)),
+            r"p.csv:2: x: .*has no gap: points at most 7.5 mm apart .*received none between -8 and 0 mm",
+        ),
+        (
+            LINE + "".join(f"2,{x} mm,{0.5 * x} mm\n" for x in range(-20, 21, 5)),
+            r"p.csv:11: x, z: .*must be high on the left .*received rises by 26.6 deg",
+        ),
     ],
 )
 def test_a_bad_profile_is_refused_with_its_row(tmp_path: Path, text: str, message: str) -> None:
@@ -55,7 +63,9 @@ def test_a_profile_alone_has_no_scatter_to_weigh_it_by(
 ) -> None:
     file(tmp_path, LINE)
     study = load_study(write_study((TUBE, DRUM), (ANGLE, TARGET)))
-    with pytest.raises(InputError, match=r"profiles are rows, 3 or more \(received shape \(1, 7\)\)"):
+    with pytest.raises(
+        InputError, match=r"p.csv: replicate: needs profiles of 3 repeats or more, .*\(received 1: 1\)"
+    ):
         with_profiles(study)
     with pytest.raises(StudyError, match=r"names pictures, profiles or a file"):
         _ = study.target
