@@ -74,6 +74,7 @@ def angle(
         from experiments.commands import photographs
         from experiments.measurement.heap_files import heap_settings
 
+        photographs.require_one_form({"--target": as_target, "--csv": as_csv, "--json": as_json})
         view = photographs.view_of(crop, plate, heap_number, elevation, distance)
         heaps = heap_settings(unit, plate_height)
         grouping = photographs.grouping_of(by)

@@ -75,6 +75,21 @@ def _four(text: str | None, option: str) -> tuple[float, float, float, float] | 
     return x1, y1, x2, y2
 
 
+def require_one_form(chosen: Mapping[str, bool]) -> None:
+    """Refuse two forms of the result at once, by their options; each takes the whole standard output.
+
+    Raises
+    ------
+    InputError
+        With the options that were given.
+    """
+    given = [option for option, wanted in chosen.items() if wanted]
+    if len(given) > 1:
+        *others, last = chosen
+        rule = f"only one of {', '.join(others)} and {last}: each is the whole output"
+        raise InputError(rule, " ".join(given), given[1])
+
+
 def grouping_of(by: str) -> Grouping:
     """Read which pictures show one heap; raise `InputError` on anything but picture or folder."""
     if by == "picture":

@@ -5,6 +5,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from commandline import dem_warp
 
 from experiments.benchmarks.photographs.camera import PhoneCamera
 from experiments.benchmarks.photographs.rendering import sharp_shadow
@@ -14,6 +15,15 @@ from experiments.commands import photographs
 from experiments.commands.photographs import drawn_names, mean_angle, measure_pictures
 from imaging import measure, save_picture
 from imaging.synthetic import Camera, DrawnHeap, draw
+
+
+@pytest.mark.parametrize("forms", [("--csv", "--json"), ("--target", "--json"), ("--csv", "--target")])
+def test_two_forms_of_the_result_at_once_are_refused(tmp_path: Path, forms: tuple[str, str]) -> None:
+    save_picture(tmp_path / "heap.png", draw(DrawnHeap(28.0, 28.0), Camera(noise=0)))
+    code, out, err = dem_warp("angle", tmp_path / "heap.png", *forms)
+    assert (code, out) == (2, "")
+    assert "only one of --target, --csv and --json" in err
+    assert all(form in err.partition("received")[2] for form in forms)
 
 
 @pytest.mark.parametrize(
