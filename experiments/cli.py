@@ -64,11 +64,11 @@ app = typer.Typer(
 
 def _show_version(wanted: bool) -> None:
     if wanted:
-        from dem_warp import __version__
         from dem_warp.version import source_commit
+        from experiments.version import program_version
 
         commit = source_commit()
-        typer.echo(f"dem-warp {__version__}" + (f" ({commit})" if commit else ""))
+        typer.echo(f"dem-warp {program_version()}" + (f" ({commit})" if commit else ""))
         raise typer.Exit
 
 

@@ -14,8 +14,8 @@ ROOT = Path(__file__).resolve().parents[1]
 # the commands, which load a companion by its name. Verification, benchmarks and trials are evidence: nothing
 # imports them.
 ROOMS = (
-    "errors", "files", "texts", "rows", "toml_files", "studyfile.units", "sphere_files", "grain_sizes",
-    "export", "measurement.observables", "studyfile", "measurement", "cases", "calibrate", "discover",
+    "version", "errors", "files", "texts", "rows", "toml_files", "studyfile.units", "sphere_files",
+    "grain_sizes", "export", "measurement.observables", "studyfile", "measurement", "cases", "calibrate", "discover",
     "report", "live.trail", "runs", "bridge", "api", "live", "commands", "live.ui", "cli", "studies",
     "verification", "benchmarks", "trials",
 )  # fmt: skip

@@ -23,6 +23,7 @@ from experiments.measurement.observables import observables_of
 from experiments.measurement.states import Observed, observe
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import TARGET_SCENE
+from experiments.version import with_version
 from imaging import HeapAngle, PictureError, Snapshot, overlay, save_picture, snapshot
 
 
@@ -82,7 +83,7 @@ class Heap:
             ],
             "observables": self.observed.observables,
             "observable_units": self.units,
-            "provenance": self.result.provenance,
+            "provenance": with_version(self.result.provenance),
         }
 
 

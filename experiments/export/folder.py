@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from dem_warp import __version__
 from experiments.errors import InputError, Problem
 from experiments.export.exporter import ExportedTest, Translation
 from experiments.export.facts import grain_rows, laws_row
 from experiments.export.library import EXPORTERS
 from experiments.files import write_text
+from experiments.version import program_version
 
 README = "README.md"
 """File that says what was translated how."""
@@ -59,7 +59,9 @@ def write_export(test: ExportedTest, to: str, translation: Translation, folder: 
 
 
 def _head(test: ExportedTest, to: str, translation: Translation) -> str:
-    lines = [f"{test.name}, {test.source}; written by dem-warp {__version__}; README.md says what is what"]
+    lines = [
+        f"{test.name}, {test.source}; written by dem-warp {program_version()}; README.md says what is what"
+    ]
     lines += [EXPORTERS[to].unproven] if EXPORTERS[to].unproven else []
     lines += [f"WARNING: {warning}" for warning in translation.warnings]
     return "".join(f"{translation.comment} {line}\n" for line in lines)
@@ -68,7 +70,7 @@ def _head(test: ExportedTest, to: str, translation: Translation) -> str:
 def readme(test: ExportedTest, to: str, translation: Translation) -> str:
     """Say how to run an exported test, what was translated how, and what could not be."""
     exporter = EXPORTERS[to]
-    parts = [f"# {test.name} in {exporter.code}\n\nFrom {test.source}, by dem-warp {__version__}.\n"]
+    parts = [f"# {test.name} in {exporter.code}\n\nFrom {test.source}, by dem-warp {program_version()}.\n"]
     if exporter.unproven:
         parts.append(f"**{exporter.unproven}**\n")
     if translation.warnings:

@@ -8,7 +8,7 @@ from typing import Any
 
 import pandas as pd
 
-from dem_warp import EDEM, __version__
+from dem_warp import EDEM
 from experiments.calibrate.results import Campaign
 from experiments.report.kit.latex import latex_table, latex_text
 from experiments.report.kit.markdown import markdown_table
@@ -17,6 +17,7 @@ from experiments.report.kit.table import Layout, Table, columns, make_table
 from experiments.report.study_facts import study_facts
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import Response
+from experiments.version import program_version
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,7 @@ def pastes_of(paragraph: str, table: Table, label: str) -> list[Paste]:
 def software(provenance: Mapping[str, Any]) -> str:
     """Name dem-warp with its version, and its commit where it is known."""
     commit = provenance.get("commit")
-    return f"dem-warp {__version__}" + (f" (commit {commit})" if commit else "")
+    return f"dem-warp {program_version()}" + (f" (commit {commit})" if commit else "")
 
 
 def methods_paragraph(campaign: Campaign, study: Study, provenance: Mapping[str, Any]) -> str:

@@ -11,7 +11,6 @@ from typing import Any
 
 import pandas as pd
 
-from dem_warp import __version__
 from experiments.calibrate.export import jsonable
 from experiments.calibrate.results import Campaign
 from experiments.cases.manifest import study_hash
@@ -22,6 +21,7 @@ from experiments.report.material_card import write_material_card
 from experiments.report.pictures import HeapPicture
 from experiments.report.solid import SolidHeap
 from experiments.studyfile import Study
+from experiments.version import program_version
 
 LIBRARIES = ("warp-lang", "numpy", "scipy", "pandas", "statsmodels", "scikit-learn", "opencv-python-headless")
 """Packages whose version may change a number."""
@@ -89,5 +89,5 @@ def write_files(
 
 def library_versions() -> dict[str, str]:
     """Return the versions of Python and of the packages that the numbers depend on."""
-    own = {"dem-warp": __version__, "python": platform.python_version()}
+    own = {"dem-warp": program_version(), "python": platform.python_version()}
     return own | {name: version(name) for name in LIBRARIES}

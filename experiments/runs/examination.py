@@ -12,11 +12,12 @@ from typing import Any
 
 import warp as wp
 
-from dem_warp import __version__, simulate
+from dem_warp import simulate
 from dem_warp.device import resolve_device
 from experiments.cases import Resources
 from experiments.cases.workers.opening import EXTRA, missing_libraries
 from experiments.cases.workers.speed import Speed, few_spheres, stored_speed
+from experiments.version import program_version
 from imaging.opengl import opengl_works
 
 
@@ -38,7 +39,7 @@ class Finding:
 def examine(resources: Resources) -> list[Finding]:
     """Look at everything that simulates or draws, and try both on a small heap."""
     resolve_device(None)
-    versions = f"dem-warp {__version__}, Warp {wp.__version__}, Python {platform.python_version()}"
+    versions = f"dem-warp {program_version()}, Warp {wp.__version__}, Python {platform.python_version()}"
     speed = stored_speed(resources.machine)
     return [
         Finding("versions", True, versions),

@@ -23,6 +23,7 @@ from experiments.studies.cellulose.plan import (
     study_at,
 )
 from experiments.studies.cellulose.simulation import WALL_TIMES, simulate_drums, with_curves, write_curves
+from experiments.version import with_version
 
 CURVES, FACTS, PREDICTION = "curves.csv", "provenance.json", "prediction.csv"
 """Files of a record: averaged edges of all drums, what made them, and the sealed prediction."""
@@ -81,4 +82,4 @@ def _failed(tables: list[pd.DataFrame]) -> list[str]:
 def _origin(device: str | None) -> dict[str, Any]:
     import warp as wp
 
-    return provenance(wp.get_device(resolve_device(device)), "mixed")
+    return with_version(provenance(wp.get_device(resolve_device(device)), "mixed"))

@@ -26,6 +26,7 @@ from experiments.studies.wheat_drums.plan import (
     study_at,
 )
 from experiments.studyfile import Study
+from experiments.version import with_version
 
 DRUMS, HEAPS, FACTS = "drums.csv", "heaps.csv", "provenance.json"
 """Files of a record."""
@@ -60,7 +61,7 @@ def run_study(scale: str, folder: Path, device: str | None = None, workers: int 
     fit = fit_slopes(Slopes.of(study, drums), data())
     planned = planned_heaps(study, fit, runs.heaps)
     simulated(heap_study_at(scale), planned, Path(HEAPS).stem, HEAP_TOLD)
-    made = provenance(wp.get_device(resolve_device(device)), "mixed")
+    made = with_version(provenance(wp.get_device(resolve_device(device)), "mixed"))
     facts = made | {"scale": scale, "wall_times": walls}
     write_text(folder / FACTS, json.dumps(facts, indent=1) + "\n")
 
