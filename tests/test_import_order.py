@@ -15,9 +15,9 @@ ROOT = Path(__file__).resolve().parents[1]
 # imports them.
 ROOMS = (
     "version", "errors", "files", "texts", "rows", "toml_files", "studyfile.units", "sphere_files",
-    "grain_sizes", "export", "measurement.observables", "studyfile", "measurement", "cases", "calibrate", "discover",
-    "report", "live.trail", "runs", "bridge", "api", "live", "commands", "live.ui", "cli", "studies",
-    "verification", "benchmarks", "trials",
+    "grain_sizes", "export", "measurement.observables", "studyfile", "measurement", "cases", "calibrate",
+    "discover", "report", "live.trail", "runs", "bridge", "api", "live", "commands", "live.ui", "cli",
+    "studies", "verification", "benchmarks", "trials",
 )  # fmt: skip
 
 # Of `doe.discrepancy`, the folders in the order of use.
