@@ -61,7 +61,8 @@ class Drum(PouredScene):
     rotation_rate: Annotated[float, Parameter("1/s", above=0.0)]
     """Revolutions per second."""
     filling: Annotated[float, Parameter("1", above=0.0, at_most=MOST_FILLED)] = 0.35
-    """Part of the drum's volume that the bed takes."""
+    """Part of the drum's volume that the bed takes, roughly: a level bed of up to a half is struck off and
+    ends lower by 0.04 to 0.07; `fill_height` tells what was reached."""
     start_up: Annotated[float, Parameter("1", at_least=0.0)] = 1.0
     """Revolutions before measuring."""
     revolutions: Annotated[float, Parameter("1", above=0.0)] = 2.0

@@ -19,6 +19,7 @@ from experiments.cases.workers.own import THIS_MACHINE, OwnWorkers
 from experiments.cases.workers.workers import Workers
 from experiments.errors import InputError
 from experiments.files import replacing, write_text
+from experiments.measurement.filling import filling_reached
 from experiments.measurement.observables import observables_of
 from experiments.measurement.states import Observed, observe
 from experiments.studyfile import Study
@@ -57,6 +58,12 @@ class Heap:
         return self.observed.reason
 
     @property
+    def filling(self) -> float | None:
+        """Part of the drum that its bed took; None of another test, or where it was not filled."""
+        scene = self.study.case(self.settings, self.seed, self.scene).scene
+        return filling_reached(scene, self.result.observables)
+
+    @property
     def units(self) -> dict[str, str]:
         """Unit of every observable that it gave."""
         scene = self.study.scenes[self.scene]
@@ -83,6 +90,7 @@ class Heap:
             ],
             "observables": self.observed.observables,
             "observable_units": self.units,
+            "filling": self.filling,
             "provenance": with_version(self.result.provenance),
         }
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from experiments.calibrate.results import Campaign
+from experiments.measurement.filling import filling_missed, filling_reached, filling_told
 from experiments.report.kit.numbers import capital, enumeration, fixed
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import TARGET_SCENE
@@ -20,6 +21,9 @@ POOR_PREDICTION = 0.5
 PREDICTION_GAP = 0.2
 """Difference of adjusted and predicted R² above which a surface is too flexible for its runs (the rule of
 Stat-Ease's Design-Expert)."""
+
+FILLED_BY = ("drum.filling", "drum.grain_count")
+"""Parameters of a study that fill a drum; of a factor among them each case has its own filling."""
 
 FEW_MEASUREMENTS = 3
 """Measurements of a target below which its scatter is hardly known."""
@@ -61,6 +65,21 @@ def _heaps(campaign: Campaign, study: Study) -> Iterator[Caution]:
     if "grain_count" in cases:
         yield from _small(cases.loc[cases["scene"] == TARGET_SCENE, "grain_count"].median())
     yield from _narrow(study)
+
+
+def _filling(campaign: Campaign, study: Study) -> Iterator[Caution]:
+    varied = [parameter for factor in study.factor_sections for parameter in factor.parameter]
+    if "fill_height" not in campaign.cases or any(parameter.endswith(FILLED_BY) for parameter in varied):
+        return
+    for name, rows in campaign.cases.groupby("scene"):
+        scene = study.case({}, 0, str(name)).scene
+        reached = filling_reached(scene, {"fill_height": float(rows["fill_height"].median())})
+        if reached is not None and filling_missed(scene, reached):
+            yield Caution(
+                f"The drum was filled otherwise than stated: {filling_told(scene, reached)}. Change filling, "
+                "or count the grains (grain_count).",
+                "summary",
+            )
 
 
 def _small(grains: float | None) -> Iterator[Caution]:
@@ -171,6 +190,7 @@ def _failed(campaign: Campaign, study: Study) -> Iterator[Caution]:
 _RULES: tuple[Callable[[Campaign, Study], Iterator[Caution]], ...] = (
     _twin,
     _heaps,
+    _filling,
     _open_region,
     _poor_surface,
     _modulus,

@@ -1,0 +1,73 @@
+"""The filling of a drum as it was reached: told of a case, and cautioned of in a campaign."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import pandas as pd
+import pytest
+from commandline import dem_warp
+
+from dem_warp import Drum, Material
+from experiments.measurement.filling import filling_missed, filling_reached, filling_told
+from experiments.report.cautions import _filling
+from experiments.studyfile import load_study
+
+TUBE = '[scene.lifted-cylinder]\ndiameter = "28 mm"\nheight = "28 mm"\ngrain_count = 30\n'
+ANGLE = '[target]\nmean = "30 deg"\nsd = "0.5 deg"\nn = 5\n'
+SCENE = """[scene.drum]
+diameter = "32 mm"
+length = "12 mm"
+rotation_rate = "1 1/s"
+filling = 0.4
+start_up = 0.0
+revolutions = 0.05
+rest_speed = "0.05 m/s"
+"""
+STEEL = Material(density=7800.0, shear_modulus=70e9, poisson_ratio=0.3)
+DRUM = Drum(diameter=0.1, length=0.02, wall_material=STEEL, rotation_rate=0.5, filling=0.4)
+
+
+def test_a_bed_up_to_the_axis_fills_half_of_a_drum() -> None:
+    assert filling_reached(DRUM, {"fill_height": 0.05}) == pytest.approx(0.5)
+    assert filling_reached(DRUM, {"fill_height": DRUM.brim}) == pytest.approx(DRUM.filling, abs=1e-6)
+    assert filling_reached(DRUM, {}) is None
+    assert filling_reached(SimpleNamespace(filling=0.4), {"fill_height": 0.05}) is None
+
+
+def test_a_filling_that_is_not_the_stated_one_is_missed_unless_grains_are_counted() -> None:
+    assert filling_missed(DRUM, 0.33)
+    assert not filling_missed(DRUM, 0.39)
+    assert filling_told(DRUM, 0.331) == "0.33 of the drum, 0.4 stated"
+    counted = replace(DRUM, grain_count=100)
+    assert not filling_missed(counted, 0.33)
+    assert filling_told(counted, 0.331) == "0.33 of the drum"
+
+
+def test_a_drums_own_filling_is_told(write_study: Callable[..., Path], tmp_path: Path) -> None:
+    study = write_study((TUBE, SCENE), (ANGLE, ""))
+    words = ("heap", study, "--device", "cpu", "--out")
+    code, out, _ = dem_warp(*words, tmp_path / "a", "--json")
+    found = json.loads(out)
+    assert code == 0
+    scene = load_study(study).case({}, 1).scene
+    assert found["filling"] == filling_reached(scene, found["observables"])
+    # The rain heaps up in the middle, and what stands above the brim is struck off.
+    assert 0.2 < found["filling"] < 0.4
+    _, out, _ = dem_warp(*words, tmp_path / "b")
+    assert out.splitlines()[-1] == f"filling: {found['filling']:.2f} of the drum, 0.4 stated"
+
+
+def test_a_campaign_of_drums_that_were_filled_otherwise_is_cautioned(
+    write_study: Callable[..., Path],
+) -> None:
+    study = load_study(write_study((TUBE, SCENE), (ANGLE, "")))
+    for height, cautioned in ((0.0105, True), (float(study.case({}, 1).scene.brim), False)):
+        cases = pd.DataFrame({"scene": ["target"] * 3, "fill_height": [height] * 3})
+        texts = [caution.text for caution in _filling(SimpleNamespace(cases=cases), study)]
+        assert len(texts) == cautioned
+        assert all("0.4 stated" in text for text in texts)
