@@ -62,7 +62,7 @@ class Drum(PouredScene):
     """Revolutions per second."""
     filling: Annotated[float, Parameter("1", above=0.0, at_most=MOST_FILLED)] = 0.35
     """Part of the drum's volume that the bed takes, roughly: a level bed of up to a half is struck off and
-    ends lower by 0.04 to 0.07; `fill_height` tells what was reached."""
+    ends lower, by a tenth to two fifths of it; `fill_height` tells what was reached."""
     start_up: Annotated[float, Parameter("1", at_least=0.0)] = 1.0
     """Revolutions before measuring."""
     revolutions: Annotated[float, Parameter("1", above=0.0)] = 2.0

@@ -27,12 +27,15 @@ LEVEL, INCLINED = (0.2, 0.35, 0.4, 0.5, 0.6, 0.7, 0.8), (0.35, 0.4, 0.5, 0.6)
 """Stated fillings, and those of a drum whose axis is inclined by 45 degrees."""
 
 BALL = Material(density=1400.0, shear_modulus=10e6, poisson_ratio=0.3)
-SURFACES = Interaction(restitution=0.4, static_friction=0.4, rolling_friction=0.05)
+SURFACES = {
+    "smooth": Interaction(restitution=0.4, static_friction=0.4, rolling_friction=0.05),
+    "rough": Interaction(restitution=0.4, static_friction=0.8, rolling_friction=0.3),
+}
 SOFTENED = 20.0
 
 
-def drum_case(across: int, filling: float, inclination: float, seed: int = 1) -> Case:
-    """A drum with so many balls across it; inclination in degrees."""
+def drum_case(surface: str, across: int, inclination: float, filling: float) -> Case:
+    """A drum with so many balls of a surface across it; inclination in degrees."""
     scene = Drum(
         diameter=DIAMETER,
         length=LENGTH,
@@ -47,34 +50,35 @@ def drum_case(across: int, filling: float, inclination: float, seed: int = 1) ->
     return Case(
         scene=scene,
         grains=GrainPopulation(ClumpShape.sphere(DIAMETER / across / 2), BALL),
-        grain_grain=SURFACES,
-        grain_wall=SURFACES,
+        grain_grain=SURFACES[surface],
+        grain_wall=SURFACES[surface],
         numerics=Numerics(modulus_scale=SOFTENED),
-        seed=seed,
+        seed=1,
     )
 
 
 def fill(device: str | None) -> pd.DataFrame:
     """Fill all drums; a row each."""
     asked = [
-        (across, inclination, filling)
+        (surface, across, inclination, filling)
+        for surface in SURFACES
         for across in ACROSS
         for inclination, fillings in ((0.0, LEVEL), (45.0, INCLINED))
         for filling in fillings
     ]
-    cases = [drum_case(across, filling, inclination) for across, inclination, filling in asked]
+    cases = [drum_case(*drum) for drum in asked]
     rows = []
-    for (across, inclination, filling), case, result in zip(
-        asked, cases, simulate(cases, device), strict=True
-    ):
+    for drum, case, result in zip(asked, cases, simulate(cases, device), strict=True):
+        surface, across, inclination, filling = drum
         reached = filling_reached(case.scene, result.observables)
         rows.append(
             {
-                "grains across": across,
+                "grains": surface,
+                "across": across,
                 "inclination [deg]": inclination,
                 "stated": filling,
                 "reached": reached,
-                "grains": result.observables.get("grain_count"),
+                "count": result.observables.get("grain_count"),
                 "solid fraction": result.observables.get("solid_fraction"),
                 "status": result.status,
             }
