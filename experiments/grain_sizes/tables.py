@@ -46,6 +46,7 @@ def read_sieves(path: Path, unit: str | None = None) -> tuple[Tabulated, float]:
             rule = "must rise from row to row: write the finest sieve, or the pan, first"
             raise row.error(rule, "opening")
     values = [_number(row, column, "mass" if column == "retained" else "") for row in rows]
+    _one_kind(rows, column)
     if column == "passing_percent":
         on_each, total = _from_passing(rows, values), 100.0
     else:
@@ -76,6 +77,9 @@ def read_counts(path: Path, unit: str | None = None) -> Tabulated:
     rows = list(read_rows(path, (), COUNT_COLUMNS))
     _at_least(path, rows, 1)
     if "diameter" in rows[0].cells:
+        if both := [name for name in ("from", "to") if name in rows[0].cells]:
+            rule = "takes a column diameter, or from, to and count, not both"
+            raise InputError(rule, f"diameter and {', '.join(both)}", str(path))
         found = [(_length(row, "diameter", unit), _count(row)) for row in rows]
         between = [(diameter, diameter, share) for diameter, share in sorted(found)]
     else:
@@ -102,6 +106,8 @@ def _from_passing(rows: Sequence[Row], passing: Sequence[float]) -> list[float]:
     for row, value in zip(rows, passing, strict=True):
         if value > 100.0:
             raise row.error("must be at most 100", "passing_percent")
+    if 0.0 < max(passing) <= 1.0:
+        raise rows[-1].error("must be percent, from 0 to 100, not parts of 1", "passing_percent")
     for row, (finer, coarser) in zip(rows[1:], pairwise(passing), strict=True):
         if coarser < finer:
             raise row.error("must rise with the opening: a coarser sieve passes no less", "passing_percent")
@@ -142,6 +148,14 @@ def _number(row: Row, column: str, dimension: str) -> float:
     if not (value >= 0.0 and math.isfinite(value)):
         raise row.error("must be 0 or more", column)
     return value
+
+
+def _one_kind(rows: Sequence[Row], column: str) -> None:
+    """Refuse a column whose numbers have a unit in some rows only."""
+    bare = [not Quantity.parse(row[column]).unit for row in rows]
+    for row, without in zip(rows, bare, strict=True):
+        if without and not all(bare) and Quantity.parse(row[column]).number != 0.0:
+            raise row.error("needs a unit, as other rows have one", column)
 
 
 def _one_of(path: Path, rows: Sequence[Row], columns: Sequence[str]) -> str:

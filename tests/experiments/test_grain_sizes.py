@@ -170,6 +170,16 @@ def test_counts_of_single_grains_are_those_grains(tmp_path: Path) -> None:
         ("opening,retained\n1,3\n", "mm", r"sizes.csv: needs 2 rows or more .*received 1"),
         ("opening\n1\n2\n", "mm", r"sizes.csv: needs one column of retained, .*received none"),
         ("opening,retained,passing_percent\n1,3,4\n", "mm", r"needs one column of"),
+        (
+            "opening,retained\n0.5,1 g\n1,12\n2,5 g\n",
+            "mm",
+            r"sizes.csv:3: retained: needs a unit, as other rows have one \(received 12\)",
+        ),
+        (
+            "opening,passing_percent\n0.5,0.02\n1,0.8\n2,1\n",
+            "mm",
+            r"sizes.csv:4: passing_percent: must be percent, .*not parts of 1 \(received 1\)",
+        ),
         ("openning,retained\n1,3\n", "mm", r"missing: opening"),
     ],
 )
@@ -190,6 +200,7 @@ def test_a_bad_sieve_analysis_is_refused_with_its_row(
         ("from,to,count\n1,0.5,3\n", r"sizes.csv:2: to: must be above from, 1 \(received 0.5\)"),
         ("from,to,count\n1,2,3\n1.5,3,4\n", r"sizes.csv:3: from: .*classes rise .*received 1.5"),
         ("from,count\n1,2\n", r"needs a column diameter, or from, to and count; missing: to"),
+        ("diameter,from,to,count\n1,1,2,3\n", r"sizes.csv: takes a column diameter, or .*not both"),
         ("diameter\n", r"sizes.csv: needs 1 rows or more"),
     ],
 )
