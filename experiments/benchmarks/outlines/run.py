@@ -9,7 +9,7 @@ is not simulated again.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -65,13 +65,18 @@ def plan(study: Study, design: Design) -> pd.DataFrame:
 
 
 class Surfaces:
-    """Angles and outlines of the design's heaps, and surfaces of the second degree over them."""
+    """Angles and outlines of the design's heaps, and surfaces of the second degree over them.
 
-    def __init__(self, design: Design, cases: pd.DataFrame) -> None:
-        runs = cases[(cases["stage"] == "design") & (cases["status"] == "finished") & cases[ANGLE].notna()]
-        self.runs, self.names = runs, design.names
+    The columns ``angle`` and ``columns`` hold both.
+    """
+
+    def __init__(
+        self, design: Design, cases: pd.DataFrame, angle: str = ANGLE, columns: Sequence[str] = HEIGHTS
+    ) -> None:
+        runs = cases[(cases["stage"] == "design") & (cases["status"] == "finished") & cases[angle].notna()]
+        self.runs, self.names, self.angle, self.columns = runs, design.names, angle, list(columns)
         self.design = design.select(runs["run"].tolist())
-        self.heights = runs[HEIGHTS].to_numpy()
+        self.heights = runs[self.columns].to_numpy()
         self.slopes = np.array([self.change_of(column) for column in self.heights.T])
 
     def fit(self, values: np.ndarray) -> Surface:
@@ -86,9 +91,11 @@ class Surfaces:
 def strengths(found: Surfaces) -> pd.DataFrame:
     """Distance by which a factor moves the angle and the outline's directions, over a heap's scatter."""
     groups = [rows for _, rows in found.runs.groupby("run")]
-    scatter = np.sqrt(np.mean([rows[ANGLE].var() for rows in groups]))
-    rows = [dict(zip(found.names, found.change_of(found.runs[ANGLE].to_numpy()) / scatter, strict=True))]
-    covariance = scatter_of_views([group[HEIGHTS].to_numpy() for group in groups])
+    scatter = np.sqrt(np.mean([rows[found.angle].var() for rows in groups]))
+    rows = [
+        dict(zip(found.names, found.change_of(found.runs[found.angle].to_numpy()) / scatter, strict=True))
+    ]
+    covariance = scatter_of_views([group[found.columns].to_numpy() for group in groups])
     if covariance is not None:
         whole = ProfileSample(found.heights.mean(axis=0), covariance, len(found.heights), 0.0)
         for mode in whole.canonical(found.slopes, len(found.names)):
@@ -102,10 +109,11 @@ def regions(found: Surfaces, cases: pd.DataFrame, factors: tuple[Factor, ...]) -
     """Compatible regions of every hidden setting, by angle and by outline; a row each."""
     rows = []
     for number, twin in cases[cases["stage"] == "hidden"].groupby("run"):
-        measured = twin[(twin["status"] == "finished") & twin[ANGLE].notna()]
+        measured = twin[(twin["status"] == "finished") & twin[found.angle].notna()]
         truth = measured[found.names].iloc[0].to_dict()
-        angle = Goal(found.fit(found.runs[ANGLE].to_numpy()), Sample.of(measured[ANGLE].to_numpy()))
-        sample = ProfileSample.of(measured[HEIGHTS].to_numpy())
+        seen = Sample.of(measured[found.angle].to_numpy())
+        angle = Goal(found.fit(found.runs[found.angle].to_numpy()), seen)
+        sample = ProfileSample.of(measured[found.columns].to_numpy())
         outline = {
             f"direction {place}": Goal(found.fit(found.heights @ mode.weights), mode.target)
             for place, mode in enumerate(sample.canonical(found.slopes, len(found.names)), 1)
