@@ -61,7 +61,9 @@ def test_drums_drawn_from_the_record_are_those_of_its_emulator() -> None:
     assert (heights.std(axis=0) > 1e-3 * drawn.READING).all()
     # The bed is high on the left; a slope over the middle is near the line through its ends.
     ends = heights[:, 1] - heights[:, -2]
-    assert seen[drawn.ANGLE] == pytest.approx(np.degrees(np.arctan(ends / (1.2 * drums.radius))), abs=5.0)
+    assert seen[drawn.ANGLE].to_numpy() == pytest.approx(
+        np.degrees(np.arctan(ends / (1.2 * drums.radius))), abs=5.0
+    )
 
 
 def test_surfaces_of_drawn_drums_leave_less_open_than_their_slopes(tmp_path, monkeypatch) -> None:
