@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from doe.discrepancy import Bank, Measured, Settings, fit_emulator
+from doe.discrepancy.analysis import LEAST_FREEDOM
 from doe.discrepancy.contest.slips import find_slips
 from experiments.discover.search import Search
 
@@ -26,9 +29,11 @@ def search_cases(settings: Settings, conditions: int) -> tuple[int, int]:
 def cases_for(search: Search, measured: Measured, bank: Bank | None, seed: int) -> tuple[int, int]:
     """Cases that an analysis of measured data asks for: likely, and at the most.
 
-    Where there is a bank, the analysis is begun: without a gap it asks for none, and where a value may be a
-    slip it goes through the data twice.
+    It asks for none where too few means were measured. Where there is a bank, it is begun: without a gap it
+    asks for none either, and where a value may be a slip it goes through the data twice.
     """
+    if _fitted_means(search, measured) - len(search.study.factors) < LEAST_FREEDOM:
+        return 0, 0
     likely, most = search_cases(search.settings, len(search.study.conditions))
     if bank is None:
         return likely, most
@@ -36,3 +41,10 @@ def cases_for(search: Search, measured: Measured, bank: Bank | None, seed: int) 
         return 0, 0
     passes = 2 if find_slips(measured, fit_emulator(bank), search.settings) else 1
     return passes * likely, passes * most
+
+
+def _fitted_means(search: Search, measured: Measured) -> int:
+    """Measured means that may take part in a fit."""
+    fitted = [condition.name for condition in search.study.conditions if not condition.held_out]
+    rows = [measured.values[name] for name in measured.conditions if name in fitted]
+    return sum(int(np.isfinite(each).any(axis=0).sum()) for each in rows)

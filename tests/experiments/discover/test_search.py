@@ -11,6 +11,7 @@ import pytest
 
 from doe.discrepancy import Measured, Outcomes, Point, Verdict, drive, load_bank
 from doe.errors import RuleError
+from experiments.discover.fresh_cases import cases_for
 from experiments.discover.library import FORMER_NAMES
 from experiments.discover.maker import maker_of_today
 from experiments.discover.search import Search
@@ -123,6 +124,16 @@ def test_what_changes_no_heap_leaves_the_bank_in_use(bank: Path) -> None:
     assert kept.space.names == Search.of(trial()).space.names
     with pytest.raises(InputError, match="looked for"):
         Search.of(trial(discover={"mechanisms": ["shape"]})).read_bank(bank)
+
+
+def test_a_plan_counts_no_fresh_run_where_too_few_means_were_measured() -> None:
+    search = Search.of(trial())
+    names = ("height", "r50", "r90")
+    rows = {"base": np.array([[0.012, 0.02, 0.03], [0.013, 0.021, 0.031]])}
+    few = Measured(("base",), names, rows)
+    assert cases_for(search, few, None, seed=1) == (0, 0)
+    more = Measured(("base", "fast"), names, {**rows, "fast": rows["base"]})
+    assert 0 < cases_for(search, more, None, seed=1)[0] < cases_for(search, more, None, seed=1)[1]
 
 
 def test_a_bank_without_outlines_serves_a_study_that_sees_them(bank: Path) -> None:
