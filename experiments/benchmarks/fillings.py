@@ -16,7 +16,9 @@ import typer
 
 from dem_warp import Case, ClumpShape, Drum, GrainPopulation, Interaction, Material, Numerics, simulate
 from experiments.benchmarks.results import write_results
+from experiments.commands.console import clear_errors
 from experiments.commands.options import OneDevice
+from experiments.files import require_folder
 from experiments.measurement.filling import filling_reached
 
 DIAMETER, LENGTH = 0.084, 0.02
@@ -91,8 +93,10 @@ def main(
     device: OneDevice = "cpu",
 ) -> None:
     """Fill drums, and say what was reached."""
-    told = "Filling of a drum as stated and as reached: the part of its volume below the bed's surface."
-    print(write_results(out, "fillings", [("fillings", told, fill(device))]))
+    with clear_errors():
+        require_folder(out)
+        told = "Filling of a drum as stated and as reached: the part of its volume below the bed's surface."
+        print(write_results(out, "fillings", [("fillings", told, fill(device))]))
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ import typer
 from experiments.commands.console import clear_errors
 from experiments.commands.options import OneDevice
 from experiments.errors import InputError
+from experiments.files import require_folder
 
 Out = Annotated[Path, typer.Option(help="Folder of the results.")]
 
@@ -38,6 +39,7 @@ def drum_commands(package: str, about: str, default: Path) -> typer.Typer:
     ) -> None:
         """Simulate, calibrate, predict."""
         with clear_errors("What is stored is not simulated again."):
+            require_folder(out)
             import_module(f"{package}.campaign").run_study(scale, out, device, workers)
 
     @app.command()

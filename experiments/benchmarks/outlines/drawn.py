@@ -21,6 +21,7 @@ from doe import CurveEmulator, Design, Factor, central_composite
 from experiments.benchmarks.outlines.run import CENTER_POINTS, REPLICATES, Surfaces, regions, strengths
 from experiments.benchmarks.results import write_results
 from experiments.commands.console import clear_errors
+from experiments.files import require_folder
 from experiments.measurement.observables import PROFILES, SURFACE_PROFILE
 from experiments.studies.cellulose.campaign import CURVES
 from experiments.studies.cellulose.plan import READING, coded, factors_of, places, study_at
@@ -159,6 +160,7 @@ def write(folder: Path, table: pd.DataFrame, moved: pd.DataFrame) -> Path:
 def main(out: Annotated[Path, typer.Option(help="Folder of the page and its tables.")]) -> None:
     """Compare surfaces and slopes of drawn drums."""
     with clear_errors():
+        require_folder(out)
         print(write(out, *compare(Drums())))
 
 

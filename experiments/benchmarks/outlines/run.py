@@ -34,6 +34,7 @@ from experiments.benchmarks.results import write_results
 from experiments.cases import OwnWorkers, Store, run_cases
 from experiments.commands.console import clear_errors
 from experiments.commands.options import OneDevice
+from experiments.files import require_folder
 from experiments.measurement.observables import ANGLE, OUTLINE
 from experiments.studyfile import Study, load_study
 
@@ -173,6 +174,7 @@ def main(
 ) -> None:
     """Compare outlines and angles on twin data."""
     with clear_errors("What is stored is not simulated again."):
+        require_folder(out)
         heaps = load_study(study)
         design = central_composite(heaps.factors, "face", CENTER_POINTS)
         cases = run_cases(heaps, plan(heaps, design), Store(out / "cases"), OwnWorkers(device, workers))
