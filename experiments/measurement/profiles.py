@@ -49,6 +49,19 @@ def with_profiles(study: Study) -> Study:
     return study.with_document(left | {"target": first} | ({"response": others} if others else {}))
 
 
+def counted_twice(study: Study) -> tuple[str, ...]:
+    """Say which slopes stand beside profiles of the same test: read from them, they would count twice."""
+    sections = [study.target_section, *study.response_sections]
+    given = [section for section in sections if section is not None]
+    shown = {section.scene for section in given if section.part_of}
+    told = "stands beside profiles of the same test: where it was read from them, it counts twice"
+    return tuple(
+        f"{section.title} {told}"
+        for section in given
+        if section.scene in shown and not section.part_of and section.observable.endswith("angle")
+    )
+
+
 def _made(study: Study, table: dict[str, Any], place: str) -> list[dict[str, Any]]:
     """Responses that a table stands for: itself, or those of its profiles."""
     profile, twin = table.get("observable"), study.target_section is not None and study.target_section.twin

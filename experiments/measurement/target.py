@@ -13,7 +13,7 @@ from experiments.errors import InputError
 from experiments.measurement.measured_file import read_measured
 from experiments.measurement.observables import ANGLE, BY_NAME
 from experiments.measurement.pictures import find_pictures, measure_pictures, require_same_fit
-from experiments.measurement.profiles import with_profiles
+from experiments.measurement.profiles import counted_twice, with_profiles
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import TARGET_SCENE
 
@@ -44,6 +44,12 @@ def with_measurements(study: Study) -> tuple[Study, tuple[str, ...]]:
         When a picture or the file cannot be used, or angles were measured otherwise than the study says.
     """
     study = with_profiles(study)
+    taken, notes = _with_source(study)
+    return taken, (*notes, *counted_twice(taken))
+
+
+def _with_source(study: Study) -> tuple[Study, tuple[str, ...]]:
+    """Take the numbers of ``[target]`` from where it says, with notes."""
     section, place = study.target_section, f"{study.file}: target"
     if section is None or section.twin is not None:
         return study, ()

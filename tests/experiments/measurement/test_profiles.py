@@ -11,6 +11,7 @@ import pytest
 from experiments.errors import InputError, StudyError
 from experiments.measurement.profile_files import read_drum_profiles
 from experiments.measurement.profiles import with_profiles
+from experiments.measurement.target import with_measurements
 from experiments.studyfile import load_study
 
 TUBE = '[scene.lifted-cylinder]\ndiameter = "28 mm"\nheight = "28 mm"\ngrain_count = 30\n'
@@ -69,6 +70,21 @@ def test_a_profile_alone_has_no_scatter_to_weigh_it_by(
         with_profiles(study)
     with pytest.raises(StudyError, match=r"names pictures, profiles or a file"):
         _ = study.target
+
+
+def test_a_slope_beside_profiles_of_the_same_test_is_told(
+    write_study: Callable[..., Path], tmp_path: Path
+) -> None:
+    rows = (
+        f"{n},{x} mm,{n - 0.5 * x + 0.1 * n * (x % 10)} mm\n" for n in (1, 2, 3) for x in range(-20, 21, 5)
+    )
+    file(tmp_path, "".join(rows))
+    slope = '[[response]]\nobservable = "dynamic_angle"\nmean = "30 deg"\nsd = "1 deg"\nn = 5\n'
+    alone, beside = (load_study(write_study((TUBE, DRUM), (ANGLE, TARGET), add=add)) for add in ("", slope))
+    assert with_measurements(alone)[1] == ()
+    assert with_measurements(beside)[1] == (
+        "dynamic_angle stands beside profiles of the same test: where it was read from them, it counts twice",
+    )
 
 
 def test_profiles_of_another_test_or_observable_are_refused(write_study: Callable[..., Path]) -> None:
