@@ -97,9 +97,9 @@ def next_step(found: Discovery, terms: Terms) -> str:
     setting = f"“{step.condition}”" + (f" ({how})" if how else "")
     settled = "" if step.settles else f", where {trimmed(step.wanted_q, 3)} would tell them apart"
     return (
-        f"Measure {step.replicates} heaps under the condition {setting}. It tells {pair} best: after both are"
-        f" fitted again they are expected to lie Q = {trimmed(step.expected_q, 3)} apart there, most in the"
-        f" {spaced(step.observable)}{settled}."
+        f"Repeat the test {step.replicates} times under the condition {setting}. It tells {pair} best: after"
+        f" both are fitted again they are expected to lie Q = {trimmed(step.expected_q, 3)} apart there, most in"
+        f" the {spaced(step.observable)}{settled}."
     )
 
 
@@ -241,10 +241,10 @@ def _settle_by_experiment(found: Discovery, terms: Terms, settings: Settings) ->
     if step is None:
         return
     if step.settles:
-        heaps = f"{step.replicates} more heaps under the condition “{step.condition}”"
-        yield f"{capital(heaps)} would settle it (see the next experiment)."
+        tests = f"{step.replicates} more tests under the condition “{step.condition}”"
+        yield f"{capital(tests)} would settle it (see the next experiment)."
         return
-    yield f"No condition of the study would settle it, not with {step.replicates} more heaps either."
+    yield f"No condition of the study would settle it, not with {step.replicates} more tests either."
     for name in found.named:
         if name in terms.mechanisms:
             yield f"To see whether it is {terms.title(name)}: {terms.mechanisms[name].confirm}"
@@ -254,8 +254,8 @@ def _more_data(found: Discovery, terms: Terms, settings: Settings) -> Iterator[s
     measured = int(np.isfinite(found.data.means[~np.array(found.data.held_out)]).sum())
     yield (
         f"The training conditions give {measured} mean value{'' if measured == 1 else 's'} for"
-        f" {len(found.factors)} fitted parameters. More observables of the same heaps (a photograph gives"
-        " six), or the same test under other conditions, would change that; more replicates would not."
+        f" {len(found.factors)} fitted parameters. More observables of the same tests (a photograph of a heap"
+        " gives six), or the same test under other conditions, would change that; more replicates would not."
     )
 
 

@@ -197,11 +197,11 @@ def test_a_tie_names_what_would_settle_it_and_says_where_no_condition_does(
     found = discovered(Verdict.TIE)
     assert found.next_experiment is not None
     told = " ".join(changes(found, terms, Settings()))
-    assert "8 more heaps under the condition “wide” would settle it" in told
+    assert "8 more tests under the condition “wide” would settle it" in told
     weak = replace(found, next_experiment=replace(found.next_experiment, wanted_q=25.9))
     told = " ".join(changes(weak, terms, Settings()))
     assert "would settle it (" not in told
-    assert "No condition of the study would settle it, not with 8 more heaps either." in told
+    assert "No condition of the study would settle it, not with 8 more tests either." in told
     # then what each of the two would do by itself
     for name in found.named:
         assert terms.mechanisms[name].confirm in told
