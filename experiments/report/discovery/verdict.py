@@ -98,8 +98,8 @@ def next_step(found: Discovery, terms: Terms) -> str:
     settled = "" if step.settles else f", where {trimmed(step.wanted_q, 3)} would tell them apart"
     return (
         f"Repeat the test {step.replicates} times under the condition {setting}. It tells {pair} best: after"
-        f" both are fitted again they are expected to lie Q = {trimmed(step.expected_q, 3)} apart there, most in"
-        f" the {spaced(step.observable)}{settled}."
+        f" both are fitted again they are expected to lie Q = {trimmed(step.expected_q, 3)} apart there, most"
+        f" in the {spaced(step.observable)}{settled}."
     )
 
 
