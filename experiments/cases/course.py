@@ -58,7 +58,7 @@ class Stage(NamedTuple):
     """A part of a test's course."""
 
     time: float
-    """How long it takes [s]."""
+    """Duration [s]."""
     pace: float
     """Speed of its fastest grain, in the mean over the stage [m/s]."""
     present: float

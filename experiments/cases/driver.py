@@ -19,7 +19,7 @@ from experiments.export import EXPORTERS, ExportedTest, Translation, export_inpu
 from experiments.files import write_text
 
 APPROXIMATE = "[engine] approximate = true (bridge: --approximate)"
-"""How a person asks for the nearest of what a code lacks."""
+"""Words that ask for the nearest of what a code lacks."""
 
 
 @dataclass(frozen=True)

@@ -65,7 +65,7 @@ def main(
 
 
 def _row(name: str, cases: list[Case], workers: OwnWorkers, speed: Speed, clock: Clock) -> dict[str, Any]:
-    """What is told of a wave, and what it takes."""
+    """Time told of a wave beside the time that it takes."""
     costs = [cost_of(case) for case in cases]
     Batch(cases[:1], "cpu").advance()  # compiles
     started = clock()
