@@ -1,10 +1,12 @@
 """One worker and two on the same wave: how much faster, and are the bits the same?
 
     python -m experiments.benchmarks.cluster.scaling --cases 12
+    python -m experiments.benchmarks.cluster.scaling --gpus --scale soft --cases 102
+    python -m experiments.benchmarks.cluster.scaling --gpus --study STUDY.toml --scale "" --cases 2048
 
-The wave is of bench heaps of the paper's study. It runs on this machine's own processes and on workers of
-Dask, with one and with two of each; kernels are compiled before. The load of the machine is part of the
-answer: on one that others use, two workers get what is left.
+The wave is of heaps of one study. On CPUs it runs on this machine's own processes and on workers of Dask,
+with one and with two of each; on GPUs with one of them and with two. Kernels are compiled before. The load
+of the machine is part of the answer: on one that others use, two workers get what is left.
 """
 
 from __future__ import annotations
@@ -44,28 +46,40 @@ def same_bits(some: Sequence[CaseResult], others: Sequence[CaseResult]) -> bool:
     return all(np.array_equal(a.positions, b.positions) and a.observables == b.observables for a, b in pairs)
 
 
+def resources(kind: str, count: int) -> Resources:
+    """So many workers of a kind."""
+    if kind == "GPUs":
+        return Resources(None, count)
+    section = ClusterSection(workers=count, gpu=False) if kind == "Dask" else None
+    return Resources("cpu", count, None, section)
+
+
 def main(
     cases: Annotated[int, typer.Option(help="Heaps of the wave.")] = 12,
+    study: Annotated[Path | None, typer.Option(help="Study of the heaps; left out: the paper's.")] = None,
+    scale: Annotated[str, typer.Option(help="Scale of the study; empty: as written.")] = "bench",
+    gpus: Annotated[bool, typer.Option("--gpus", help="Use GPUs, not cores.")] = False,
     out: Annotated[Path, typer.Option(help="Folder of the table.")] = Path("out/scaling"),
 ) -> None:
     """Run the wave on one worker and on two, and write the table."""
-    study = load_study(None, "bench")
-    wave = [study.case({}, seed) for seed in range(cases)]
+    loaded = load_study(study, scale or None)
+    wave = [loaded.case({}, seed) for seed in range(cases)]
     rows, reference = [], None
-    for kind in ("own processes", "Dask"):
+    for kind in ("GPUs",) if gpus else ("own processes", "Dask"):
         alone = None
         for count in (1, 2):
-            section = ClusterSection(workers=count, gpu=False) if kind == "Dask" else None
-            with open_workers(Resources("cpu", count, None, section)) as workers:
-                workers.simulate(wave[:1])
+            with open_workers(resources(kind, count)) as workers:
+                workers.simulate(wave[:count])
                 seconds, results = timed(workers, wave)
+                machine = workers.machine
             reference, alone = reference or results, alone or seconds
             bits = "same" if same_bits(results, reference) else "DIFFERENT"
             load = os.getloadavg()[0]
             rows.append((kind, count, seconds, alone / seconds, bits, load))
     columns = ["workers", "number", "seconds", "times as fast", "bits", "load at the end"]
     table = pd.DataFrame(rows, columns=columns)
-    text = f"{cases} bench heaps on {os.cpu_count()} cores; the load counts this run too."
+    heaps = f"{cases} heaps of {loaded.name}, scale {scale or 'as written'}"
+    text = f"{heaps}, on {machine}; the load counts this run too."
     print(write_results(out, "scaling", [("scaling", text, table)]).read_text(encoding="utf-8"))
 
 
