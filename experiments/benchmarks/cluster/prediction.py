@@ -1,11 +1,13 @@
 """Times that a dry run tells against those that waves then take, on studies and tests of every kind.
 
     python -m experiments.benchmarks.cluster.prediction
+    python -m experiments.benchmarks.cluster.prediction --gpu --each 32 --table prediction
 
 The machine is measured first, by the waves of `dem-warp doctor --measure`; then each wave runs. A prediction
 is good where the ratio lies between 1 / 1.5 and 1.5. On a machine of its own, `--wall` times waves on all
 cores. On one that others use, wall time is theirs too: so the default is one worker, this process, and its
 time of the processor, in the measurement and in the waves. Neither counts the start of other processes then.
+On a GPU the time is that of the wall.
 """
 
 from __future__ import annotations
@@ -44,21 +46,26 @@ def main(
     wall: Annotated[
         bool, typer.Option("--wall", help="Wall time on all cores, the machine being free.")
     ] = False,
-    out: Annotated[Path, typer.Option(help="Folder of the table.")] = Path("out/prediction"),
+    gpu: Annotated[bool, typer.Option("--gpu", help="Wall time on a GPU.")] = False,
+    table: Annotated[list[str] | None, typer.Option(help="Table to make; left out: all.")] = None,
+    out: Annotated[Path, typer.Option(help="Folder of the tables.")] = Path("out/prediction"),
 ) -> None:
     """Measure the machine, predict, run and compare."""
-    workers = OwnWorkers("cpu", None if wall else 1)
-    clock = time.perf_counter if wall else time.process_time
+    if strange := set(table or ()) - set(SETS):
+        raise typer.BadParameter(f"must be of {', '.join(SETS)}, not {', '.join(sorted(strange))}")
+    workers = OwnWorkers("cuda" if gpu else "cpu", None if wall or gpu else 1)
+    clock = time.perf_counter if wall or gpu else time.process_time
     speed = measure_speed(workers, clock)
     parts, good, waves = [], 0, 0
-    for name, (what, made) in SETS.items():
-        table = pd.DataFrame([_row(*wave, workers, speed, clock) for wave in made(each).items()])
-        within = int(table["told / taken"].between(1.0 / WITHIN, WITHIN).sum())
-        parts.append((name, f"{what}: {within} of {len(table)} within a factor of {WITHIN}.", table))
-        good, waves = good + within, waves + len(table)
+    for name in table or SETS:
+        what, made = SETS[name]
+        rows = pd.DataFrame([_row(*wave, workers, speed, clock) for wave in made(each).items()])
+        within = int(rows["told / taken"].between(1.0 / WITHIN, WITHIN).sum())
+        parts.append((name, f"{what}: {within} of {len(rows)} within a factor of {WITHIN}.", rows))
+        good, waves = good + within, waves + len(rows)
     count = f"{workers.count} {'worker' if workers.count == 1 else 'workers'}"
-    of = "wall time" if wall else "time of the processor"
-    text = f"{machine('cpu')}, {count}, {of}. Measured: {speed.text}.\n\n"
+    of = "wall time" if wall or gpu else "time of the processor"
+    text = f"{machine(workers.name)}, {count}, {of}. Measured: {speed.text}.\n\n"
     parts[0] = (parts[0][0], text + parts[0][1], parts[0][2])
     print(write_results(out, "prediction", parts).read_text(encoding="utf-8"))
     raise typer.Exit(int(good < waves))
@@ -67,14 +74,14 @@ def main(
 def _row(name: str, cases: list[Case], workers: OwnWorkers, speed: Speed, clock: Clock) -> dict[str, Any]:
     """Time told of a wave beside the time that it takes."""
     costs = [cost_of(case) for case in cases]
-    Batch(cases[:1], "cpu").advance()  # compiles
+    Batch(cases[:1], workers.name).advance()  # compiles
     started = clock()
     results = workers.simulate(cases)
     took = clock() - started
     # a failed case does not tell the steps of its last phase
     ends = [result.phases for result in results if result.status == "finished"]
     steps = sum(phase["steps"] for phases in ends for phase in phases) / len(ends) if ends else math.nan
-    told = wave_seconds(costs, speed, workers.count, on_gpu=False)
+    told = wave_seconds(costs, speed, workers.count, on_gpu=workers.on_gpu)
     row = {
         "study": name,
         "cases": len(cases),
