@@ -17,7 +17,7 @@ from experiments.calibrate.campaign import plan_opening
 from experiments.calibrate.screening import screening_design
 from experiments.cases import Resources, open_workers
 from experiments.cases.cost import Cost, cost_of, device_bytes
-from experiments.cases.workers.batches import worlds_at_once
+from experiments.cases.workers.batches import rounds_of
 from experiments.cases.workers.speed import Speed, measure_speed, store_speed, stored_speed, wave_seconds
 from experiments.discover.engine import EngineSimulator
 from experiments.discover.outcome_table import OutcomeTable
@@ -247,7 +247,8 @@ def _sized_plan(
         each = device_bytes(largest)
         most = max(wave.most for wave in planned)
         if on_gpu:
-            memory = each * min(worlds_at_once(cases, 1e15), -(-most // resources.count))
+            grains = most * max(cost_of(case).grains for case in cases)
+            memory = each * -(-most // (resources.count * rounds_of(most, grains, resources.count)))
         else:
             memory = (each + PROCESS_BYTES) * min(resources.count, most) + PROCESS_BYTES
     disk = 5e6 + stored * sum(wave.most for wave in planned)

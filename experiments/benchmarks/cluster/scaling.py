@@ -41,9 +41,15 @@ def timed(workers: Workers, cases: Sequence[Case]) -> tuple[float, list[CaseResu
 
 
 def same_bits(some: Sequence[CaseResult], others: Sequence[CaseResult]) -> bool:
-    """Tell that heaps agree in every bit."""
-    pairs = zip(some, others, strict=True)
-    return all(np.array_equal(a.positions, b.positions) and a.observables == b.observables for a, b in pairs)
+    """Tell that heaps agree in every bit; how often lists were made anew may depend on the company."""
+    return all(
+        np.array_equal(a.positions, b.positions) and _seen(a) == _seen(b)
+        for a, b in zip(some, others, strict=True)
+    )
+
+
+def _seen(result: CaseResult) -> dict[str, float]:
+    return {name: value for name, value in result.observables.items() if name != "rebuilds"}
 
 
 def resources(kind: str, count: int) -> Resources:

@@ -45,16 +45,25 @@ def plan_batches(
     dealt = []
     for group in batches(cases, one_each=False):
         members = np.array(group)[_falling(costs[group])]
-        dealt += _dealt(members, worlds_at_once([cases[i] for i in group], memory), workers)
+        some = [cases[i] for i in group]
+        grains = len(some) * max(cost_of(case).grains for case in some)
+        dealt += _dealt(members, rounds_of(len(some), grains, workers, _worlds_held(some, memory)), workers)
     return sorted(dealt, key=lambda batch: -float(costs[batch].sum()))
 
 
-def worlds_at_once(cases: Sequence[Case], memory: float) -> int:
-    """Worlds of a launch: enough to fill a GPU, no more than its free memory holds [bytes]."""
+def rounds_of(count: int, grains: float, workers: int, most: int = WORLDS) -> int:
+    """Rounds of a launch a worker, in which so many worlds, of so many grains in all, are simulated.
+
+    A launch fills a GPU as nearly as it can, since the last world of each runs alone at the end. It holds
+    `most` worlds at the most.
+    """
+    return max(round(grains / (workers * FULL_GRAINS)), math.ceil(count / (workers * most)), 1)
+
+
+def _worlds_held(cases: Sequence[Case], memory: float) -> int:
+    """Worlds that the free memory of a GPU holds [bytes], `WORLDS` at the most."""
     largest = max(cases, key=lambda case: cost_of(case).spheres)
-    enough = math.ceil(FULL_GRAINS / max(cost_of(largest).grains, 1))
-    room = int(MEMORY_SHARE * memory / device_bytes(largest))
-    return max(min(enough, room, WORLDS), 1)
+    return max(min(int(MEMORY_SHARE * memory / device_bytes(largest)), WORLDS), 1)
 
 
 def _falling(costs: np.ndarray) -> np.ndarray:
@@ -62,8 +71,7 @@ def _falling(costs: np.ndarray) -> np.ndarray:
     return np.argsort(-costs, kind="stable")
 
 
-def _dealt(members: np.ndarray, worlds: int, workers: int) -> list[list[int]]:
+def _dealt(members: np.ndarray, rounds: int, workers: int) -> list[list[int]]:
     """Deal members out in rounds of a batch a worker; in each round all batches cost much the same."""
-    rounds = math.ceil(len(members) / (workers * worlds))
     parts = np.array_split(members, rounds)
     return [part[w::workers].tolist() for part in parts for w in range(min(workers, len(part)))]

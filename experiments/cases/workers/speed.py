@@ -28,7 +28,7 @@ from dem_warp import (
 )
 from experiments.cases.cost import Cost, cost_of
 from experiments.cases.engine import Engine
-from experiments.cases.workers.batches import FULL_GRAINS, WORLDS
+from experiments.cases.workers.batches import FULL_GRAINS, WORLDS, rounds_of
 from experiments.cases.workers.workers import Workers
 from experiments.files import read_file, write_text
 
@@ -121,9 +121,8 @@ def wave_seconds(costs: Sequence[Cost], speed: Speed, workers: int, on_gpu: bool
         return 0.0
     if on_gpu:
         grains, spheres = (sum(getattr(cost, name) for cost in costs) for name in ("grains", "spheres"))
-        launches = max(math.ceil(grains / FULL_GRAINS), math.ceil(len(costs) / WORLDS), 1)
-        rounds, longest = math.ceil(launches / workers), max(cost.steps for cost in costs)
-        share = max(launches, min(workers, len(costs)))
+        rounds, longest = rounds_of(len(costs), grains, workers), max(cost.steps for cost in costs)
+        share = min(rounds * workers, len(costs))
         dearest, meshed = max(cost.law for cost in costs), any(cost.meshed for cost in costs)
         size = math.ceil(grains / share), math.ceil(spheres / share)
         launch = Cost(*size, longest, law=dearest, meshed=meshed)

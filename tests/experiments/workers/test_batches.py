@@ -114,6 +114,14 @@ def test_on_gpus_workers_get_batches_of_like_cost_that_their_memory_holds(
     assert {7, 1, 3, 2} == {index for batch in halves[:2] for index in batch}
     monkeypatch.setattr(batches, "WORLDS", 3)
     assert sorted(len(batch) for batch in plan_batches(cases, costs, 1, memory=1e12)) == [2, 3, 3]
+    # As full as can be: six worlds of ten thirds that fill a GPU are two launches of three, not three of two.
+    monkeypatch.setattr(batches, "FULL_GRAINS", 3.3 * cost_of(cases[0]).grains)
+    assert list(map(len, plan_batches(cases[:6], costs[:6], 1, memory=1e12))) == [3, 3]
+    assert list(map(len, plan_batches(cases[:4], costs[:4], 1, memory=1e12))) == [2, 2]
+    monkeypatch.setattr(batches, "WORLDS", 1024)
+    assert list(map(len, plan_batches(cases[:4], costs[:4], 1, memory=1e12))) == [4]
+    assert list(map(len, plan_batches(cases, costs, 1, memory=1e12))) == [4, 4]
+    assert list(map(len, plan_batches(cases, costs, 2, memory=1e12))) == [4, 4]
 
 
 def test_what_needs_other_kernels_is_another_batch(cases: list[Case], small_study: Study) -> None:
