@@ -18,7 +18,7 @@ from dem_warp.rollback import Rollback
 from dem_warp.room import neighbour_room
 from dem_warp.scenes.scene import course_of
 from dem_warp.snapshot import STEP, put_snapshot, take_snapshot
-from dem_warp.solver import CHUNK, SHORTEST_CYCLE, Solver
+from dem_warp.solver import CHUNK, Solver
 from dem_warp.types import WorldFlag
 
 _log = logging.getLogger(__name__)
@@ -35,7 +35,8 @@ ADVICE = {
     ),
     WorldFlag.LATE_REBUILD: (
         "failed",
-        "a grain or a wall outran the neighbour lists within {steps} steps at {time:.4f} s: raise the skin",
+        "a grain or a wall outran the neighbour lists within a step at {time:.4f} s: "
+        "raise numerics.skin, or lower time_step_fraction",
     ),
 }
 
@@ -269,5 +270,5 @@ def _refusal(case: Case, reason: str, device: str) -> CaseResult:
 def _verdict(flags: WorldFlag, at: float) -> tuple[str, str] | None:
     for flag, (status, advice) in ADVICE.items():
         if flag in flags:
-            return status, advice.format(time=at, steps=SHORTEST_CYCLE)
+            return status, advice.format(time=at)
     return None

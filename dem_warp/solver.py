@@ -95,7 +95,7 @@ class Solver:
         self._watch_kernels = watch_kernels(self.build)
         self.cycle_limit = LONGEST_CYCLE
         self.careful = False
-        """Take the shortest cycles, each with lists of its own: slow, and nothing is seen late."""
+        """Look before every step, with lists made for it: slow, and nothing is seen late."""
         with wp.ScopedDevice(self.device):
             self._build_state([(found, capacity or listed) for found, listed in room])
         self._running = list(range(len(worlds)))
@@ -229,10 +229,13 @@ class Solver:
         self._launch(self._watch_kernels.find_fastest, row * self.layout.world_count, inputs)
 
     def _cycle(self, steps: int, read: int = 0) -> None:
-        self._look_ahead(steps, read)
-        for step in range(steps):
-            self._step((read + step) % 2)
-        self._look_back((read + steps) % 2)
+        """Take steps between two looks; a careful solver looks before each."""
+        each = 1 if self.careful else steps
+        for first in range(read, read + steps, each):
+            self._look_ahead(each, first % 2)
+            for step in range(first, first + each):
+                self._step(step % 2)
+            self._look_back((first + each) % 2)
 
     def _graph(self, cycle: int) -> Any:
         key = (self.lanes, len(self._running), cycle, self.careful)

@@ -82,6 +82,11 @@ class DrawDown(PouredScene):
         """Height that the upper box is filled to [m]."""
         return self.drop + self.fill_depth
 
+    @property
+    def opening(self) -> float:
+        """Width of the slot [m]."""
+        return self.slot
+
     def volume_below(self, height: float) -> float:
         """Volume of the upper box up to a height [m3]."""
         return self.width * self.depth * (height - self.drop)

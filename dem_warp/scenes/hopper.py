@@ -56,6 +56,11 @@ class Hopper(PouredScene):
         """Height that it is filled to [m]."""
         return self.fill_depth
 
+    @property
+    def opening(self) -> float:
+        """Diameter of the outlet [m]."""
+        return self.outlet
+
     def volume_below(self, height: float) -> float:
         """Volume of the bin up to a height [m3]."""
         return np.pi / 4 * self.diameter**2 * height

@@ -153,6 +153,11 @@ class PouredScene(ABC):
         """Speed of the fastest grain that an ordinary course of events brings [m/s]."""
         return float(np.sqrt(self.rain_speed**2 + 2 * GRAVITY * FREEBOARD * self.fall_height))
 
+    @property
+    def opening(self) -> float:
+        """Width of what grains run out through [m]; infinite where it is the whole container."""
+        return np.inf
+
     # ---- the world before the first step -------------------------------------------------------------------
 
     def supply(self, case: Case[Any]) -> int:
@@ -161,8 +166,16 @@ class PouredScene(ABC):
         Raises
         ------
         ValueError
-            If they are more than a world can have.
+            If they are more than a world can have, or none could pass the opening.
         """
+        thinnest = (
+            2.0 * case.grains.size_mean * min(shape.radii.max() for shape in case.grains.mixture.shapes)
+        )
+        if self.opening < thinnest:
+            raise ValueError(
+                f"{type(self).__name__}: must have an opening that lets grains through, {thinnest:.4g} m or "
+                f"wider, got {self.opening:.4g} m"
+            )
         mean_volume = case.grains.mean(lambda shape: shape.volume)
         count = self.grain_count or np.ceil(self.densest_fill * self.volume / mean_volume)
         most = max_partners(case.grains.sphere_count) // case.grains.sphere_count
@@ -234,7 +247,11 @@ def _falling(case: Case[Any], rain: Rain, release: float, reach: float) -> Grain
 
 
 def default_skin(case: Case[Any]) -> float:
-    """Skin that keeps both the lists short and the rebuilds rare [m]; longer steps want a larger one."""
+    """Skin that keeps both the lists short and the rebuilds rare [m]; longer steps want a larger one.
+
+    Two grains may each use up half of it within the shortest cycle, two steps. So it holds four steps of the
+    fastest grain, and an eighth more, up to three radii.
+    """
     radius = case.grains.mean(lambda shape: float(shape.radii.mean())) * case.grains.size_mean
     path = case.scene.top_speed * case.time_step
-    return float(np.clip(24.0 * path, 0.7 * radius, radius))
+    return float(np.clip(24.0 * path, 0.7 * radius, np.clip(4.5 * path, radius, 3.0 * radius)))

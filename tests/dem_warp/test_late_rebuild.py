@@ -3,10 +3,11 @@
 from dataclasses import replace
 
 import pytest
-from worlds import SMALL_TUBE, assert_same_result, run_batch, small_case
+from worlds import PYRAMID, SMALL_TUBE, assert_same_result, run_batch, small_case
 
 from dem_warp import Case, batch, simulate, solver
 from dem_warp.rollback import Rollback
+from dem_warp.scenes.poured_scene import default_skin
 
 FEW = replace(SMALL_TUBE, grain_count=24)
 """Three layers, of which grains outrun their lists in the rain and at the lift, two dozen times."""
@@ -61,11 +62,22 @@ def test_no_skin_gives_another_heap(heap, skin):
         assert_same_result(result, heap)
     else:
         assert result.status == "failed"
-        assert "outran the neighbour lists within 2 steps" in result.reason
-        assert "raise the skin" in result.reason
+        assert "outran the neighbour lists within a step" in result.reason
+        assert "raise numerics.skin" in result.reason
 
 
 def test_a_skin_that_is_too_thin_is_never_finished():
     # 0.5 m/s times two steps of some microseconds is more than the grains may come.
     [result] = simulate([few(skin=1e-6)], device="cpu", workers=1)
     assert result.status == "failed"
+
+
+def test_a_long_fall_with_long_steps_has_the_skin_that_it_needs():
+    # 0.2 m, and so soft that two steps of two falling grains are longer than a sphere's radius.
+    fall = few(modulus_scale=1600.0)
+    fall = replace(fall, scene=replace(FEW, height=0.2, lift_speed=1.0))
+    radius, path = float(PYRAMID.radii.mean()), 4.0 * fall.scene.top_speed * fall.time_step
+    assert radius < path < default_skin(fall) < 3.0 * radius
+    assert simulate([fall], device="cpu", workers=1)[0].status == "finished"
+    thin = replace(fall, numerics=replace(fall.numerics, skin=radius))
+    assert "raise numerics.skin" in simulate([thin], device="cpu", workers=1)[0].reason
