@@ -3,9 +3,9 @@
     python -m experiments.trials.other_codes.offsets experiments/trials/record/liggghts
 
 The heaps of a record's revealed nulls are held against the emulator of the trial study at the true factors.
-What differs is neither calibrated away nor a hidden effect: it is what the two codes do not have in common. The
-table tells by how much an observable is off in the mean over conditions and nulls, in standard deviations of one
-run and in its unit. The last column has the noise of the means and the emulator's error in it as well.
+What differs is neither calibrated away nor a hidden effect: it is what the two codes do not have in common.
+By how much an observable is off, in the mean over conditions and nulls, stands in deviations of one run and
+in its unit. The last column has the noise of the means and the emulator's error in it as well.
 """
 
 from __future__ import annotations
