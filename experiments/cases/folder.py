@@ -76,7 +76,7 @@ def open_folder(folder: Path, study: Study, resume: bool = False) -> tuple[Store
     """Make a run's folder, or go on in an existing one.
 
     What an earlier run of another study left there, its ``study.json`` with it, stays until `publishing`
-    replaces all of it.
+    replaces all of it but what is stored by key.
 
     Returns
     -------
@@ -99,7 +99,8 @@ def open_folder(folder: Path, study: Study, resume: bool = False) -> tuple[Store
     if resume:
         changes = list(differences(read_manifest(folder), describe(study)))
         for name in changed_outputs(folder):
-            _log.warning("%s is not as the earlier run wrote it, and will be written anew", folder / name)
+            said = "%s is not as the earlier run wrote it: what this run makes is written anew"
+            _log.warning(said, folder / name)
     else:
         write_manifest(folder, study)
     return Store(folder / CASES, engine), changes
