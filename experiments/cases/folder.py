@@ -123,7 +123,7 @@ def require_unused(folder: Path, advice: str = "") -> None:
         When the folder is not new or empty.
     """
     if is_used(folder):
-        raise StoreError(f"the output folder must be new or empty{advice}", "a used one", str(folder))
+        raise StoreError(f"the output folder must be new or empty{advice}", _kind(folder), str(folder))
 
 
 def _require_usable(folder: Path, resume: bool) -> None:
@@ -133,10 +133,17 @@ def _require_usable(folder: Path, resume: bool) -> None:
         rule = "a folder to resume must be that of an earlier run: without --resume, a new one is made"
         raise StoreError(rule, "none" if not folder.exists() else "an empty one", str(folder))
     elif not folder.is_dir():
-        raise StoreError(f"a folder to resume must hold a {MANIFEST}", "a file", str(folder))
+        raise StoreError(f"a folder to resume must hold a {MANIFEST}", _kind(folder), str(folder))
     else:
         _require_no_links(folder)
         read_manifest(folder)
+
+
+def _kind(folder: Path) -> str:
+    """Say what stands in the place of a new folder."""
+    if os.path.isdir(folder):
+        return "a used one"
+    return "a file" if os.path.exists(folder) else "a link that leads nowhere"
 
 
 def _require_no_links(folder: Path) -> None:

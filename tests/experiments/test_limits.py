@@ -59,6 +59,12 @@ def test_a_pipe_and_a_device_are_no_files(tmp_path: Path, name: str) -> None:
         READERS[name](tmp_path / name)
 
 
+def test_a_pipe_is_said_to_be_no_regular_file_where_a_picture_is_wanted(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "a.png")
+    with pytest.raises(PictureError, match="a regular file; received a pipe or a device"):
+        read_picture(tmp_path / "a.png")
+
+
 @pytest.mark.parametrize("name", ["a.toml", "a.csv", "a.txt", "a.stl", "a.png"])
 def test_a_file_of_a_terabyte_is_not_read(tmp_path: Path, name: str) -> None:
     with (tmp_path / name).open("wb") as file:
