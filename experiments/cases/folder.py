@@ -99,6 +99,7 @@ def open_folder(folder: Path, study: Study, resume: bool = False) -> tuple[Store
     if resume:
         changes = list(differences(read_manifest(folder), describe(study)))
         for name in changed_outputs(folder):
+            _require_file(folder / name, "an output")
             said = "%s is not as the earlier run wrote it: what this run makes is written anew"
             _log.warning(said, folder / name)
     else:
@@ -136,6 +137,7 @@ def _require_usable(folder: Path, resume: bool) -> None:
         raise StoreError(f"a folder to resume must hold a {MANIFEST}", _kind(folder), str(folder))
     else:
         _require_no_links(folder)
+        _require_stored_cases(folder)
         read_manifest(folder)
 
 
@@ -152,3 +154,18 @@ def _require_no_links(folder: Path) -> None:
         for name in (*folders, *files):
             if (path := Path(place, name)).is_symlink():
                 raise StoreError("a folder to resume must hold no links", "a link", str(path))
+
+
+def _require_stored_cases(folder: Path) -> None:
+    """Refuse what a case could not be saved over, before it is simulated."""
+    if os.path.lexists(cases := folder / CASES) and not cases.is_dir():
+        raise StoreError("must be the folder of the stored cases: move it away", "a file", str(cases))
+    for place in (folder, cases):
+        for path in place.glob("*.npz"):
+            _require_file(path, "a stored case" if place == cases else "a bank")
+
+
+def _require_file(path: Path, what: str) -> None:
+    if os.path.lexists(path) and not path.is_file():
+        found = "a folder" if path.is_dir() else "a pipe or a device"
+        raise StoreError(f"must be the file of {what}: move it away", found, str(path))
