@@ -38,8 +38,10 @@ def read_picture(path: str | Path) -> Picture:
     """
     file = Path(path)
     if not os.path.isfile(file):  # a name too long is none, and raises nothing
-        found = "a folder; name what is in it, as FOLDER/*.jpg" if os.path.isdir(file) else "no such file"
-        raise PictureError("the picture is a file", found, str(path))
+        found = "a pipe or a device" if os.path.exists(file) else "no such file"
+        if os.path.isdir(file):
+            found = "a folder; name what is in it, as FOLDER/*.jpg"
+        raise PictureError("the picture is a regular file", found, str(path))
     if file.suffix.lower() in HEIC_ENDINGS:
         return _read_heic(file)
     if (length := file.stat().st_size) > LARGEST_FILE:

@@ -10,11 +10,15 @@ import numpy as np
 import pandas as pd
 
 from experiments.calibrate.results import STAGES, Outcome, failed
+from experiments.errors import shortened
 from experiments.studyfile.campaign import TARGET_SCENE, Response, scenes_of
 
 if TYPE_CHECKING:
     from doe import Factor
     from experiments.studyfile import Study
+
+LONGEST_REASON = 300
+"""Characters of a case's reason that the end of a campaign tells."""
 
 Runner = Callable[[pd.DataFrame], pd.DataFrame]
 """Simulates all rows of a table at once and returns them in order, ``status`` and observables added."""
@@ -128,11 +132,32 @@ def failure_summary(cases: pd.DataFrame, *responses: Response) -> str:
     return f"{len(lost)} of {len(cases)} cases failed ({counts})"
 
 
+def _commonest_reason(cases: pd.DataFrame, response: Response) -> tuple[str, int]:
+    """Reason that most cases without a response have, and their number; numbers in a reason are set aside."""
+    cases = cases[cases["scene"] == response.scene]
+    lost = failed(cases, [response])
+    reasons = lost["reason"][lost["reason"].fillna("") != ""] if "reason" in lost else pd.Series(dtype=str)
+    if reasons.empty:
+        return "", 0
+    kinds = reasons.str.replace(r"\d[\d.,]*", "#", regex=True)
+    [kind, *_] = kinds.mode()
+    same = reasons[kinds == kind]
+    return str(same.iloc[0]), len(same)
+
+
 def too_many_failed(cases: pd.DataFrame, stage: str, need: str, response: Response) -> StageEnd:
     """Return the end of a campaign whose stage cannot be analysed."""
     failures = failure_summary(cases, response) or "no case failed"
-    reason = (
-        f"The stage {stage.replace('_', ' ')} {need} for {response.name}; {failures}. See the reasons in the "
-        "table of cases, then widen the time limit or narrow the factors' ranges."
-    )
+    reason = f"The stage {stage.replace('_', ' ')} {need} for {response.name}; {failures}."
+    told, count = _commonest_reason(cases, response)
+    if told:
+        reason += f" The reason of {count} of them: {shortened(told, LONGEST_REASON).rstrip('.')}."
+    if not told or "time limit" in told:
+        reason += (
+            " See the reasons in the table of cases, then widen the time limit or narrow the factors' ranges."
+        )
+    else:
+        # where every case fails alike, other ranges do not help
+        way = "" if count == (cases["scene"] == response.scene).sum() else ", or narrow the factors' ranges"
+        reason += f" Mend that{way}; the table of cases has every reason."
     return StageEnd(Outcome.TOO_MANY_FAILED_RUNS, reason)

@@ -76,7 +76,7 @@ def open_folder(folder: Path, study: Study, resume: bool = False) -> tuple[Store
     """Make a run's folder, or go on in an existing one.
 
     What an earlier run of another study left there, its ``study.json`` with it, stays until `publishing`
-    replaces all of it.
+    replaces all of it but what is stored by key.
 
     Returns
     -------
@@ -99,7 +99,9 @@ def open_folder(folder: Path, study: Study, resume: bool = False) -> tuple[Store
     if resume:
         changes = list(differences(read_manifest(folder), describe(study)))
         for name in changed_outputs(folder):
-            _log.warning("%s is not as the earlier run wrote it, and will be written anew", folder / name)
+            _require_file(folder / name, "an output")
+            said = "%s is not as the earlier run wrote it: what this run makes is written anew"
+            _log.warning(said, folder / name)
     else:
         write_manifest(folder, study)
     return Store(folder / CASES, engine), changes
@@ -122,7 +124,7 @@ def require_unused(folder: Path, advice: str = "") -> None:
         When the folder is not new or empty.
     """
     if is_used(folder):
-        raise StoreError(f"the output folder must be new or empty{advice}", "a used one", str(folder))
+        raise StoreError(f"the output folder must be new or empty{advice}", _kind(folder), str(folder))
 
 
 def _require_usable(folder: Path, resume: bool) -> None:
@@ -132,10 +134,18 @@ def _require_usable(folder: Path, resume: bool) -> None:
         rule = "a folder to resume must be that of an earlier run: without --resume, a new one is made"
         raise StoreError(rule, "none" if not folder.exists() else "an empty one", str(folder))
     elif not folder.is_dir():
-        raise StoreError(f"a folder to resume must hold a {MANIFEST}", "a file", str(folder))
+        raise StoreError(f"a folder to resume must hold a {MANIFEST}", _kind(folder), str(folder))
     else:
         _require_no_links(folder)
+        _require_stored_cases(folder)
         read_manifest(folder)
+
+
+def _kind(folder: Path) -> str:
+    """Say what stands in the place of a new folder."""
+    if os.path.isdir(folder):
+        return "a used one"
+    return "a file" if os.path.exists(folder) else "a link that leads nowhere"
 
 
 def _require_no_links(folder: Path) -> None:
@@ -144,3 +154,18 @@ def _require_no_links(folder: Path) -> None:
         for name in (*folders, *files):
             if (path := Path(place, name)).is_symlink():
                 raise StoreError("a folder to resume must hold no links", "a link", str(path))
+
+
+def _require_stored_cases(folder: Path) -> None:
+    """Refuse what a case could not be saved over, before it is simulated."""
+    if os.path.lexists(cases := folder / CASES) and not cases.is_dir():
+        raise StoreError("must be the folder of the stored cases: move it away", "a file", str(cases))
+    for place in (folder, cases):
+        for path in place.glob("*.npz"):
+            _require_file(path, "a stored case" if place == cases else "a bank")
+
+
+def _require_file(path: Path, what: str) -> None:
+    if os.path.lexists(path) and not path.is_file():
+        found = "a folder" if path.is_dir() else "a pipe or a device"
+        raise StoreError(f"must be the file of {what}: move it away", found, str(path))

@@ -2,7 +2,8 @@
 
 Reports, tables and cards are written beside the folder's own files, in drafts, and moved to their places when
 the run has come to its end. So a run that is stopped leaves the earlier outputs as they were, and one that
-ends leaves none of another study beside its own.
+ends leaves none of another study beside its own. What runs look up by a key that holds all that determines a
+result, the stored cases and a search's table of outcomes, is no output: it serves any study, and stays.
 """
 
 from __future__ import annotations
@@ -29,13 +30,18 @@ DRAFTS = ".drafts"
 
 
 @contextmanager
-def publishing(folder: Path, study: Study, **made_from: object) -> Iterator[Path]:
+def publishing(
+    folder: Path, study: Study, lasting: Mapping[str, bool] | None = None, **made_from: object
+) -> Iterator[Path]:
     """Hand out a folder for drafts, and make them the outputs of a run's folder when the block ends well.
 
     Parameters
     ----------
     folder
         Folder of the run.
+    lasting
+        Files of the folder that last over its runs, by name, each with whether it serves the study: it then
+        stays and is listed, whatever the run is made from. One that does not is removed.
     study, made_from
         Study of the outputs, and whatever else they follow from, as JSON-able data. Earlier outputs that were
         made from the same stay, save those that are written anew; those made from anything else are removed.
@@ -46,9 +52,15 @@ def publishing(folder: Path, study: Study, **made_from: object) -> Iterator[Path
     try:
         yield drafts
         write_manifest(drafts, study)
-        _publish(drafts, folder, {"study": study_hash(study), "engine": engine_fingerprint(), **made_from})
+        made = {"study": study_hash(study), "engine": engine_fingerprint(), **made_from}
+        _publish(drafts, folder, made, lasting or {})
     finally:
         shutil.rmtree(drafts, ignore_errors=True)
+
+
+def is_listed(folder: Path, name: str) -> bool:
+    """Tell that the list of a folder's outputs names a file."""
+    return name in _read_list(folder)["files"]
 
 
 def changed_outputs(folder: Path) -> list[str]:
@@ -65,18 +77,18 @@ def sha256_of(path: Path) -> str | None:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _publish(drafts: Path, folder: Path, made_from: dict[str, Any]) -> None:
+def _publish(drafts: Path, folder: Path, made_from: dict[str, Any], lasting: Mapping[str, bool]) -> None:
     """Move drafts to their places; the list names every file from before the first move on."""
     earlier = _read_list(folder)
     old, drawn = earlier["files"], sorted(path for path in drafts.rglob("*") if path.is_file())
     new = {path.relative_to(drafts).as_posix(): sha256_of(path) for path in drawn}
-    _write_list(folder, {}, dict.fromkeys([*old, *new]))
+    _write_list(folder, {}, dict.fromkeys([*old, *lasting, *new]))
     kept = {}
-    for name, known in old.items():
+    for name, known in (old | dict.fromkeys(lasting)).items():
         if name in new:
             continue
-        if earlier["made_from"] == made_from:
-            kept[name] = known
+        if lasting.get(name, earlier["made_from"] == made_from):
+            kept[name] = sha256_of(folder / name) if name in lasting else known
         else:
             _place(folder, name).unlink(missing_ok=True)
     for name in new:

@@ -1,4 +1,4 @@
-"""``--dry-run``: what a command would run, how long, and on what; nothing is written."""
+"""``--dry-run``: what a command would run, how long, and on what; no folder of results is touched."""
 
 from __future__ import annotations
 
@@ -62,10 +62,11 @@ def show_heap(study: Study, resources: Resources, case: Case, as_json: bool) -> 
 
 def show_plan(resources: Resources, planned: Callable[[Speed], Plan], as_json: bool) -> None:
     """Show the plan of a command on some workers, whose speed is measured where it never was."""
-    from experiments.cases.workers.speed import stored_speed
+    from experiments.cases.workers.speed import SPEEDS, stored_speed, user_folder
     from experiments.runs.plan import measured_speed
 
-    if stored_speed(resources.machine) is None and not resources.submits_jobs:
+    measures = stored_speed(resources.machine) is None and not resources.submits_jobs
+    if measures:
         messages.print(f"Measuring the speed of {resources}, once; a minute or two.")
     plan = planned(measured_speed(resources, measure=not resources.submits_jobs))
     if as_json:
@@ -87,7 +88,12 @@ def show_plan(resources: Resources, planned: Callable[[Speed], Plan], as_json: b
     if resources.submits_jobs:
         what = "of the workers"
     typer.echo(f"Memory {what}: {_bytes(plan.memory)}. Disk: at most {_bytes(plan.disk)}")
-    typer.echo(f"Speed measured on {plan.speed.on}. Nothing was run, nothing was written.")
+    told = "Nothing was run, nothing was written."
+    if measures:
+        told = (
+            f"It was stored in {user_folder() / SPEEDS}; no case was run, and no folder of results touched."
+        )
+    typer.echo(plain(f"Speed measured on {plan.speed.on}. {told}"))
 
 
 def _bytes(number: float) -> str:

@@ -167,7 +167,15 @@ def _check_unit(unit: str) -> None:
 
 def _mesh(path: Path, unit: str | None) -> Trimesh:
     """Read one closed body of a grain's size."""
-    mesh = read_mesh(path, length_unit(unit or "mm"))
+    try:
+        mesh = read_mesh(path, length_unit(unit or "mm"))
+    except ValueError as error:
+        if error.__cause__ is None:
+            raise
+        # the reader's own words, without the class of its error
+        cause = error.__cause__
+        found = f"a file without {cause}" if isinstance(cause, KeyError) else str(cause) or "another file"
+        raise InputError("must be a mesh that can be read", found, str(path)) from error
     if mesh.body_count > 1:
         raise InputError("a grain is one closed body", f"{mesh.body_count} bodies in the mesh", str(path))
     if unit is None:

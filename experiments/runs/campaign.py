@@ -33,6 +33,7 @@ from experiments.report import heap_pictures, verified_heap, write_report
 from experiments.report.companion import Replay, companion_of
 from experiments.report.kit.markdown import WALL_TIMES
 from experiments.report.writer import library_versions
+from experiments.runs.lasting import lasting_files
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import scenes_of
 
@@ -113,7 +114,9 @@ class Desk:
     def publishing(self) -> AbstractContextManager[Path]:
         """Folder for drafts of outputs, which take their places when the block ends well."""
         engine = self.store.engine
-        return publishing(self.folder, self.study, simulated_by=engine and engine_identity(engine))
+        made_by = engine and engine_identity(engine)
+        lasting = lasting_files(self.folder, self.study)
+        return publishing(self.folder, self.study, lasting, simulated_by=made_by)
 
     @property
     def wall_times(self) -> pd.DataFrame:

@@ -31,10 +31,11 @@ from experiments.report.companion import Companion, companion_of
 from experiments.report.discovery import Terms, write_discovery
 from experiments.report.discovery.pictures import photograph, simulated_heaps, turned
 from experiments.runs.campaign import Watch, watching
+from experiments.runs.lasting import BANK, OUTCOMES, lasting_files
 from experiments.studyfile import Study
 
-OUTCOMES, BANK, SETTINGS = "outcomes.sqlite", "bank.npz", "settings.json"
-"""Files of a search's folder beside the report: what was simulated, the library waves, the rules."""
+SETTINGS = "settings.json"
+"""File of the rules of a search, beside its report."""
 
 _log = logging.getLogger(__name__)
 
@@ -153,7 +154,8 @@ def _search(
 
 def _publishing(job: Job) -> AbstractContextManager[Path]:
     data = sha256_of(job.measured) if job.measured else None
-    return publishing(job.folder, job.study, data=data, photographs_only=job.photographs_only, seed=job.seed)
+    made_from = {"data": data, "photographs_only": job.photographs_only, "seed": job.seed}
+    return publishing(job.folder, job.study, lasting_files(job.folder, job.study), **made_from)
 
 
 def heaps_side_by_side(

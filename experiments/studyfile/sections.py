@@ -6,6 +6,7 @@ A field's type names its dimension; its bounds are the hard physical limits, for
 from __future__ import annotations
 
 import os
+import re
 from functools import lru_cache, partial
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -30,6 +31,17 @@ LEAST_SIZE, LARGEST_SIZE = 1e-6, 1e6
 
 MOST_GRAINS = 20_000_000
 """Grains of a case: more fill a GPU of 140 GB."""
+
+_ENGINES_LIMIT = re.compile(r"\w+: (must hold at most .+), got ([\d.e+]+|inf): .+")
+"""Words of `PouredScene.supply`: rule and number."""
+
+
+class TooManyGrains(ValueError):  # noqa: N818  (what is wrong, as `StageEnd` is an end)
+    """More grains than a case can have: the rule, and their number."""
+
+    def __init__(self, rule: str, number: str) -> None:
+        super().__init__(f"{rule}, got {number}")
+        self.rule, self.number = rule, number
 
 
 class ShapeSection(Section):
@@ -238,7 +250,7 @@ class Physics(Section):
         return narrowness(getattr(scene, "diameter", None), grains.shape, size)
 
     def build_case(self, seed: int) -> Case:
-        """Build one case of the engine; a ValueError tells what it cannot be."""
+        """Build one case of the engine; a ValueError tells what it cannot be, `TooManyGrains` for one."""
         case = Case(
             scene=self.scene.scene(self.wall.material()),
             grains=self.grain.population(),
@@ -250,14 +262,24 @@ class Physics(Section):
             laws=self.solver.laws,
             wall_parts=self.wall_parts(),
         )
-        if isinstance(case.scene, PouredScene) and (grains := case.scene.supply(case)) > MOST_GRAINS:
-            rule = (
-                f"a case has at most {MOST_GRAINS:,} grains: lower grain_count, or make the container smaller"
-            )
-            raise ValueError(f"{rule}, got {grains:,}")
+        if isinstance(case.scene, PouredScene):
+            _check_supply(case)
         return case
 
     def wall_parts(self) -> tuple[WallPart, ...]:
         """Build the engine's parts of the walls, in the order of their names."""
         parts = sorted(self.walls.items())
         return tuple(part.part(name, self.wall, self.contact.grain_wall) for name, part in parts)
+
+
+def _check_supply(case: Case) -> None:
+    """Refuse a case of more grains than it can have, by the engine's rule or by that of the studies."""
+    advice = "lower grain_count, or make the container smaller"
+    try:
+        grains = case.scene.supply(case)
+    except ValueError as error:
+        if (told := _ENGINES_LIMIT.fullmatch(str(error))) is None:
+            raise
+        raise TooManyGrains(f"{told[1]}: {advice}", f"{float(told[2]):,.0f}") from None
+    if grains > MOST_GRAINS:
+        raise TooManyGrains(f"must have at most {MOST_GRAINS:,} grains a case: {advice}", f"{grains:,}")

@@ -32,11 +32,11 @@ from experiments.studyfile.factor_section import (
     natural_value,
     with_factor_values,
 )
-from experiments.studyfile.places import Places
+from experiments.studyfile.places import KeyPath, Places
 from experiments.studyfile.reserved_names import check_factor_names
 from experiments.studyfile.scene_sections import SceneSection
 from experiments.studyfile.schema import Section, validated
-from experiments.studyfile.sections import Physics, Scene
+from experiments.studyfile.sections import Physics, Scene, TooManyGrains
 from experiments.studyfile.setters import changed
 from experiments.studyfile.target_section import ResponseSection, TargetSection, build_target
 from experiments.texts import nearest_name
@@ -259,8 +259,17 @@ class Study(Physics):
             changes["scene"] = self.response_scenes[scene]
         try:
             return changed(self._physics, changes).build_case(seed)
+        except TooManyGrains as error:
+            raise StudyError(error.rule, error.number, self._place_of_grains(scene)) from None
         except ValueError as error:
             raise StudyError(str(error), dict(settings), str(self.file)) from error
+
+    def _place_of_grains(self, scene: str) -> str:
+        """Place of the number of a scene's grains, or of the container that it follows from."""
+        path: KeyPath = ("scene",) if scene == TARGET_SCENE else ("response-scene", scene)
+        [(kind, section)] = self.scenes[scene].given.items()
+        given = getattr(section, "grain_count", None) is not None
+        return self._places.of((*path, kind, *(["grain_count"] if given else [])))
 
     @cached_property
     def _physics(self) -> Physics:

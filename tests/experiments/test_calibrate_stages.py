@@ -9,7 +9,7 @@ import pytest
 
 from doe import Design, Factor
 from experiments.calibrate import calibrate, case_seed
-from experiments.calibrate.cases import plan_cases, response_table
+from experiments.calibrate.cases import plan_cases, response_table, too_many_failed
 from experiments.calibrate.climb import _Line
 from experiments.calibrate.results import STAGES
 from experiments.calibrate.screening import analyse_screening, screening_design
@@ -17,6 +17,7 @@ from experiments.calibrate.surface import fit_inside
 from experiments.calibrate.target import plan_target
 from experiments.studyfile import load_study
 from experiments.studyfile.campaign import (
+    TARGET_SCENE,
     CampaignSettings,
     Response,
     ScreeningSettings,
@@ -159,3 +160,30 @@ def test_the_buckwheat_study_runs_through_all_stages(scale: str) -> None:
     assert list(campaign.stages) == list(STAGES)
     assert {"E", "F"} <= set(campaign.selection.kept)
     assert (campaign.optimum.truth is None) == (study.target.twin is None)
+
+
+SPEED = "a grain passed the speed limit at {} s: lower time_step_fraction"
+LIMIT = "the program was ended at its time limit of 60 s"
+
+
+@pytest.mark.parametrize(
+    ("reasons", "told", "advice"),
+    [
+        ([SPEED.format(0.25), SPEED.format(1.5), SPEED.format(2)], f"of 3 of them: {SPEED}.", "Mend that;"),
+        ([LIMIT, SPEED.format(2), SPEED.format(0.1)], f"of 2 of them: {SPEED}.", "Mend that, or narrow"),
+        (["", SPEED.format(2), ""], f"of 1 of them: {SPEED}.", "or narrow the factors' ranges;"),
+        ([LIMIT, LIMIT, SPEED.format(2)], f"of 2 of them: {LIMIT}.", "widen the time limit or narrow"),
+        ([None, None, None], "3 of 3 cases failed", "widen the time limit or narrow"),
+    ],
+)
+def test_the_end_of_a_campaign_tells_the_commonest_reason_and_what_it_advises(
+    reasons: list[str | None], told: str, advice: str
+) -> None:
+    status = ["finished" if reason == "" else "failed" for reason in reasons]
+    angle = [20.0 if reason == "" else np.nan for reason in reasons]
+    cases = pd.DataFrame({"scene": TARGET_SCENE, "status": status, "reason": reasons, "angle": angle})
+    said = too_many_failed(cases, "noise_floor", "needs at least 2 measured cases", ANGLE).reason
+    first = next((reason for reason in reasons if reason and "speed" in reason), "")
+    assert told.replace(SPEED, first) in said
+    assert advice in said
+    assert ("widen" in said) is ("widen" in advice)

@@ -28,6 +28,8 @@ TETRAHEDRA = "".join(
 TWO_BODIES = f"solid two\n{TETRAHEDRA}endsolid two\n"
 ONE_BODY = TWO_BODIES.replace(TETRAHEDRA, TETRAHEDRA[: len(TETRAHEDRA) // 2])
 
+PLY = "ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty float x\n"
+
 
 @dataclass(frozen=True)
 class Hostile:
@@ -128,6 +130,15 @@ HOSTILE = {
     "a used folder": Hostile(
         "heap s.toml --device cpu --out .", (".", "new or empty", "used"), {"s.toml": SMALL_STUDY}
     ),
+    "a file for a folder": Hostile(
+        "heap s.toml --device cpu --out s.toml", ("s.toml", "new or empty", "(received a file)"),
+        {"s.toml": SMALL_STUDY},
+    ),
+    "a bank of nothing": Hostile(
+        "discover s.toml m.csv --bank b.npz --device cpu --out o",
+        ("b.npz", "must be a bank", "an archive without space, observables, theta"),
+        {"s.toml": SMALL_STUDY + CONDITIONS, "m.csv": HEAD, "b.npz": b"PK\x05\x06" + bytes(18)},
+    ),
     "nothing to resume": Hostile(
         "calibrate s.toml --device cpu --resume --out in", ("in/study.json", "resume", "none"),
         {"s.toml": SMALL_STUDY, "in/x": "x"},
@@ -172,13 +183,24 @@ HOSTILE = {
         "vertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n"
         "endsolid o\n", "g.stl", "closed", "open or doubled", options="--spheres 3", name="g.stl",
     ),
+    "half a mesh": clump(
+        PLY + "property float y\nproperty float z\nend_header\n0",
+        "g.ply", "must be a mesh that can be read (received PLY is unexpected length!)",
+        options="--spheres 3", name="g.ply",
+    ),
+    "a mesh without heights": clump(
+        PLY.replace("binary_little_endian", "ascii") + "end_header\n0\n",
+        "g.ply", "must be a mesh that can be read (received a file without 'y')",
+        options="--spheres 3", name="g.ply",
+    ),
     "spheres in metres": clump("x,y,z,r\n0,0,0,0.002\n", "g.txt", "--unit", "0.004 mm"),
     "spheres apart": clump("0 0 0 1\n9 0 0 1\n", "g.txt", "touch one another", "2 parts"),
     "a word among spheres": clump("0 0 0 1\n0 0 one 1\n", "g.txt, line 2", "finite", "0 0 one 1"),
     "binary spheres": clump(bytes(range(256)), "g.txt", "UTF-8", "binary"),
     "no unit of length": clump("0 0 0 1\n", "--unit", "unit of length", "kg", options="--unit kg"),
     # Pictures and heaps
-    "no picture": Hostile("angle p.jpg", ("p.jpg", "the picture is a file", "no such file")),
+    "no picture": Hostile("angle p.jpg", ("p.jpg", "the picture is a regular file", "no such file")),
+    "a folder as a picture": Hostile("angle .", ("the picture is a regular file", "a folder; name what")),
     "text as a picture": Hostile("angle p.jpg", ("p.jpg", "expected: the file is a picture", "6 bytes"),
                                  {"p.jpg": "hello\n"}),
     "half a crop": Hostile("angle p.jpg --crop 1,2", ("--crop", "four numbers", "1,2"), {"p.jpg": "x"}),

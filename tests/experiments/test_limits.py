@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import os
+import re
 import time
 import zipfile
 from collections.abc import Callable
@@ -12,13 +14,13 @@ import cv2
 import numpy as np
 import pytest
 
-from dem_warp import ClumpShape
+from dem_warp import ClumpShape, LiftedCylinder
 from dem_warp.solids import read_mesh
 from doe import DesignError
 from doe.discrepancy import load_bank
 from experiments.cases.manifest import read_manifest
 from experiments.discover.outcome_table import OutcomeTable
-from experiments.errors import InputError, StudyError
+from experiments.errors import InputError, Problem, StudyError
 from experiments.measurement.target import with_measurements
 from experiments.rows import read_rows
 from experiments.runs.campaign import check_runs
@@ -55,6 +57,12 @@ def test_a_pipe_and_a_device_are_no_files(tmp_path: Path, name: str) -> None:
     (tmp_path / name).symlink_to("/dev/zero")
     with pytest.raises(REFUSED):
         READERS[name](tmp_path / name)
+
+
+def test_a_pipe_is_said_to_be_no_regular_file_where_a_picture_is_wanted(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "a.png")
+    with pytest.raises(PictureError, match="a regular file; received a pipe or a device"):
+        read_picture(tmp_path / "a.png")
 
 
 @pytest.mark.parametrize("name", ["a.toml", "a.csv", "a.txt", "a.stl", "a.png"])
@@ -114,6 +122,49 @@ def test_a_case_that_no_memory_holds_is_refused_before_it_is_made(
         study.case({}, 1)
     with pytest.raises(StudyError, match=said):
         check_runs(study)
+
+
+@pytest.mark.parametrize("count", [130_000_000, 1_000_000_000])
+def test_too_many_grains_are_told_with_their_number_and_their_key(
+    write_study: WriteStudy, count: int
+) -> None:
+    path = write_study(("grain_count = 30", f"grain_count = {count}"))
+    problem = _problem_with_grains(path)
+    line = path.read_text(encoding="utf-8").splitlines().index(f"grain_count = {count}") + 1
+    assert (problem.value, problem.place) == (
+        f"{count:,}",
+        f"{path}:{line}: scene.lifted-cylinder.grain_count",
+    )
+
+
+@pytest.mark.parametrize("height", [1e4, 9e9])
+def test_too_many_grains_of_a_large_tube_are_told_at_the_tube(write_study: WriteStudy, height: float) -> None:
+    path = write_study(('height = "28 mm"\ngrain_count = 30', f'height = "{height} m"'))
+    problem = _problem_with_grains(path)
+    line = path.read_text(encoding="utf-8").splitlines().index("[scene.lifted-cylinder]") + 1
+    assert problem.place == f"{path}:{line}: scene.lifted-cylinder"
+    # the engine rounds a number beyond its own limit to four digits
+    count = LiftedCylinder.densest_fill * math.pi * 0.014**2 * height / (4 / 3 * math.pi * 0.002**3)
+    assert float(problem.value.replace(",", "")) == pytest.approx(count, rel=5e-4)
+
+
+def _problem_with_grains(path: Path) -> Problem:
+    with pytest.raises(StudyError) as caught:
+        load_study(path).case({"E": 0.5}, 1)
+    [problem] = caught.value.problems
+    assert re.fullmatch(r"must (hold|have) at most [\d,]+ grains .*: lower grain_count, or .*", problem.rule)
+    assert "got" not in problem.rule
+    return problem
+
+
+def test_the_place_of_too_many_grains_is_that_of_the_condition_that_asks_for_them(
+    write_study: WriteStudy,
+) -> None:
+    condition = "\n[condition.large]\nscene.lifted-cylinder.grain_count = 130_000_000\n"
+    study = load_study(write_study(add=condition))
+    with pytest.raises(StudyError) as caught:
+        study.case({}, 1, "large")
+    assert caught.value.place.endswith(": condition.large.scene.lifted-cylinder.grain_count")
 
 
 def test_a_clump_has_a_limit_of_spheres(tmp_path: Path) -> None:

@@ -169,6 +169,27 @@ def test_links_in_a_folder_are_not_followed(
     assert list(outside.iterdir()) == []
 
 
+@pytest.mark.parametrize("place", ["cases/0a1b.npz", "bank.npz", "tables/effects.csv"])
+def test_a_folder_where_a_file_belongs_is_refused_before_anything_runs(
+    folder: Path, small_study: Study, place: str
+) -> None:
+    publish(folder, small_study, "tables/effects.csv")
+    (folder / place).unlink(missing_ok=True)
+    (folder / place / "mine").mkdir(parents=True)
+    with pytest.raises(StoreError) as caught, locked(folder, resume=True):
+        open_folder(folder, small_study, resume=True)
+    assert caught.value.place == str(folder / place)
+    assert caught.value.value == "a folder"
+    assert (folder / place / "mine").is_dir()
+
+
+def test_a_file_where_the_stored_cases_belong_is_refused(folder: Path, small_study: Study) -> None:
+    publish(folder, small_study, "report.html")
+    (folder / "cases").write_text("mine", encoding="utf-8")
+    with pytest.raises(StoreError, match="must be the folder of the stored cases"):
+        open_folder(folder, small_study, resume=True)
+
+
 def test_one_run_at_a_time_works_in_a_folder(folder: Path, small_study: Study) -> None:
     refused: list[str] = []
 

@@ -11,19 +11,25 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pandas as pd
 import pytest
 
 from dem_warp import Case, CaseResult
+from doe.discrepancy import Outcomes, bank_points, make_bank
 from experiments import api
 from experiments.calibrate import Campaign, Outcome
 from experiments.calibrate.campaign import StageHook
 from experiments.cases import execute
+from experiments.cases.outputs import LIST, sha256_of
 from experiments.cases.workers import own
+from experiments.discover.outcome_table import OutcomeTable
+from experiments.discover.search import Search
 from experiments.errors import InputError
 from experiments.measurement.states import Observed
 from experiments.runs import campaign as run
 from experiments.runs.campaign import Desk
+from experiments.runs.lasting import BANK, OUTCOMES
 from experiments.studyfile import Study, load_study
 
 SLOPE = 30.0
@@ -192,6 +198,51 @@ def test_another_replicate_simulates_only_that(
     assert second.noise_floor is not None
     pd.testing.assert_frame_equal(second.noise_floor.cases.iloc[:5], first.noise_floor.cases)
     assert len(engine.seeds) == count + 1
+
+
+def leave_bank(study: Study, folder: Path, table: bool = True) -> None:
+    """Leave a bank in a folder, and the table of outcomes that it was made of, as a search does."""
+    search, names = Search.of(study), tuple(each.name for each in study.measurable)
+    points = bank_points(search.space, search.settings)
+    outcomes = Outcomes(np.ones((len(points), len(names))), ("",) * len(points))
+    make_bank(search.space, names, points, outcomes, search.fingerprint).save(folder / BANK)
+    if table:
+        OutcomeTable(folder / OUTCOMES).save({"key": (np.ones(1), "")})
+
+
+def listed(folder: Path) -> dict[str, str]:
+    found: dict[str, str] = json.loads((folder / LIST).read_text(encoding="utf-8"))["files"]
+    return found
+
+
+@pytest.mark.usefixtures("_without_report", "engine")
+def test_a_bank_goes_when_another_grain_or_test_is_run_and_stays_while_it_serves(
+    write_study: Callable[..., Path], tmp_path: Path
+) -> None:
+    folder, more = tmp_path / "out", "[campaign.noise_floor]\nreplicates = 5\n"
+    first = load_study(write_study(add=more))
+    run_campaign(first, folder)
+    leave_bank(first, folder)
+    outcomes = sha256_of(folder / OUTCOMES)
+    for same_heaps in (first, load_study(write_study(("n = 5", "n = 6"), add=more))):
+        run_campaign(same_heaps, folder, resume=True)
+        assert listed(folder)[BANK] == sha256_of(folder / BANK)
+    wider = load_study(write_study(('diameter = "28 mm"', 'diameter = "29 mm"'), add=more))
+    run_campaign(wider, folder, resume=True)
+    assert not (folder / BANK).exists()
+    assert BANK not in listed(folder)
+    # its rows are found by all that determines them, as the stored cases are
+    assert sha256_of(folder / OUTCOMES) == outcomes
+
+
+@pytest.mark.usefixtures("_without_report", "engine")
+def test_a_bank_that_a_person_brought_is_left_alone(study: Study, tmp_path: Path) -> None:
+    run_campaign(study, tmp_path / "out")
+    other = study.with_document(study.document | {"wall": study.document["wall"] | {"poisson_ratio": 0.2}})
+    leave_bank(other, tmp_path / "out", table=False)
+    run_campaign(study, tmp_path / "out", resume=True)
+    assert (tmp_path / "out" / BANK).is_file()
+    assert BANK not in listed(tmp_path / "out")
 
 
 def test_the_papers_runs_stand_beside_the_campaign_and_in_the_record(engine: Engine, tmp_path: Path) -> None:

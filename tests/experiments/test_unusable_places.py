@@ -39,6 +39,15 @@ def test_a_place_that_cannot_be_made_ends_with_2(
     assert Path("a-file").read_text(encoding="utf-8") == "mine"
 
 
+@pytest.mark.parametrize("command", ["heap", "calibrate"])
+def test_a_link_that_leads_nowhere_is_said_to_be_one(command: str, tmp_path: Path) -> None:
+    (tmp_path / "out").symlink_to(tmp_path / "gone")
+    code, out, err = dem_warp(command, STUDY, "--device", "cpu", "--out", tmp_path / "out")
+    assert (code, out) == (2, "")
+    assert "(received a link that leads nowhere)" in " ".join(err.split())
+    assert not (tmp_path / "gone").exists()
+
+
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_folder_that_is_only_read_ends_with_2(command: str, tmp_path: Path) -> None:
     tmp_path.chmod(0o500)

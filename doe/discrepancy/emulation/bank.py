@@ -26,6 +26,9 @@ from doe.errors import RuleError
 LARGEST = 500_000_000
 """Bytes of the arrays of the largest bank that is read."""
 
+_PARTS = ("space", "observables", "theta", "mechanism", "size", "condition", "values", "reasons")
+"""Arrays that every bank's file has."""
+
 
 def sobol_points(count: int, columns: int, seed: int) -> np.ndarray:
     """First points of a scrambled Sobol sequence in the unit cube, (count, columns)."""
@@ -155,6 +158,8 @@ def load_bank(path: Path) -> Bank:
     """
     try:
         columns = _read_columns(path)
+        if missing := [name for name in _PARTS if name not in columns]:
+            raise ValueError(f"an archive without {', '.join(missing)}")
         document = json.loads(str(columns.pop("space")))
         ranges = tuple(MechanismRange(**entry) for entry in document.pop("mechanisms"))
         space = SearchSpace(**{name: tuple(value) for name, value in document.items()}, mechanisms=ranges)

@@ -16,6 +16,7 @@ from experiments import api
 from experiments.cases import OwnWorkers
 from experiments.cases.cost import EMPTY, Cost
 from experiments.cases.workers.speed import (
+    SPEEDS,
     Speed,
     split_costs,
     store_speed,
@@ -145,8 +146,23 @@ def test_a_plan_reads_well(write_study: Write, tmp_path: Path) -> None:
     code, out, _ = dem_warp("calibrate", write_study(), "--device", "cpu", "--workers", 2, "--dry-run")
     assert code == 0
     assert "verification" in out
-    assert "Nothing was run" in out
+    assert "Nothing was run, nothing was written." in out
     assert "Speed measured on 2026-01-02, 2 workers" in " ".join(out.split())
+
+
+def test_a_plan_that_measures_the_speed_says_where_it_stored_it(
+    write_study: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (user_folder() / SPEEDS).unlink()
+    monkeypatch.setattr("experiments.runs.plan.measure_speed", lambda _: SPEED)
+    words = ("calibrate", write_study(), "--device", "cpu", "--out", tmp_path / "out", "--dry-run")
+    code, out, _ = dem_warp(*words)
+    told = f"It was stored in {user_folder() / SPEEDS}; no case was run, and no folder of results touched."
+    assert code == 0
+    assert "".join(told.split()) in "".join(out.split())
+    assert "nothing was written" not in out
+    assert not (tmp_path / "out").exists()
+    assert "Nothing was run, nothing was written." in dem_warp(*words)[1]
 
 
 def test_cases_that_cannot_begin_have_no_plan(write_study: Write) -> None:
