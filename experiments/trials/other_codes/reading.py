@@ -72,12 +72,16 @@ class Grasp:
     def frame(self, step: int, rows: np.ndarray) -> Frame:
         """Take a frame from rows of a dump: id, body, x, y, z, vx, vy, vz, radius.
 
+        Spheres without a body, which has the number -1 then, are left out: LIGGGHTS takes a grain away as
+        soon as one of its spheres leaves the box, and its others at their next step.
+
         Raises
         ------
         AnswerError
             When a body has not the spheres of the shape.
         """
         count = self.shape.sphere_count
+        rows = rows[rows[:, 1] > 0]
         rows = rows[np.lexsort((rows[:, 0], rows[:, 1]))]
         numbers, found = np.unique(rows[:, 1], return_counts=True)
         if not len(numbers) or not (found == count).all():

@@ -101,6 +101,14 @@ def test_spheres_that_are_no_grain_are_refused() -> None:
         Grasp(SHAPE).frame(0, rows[:2])
 
 
+def test_spheres_of_a_grain_that_has_left_are_passed_over() -> None:
+    rows = rows_of(np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]]), np.ones(2), 2, np.zeros(3))
+    gone = np.flatnonzero(rows[:, 1] == 2)
+    rows[gone, 1] = -1
+    frame = Grasp(SHAPE).frame(5, np.delete(rows, gone[0], axis=0))
+    assert frame.positions == pytest.approx(np.zeros((1, 3)), abs=1e-12)
+
+
 def test_a_film_that_breaks_off_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "film.dump"
     with pytest.raises(AnswerError, match=r"wrote no film\.dump"):
