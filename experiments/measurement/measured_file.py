@@ -10,8 +10,8 @@ views of it: their mean counts. The observable ``clogged`` says that the tube he
 is no heap. A row without value and picture says that nothing was measured. Rows of the condition
 ``calibration`` state what instruments may be off by (`calibration`).
 
-A value that the test cannot give, of a wrong unit most often, is set aside and noted; what cannot be read at
-all is an error.
+A value that the test cannot give, in mm for cm most often, is set aside and noted. What cannot be read is an
+error, whatever the other rows are: a unit that is unknown or of another kind, too.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ class _Found:
     """Observables of the test, by name and by alias."""
     heaps: dict[tuple[str, str], list[Reading]] = field(default_factory=dict)
     doubts: list[tuple[int, Problem]] = field(default_factory=list)
-    """Values of wrong units, which are set aside."""
+    """Values that the test cannot give, which are set aside."""
     problems: list[tuple[int, Problem]] = field(default_factory=list)
     """Rows that cannot be read."""
     notes: list[str] = field(default_factory=list)
@@ -101,7 +101,7 @@ class _Found:
             self.empty += not readings
 
     def require_sound(self) -> None:
-        """Raise an error with all that is wrong if a row cannot be read, or wrong units leave no value."""
+        """Raise an error with all that is wrong if a row cannot be read, or all values are set aside."""
         if self.problems or (self.doubts and not any(self.heaps.values())):
             wrong = sorted([*self.problems, *self.doubts], key=itemgetter(0))
             raise InputError.of(_told_once(wrong))
@@ -134,7 +134,7 @@ def _heap_of(row: Row, conditions: Collection[str]) -> tuple[str, str]:
 
 
 def _set_aside(doubts: Sequence[tuple[int, Problem]]) -> Iterator[str]:
-    """Say which rows were set aside for their units: a note for all that break the same rule."""
+    """Say which rows were set aside: a note for all that break the same rule."""
     for rule in dict.fromkeys(doubt.rule for _, doubt in doubts):
         alike = [(line, doubt.value) for line, doubt in doubts if doubt.rule == rule]
         received = alike[0][1] if len(alike) == 1 else f"{alike[0][1]}, ..."

@@ -165,15 +165,35 @@ def test_what_cannot_be_read_is_refused_with_its_row(read, row: str, message: st
         ("height,12,", "in this test: is the unit right (none given: m)? (received 12 m); set aside"),
         ("rolled_fraction,12,", "rolled_fraction lies between 0 and 1 in this test: is the unit right?"),
         ("t75,400,s", "(received 400 s); set aside"),
-        ("flank_angle,25,mm", "flank_angle needs a unit of angle"),
-        ("t75,0.4,furlong", "t75 needs a unit of time"),
-        ("concavity,0.1,mm", "concavity must be a plain number"),
     ],
 )
-def test_a_value_whose_unit_cannot_be_right_is_set_aside_with_its_row(read, row: str, note: str) -> None:
+def test_a_value_that_the_test_cannot_give_is_set_aside_with_its_row(read, row: str, note: str) -> None:
     data = read(angles("base", 25.0) + f"base,1,{row}\nbase,1,asymmetry,0.1\n")
     assert data.observables == ("flank_angle", "asymmetry")
     assert len(noted(data, "row 3:", note)) == 1
+
+
+@pytest.mark.parametrize(
+    ("row", "rule"),
+    [
+        ("flank_angle,25,mm", "flank_angle needs a unit of angle"),
+        ("t75,0.4,furlong", "t75 needs a unit of time"),
+        ("height,0.2,in", "height needs a unit of length"),
+        ("height,0.2 in,", "height needs a unit of length"),
+        ("height,12,1", "height needs a unit of length"),
+        ("concavity,0.1,mm", "concavity must be a plain number"),
+    ],
+)
+def test_a_unit_of_another_kind_is_refused_whatever_the_other_rows_are(read, row: str, rule: str) -> None:
+    with pytest.raises(InputError, match=rule) as error:
+        read(angles("base", 25.0) + f"base,1,{row}\nbase,1,asymmetry,0.1\n")
+    assert error.value.place.endswith("measured.csv:3: value")
+    assert error.value.value.startswith(row.split(",")[1])
+
+
+def test_one_error_tells_of_all_rows_of_a_wrong_unit(read) -> None:
+    with pytest.raises(InputError, match=r"csv:3: value, rows 3, 4: .*\(received 0.2 in, 0.3 furlong\)"):
+        read(angles("base", 25.0) + "base,1,height,0.2,in\nbase,2,height,0.3,furlong\n")
 
 
 def test_one_note_tells_of_all_values_of_one_wrong_unit(read) -> None:
