@@ -124,6 +124,43 @@ def test_a_file_of_heaps_becomes_a_response_for_each_observable(from_source, tmp
     assert study.case({}, seed=1, scene="fast").scene.lift_speed == 0.25
 
 
+@pytest.mark.parametrize(
+    ("asked", "leading"),
+    [
+        ('observable = "t75"', "t75"),
+        ('observable = "angle"', "angle"),
+        ('observable = "angle"\nscene = "fast"', "angle_fast"),
+        ('observable = "t75"\nscene = "base"', "t75"),
+    ],
+)
+def test_the_observable_that_a_target_asks_its_file_for_leads(
+    from_source, tmp_path: Path, asked: str, leading: str
+) -> None:
+    (tmp_path / "measured.csv").write_text(MEASURED, encoding="utf-8")
+    study, _ = with_measurements(from_source(f'{asked}\nfile = "measured.csv"', CONDITIONS))
+    assert study.target.leading.name == leading
+    names = {response.name for response in study.target.responses}
+    assert names == {"angle", "t75", "angle_fast", "angle_wide"}
+
+
+@pytest.mark.parametrize(
+    ("asked", "told"),
+    [
+        ('observable = "height"', r"two values .* height shows no scatter.* \(received height \("),
+        ('observable = "r90"', r"measured.csv has angle \(base\), t75 \(base\), angle \(fast\) \(rec"),
+        ('observable = "t75"\nscene = "fast"', r"received t75 \(fast\)"),
+        ('observable = "angle"\nscene = "wide"', r"received angle \(wide\)"),
+    ],
+)
+def test_an_observable_that_the_file_does_not_have_is_refused(
+    from_source, tmp_path: Path, asked: str, told: str
+) -> None:
+    (tmp_path / "measured.csv").write_text(MEASURED, encoding="utf-8")
+    with pytest.raises(InputError, match=told) as error:
+        with_measurements(from_source(f'{asked}\nfile = "measured.csv"', CONDITIONS))
+    assert error.value.place.endswith("target.observable")
+
+
 def test_a_file_measured_under_held_out_conditions_alone_leads_nowhere(from_source, tmp_path: Path) -> None:
     rows = [line for line in MEASURED.splitlines() if line.startswith(("condition", "wide"))]
     (tmp_path / "measured.csv").write_text("\n".join(rows), encoding="utf-8")
