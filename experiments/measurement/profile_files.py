@@ -15,6 +15,7 @@ import numpy as np
 
 from dem_warp.scenes.drum_surface import STATIONS
 from experiments.errors import InputError
+from experiments.measurement.plausible import SizeOfTest
 from experiments.rows import Row, read_rows
 from experiments.studyfile.units import Quantity
 from imaging import PictureError
@@ -89,15 +90,17 @@ def read_drum_profiles(path: Path, radius: float) -> Profiles:
     return _profiles(kept, heights)
 
 
-def read_heap_profiles(path: Path, fit: str) -> Profiles:
+def read_heap_profiles(path: Path, fit: str, size: SizeOfTest) -> Profiles:
     """Read outlines of heaps at the places of `imaging.profile`, from points, pictures and files of spheres.
 
-    Those of spheres have their flanks fitted by a ``fit``, which tells what is no heap.
+    Those of spheres have their flanks fitted by a ``fit``, which tells what is no heap. The ``size`` of the
+    test says how high a heap may be.
 
     Raises
     ------
     InputError
-        When the file cannot be read, a picture shows no heap or one in doubt, or a profile lacks a foot.
+        When the file cannot be read, a picture shows no heap or one in doubt, a profile lacks a foot, or the
+        test cannot give its height.
     """
     points: dict[str, dict[str, _Points]] = {}
     heaps: dict[str, list[np.ndarray]] = {}
@@ -105,14 +108,14 @@ def read_heap_profiles(path: Path, fit: str) -> Profiles:
         if row["picture"]:
             if row["x"] or row["z"]:
                 raise row.error("a row has a picture or a point, not both", "picture")
-            heaps.setdefault(_label(row), []).extend(_pictured(row, fit))
+            heaps.setdefault(_label(row), []).extend(_pictured(row, fit, size))
         else:
             _, z = _take_point(row, points)
             if z < 0.0:
                 raise row.error("must stand on the plate: z counts from it", "z")
             heaps.setdefault(row["replicate"], [])
     for name, views in points.items():
-        heaps[name] += [_drawn(view, f"{path}:{view.line}") for view in views.values()]
+        heaps[name] += [_drawn(view, f"{path}:{view.line}", size) for view in views.values()]
     stations = list(range(len(next(iter(heaps.values()))[0]))) if heaps else []
     return _profiles(stations, heaps)
 
@@ -160,7 +163,7 @@ def _check_surface(view: _Points, radius: float, place: str) -> None:
         raise InputError(rule, f"rises by {rise:.1f} deg", f"{place}: x, z")
 
 
-def _drawn(view: _Points, place: str) -> np.ndarray:
+def _drawn(view: _Points, place: str, size: SizeOfTest) -> np.ndarray:
     """Heights of an outline that points draw."""
     from imaging import profile_heights
 
@@ -173,16 +176,18 @@ def _drawn(view: _Points, place: str) -> np.ndarray:
         ends = f"{1e3 * z[0]:.4g} and {1e3 * z[-1]:.4g} of {1e3 * z.max():.4g} mm"
         raise InputError(rule, ends, place)
     try:
-        return profile_heights(x, z, place)
+        heights = profile_heights(x, z, place)
     except PictureError as error:
         raise InputError("a heap's profile has an area", "none", place) from error
+    size.require_height(float(z.max()), "is the unit right?", "", f"{place}: z")
+    return heights
 
 
-def _pictured(row: Row, fit: str) -> Iterator[np.ndarray]:
+def _pictured(row: Row, fit: str, size: SizeOfTest) -> Iterator[np.ndarray]:
     """Heights of the outlines that a photograph, or a file of spheres from all around, shows."""
     # a file of points needs no pictures
     from experiments.measurement.heap_files import HeapSettings, is_heap_file, measure_heap_file
-    from imaging import find_outline, heap_profile, measure, read_picture
+    from imaging import find_outline, heap_profile, heap_shape, measure, read_picture
 
     path, place = row.file.parent / row["picture"], f"{row.file}:{row.line}: picture"
     if not os.path.isfile(path):  # a name too long is none, and raises nothing
@@ -191,6 +196,8 @@ def _pictured(row: Row, fit: str) -> Iterator[np.ndarray]:
     try:
         if is_heap_file(path):
             heap = measure_heap_file(path, fit, HeapSettings())
+            height = max(heap_shape(view.outline).height for view in heap.angle.views)
+            size.require_height(height, "is its unit of length right?", f" in {path}", place)
             yield from (heap_profile(view.outline) for view in heap.angle.views)
             return
         if not row["pixel"]:
@@ -204,6 +211,10 @@ def _pictured(row: Row, fit: str) -> Iterator[np.ndarray]:
     if seen.doubts:
         rule = "must show a heap without a doubt: crop it, or leave the row out"
         raise InputError(rule, "; ".join(map(str, seen.doubts)), place)
+    told = f" in {path}, with a pixel of {row['pixel']}"
+    question = "is the size of the pixels right?"
+    height = heap_shape(seen.outline).height
+    size.require_height(height, question, told, f"{row.file}:{row.line}: pixel")
     yield heap_profile(seen.outline)
 
 

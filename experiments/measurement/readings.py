@@ -128,7 +128,7 @@ def _profiled(row: Row, size: SizeOfTest, fit: str, known: Mapping[str, Observab
     if size.radius is not None:
         found = read_drum_profiles(path, size.radius)
     else:
-        found = read_heap_profiles(path, fit)
+        found = read_heap_profiles(path, fit, size)
     name = row["replicate"]
     if name not in found.names:
         rule = f"the file {path} has a profile of each replicate, {nearest_name(name, found.names)}"
