@@ -11,7 +11,8 @@ is no heap. A row without value and picture says that nothing was measured. Rows
 ``calibration`` state what instruments may be off by (`calibration`).
 
 A value that the test cannot give, in mm for cm most often, is set aside and noted. What cannot be read is an
-error, whatever the other rows are: a unit that is unknown or of another kind, too.
+error, whatever the other rows are: a unit that is unknown or of another kind, too, and a picture or a profile
+of another replicate.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ import numpy as np
 from doe.discrepancy import Measured
 from experiments.errors import InputError, Problem
 from experiments.measurement.calibration import CALIBRATION, stated_calibration
+from experiments.measurement.copies import Repeats
 from experiments.measurement.notes import data_notes
 from experiments.measurement.observables import Observable
 from experiments.measurement.plausible import SizeOfTest, inversions, size_of_test
@@ -85,12 +87,15 @@ class _Found:
     notes: list[str] = field(default_factory=list)
     empty: int = 0
     outlines: Outlines = field(default_factory=Outlines)
+    repeats: dict[str, Repeats] = field(default_factory=dict)
+    """Pictures and profiles of each condition."""
 
     def add(self, row: Row, sizes: Mapping[str, SizeOfTest], fit: str) -> None:
         """Read a row."""
         try:
             heap = self.heaps.setdefault(_heap_of(row, sizes), [])
             readings = list(readings_of(row, sizes[row["condition"]], fit, self.known, self.outlines))
+            self._require_own(row, readings)
         except InputError as error:
             self.problems += [(row.line, problem) for problem in error.problems]
         except PictureError as error:
@@ -99,6 +104,15 @@ class _Found:
             heap += [reading for reading in readings if not reading.doubt]
             self.doubts += [(row.line, reading.doubt) for reading in readings if reading.doubt]
             self.empty += not readings
+
+    def _require_own(self, row: Row, readings: Sequence[Reading]) -> None:
+        """Refuse a picture or a profile of another replicate of the condition."""
+        repeats = self.repeats.setdefault(row["condition"], Repeats())
+        if row["profile"]:
+            profile = tuple((reading.observable, reading.value) for reading in readings)
+            repeats.add(profile, row["replicate"], row["profile"], row.place("profile"))
+        elif readings and (picture := readings[0].picture):
+            repeats.add_file(row.file.parent / picture, row["replicate"], picture, row.place("picture"))
 
     def require_sound(self) -> None:
         """Raise an error with all that is wrong if a row cannot be read, or all values are set aside."""

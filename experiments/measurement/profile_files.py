@@ -15,6 +15,7 @@ import numpy as np
 
 from dem_warp.scenes.drum_surface import STATIONS
 from experiments.errors import InputError
+from experiments.measurement.copies import Repeats
 from experiments.measurement.plausible import SizeOfTest
 from experiments.rows import Row, read_rows
 from experiments.studyfile.units import Quantity
@@ -66,7 +67,7 @@ def read_drum_profiles(path: Path, radius: float) -> Profiles:
     ------
     InputError
         When the file cannot be read, a point lies outside the drum, the profiles span too few stations, or
-        one of them has a gap or is mirrored.
+        one of them has a gap, is mirrored or is a copy of another.
     """
     found: dict[str, dict[str, _Points]] = {}
     for row in read_rows(path, ("replicate", "x", "z"), COLUMNS[:4]):
@@ -86,6 +87,7 @@ def read_drum_profiles(path: Path, radius: float) -> Profiles:
     for each in found.values():
         for view in each.values():
             _check_surface(view, radius, f"{path}:{view.line}")
+    _require_own_points(found, path)
     heights = {name: [_between(view, places[kept]) for view in each] for name, each in views.items()}
     return _profiles(kept, heights)
 
@@ -99,16 +101,19 @@ def read_heap_profiles(path: Path, fit: str, size: SizeOfTest) -> Profiles:
     Raises
     ------
     InputError
-        When the file cannot be read, a picture shows no heap or one in doubt, a profile lacks a foot, or the
-        test cannot give its height.
+        When the file cannot be read, a picture shows no heap or one in doubt, a profile lacks a foot or is a
+        copy of another, or the test cannot give its height.
     """
     points: dict[str, dict[str, _Points]] = {}
     heaps: dict[str, list[np.ndarray]] = {}
+    pictures = Repeats()
     for row in read_rows(path, ("replicate",), COLUMNS):
         if row["picture"]:
             if row["x"] or row["z"]:
                 raise row.error("a row has a picture or a point, not both", "picture")
             heaps.setdefault(_label(row), []).extend(_pictured(row, fit, size))
+            # views of one heap are pictures of their own, too
+            pictures.add_file(path.parent / row["picture"], row.line, row["picture"], row.place("picture"))
         else:
             _, z = _take_point(row, points)
             if z < 0.0:
@@ -116,6 +121,7 @@ def read_heap_profiles(path: Path, fit: str, size: SizeOfTest) -> Profiles:
             heaps.setdefault(row["replicate"], [])
     for name, views in points.items():
         heaps[name] += [_drawn(view, f"{path}:{view.line}", size) for view in views.values()]
+    _require_own_points(points, path)
     stations = list(range(len(next(iter(heaps.values()))[0]))) if heaps else []
     return _profiles(stations, heaps)
 
@@ -135,6 +141,15 @@ def _take_point(row: Row, found: dict[str, dict[str, _Points]]) -> tuple[float, 
         raise row.error("every place of a profile stands once", "x")
     view.heights[x] = z
     return x, z
+
+
+def _require_own_points(found: Mapping[str, Mapping[str, _Points]], path: Path) -> None:
+    """Refuse a profile whose points are those of another replicate, to the last digit."""
+    repeats = Repeats()
+    for name, views in found.items():
+        for view in views.values():
+            points = tuple(sorted(view.heights.items()))
+            repeats.add(points, name, f"replicate {name}", f"{path}:{view.line}")
 
 
 def _label(row: Row) -> str:
@@ -189,7 +204,7 @@ def _pictured(row: Row, fit: str, size: SizeOfTest) -> Iterator[np.ndarray]:
     from experiments.measurement.heap_files import HeapSettings, is_heap_file, measure_heap_file
     from imaging import find_outline, heap_profile, heap_shape, measure, read_picture
 
-    path, place = row.file.parent / row["picture"], f"{row.file}:{row.line}: picture"
+    path, place = row.file.parent / row["picture"], row.place("picture")
     if not os.path.isfile(path):  # a name too long is none, and raises nothing
         rule = f"must name a picture or a file of spheres, relative to this one (looked for {path})"
         raise row.error(rule, "picture")
@@ -214,7 +229,7 @@ def _pictured(row: Row, fit: str, size: SizeOfTest) -> Iterator[np.ndarray]:
     told = f" in {path}, with a pixel of {row['pixel']}"
     question = "is the size of the pixels right?"
     height = heap_shape(seen.outline).height
-    size.require_height(height, question, told, f"{row.file}:{row.line}: pixel")
+    size.require_height(height, question, told, row.place("pixel"))
     yield heap_profile(seen.outline)
 
 

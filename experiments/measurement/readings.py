@@ -214,4 +214,4 @@ def _doubt(row: Row, observable: Observable, value: float, size: SizeOfTest) -> 
 
 
 def _place(row: Row) -> str:
-    return f"{row.file}:{row.line}: {next((key for key in ('value', 'picture') if row[key]), 'profile')}"
+    return row.place(next((key for key in ("value", "picture") if row[key]), "profile"))

@@ -11,6 +11,7 @@ import numpy as np
 
 from doe import Sample
 from experiments.errors import InputError
+from experiments.measurement.copies import require_separate
 from experiments.measurement.measured_file import read_measured
 from experiments.measurement.observables import ANGLE, BY_NAME
 from experiments.measurement.pictures import find_pictures, measure_pictures, require_same_fit
@@ -57,9 +58,7 @@ def _with_source(study: Study) -> tuple[Study, tuple[str, ...]]:
     if section.fit is not None:
         require_same_fit(section.fit, study.measurement.fit, f"{place}.fit")
     if section.pictures is not None:
-        check_pictured(study)
-        paths = find_pictures(section.pictures, study.file.parent, f"{place}.pictures")
-        angles = measure_pictures(paths, study.measurement.fit)
+        angles = measure_pictures(find_pictured(study), study.measurement.fit)
         clear = {path: angle for path, angle in angles.items() if not angle.doubts}
         notes = tuple(
             f"{path.name} is doubtful, and left out: {'; '.join(map(str, angle.doubts))}"
@@ -110,22 +109,26 @@ def _asked(study: Study, found: Sequence[Replicated], notes: Iterable[str], path
     raise InputError(rule, f"{section.observable} ({section.scene})", f"{study.file}: target.observable")
 
 
-def check_pictured(study: Study) -> None:
-    """Check that photographs of heaps can be the target of a study, before any is looked for.
+def find_pictured(study: Study) -> list[Path]:
+    """Find the photographs of heaps that are the target of a study; none where it names none.
 
     Raises
     ------
     InputError
-        When its test leaves no heap, or the target is another number than the heap's angle.
+        When its test leaves no heap, the target is another number than the heap's angle, there are fewer than
+        two photographs, or one is a copy of another.
     """
     section, place = study.target_section, f"{study.file}: target.pictures"
     if section is None or section.pictures is None:
-        return
+        return []
     if not study.scene.leaves_a_heap:
         rule = "must be left out of a test that leaves no heap; of a drum give profiles"
         raise InputError(rule, study.scene.kind.name, place)
     if section.observable != ANGLE or section.scene != TARGET_SCENE:
         raise InputError("photographs give the angle of the study's own scene", section.title, place)
+    paths = find_pictures(section.pictures, study.file.parent, place)
+    require_separate(paths, place)
+    return paths
 
 
 def target_tables(

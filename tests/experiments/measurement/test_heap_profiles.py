@@ -164,6 +164,31 @@ def test_outlines_of_a_study_are_as_high_as_its_test_can_give(
         read_measured(table, asked)
 
 
+def test_copies_of_an_outline_are_refused_with_both_places(
+    write_study: Callable[..., Path], tmp_path: Path
+) -> None:
+    save_picture(tmp_path / "heap.png", draw(DrawnHeap(28.0, 28.0), Camera(noise=0)))
+    (tmp_path / "copy.png").write_bytes((tmp_path / "heap.png").read_bytes())
+    rows = file(tmp_path, "1,a,heap.png,0.1 mm\n1,b,copy.png,0.1 mm\n", "replicate,view,picture,pixel")
+    with pytest.raises(InputError, match=r"p.csv:3: picture: .*heap.png \(.*p.csv:2: picture\) .*copy.png"):
+        read_heap_profiles(rows, "flank", SIZE)
+    points = [f"{x} mm,{9 - abs(x)} mm\n" for x in range(-9, 10)]
+    text = "".join(f"1,{point}" for point in points) + "".join(f"2,{point}" for point in points[::-1])
+    with pytest.raises(InputError, match=r"p.csv:21: .*replicate 1 \(.*p.csv:2\) \(received replicate 2\)"):
+        read_heap_profiles(file(tmp_path, text), "flank", SIZE)
+    # In a measured table each replicate may have a file of its own.
+    table = tmp_path / "m.csv"
+    table.write_text(
+        "condition,replicate,observable,profile\nbase,1,outline,1.csv\nbase,2,outline,2.csv\n", "utf-8"
+    )
+    for name in "12":
+        rows = "".join(f"{name},{point}" for point in points)
+        (tmp_path / f"{name}.csv").write_text(f"replicate,x,z\n{rows}", "utf-8")
+    asked = load_study(write_study(("pixels = 200", "pixels = 200\noutline = true")))
+    with pytest.raises(InputError, match=r"m.csv:3: profile: .*1.csv \(.*m.csv:2: profile\) .*2.csv"):
+        read_measured(table, asked)
+
+
 def test_an_outline_in_doubt_is_refused_with_the_doubt(tmp_path: Path) -> None:
     save_picture(tmp_path / "lean.png", draw(DrawnHeap(24.0, 33.0), Camera(noise=0)))
     row = file(tmp_path, "1,lean.png,0.1 mm\n", "replicate,picture,pixel")

@@ -125,9 +125,20 @@ def test_a_picture_is_looked_at_once(read, tmp_path: Path, monkeypatch: pytest.M
         return find(*arguments, **options)
 
     monkeypatch.setattr(imaging, "find_outline", note)
-    row = "base,{},flank_angle,,,heap.png,{}\n"
-    read("".join(row.format(number, "0.1 mm") for number in range(1, 6)) + row.format(6, ""))
+    read("".join(f"base,1,{name},,,heap.png,0.1 mm\n" for name in NAMES[:5]) + "fast,1,,,,heap.png,\n")
     assert looks == [pytest.approx(1e-4), None]
+
+
+def test_a_picture_of_two_replicates_is_refused_with_both_places(read, tmp_path: Path) -> None:
+    save_picture(tmp_path / "heap.png", draw(DrawnHeap(27.0, 31.0), PLAIN))
+    (tmp_path / "copy.png").write_bytes((tmp_path / "heap.png").read_bytes())
+    for name in ("heap.png", "copy.png"):
+        told = rf"csv:3: picture: .*never copies.*heap.png \(.*measured.csv:2: picture\) \(received {name}\)"
+        with pytest.raises(InputError, match=told):
+            read(f"base,1,,,,heap.png,0.1 mm\nbase,2,,,,{name},0.1 mm\n")
+    # Another view of the same heap, or a row for each observable, is no repeat.
+    data = read("base,1,flank_angle,,,heap.png,\nbase,1,concavity,,,copy.png,\n")
+    assert len(data.values["base"]) == 1
 
 
 def test_a_picture_without_a_heap_is_noted_and_the_rest_stays(read, tmp_path: Path) -> None:

@@ -59,6 +59,12 @@ def test_a_bad_profile_is_refused_with_its_row(tmp_path: Path, text: str, messag
         read_drum_profiles(file(tmp_path, text), 0.03)
 
 
+def test_a_copy_of_a_profile_is_refused_with_both_places(tmp_path: Path) -> None:
+    text = LINE + LINE.replace("1,", "2,")
+    with pytest.raises(InputError, match=r"p.csv:11: .*never copies.*replicate 1 \(.*p.csv:2\)"):
+        read_drum_profiles(file(tmp_path, text), 0.03)
+
+
 def test_a_profile_alone_has_no_scatter_to_weigh_it_by(
     write_study: Callable[..., Path], tmp_path: Path
 ) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from doe import Sample
+from experiments.commands.early import check_calibration_file
 from experiments.errors import InputError
 from experiments.measurement.target import with_measurements
 from experiments.runs.campaign import check_runs
@@ -89,14 +90,26 @@ def test_a_picture_in_doubt_is_left_out_and_told(from_source, photographs: list[
     assert study.target.leading.measured == Sample.of(angles)
     assert len(notes) == 1
     assert notes[0].startswith("heap-1.png is doubtful, and left out: ")
-    save_picture(photographs[0], lean)
+    save_picture(photographs[0], draw(DrawnHeap(33.0, 24.0), Camera(noise=0)))
     with pytest.raises(InputError, match=r"target.pictures: .*without a doubt .*received 1"):
         with_measurements(from_source('pictures = "photos"'))
 
 
+def test_a_copy_of_a_photograph_is_refused_with_both_before_anything_is_measured(
+    from_source, photographs: list[Path]
+) -> None:
+    photographs[2].write_bytes(photographs[0].read_bytes())
+    study = from_source('pictures = "photos"')
+    told = r"target.pictures: .*never copies.*heap-0.png \(.*\(received .*heap-2.png\)"
+    with pytest.raises(InputError, match=told):
+        check_runs(study)
+    with pytest.raises(InputError, match=told):
+        check_calibration_file(study.file)
+
+
 def test_every_picture_without_a_heap_is_named(from_source, photographs: list[Path]) -> None:
     for path in photographs[:2]:
-        save_picture(path, np.full((300, 500, 3), 200, np.uint8))
+        save_picture(path, np.full((300, 500, 3), 200 + int(path.stem[-1]), np.uint8))
     with pytest.raises(InputError) as error:
         check_runs(from_source('pictures = "photos"'))
     assert [problem.place for problem in error.value.problems] == [str(path) for path in photographs[:2]]
