@@ -7,7 +7,7 @@ or a file of spheres of another code. The column ``view`` tells views of a heap,
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sized
 from pathlib import Path
 from typing import NamedTuple
 
@@ -76,9 +76,10 @@ def read_drum_profiles(path: Path, radius: float) -> Profiles:
             rule = f"must lie in the drum, within {1e3 * radius:g} mm of its axis"
             value = f"x {row['x']}, z {row['z']}"
             raise InputError(rule, value, f"{path}:{row.line}: x, z")
+    _require_rows(found, path)
     places = np.array(STATIONS) * radius
     views = {name: [view.heights for view in each.values()] for name, each in found.items()}
-    ends = [(min(view), max(view)) for each in views.values() for view in each] or [(0.0, 0.0)]
+    ends = [(min(view), max(view)) for each in views.values() for view in each]
     low, high = max(end[0] for end in ends), min(end[1] for end in ends)
     kept = [number for number, place in enumerate(places) if low <= place <= high]
     if len(kept) < LEAST_STATIONS:
@@ -122,7 +123,8 @@ def read_heap_profiles(path: Path, fit: str, size: SizeOfTest) -> Profiles:
     for name, views in points.items():
         heaps[name] += [_drawn(view, f"{path}:{view.line}", size) for view in views.values()]
     _require_own_points(points, path)
-    stations = list(range(len(next(iter(heaps.values()))[0]))) if heaps else []
+    _require_rows(heaps, path)
+    stations = list(range(len(next(iter(heaps.values()))[0])))
     return _profiles(stations, heaps)
 
 
@@ -141,6 +143,11 @@ def _take_point(row: Row, found: dict[str, dict[str, _Points]]) -> tuple[float, 
         raise row.error("every place of a profile stands once", "x")
     view.heights[x] = z
     return x, z
+
+
+def _require_rows(found: Sized, path: Path) -> None:
+    if not found:
+        raise InputError("needs rows below the names of the columns", "no rows", str(path))
 
 
 def _require_own_points(found: Mapping[str, Mapping[str, _Points]], path: Path) -> None:

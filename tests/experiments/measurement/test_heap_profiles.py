@@ -93,6 +93,7 @@ def test_states_spheres_pictures_and_points_give_one_profile(cone: Cone, tmp_pat
             "".join(f"1,{n} mm,{n} mm\n" for n in range(9)),
             r"p.csv:2: .*from foot to foot.*received 0 and 8 ",
         ),
+        ("", r"p.csv: needs rows below the names of the columns \(received no rows\)"),
         ("1,0 mm,-1 mm\n", r"p.csv:2: z: must stand on the plate"),
         ("1,0 in,1 in\n", r"p.csv:2: x: needs a unit of length"),
         ("1,0,1\n", r"p.csv:2: x: needs a unit of length"),
