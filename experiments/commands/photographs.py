@@ -293,14 +293,8 @@ def mean_angle(
     return MeanAngle(mean, sd, n, mean - reach, mean + reach, len(used), left_out)
 
 
-def require_separate_heaps(rows: Sequence[Mapping[str, Any]], by: Grouping) -> None:
-    """Refuse measured pictures, one of which is given for two heaps, to the byte.
-
-    Raises
-    ------
-    InputError
-        With both.
-    """
+def _require_separate_heaps(rows: Sequence[Mapping[str, Any]], by: Grouping) -> None:
+    """Refuse measured pictures, one of which is given for two heaps, to the byte."""
     repeats = Repeats()
     for index, row in enumerate(rows):
         if row["mean"] is not None:
@@ -313,14 +307,17 @@ def _heap(row: Mapping[str, Any], index: int, by: Grouping) -> Hashable:
     return Path(row["picture"]).parent if by == "folder" else index
 
 
-def target_section(mean: MeanAngle | None, fit: str) -> str:
-    """Write the ``[target]`` section of a study file.
+def target_section(
+    mean: MeanAngle | None, fit: str, rows: Sequence[Mapping[str, Any]], by: Grouping = "picture"
+) -> str:
+    """Write the ``[target]`` section of a study file, of the mean of rows.
 
     Raises
     ------
     InputError
-        When there are not two heaps: a target has a standard deviation.
+        When there are not two heaps: a target has a standard deviation. When a picture is given for two.
     """
+    _require_separate_heaps(rows, by)
     if mean is None or mean.sd is None:
         received = f"{mean.n if mean else 0} (doubtful pictures count with --keep-doubtful)"
         raise InputError("a target needs two measured heaps at the least", received, "--target")
