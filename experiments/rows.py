@@ -25,9 +25,13 @@ class Row:
         """The cell of a column; empty where the file has no such column."""
         return self.cells.get(column, "")
 
+    def place(self, column: str) -> str:
+        """File, line and column of a cell."""
+        return f"{self.file}:{self.line}: {column}"
+
     def error(self, rule: str, column: str) -> InputError:
         """Build the error of a cell that breaks a rule."""
-        return InputError(rule, self[column] or "nothing", f"{self.file}:{self.line}: {column}")
+        return InputError(rule, self[column] or "nothing", self.place(column))
 
 
 def read_rows(path: Path, needed: Collection[str], known: Collection[str]) -> Iterator[Row]:

@@ -67,7 +67,8 @@ class ReposeAngle:
         if not self.outline.photographed:
             return ()
         judged = doubts_of(self.left_line, self.right_line, self.mean, self.se, self.outline)
-        return (*self.outline.doubts, *judged)
+        told = {doubt.name for doubt in self.outline.doubts}  # a tilt that no plate shows has the lower limit
+        return (*self.outline.doubts, *(doubt for doubt in judged if doubt.name not in told))
 
     @property
     def dof(self) -> float:

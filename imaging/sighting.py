@@ -142,7 +142,8 @@ def _chosen_piece(above: NDArray[np.bool_], plate: PlateLine, view: View, place:
     large = large[np.argsort(stats[large, cv2.CC_STAT_LEFT])]
     if view.heap is not None:
         if view.heap > len(large):
-            raise PictureError(f"the picture shows {len(large)} heaps", f"heap {view.heap}", place)
+            shown = f"{len(large)} heap{'s' if len(large) > 1 else ''}"
+            raise PictureError(f"the picture shows {shown}", f"heap {view.heap}", place)
         return np.asarray(labels == large[view.heap - 1])
     if len(large) > 1:
         rule = "one heap stands on the plate, and nothing of its size beside it (cut it out, or choose one)"

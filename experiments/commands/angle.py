@@ -81,7 +81,7 @@ def angle(
         rows = photographs.measure_pictures(pictures, fit, overlay, view, heaps)
         mean = photographs.mean_angle(rows, grouping, keep_doubtful)
         if as_target:
-            typer.echo(photographs.target_section(mean, fit), nl=False)
+            typer.echo(photographs.target_section(mean, fit, rows, grouping), nl=False)
         elif as_csv:
             typer.echo(plain(photographs.csv_table(rows)), nl=False)
         elif as_json:

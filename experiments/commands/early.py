@@ -37,14 +37,9 @@ def check_calibration_file(path: Path | None, scale: str | None = None, engine: 
     if (study := _readable(path, scale, engine)) is None:
         return
     from experiments.calibrate.checks import check_calibration
-    from experiments.measurement.pictures import find_pictures
-    from experiments.measurement.target import check_pictured, with_measurements
+    from experiments.measurement.target import find_pictured, with_measurements
 
-    section = study.target_section
-    if section is not None and section.pictures is not None:
-        check_pictured(study)
-        find_pictures(section.pictures, study.file.parent, f"{study.file}: target.pictures")
-    else:
+    if not find_pictured(study):
         check_calibration(with_measurements(study)[0])
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
@@ -16,6 +16,7 @@ from scipy import special
 
 from experiments.errors import InputError
 from experiments.files import replacing
+from experiments.measurement.copies import Repeats
 from experiments.measurement.heap_files import HeapSettings, is_heap_file, measure_heap_file, values_of
 from imaging import (
     FitSettings,
@@ -279,10 +280,9 @@ def mean_angle(
     used = [row for row in measured if keep_doubtful or not row["doubts"]]
     if not used:
         return None
-    heaps: dict[str, list[float]] = {}
+    heaps: dict[Hashable, list[float]] = {}
     for index, row in enumerate(used):
-        heap = str(Path(row["picture"]).parent) if by == "folder" else str(index)
-        heaps.setdefault(heap, []).append(row["mean"])
+        heaps.setdefault(_heap(row, index, by), []).append(row["mean"])
     means = np.array([np.mean(views) for views in heaps.values()])
     left_out = tuple(row["picture"] for row in measured if row not in used)
     mean, n = float(means.mean()), len(means)
@@ -293,14 +293,31 @@ def mean_angle(
     return MeanAngle(mean, sd, n, mean - reach, mean + reach, len(used), left_out)
 
 
-def target_section(mean: MeanAngle | None, fit: str) -> str:
-    """Write the ``[target]`` section of a study file.
+def _require_separate_heaps(rows: Sequence[Mapping[str, Any]], by: Grouping) -> None:
+    """Refuse measured pictures, one of which is given for two heaps, to the byte."""
+    repeats = Repeats()
+    for index, row in enumerate(rows):
+        if row["mean"] is not None:
+            name = row["picture"]
+            repeats.add_file(Path(name), _heap(row, index, by), name, f"--target: picture {index + 1}")
+
+
+def _heap(row: Mapping[str, Any], index: int, by: Grouping) -> Hashable:
+    """Heap that a picture shows."""
+    return Path(row["picture"]).parent if by == "folder" else index
+
+
+def target_section(
+    mean: MeanAngle | None, fit: str, rows: Sequence[Mapping[str, Any]], by: Grouping = "picture"
+) -> str:
+    """Write the ``[target]`` section of a study file, of the mean of rows.
 
     Raises
     ------
     InputError
-        When there are not two heaps: a target has a standard deviation.
+        When there are not two heaps: a target has a standard deviation. When a picture is given for two.
     """
+    _require_separate_heaps(rows, by)
     if mean is None or mean.sd is None:
         received = f"{mean.n if mean else 0} (doubtful pictures count with --keep-doubtful)"
         raise InputError("a target needs two measured heaps at the least", received, "--target")

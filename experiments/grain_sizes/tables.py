@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -11,9 +12,12 @@ from experiments.errors import InputError
 from experiments.grain_sizes.distribution import Tabulated
 from experiments.rows import Row, read_rows
 from experiments.studyfile.units import Quantity
+from experiments.texts import read_text
 
 ROUNDING = 0.5
 """Percent by which rounded percentages may miss 100."""
+
+_MESH_NUMBER = re.compile(r'^ *"?(#\d+)"? *[,;\t] *"?[\d.]', re.MULTILINE)
 
 SIEVE_COLUMNS = ("opening", "retained", "retained_percent", "passing_percent")
 COUNT_COLUMNS = ("diameter", "from", "to", "count")
@@ -37,6 +41,7 @@ def read_sieves(path: Path, unit: str | None = None) -> tuple[Tabulated, float]:
     InputError
         When the file cannot be read or breaks a rule: the rule, the value and the row.
     """
+    _refuse_mesh_numbers(path)
     rows = list(read_rows(path, ("opening",), SIEVE_COLUMNS))
     column = _one_of(path, rows, SIEVE_COLUMNS[1:])
     _at_least(path, rows, 2)
@@ -61,6 +66,15 @@ def read_sieves(path: Path, unit: str | None = None) -> tuple[Tabulated, float]:
     if not kept > 0.0:
         raise InputError("must hold mass between two sieves", f"{kept:g}", f"{path}: {column}")
     return _tabulated(between, kept), 1.0 - kept / total
+
+
+def _refuse_mesh_numbers(path: Path) -> None:
+    """Refuse rows that begin with the number of a mesh, as ``#40``, before they are taken for comments."""
+    text = read_text(path)
+    if found := _MESH_NUMBER.search(text):
+        rule = "needs a unit of length, as 0.425 mm: the number of a mesh has none"
+        line = text.count("\n", 0, found.start()) + 1
+        raise InputError(rule, found[1], f"{path}:{line}: opening")
 
 
 def read_counts(path: Path, unit: str | None = None) -> Tabulated:

@@ -10,8 +10,9 @@ views of it: their mean counts. The observable ``clogged`` says that the tube he
 is no heap. A row without value and picture says that nothing was measured. Rows of the condition
 ``calibration`` state what instruments may be off by (`calibration`).
 
-A value that the test cannot give, of a wrong unit most often, is set aside and noted; what cannot be read at
-all is an error.
+A value that the test cannot give, in mm for cm most often, is set aside and noted. What cannot be read is an
+error, whatever the other rows are: a unit that is unknown or of another kind, too, and a picture or a profile
+of another replicate.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ import numpy as np
 from doe.discrepancy import Measured
 from experiments.errors import InputError, Problem
 from experiments.measurement.calibration import CALIBRATION, stated_calibration
+from experiments.measurement.copies import Repeats
 from experiments.measurement.notes import data_notes
 from experiments.measurement.observables import Observable
 from experiments.measurement.plausible import SizeOfTest, inversions, size_of_test
@@ -79,18 +81,21 @@ class _Found:
     """Observables of the test, by name and by alias."""
     heaps: dict[tuple[str, str], list[Reading]] = field(default_factory=dict)
     doubts: list[tuple[int, Problem]] = field(default_factory=list)
-    """Values of wrong units, which are set aside."""
+    """Values that the test cannot give, which are set aside."""
     problems: list[tuple[int, Problem]] = field(default_factory=list)
     """Rows that cannot be read."""
     notes: list[str] = field(default_factory=list)
     empty: int = 0
     outlines: Outlines = field(default_factory=Outlines)
+    repeats: dict[str, Repeats] = field(default_factory=dict)
+    """Pictures and profiles of each condition."""
 
     def add(self, row: Row, sizes: Mapping[str, SizeOfTest], fit: str) -> None:
         """Read a row."""
         try:
             heap = self.heaps.setdefault(_heap_of(row, sizes), [])
             readings = list(readings_of(row, sizes[row["condition"]], fit, self.known, self.outlines))
+            self._require_own(row, readings)
         except InputError as error:
             self.problems += [(row.line, problem) for problem in error.problems]
         except PictureError as error:
@@ -100,8 +105,17 @@ class _Found:
             self.doubts += [(row.line, reading.doubt) for reading in readings if reading.doubt]
             self.empty += not readings
 
+    def _require_own(self, row: Row, readings: Sequence[Reading]) -> None:
+        """Refuse a picture or a profile of another replicate of the condition."""
+        repeats = self.repeats.setdefault(row["condition"], Repeats())
+        if row["profile"]:
+            profile = tuple((reading.observable, reading.value) for reading in readings)
+            repeats.add(profile, row["replicate"], row["profile"], row.place("profile"))
+        elif readings and (picture := readings[0].picture):
+            repeats.add_file(row.file.parent / picture, row["replicate"], picture, row.place("picture"))
+
     def require_sound(self) -> None:
-        """Raise an error with all that is wrong if a row cannot be read, or wrong units leave no value."""
+        """Raise an error with all that is wrong if a row cannot be read, or all values are set aside."""
         if self.problems or (self.doubts and not any(self.heaps.values())):
             wrong = sorted([*self.problems, *self.doubts], key=itemgetter(0))
             raise InputError.of(_told_once(wrong))
@@ -134,7 +148,7 @@ def _heap_of(row: Row, conditions: Collection[str]) -> tuple[str, str]:
 
 
 def _set_aside(doubts: Sequence[tuple[int, Problem]]) -> Iterator[str]:
-    """Say which rows were set aside for their units: a note for all that break the same rule."""
+    """Say which rows were set aside: a note for all that break the same rule."""
     for rule in dict.fromkeys(doubt.rule for _, doubt in doubts):
         alike = [(line, doubt.value) for line, doubt in doubts if doubt.rule == rule]
         received = alike[0][1] if len(alike) == 1 else f"{alike[0][1]}, ..."

@@ -10,8 +10,10 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from dem_warp import Drum, LiftedCylinder
-from experiments.measurement.observables import OBSERVABLES, Observable
+from experiments.errors import InputError
+from experiments.measurement.observables import BY_NAME, OBSERVABLES, Observable
 from experiments.studyfile import Study
+from experiments.studyfile.campaign import TARGET_SCENE
 
 PATIENCE = 10.0
 """Time that a heap is given after the tube is gone [s]."""
@@ -38,18 +40,31 @@ class SizeOfTest:
         masses = {"kg": (0.0, math.inf), "kg/s": (0.0, math.inf)}
         return observable.limits or (by_unit | masses).get(observable.unit, (-math.inf, math.inf))
 
+    def require_height(self, height: float, question: str, told: str, place: str) -> None:
+        """Refuse the outline of a heap whose greatest height [m] the test cannot give.
 
-def size_of_test(study: Study) -> SizeOfTest:
-    """Size of the test of a study."""
-    case = study.case({}, seed=0)
-    scene = case.scene
-    if not isinstance(scene, LiftedCylinder):
-        half_x, half_y, bottom = scene.room(case.grains.grain_reach)
-        room = max(2.0 * half_x, 2.0 * half_y, scene.brim - bottom)
-        radius = scene.diameter / 2 if isinstance(scene, Drum) else None
+        Raises
+        ------
+        InputError
+            With the ``question`` what may be wrong, and what else is ``told`` of it.
+        """
+        low, high = self.limits(BY_NAME["height"])
+        if not low <= height <= high:
+            rule = f"an outline is between {1e3 * low:.3g} and {1e3 * high:.3g} mm high in this test"
+            raise InputError(f"{rule}: {question}", f"{1e3 * height:.6g} mm{told}", place)
+
+
+def size_of_test(study: Study, scene: str = TARGET_SCENE) -> SizeOfTest:
+    """Size of the test of a study, or of another of its scenes."""
+    case = study.case({}, 0, scene)
+    test = case.scene
+    if not isinstance(test, LiftedCylinder):
+        half_x, half_y, bottom = test.room(case.grains.grain_reach)
+        room = max(2.0 * half_x, 2.0 * half_y, test.brim - bottom)
+        radius = test.diameter / 2 if isinstance(test, Drum) else None
         return SizeOfTest(case.grains.smallest_sphere, room, math.inf, radius)
-    reach = 4.0 * scene.diameter + 2.0 * scene.height
-    return SizeOfTest(case.grains.smallest_sphere, reach, PATIENCE + 10.0 * scene.height / scene.lift_speed)
+    reach = 4.0 * test.diameter + 2.0 * test.height
+    return SizeOfTest(case.grains.smallest_sphere, reach, PATIENCE + 10.0 * test.height / test.lift_speed)
 
 
 def inversions(heap: Mapping[str, float]) -> Iterable[tuple[str, str]]:

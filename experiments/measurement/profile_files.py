@@ -7,7 +7,7 @@ or a file of spheres of another code. The column ``view`` tells views of a heap,
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sized
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,6 +15,8 @@ import numpy as np
 
 from dem_warp.scenes.drum_surface import STATIONS
 from experiments.errors import InputError
+from experiments.measurement.copies import Repeats
+from experiments.measurement.plausible import SizeOfTest
 from experiments.rows import Row, read_rows
 from experiments.studyfile.units import Quantity
 from imaging import PictureError
@@ -65,7 +67,7 @@ def read_drum_profiles(path: Path, radius: float) -> Profiles:
     ------
     InputError
         When the file cannot be read, a point lies outside the drum, the profiles span too few stations, or
-        one of them has a gap or is mirrored.
+        one of them has a gap, is mirrored or is a copy of another.
     """
     found: dict[str, dict[str, _Points]] = {}
     for row in read_rows(path, ("replicate", "x", "z"), COLUMNS[:4]):
@@ -74,9 +76,10 @@ def read_drum_profiles(path: Path, radius: float) -> Profiles:
             rule = f"must lie in the drum, within {1e3 * radius:g} mm of its axis"
             value = f"x {row['x']}, z {row['z']}"
             raise InputError(rule, value, f"{path}:{row.line}: x, z")
+    _require_rows(found, path)
     places = np.array(STATIONS) * radius
     views = {name: [view.heights for view in each.values()] for name, each in found.items()}
-    ends = [(min(view), max(view)) for each in views.values() for view in each] or [(0.0, 0.0)]
+    ends = [(min(view), max(view)) for each in views.values() for view in each]
     low, high = max(end[0] for end in ends), min(end[1] for end in ends)
     kept = [number for number, place in enumerate(places) if low <= place <= high]
     if len(kept) < LEAST_STATIONS:
@@ -85,35 +88,43 @@ def read_drum_profiles(path: Path, radius: float) -> Profiles:
     for each in found.values():
         for view in each.values():
             _check_surface(view, radius, f"{path}:{view.line}")
+    _require_own_points(found, path)
     heights = {name: [_between(view, places[kept]) for view in each] for name, each in views.items()}
     return _profiles(kept, heights)
 
 
-def read_heap_profiles(path: Path, fit: str) -> Profiles:
+def read_heap_profiles(path: Path, fit: str, size: SizeOfTest) -> Profiles:
     """Read outlines of heaps at the places of `imaging.profile`, from points, pictures and files of spheres.
 
-    Those of spheres have their flanks fitted by a ``fit``, which tells what is no heap.
+    Those of spheres have their flanks fitted by a ``fit``, which tells what is no heap. The ``size`` of the
+    test says how high a heap may be.
 
     Raises
     ------
     InputError
-        When the file cannot be read, a picture shows no heap or one in doubt, or a profile lacks a foot.
+        When the file cannot be read, a picture shows no heap or one in doubt, a profile lacks a foot or is a
+        copy of another, or the test cannot give its height.
     """
     points: dict[str, dict[str, _Points]] = {}
     heaps: dict[str, list[np.ndarray]] = {}
+    pictures = Repeats()
     for row in read_rows(path, ("replicate",), COLUMNS):
         if row["picture"]:
             if row["x"] or row["z"]:
                 raise row.error("a row has a picture or a point, not both", "picture")
-            heaps.setdefault(_label(row), []).extend(_pictured(row, fit))
+            heaps.setdefault(_label(row), []).extend(_pictured(row, fit, size))
+            # views of one heap are pictures of their own, too
+            pictures.add_file(path.parent / row["picture"], row.line, row["picture"], row.place("picture"))
         else:
             _, z = _take_point(row, points)
             if z < 0.0:
                 raise row.error("must stand on the plate: z counts from it", "z")
             heaps.setdefault(row["replicate"], [])
     for name, views in points.items():
-        heaps[name] += [_drawn(view, f"{path}:{view.line}") for view in views.values()]
-    stations = list(range(len(next(iter(heaps.values()))[0]))) if heaps else []
+        heaps[name] += [_drawn(view, f"{path}:{view.line}", size) for view in views.values()]
+    _require_own_points(points, path)
+    _require_rows(heaps, path)
+    stations = list(range(len(next(iter(heaps.values()))[0])))
     return _profiles(stations, heaps)
 
 
@@ -132,6 +143,20 @@ def _take_point(row: Row, found: dict[str, dict[str, _Points]]) -> tuple[float, 
         raise row.error("every place of a profile stands once", "x")
     view.heights[x] = z
     return x, z
+
+
+def _require_rows(found: Sized, path: Path) -> None:
+    if not found:
+        raise InputError("needs rows below the names of the columns", "no rows", str(path))
+
+
+def _require_own_points(found: Mapping[str, Mapping[str, _Points]], path: Path) -> None:
+    """Refuse a profile whose points are those of another replicate, to the last digit."""
+    repeats = Repeats()
+    for name, views in found.items():
+        for view in views.values():
+            points = tuple(sorted(view.heights.items()))
+            repeats.add(points, name, f"replicate {name}", f"{path}:{view.line}")
 
 
 def _label(row: Row) -> str:
@@ -160,7 +185,7 @@ def _check_surface(view: _Points, radius: float, place: str) -> None:
         raise InputError(rule, f"rises by {rise:.1f} deg", f"{place}: x, z")
 
 
-def _drawn(view: _Points, place: str) -> np.ndarray:
+def _drawn(view: _Points, place: str, size: SizeOfTest) -> np.ndarray:
     """Heights of an outline that points draw."""
     from imaging import profile_heights
 
@@ -173,24 +198,28 @@ def _drawn(view: _Points, place: str) -> np.ndarray:
         ends = f"{1e3 * z[0]:.4g} and {1e3 * z[-1]:.4g} of {1e3 * z.max():.4g} mm"
         raise InputError(rule, ends, place)
     try:
-        return profile_heights(x, z, place)
+        heights = profile_heights(x, z, place)
     except PictureError as error:
         raise InputError("a heap's profile has an area", "none", place) from error
+    size.require_height(float(z.max()), "is the unit right?", "", f"{place}: z")
+    return heights
 
 
-def _pictured(row: Row, fit: str) -> Iterator[np.ndarray]:
+def _pictured(row: Row, fit: str, size: SizeOfTest) -> Iterator[np.ndarray]:
     """Heights of the outlines that a photograph, or a file of spheres from all around, shows."""
     # a file of points needs no pictures
     from experiments.measurement.heap_files import HeapSettings, is_heap_file, measure_heap_file
-    from imaging import find_outline, heap_profile, measure, read_picture
+    from imaging import find_outline, heap_profile, heap_shape, measure, read_picture
 
-    path, place = row.file.parent / row["picture"], f"{row.file}:{row.line}: picture"
+    path, place = row.file.parent / row["picture"], row.place("picture")
     if not os.path.isfile(path):  # a name too long is none, and raises nothing
         rule = f"must name a picture or a file of spheres, relative to this one (looked for {path})"
         raise row.error(rule, "picture")
     try:
         if is_heap_file(path):
             heap = measure_heap_file(path, fit, HeapSettings())
+            height = max(heap_shape(view.outline).height for view in heap.angle.views)
+            size.require_height(height, "is its unit of length right?", f" in {path}", place)
             yield from (heap_profile(view.outline) for view in heap.angle.views)
             return
         if not row["pixel"]:
@@ -204,6 +233,10 @@ def _pictured(row: Row, fit: str) -> Iterator[np.ndarray]:
     if seen.doubts:
         rule = "must show a heap without a doubt: crop it, or leave the row out"
         raise InputError(rule, "; ".join(map(str, seen.doubts)), place)
+    told = f" in {path}, with a pixel of {row['pixel']}"
+    question = "is the size of the pixels right?"
+    height = heap_shape(seen.outline).height
+    size.require_height(height, question, told, row.place("pixel"))
     yield heap_profile(seen.outline)
 
 

@@ -10,6 +10,7 @@ from doe.errors import RuleError
 from doe.profiles import LEAST_PROFILES
 from experiments.errors import InputError
 from experiments.measurement.observables import OUTLINE_PROFILE, PROFILES, SURFACE_PROFILE
+from experiments.measurement.plausible import size_of_test
 from experiments.measurement.profile_files import Profiles, read_drum_profiles, read_heap_profiles
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import TARGET_SCENE
@@ -87,7 +88,7 @@ def _made(study: Study, table: dict[str, Any], place: str) -> list[dict[str, Any
     if isinstance(scene, Drum):
         found = read_drum_profiles(path, scene.diameter / 2)
     else:
-        found = read_heap_profiles(path, study.measurement.fit)
+        found = read_heap_profiles(path, study.measurement.fit, size_of_test(study, name))
     if len(found.names) < LEAST_PROFILES:
         rule = f"needs profiles of {LEAST_PROFILES} repeats or more, each with a replicate of its own"
         raise InputError(rule, f"{len(found.names)}: {', '.join(found.names)}", f"{path}: replicate")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from experiments.errors import Problem
+from experiments.errors import InputError, Problem
 from experiments.measurement.observables import (
     DIMENSIONS,
     OUTLINE_PROFILE,
@@ -44,11 +44,11 @@ class Reading:
     observable: str
     """Its name, or `CLOGGED_ROW`."""
     value: float
-    """Value in the unit of the observable; NaN without a heap, and where its unit is of another kind."""
+    """Value in the unit of the observable; NaN without a heap."""
     picture: str = ""
     """The picture that it was measured on, empty if none."""
     doubt: Problem | None = None
-    """Reason that its unit, or the size of the picture's pixels, cannot be right."""
+    """Reason that it cannot be right: its unit, most often, or the size of the picture's pixels."""
 
 
 class Outlines:
@@ -128,7 +128,7 @@ def _profiled(row: Row, size: SizeOfTest, fit: str, known: Mapping[str, Observab
     if size.radius is not None:
         found = read_drum_profiles(path, size.radius)
     else:
-        found = read_heap_profiles(path, fit)
+        found = read_heap_profiles(path, fit, size)
     name = row["replicate"]
     if name not in found.names:
         rule = f"the file {path} has a profile of each replicate, {nearest_name(name, found.names)}"
@@ -142,13 +142,12 @@ def _profiled(row: Row, size: SizeOfTest, fit: str, known: Mapping[str, Observab
 def _written(row: Row, observable: Observable, size: SizeOfTest) -> Reading:
     """Take the value that a row gives as a number."""
     quantity = _quantity(row)
-    if not quantity.unit and observable.unit != "1":
+    if not quantity.unit and not row["unit"] and observable.unit != "1":
         quantity = replace(quantity, unit=observable.unit)
     try:
         value = quantity.to_base(DIMENSIONS[observable.unit])
     except ValueError as error:
-        doubt = Problem(f"{observable.name} {error}", str(quantity), _place(row))
-        return Reading(row, observable.name, np.nan, doubt=doubt)
+        raise InputError(f"{observable.name} {error}", str(quantity), _place(row)) from None
     return Reading(row, observable.name, value, doubt=_doubt(row, observable, value, size))
 
 
@@ -215,4 +214,4 @@ def _doubt(row: Row, observable: Observable, value: float, size: SizeOfTest) -> 
 
 
 def _place(row: Row) -> str:
-    return f"{row.file}:{row.line}: {next((key for key in ('value', 'picture') if row[key]), 'profile')}"
+    return row.place(next((key for key in ("value", "picture") if row[key]), "profile"))

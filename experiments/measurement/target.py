@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from doe import Sample
 from experiments.errors import InputError
+from experiments.measurement.copies import require_separate
 from experiments.measurement.measured_file import read_measured
 from experiments.measurement.observables import ANGLE, BY_NAME
 from experiments.measurement.pictures import find_pictures, measure_pictures, require_same_fit
@@ -56,9 +58,7 @@ def _with_source(study: Study) -> tuple[Study, tuple[str, ...]]:
     if section.fit is not None:
         require_same_fit(section.fit, study.measurement.fit, f"{place}.fit")
     if section.pictures is not None:
-        check_pictured(study)
-        paths = find_pictures(section.pictures, study.file.parent, f"{place}.pictures")
-        angles = measure_pictures(paths, study.measurement.fit)
+        angles = measure_pictures(find_pictured(study), study.measurement.fit)
         clear = {path: angle for path, angle in angles.items() if not angle.doubts}
         notes = tuple(
             f"{path.name} is doubtful, and left out: {'; '.join(map(str, angle.doubts))}"
@@ -72,7 +72,8 @@ def _with_source(study: Study) -> tuple[Study, tuple[str, ...]]:
         note = f"{len(clear)} pictures: {', '.join(path.name for path in clear)}"
         return _given(study, [Replicated(TARGET_SCENE, ANGLE, sample)], note), notes
     if section.file is not None:
-        measured = read_measured(study.file.parent / section.file, study)
+        path = study.file.parent / section.file
+        measured = read_measured(path, study)
         found, said = [], list(measured.notes)
         for condition in measured.conditions:
             for name, column in zip(measured.observables, measured.values[condition].T, strict=True):
@@ -81,38 +82,73 @@ def _with_source(study: Study) -> tuple[Study, tuple[str, ...]]:
                     found.append(Replicated(condition, name, Sample.of(values)))
                 elif len(values):
                     said.append(f"{condition}: {name} shows no scatter, so that it is not to be matched")
-        return _given(study, found, f"file {section.file}"), tuple(said)
+        asked = _asked(study, found, said, path)
+        return _given(study, found, f"file {section.file}", asked), tuple(said)
     return study, ()
 
 
-def check_pictured(study: Study) -> None:
-    """Check that photographs of heaps can be the target of a study, before any is looked for.
+def _asked(study: Study, found: Sequence[Replicated], notes: Iterable[str], path: Path) -> Replicated | None:
+    """Observable that ``[target]`` asks a file for; None where it asks for none.
 
     Raises
     ------
     InputError
-        When its test leaves no heap, or the target is another number than the heap's angle.
+        When the file does not have it, with what it has and the notes about it.
+    """
+    section = study.target_section
+    if section is None or not {"observable", "scene"} & section.model_fields_set:
+        return None
+    fitted = [one for one in found if one.condition not in _held_out(study)]
+    wanted = (section.observable, _scene(study, section.scene))
+    for one in fitted:
+        if (_column(one), _scene(study, one.condition)) == wanted:
+            return one
+    has = ", ".join(f"{_column(one)} ({one.condition})" for one in fitted) or "none"
+    rule = f"must be an observable with two values that differ under the target's condition; {path} has {has}"
+    rule += "".join(f"; {note}" for note in notes if section.observable in note)
+    raise InputError(rule, f"{section.observable} ({section.scene})", f"{study.file}: target.observable")
+
+
+def find_pictured(study: Study) -> list[Path]:
+    """Find the photographs of heaps that are the target of a study; none where it names none.
+
+    Raises
+    ------
+    InputError
+        When its test leaves no heap, the target is another number than the heap's angle, there are fewer than
+        two photographs, or one is a copy of another.
     """
     section, place = study.target_section, f"{study.file}: target.pictures"
     if section is None or section.pictures is None:
-        return
+        return []
     if not study.scene.leaves_a_heap:
         rule = "must be left out of a test that leaves no heap; of a drum give profiles"
         raise InputError(rule, study.scene.kind.name, place)
     if section.observable != ANGLE or section.scene != TARGET_SCENE:
         raise InputError("photographs give the angle of the study's own scene", section.title, place)
+    paths = find_pictures(section.pictures, study.file.parent, place)
+    require_separate(paths, place)
+    return paths
 
 
-def target_tables(study: Study, measured: Iterable[Replicated]) -> dict[str, Any]:
+def target_tables(
+    study: Study, measured: Iterable[Replicated], asked: Replicated | None = None
+) -> dict[str, Any]:
     """Write measurements as ``[target]`` and ``[[response]]`` tables; none where none can take part in a fit.
 
-    The angle of the first condition that takes part in the fit leads, or else its first observable.
+    What is asked for leads; else the angle of the first condition that takes part in the fit, or else its
+    first observable.
     """
-    held_out = {condition.name for condition in study.conditions if condition.held_out}
+    held_out = _held_out(study)
     order = [TARGET_SCENE, *(condition.name for condition in study.conditions)]
     ranked = sorted(
         measured,
-        key=lambda one: (one.condition in held_out, order.index(one.condition), _column(one) != ANGLE),
+        key=lambda one: (
+            one is not asked,
+            one.condition in held_out,
+            order.index(one.condition),
+            _column(one) != ANGLE,
+        ),
     )
     if not ranked or ranked[0].condition in held_out:
         return {}
@@ -120,10 +156,10 @@ def target_tables(study: Study, measured: Iterable[Replicated]) -> dict[str, Any
     return {"target": first} | ({"response": others} if others else {})
 
 
-def _given(study: Study, measured: list[Replicated], note: str) -> Study:
+def _given(study: Study, measured: list[Replicated], note: str, asked: Replicated | None = None) -> Study:
     """Put measurements in place of where they come from; the responses of the study stay."""
     document = study.document
-    tables = target_tables(study, measured)
+    tables = target_tables(study, measured, asked)
     if not tables:
         rule = "needs an observable with two values or more under a condition that is not held out"
         raise InputError(rule, note, f"{study.file}: target")
@@ -140,11 +176,20 @@ def _table(study: Study, one: Replicated) -> dict[str, Any]:
         key: value if unit == "1" else f"{value!r} {unit}"
         for key, value in (("mean", float(one.sample.mean)), ("sd", float(one.sample.sd)))
     } | {"n": one.sample.n}
-    # A condition that changes nothing is the study as it is written.
-    if not any(condition.changes for condition in study.conditions if condition.name == one.condition):
+    if _scene(study, one.condition) == TARGET_SCENE:
         return {"observable": column, **numbers}
     name = f"{column}_{one.condition}".replace("-", "_")
     return {"name": name, "observable": column, "scene": one.condition, **numbers}
+
+
+def _held_out(study: Study) -> set[str]:
+    return {condition.name for condition in study.conditions if condition.held_out}
+
+
+def _scene(study: Study, condition: str) -> str:
+    """Scene of a condition: one that changes nothing is the study as it is written."""
+    same = any(not each.changes for each in study.conditions if each.name == condition)
+    return TARGET_SCENE if same else condition
 
 
 def _column(one: Replicated) -> str:

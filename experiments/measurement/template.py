@@ -24,8 +24,9 @@ _HEAD = """\
 Tests measured for the study {study}: a row a measurement. Fill in what was measured, then
     dem-warp discover {study} {file}
 or name it in the study, as the file of its [target], and calibrate.
-A row without a value is not measured; whole rows may be left out or added, with other units too. A value
-that this test cannot give, of a wrong unit most often, is set aside, and the report says so.
+A row without a value is not measured; whole rows may be left out or added, with other units too. A unit that
+is unknown or of another kind, as inches, is refused. A value that this test cannot give, in mm for cm most
+often, is set aside; --dry-run and the report say so.
 
 condition: how the test was done, a condition of the study.
 {conditions}

@@ -122,7 +122,8 @@ class TargetSection(ResponseSection):
     pictures: str | None = None
     """Photographs of the heaps, instead of numbers: a folder, or a pattern as ``"photos/*.jpg"``."""
     file: str | None = None
-    """File of measured heaps, instead of numbers: all that it tells is to be matched."""
+    """File of measured heaps, instead of numbers: all that it tells is to be matched, the observable first
+    that is named here."""
     note: str = ""
     """Source of the measurements, in words."""
     twin: TwinSection | None = None

@@ -296,6 +296,22 @@ def test_photographs_become_a_target() -> None:
     assert (code, len(out.splitlines())) == (0, 3)
 
 
+def test_a_photograph_given_twice_has_its_rows_and_is_no_target() -> None:
+    Path("views").mkdir()
+    for name in ("a.png", "views/a.png", "views/b.png"):
+        save_picture(name, triangle(0.5))
+    save_picture("c.png", triangle(0.54))
+    code, out, _ = dem_warp("angle", "a.png", "views/a.png", "--csv")
+    assert (code, len(out.splitlines())) == (0, 3)
+    code, out, err = dem_warp("angle", "a.png", "c.png", "views/a.png", "--target")
+    assert (code, out) == (2, "")
+    assert "a.png (--target: picture 1)" in err
+    assert "--target: picture 3" in err
+    # Views of one heap are no repeats.
+    code, _, _ = dem_warp("angle", "c.png", "views/a.png", "views/b.png", "--by", "folder", "--target")
+    assert code == 0
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [

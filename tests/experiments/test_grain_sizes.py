@@ -171,6 +171,11 @@ def test_counts_of_single_grains_are_those_grains(tmp_path: Path) -> None:
         ("opening\n1\n2\n", "mm", r"sizes.csv: needs one column of retained, .*received none"),
         ("opening,retained,passing_percent\n1,3,4\n", "mm", r"needs one column of"),
         (
+            "# 3 sieves, dry\nopening,passing_percent\n0.4 mm,2\n#30,20\n#20,100\n",
+            None,
+            r"sizes.csv:4: opening: needs a unit of length, .*\(received #30\)",
+        ),
+        (
             "opening,retained\n0.5,1 g\n1,12\n2,5 g\n",
             "mm",
             r"sizes.csv:3: retained: needs a unit, as other rows have one \(received 12\)",

@@ -96,6 +96,9 @@ def test_a_tilt_is_believed_where_the_plate_is_seen() -> None:
         for plate in (None, (60, 60, 60))
     ]
     assert names == [["tilt"], []]
+    # one beyond both limits, that without a plate and that with one, is told once
+    steep = measure(draw(DrawnHeap(30, 30), Camera(tilt=14)))
+    assert [doubt.name for doubt in steep.doubts].count("tilt") == 1
 
 
 def test_a_slanting_sliver_is_doubted() -> None:
@@ -126,6 +129,8 @@ def test_one_of_two_heaps_is_chosen_or_cut_out() -> None:
         assert crop[0] < columns[0] < columns[1] < crop[2]
     with pytest.raises(PictureError, match="heap 3"):
         measure(picture, view=View(heap=3))
+    with pytest.raises(PictureError, match=r"shows 1 heap\b"):
+        measure(draw(DrawnHeap(30, 30)), view=View(heap=3))
     with pytest.raises(PictureError, match="the crop lies in the picture"):
         measure(picture, view=View(crop=(0, 0, 5000, 100)))
 

@@ -6,6 +6,7 @@ what is read from a mutated one must be what was written.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -37,6 +38,7 @@ from experiments.discover.outcome_table import OutcomeTable
 from experiments.errors import InputError
 from experiments.live.trail.glimpses import Glimpses, read_glimpse
 from experiments.measurement.measured_file import read_measured
+from experiments.measurement.plausible import SizeOfTest
 from experiments.measurement.profile_files import read_drum_profiles, read_heap_profiles
 from experiments.studyfile import load_study
 from imaging import PictureError, measure_photograph
@@ -118,7 +120,7 @@ def profiles(folder: Path) -> Reader:
     def read(path: Path) -> object:
         if path.name.startswith("drum"):
             return read_drum_profiles(path, 0.03)
-        return read_heap_profiles(path, "flank")
+        return read_heap_profiles(path, "flank", SizeOfTest(1e-4, 0.2, math.inf))
 
     return Reader({name: text.encode() for name, text in texts.items()}, read)
 

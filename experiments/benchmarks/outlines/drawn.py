@@ -18,7 +18,15 @@ import typer
 
 from dem_warp.scenes.drum_surface import STATIONS
 from doe import CurveEmulator, Design, Factor, central_composite
-from experiments.benchmarks.outlines.run import CENTER_POINTS, REPLICATES, Surfaces, regions, strengths
+from experiments.benchmarks.outlines.run import (
+    CENTER_POINTS,
+    REPLICATES,
+    TRIED,
+    Surfaces,
+    aim_told,
+    regions,
+    strengths,
+)
 from experiments.benchmarks.results import write_results
 from experiments.commands.console import clear_errors
 from experiments.files import require_folder
@@ -138,6 +146,7 @@ def summary(table: pd.DataFrame) -> pd.DataFrame:
 
 def write(folder: Path, table: pd.DataFrame, moved: pd.DataFrame) -> Path:
     """Write the page and its tables."""
+    means = summary(table)
     said = (
         "# Surfaces and slopes of drawn drums\n\n"
         "    python -m experiments.benchmarks.outlines.drawn --out OUT\n\n"
@@ -146,6 +155,7 @@ def write(folder: Path, table: pd.DataFrame, moved: pd.DataFrame) -> Path:
         f"ranges of {' and '.join(OPEN)}, about their middle. A drum scatters as those of the record do, and "
         f"each height is read with an error of {READING:g} mm. {SERIES} laboratories measure each of "
         f"{len(HIDDEN)} hidden settings, and each has a design of its own with {REPLICATES} drums a run.\n\n"
+        f"{aim_told(means['ratio, mean'].min())} {TRIED}\n\n"
         "Ratio: of the region compatible with the surface to that with the slope. Range: part of the "
         "explored range of a factor that is compatible."
     )
@@ -154,7 +164,7 @@ def write(folder: Path, table: pd.DataFrame, moved: pd.DataFrame) -> Path:
         "scatter of one drum."
     )
     moved = moved.replace("outline", "surface", regex=True)
-    return write_results(folder, "drawn", [("drawn", said, summary(table)), ("drawn-strengths", what, moved)])
+    return write_results(folder, "drawn", [("drawn", said, means), ("drawn-strengths", what, moved)])
 
 
 def main(out: Annotated[Path, typer.Option(help="Folder of the page and its tables.")]) -> None:

@@ -13,6 +13,7 @@ from dem_warp import CaseResult
 from experiments.errors import InputError, StudyError
 from experiments.measurement.measured_file import read_measured
 from experiments.measurement.observables import OUTLINE, OUTLINE_STATIONS
+from experiments.measurement.plausible import SizeOfTest
 from experiments.measurement.profile_files import read_heap_profiles
 from experiments.measurement.profiles import with_profiles
 from experiments.measurement.states import measure, observe
@@ -22,6 +23,7 @@ from imaging import save_picture, silhouette
 from imaging.profile import SPACING, STATIONS, profile_heights
 from imaging.synthetic import Camera, DrawnHeap, draw
 
+SIZE = SizeOfTest(grain=1e-4, length=0.14, time=np.inf)
 SETTINGS = MeasurementSection(azimuths=4, pixels=400, outline=True)
 NAMES = [each.name for each in OUTLINE]
 ANGLE = '[target]\nmean = "30 deg"\nsd = "0.5 deg"\nn = 5\n'
@@ -76,7 +78,7 @@ def test_states_spheres_pictures_and_points_give_one_profile(cone: Cone, tmp_pat
         )
     )
     text = f"1,,,,heap.csv,\n{points}3,a,,,heap.png,{1e3 * drawn.meters_per_pixel} mm\n"
-    found = read_heap_profiles(file(tmp_path, text, "replicate,view,x,z,picture,pixel"), "flank")
+    found = read_heap_profiles(file(tmp_path, text, "replicate,view,x,z,picture,pixel"), "flank", SIZE)
     assert [len(views) for views in found.views] == [8, 1, 1]
     # The points draw a smooth cone over the spheres, whose radius is 1 mm.
     for heights in found.heights:
@@ -91,6 +93,7 @@ def test_states_spheres_pictures_and_points_give_one_profile(cone: Cone, tmp_pat
             "".join(f"1,{n} mm,{n} mm\n" for n in range(9)),
             r"p.csv:2: .*from foot to foot.*received 0 and 8 ",
         ),
+        ("", r"p.csv: needs rows below the names of the columns \(received no rows\)"),
         ("1,0 mm,-1 mm\n", r"p.csv:2: z: must stand on the plate"),
         ("1,0 in,1 in\n", r"p.csv:2: x: needs a unit of length"),
         ("1,0,1\n", r"p.csv:2: x: needs a unit of length"),
@@ -100,7 +103,7 @@ def test_states_spheres_pictures_and_points_give_one_profile(cone: Cone, tmp_pat
 )
 def test_points_that_are_no_heap_are_refused_with_their_row(tmp_path: Path, text: str, message: str) -> None:
     with pytest.raises(InputError, match=message):
-        read_heap_profiles(file(tmp_path, text), "flank")
+        read_heap_profiles(file(tmp_path, text), "flank", SIZE)
 
 
 @pytest.mark.parametrize(
@@ -120,14 +123,78 @@ def test_a_picture_that_shows_no_side_of_a_heap_is_refused(tmp_path: Path, row: 
     cv2.circle(top, (300, 200), 120, (60, 90, 120), -1)
     cv2.imwrite(str(tmp_path / "top.png"), top)
     with pytest.raises(InputError, match=message):
-        read_heap_profiles(file(tmp_path, row, "replicate,picture,pixel"), "flank")
+        read_heap_profiles(file(tmp_path, row, "replicate,picture,pixel"), "flank", SIZE)
+
+
+def test_a_heap_that_the_test_cannot_give_is_refused_with_file_and_pixel(tmp_path: Path) -> None:
+    """The heap is drawn 400 pixels wide: with pixels of 0.1 mm it is some 10 mm high."""
+    save_picture(tmp_path / "heap.png", draw(DrawnHeap(28.0, 28.0), Camera(noise=0)))
+    for pixel in ("3 m", "0.1 um"):
+        row = file(tmp_path, f"1,heap.png,{pixel}\n", "replicate,picture,pixel")
+        with pytest.raises(
+            InputError,
+            match=rf"p.csv:2: pixel: .*0.1 and 140 mm .* mm in .*heap.png, with a pixel of {pixel}",
+        ):
+            read_heap_profiles(row, "flank", SIZE)
+    points = "".join(f"1,{x} m,{5 - abs(x)} m\n" for x in range(-5, 6))
+    with pytest.raises(InputError, match=r"p.csv:2: z: .*is the unit right\? \(received 5000 mm\)"):
+        read_heap_profiles(file(tmp_path, points), "flank", SIZE)
+    spheres = [[x, y, z, 0.5] for z in range(4) for x in range(z - 8, 9 - z) for y in range(z - 8, 9 - z)]
+    np.savetxt(tmp_path / "heap.csv", spheres, delimiter=",", header="x,y,z,radius", comments="")
+    with pytest.raises(InputError, match=r"p.csv:2: picture: .*unit of length right\? .* mm in .*heap.csv"):
+        read_heap_profiles(file(tmp_path, "1,heap.csv\n", "replicate,picture"), "flank", SIZE)
+
+
+def test_outlines_of_a_study_are_as_high_as_its_test_can_give(
+    write_study: Callable[..., Path], tmp_path: Path
+) -> None:
+    save_picture(tmp_path / "heap.png", draw(DrawnHeap(28.0, 28.0), Camera(noise=0)))
+    file(tmp_path, "1,heap.png,3 m\n", "replicate,picture,pixel")
+    with pytest.raises(
+        InputError, match=r"p.csv:2: pixel: .*an outline is between 1.7 and 168 mm high in this test"
+    ):
+        with_profiles(load_study(write_study((ANGLE, TARGET))))
+    table = tmp_path / "m.csv"
+    table.write_text(
+        "condition,replicate,observable,value,profile\nbase,1,angle,25,\nbase,1,outline,,p.csv\n", "utf-8"
+    )
+    asked = load_study(write_study(("pixels = 200", "pixels = 200\noutline = true")))
+    with pytest.raises(
+        InputError, match=r"p.csv:2: pixel: .*an outline is between 1.7 and 168 mm high in this test"
+    ):
+        read_measured(table, asked)
+
+
+def test_copies_of_an_outline_are_refused_with_both_places(
+    write_study: Callable[..., Path], tmp_path: Path
+) -> None:
+    save_picture(tmp_path / "heap.png", draw(DrawnHeap(28.0, 28.0), Camera(noise=0)))
+    (tmp_path / "copy.png").write_bytes((tmp_path / "heap.png").read_bytes())
+    rows = file(tmp_path, "1,a,heap.png,0.1 mm\n1,b,copy.png,0.1 mm\n", "replicate,view,picture,pixel")
+    with pytest.raises(InputError, match=r"p.csv:3: picture: .*heap.png \(.*p.csv:2: picture\) .*copy.png"):
+        read_heap_profiles(rows, "flank", SIZE)
+    points = [f"{x} mm,{9 - abs(x)} mm\n" for x in range(-9, 10)]
+    text = "".join(f"1,{point}" for point in points) + "".join(f"2,{point}" for point in points[::-1])
+    with pytest.raises(InputError, match=r"p.csv:21: .*replicate 1 \(.*p.csv:2\) \(received replicate 2\)"):
+        read_heap_profiles(file(tmp_path, text), "flank", SIZE)
+    # In a measured table each replicate may have a file of its own.
+    table = tmp_path / "m.csv"
+    table.write_text(
+        "condition,replicate,observable,profile\nbase,1,outline,1.csv\nbase,2,outline,2.csv\n", "utf-8"
+    )
+    for name in "12":
+        rows = "".join(f"{name},{point}" for point in points)
+        (tmp_path / f"{name}.csv").write_text(f"replicate,x,z\n{rows}", "utf-8")
+    asked = load_study(write_study(("pixels = 200", "pixels = 200\noutline = true")))
+    with pytest.raises(InputError, match=r"m.csv:3: profile: .*1.csv \(.*m.csv:2: profile\) .*2.csv"):
+        read_measured(table, asked)
 
 
 def test_an_outline_in_doubt_is_refused_with_the_doubt(tmp_path: Path) -> None:
     save_picture(tmp_path / "lean.png", draw(DrawnHeap(24.0, 33.0), Camera(noise=0)))
     row = file(tmp_path, "1,lean.png,0.1 mm\n", "replicate,picture,pixel")
     with pytest.raises(InputError, match=r"p.csv:2: picture: .*without a doubt: .*left"):
-        read_heap_profiles(row, "flank")
+        read_heap_profiles(row, "flank", SIZE)
 
 
 def test_an_outline_needs_profiles_or_a_twin(write_study: Callable[..., Path], tmp_path: Path) -> None:

@@ -125,9 +125,20 @@ def test_a_picture_is_looked_at_once(read, tmp_path: Path, monkeypatch: pytest.M
         return find(*arguments, **options)
 
     monkeypatch.setattr(imaging, "find_outline", note)
-    row = "base,{},flank_angle,,,heap.png,{}\n"
-    read("".join(row.format(number, "0.1 mm") for number in range(1, 6)) + row.format(6, ""))
+    read("".join(f"base,1,{name},,,heap.png,0.1 mm\n" for name in NAMES[:5]) + "fast,1,,,,heap.png,\n")
     assert looks == [pytest.approx(1e-4), None]
+
+
+def test_a_picture_of_two_replicates_is_refused_with_both_places(read, tmp_path: Path) -> None:
+    save_picture(tmp_path / "heap.png", draw(DrawnHeap(27.0, 31.0), PLAIN))
+    (tmp_path / "copy.png").write_bytes((tmp_path / "heap.png").read_bytes())
+    for name in ("heap.png", "copy.png"):
+        told = rf"csv:3: picture: .*never copies.*heap.png \(.*measured.csv:2: picture\) \(received {name}\)"
+        with pytest.raises(InputError, match=told):
+            read(f"base,1,,,,heap.png,0.1 mm\nbase,2,,,,{name},0.1 mm\n")
+    # Another view of the same heap, or a row for each observable, is no repeat.
+    data = read("base,1,flank_angle,,,heap.png,\nbase,1,concavity,,,copy.png,\n")
+    assert len(data.values["base"]) == 1
 
 
 def test_a_picture_without_a_heap_is_noted_and_the_rest_stays(read, tmp_path: Path) -> None:
@@ -165,15 +176,35 @@ def test_what_cannot_be_read_is_refused_with_its_row(read, row: str, message: st
         ("height,12,", "in this test: is the unit right (none given: m)? (received 12 m); set aside"),
         ("rolled_fraction,12,", "rolled_fraction lies between 0 and 1 in this test: is the unit right?"),
         ("t75,400,s", "(received 400 s); set aside"),
-        ("flank_angle,25,mm", "flank_angle needs a unit of angle"),
-        ("t75,0.4,furlong", "t75 needs a unit of time"),
-        ("concavity,0.1,mm", "concavity must be a plain number"),
     ],
 )
-def test_a_value_whose_unit_cannot_be_right_is_set_aside_with_its_row(read, row: str, note: str) -> None:
+def test_a_value_that_the_test_cannot_give_is_set_aside_with_its_row(read, row: str, note: str) -> None:
     data = read(angles("base", 25.0) + f"base,1,{row}\nbase,1,asymmetry,0.1\n")
     assert data.observables == ("flank_angle", "asymmetry")
     assert len(noted(data, "row 3:", note)) == 1
+
+
+@pytest.mark.parametrize(
+    ("row", "rule"),
+    [
+        ("flank_angle,25,mm", "flank_angle needs a unit of angle"),
+        ("t75,0.4,furlong", "t75 needs a unit of time"),
+        ("height,0.2,in", "height needs a unit of length"),
+        ("height,0.2 in,", "height needs a unit of length"),
+        ("height,12,1", "height needs a unit of length"),
+        ("concavity,0.1,mm", "concavity must be a plain number"),
+    ],
+)
+def test_a_unit_of_another_kind_is_refused_whatever_the_other_rows_are(read, row: str, rule: str) -> None:
+    with pytest.raises(InputError, match=rule) as error:
+        read(angles("base", 25.0) + f"base,1,{row}\nbase,1,asymmetry,0.1\n")
+    assert error.value.place.endswith("measured.csv:3: value")
+    assert error.value.value.startswith(row.split(",")[1])
+
+
+def test_one_error_tells_of_all_rows_of_a_wrong_unit(read) -> None:
+    with pytest.raises(InputError, match=r"csv:3: value, rows 3, 4: .*\(received 0.2 in, 0.3 furlong\)"):
+        read(angles("base", 25.0) + "base,1,height,0.2,in\nbase,2,height,0.3,furlong\n")
 
 
 def test_one_note_tells_of_all_values_of_one_wrong_unit(read) -> None:

@@ -43,7 +43,7 @@ def test_a_profile_is_read_at_the_stations_that_it_spans(tmp_path: Path) -> None
         (",2 mm,3 mm\n", r"p.csv:2: replicate: needs a label"),
         ("1,2 mm,3 mm\n1,2 mm,4 mm\n", r"p.csv:3: x: .*every place of a profile stands once"),
         ("1,0 mm,0 mm\n1,5 mm,1 mm\n", r"must span 3 stations of the drum \(received 0 to 5 mm, 1 stations"),
-        ("", r"must span 3 stations"),
+        ("", r"p.csv: needs rows below the names of the columns \(received no rows\)"),
         (
             "".join(f"1,{x} mm,0 mm\n" for x in (-20, -14, -8, 0, 6, 12, 18)),
             r"p.csv:2: x: .*has no gap: points at most 7.5 mm apart .*received none between -8 and 0 mm",
@@ -56,6 +56,12 @@ def test_a_profile_is_read_at_the_stations_that_it_spans(tmp_path: Path) -> None
 )
 def test_a_bad_profile_is_refused_with_its_row(tmp_path: Path, text: str, message: str) -> None:
     with pytest.raises(InputError, match=message):
+        read_drum_profiles(file(tmp_path, text), 0.03)
+
+
+def test_a_copy_of_a_profile_is_refused_with_both_places(tmp_path: Path) -> None:
+    text = LINE + LINE.replace("1,", "2,")
+    with pytest.raises(InputError, match=r"p.csv:11: .*never copies.*replicate 1 \(.*p.csv:2\)"):
         read_drum_profiles(file(tmp_path, text), 0.03)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from doe import Sample
+from experiments.commands.early import check_calibration_file
 from experiments.errors import InputError
 from experiments.measurement.target import with_measurements
 from experiments.runs.campaign import check_runs
@@ -89,14 +90,26 @@ def test_a_picture_in_doubt_is_left_out_and_told(from_source, photographs: list[
     assert study.target.leading.measured == Sample.of(angles)
     assert len(notes) == 1
     assert notes[0].startswith("heap-1.png is doubtful, and left out: ")
-    save_picture(photographs[0], lean)
+    save_picture(photographs[0], draw(DrawnHeap(33.0, 24.0), Camera(noise=0)))
     with pytest.raises(InputError, match=r"target.pictures: .*without a doubt .*received 1"):
         with_measurements(from_source('pictures = "photos"'))
 
 
+def test_a_copy_of_a_photograph_is_refused_with_both_before_anything_is_measured(
+    from_source, photographs: list[Path]
+) -> None:
+    photographs[2].write_bytes(photographs[0].read_bytes())
+    study = from_source('pictures = "photos"')
+    told = r"target.pictures: .*never copies.*heap-0.png \(.*\(received .*heap-2.png\)"
+    with pytest.raises(InputError, match=told):
+        check_runs(study)
+    with pytest.raises(InputError, match=told):
+        check_calibration_file(study.file)
+
+
 def test_every_picture_without_a_heap_is_named(from_source, photographs: list[Path]) -> None:
     for path in photographs[:2]:
-        save_picture(path, np.full((300, 500, 3), 200, np.uint8))
+        save_picture(path, np.full((300, 500, 3), 200 + int(path.stem[-1]), np.uint8))
     with pytest.raises(InputError) as error:
         check_runs(from_source('pictures = "photos"'))
     assert [problem.place for problem in error.value.problems] == [str(path) for path in photographs[:2]]
@@ -122,6 +135,43 @@ def test_a_file_of_heaps_becomes_a_response_for_each_observable(from_source, tmp
     # One height shows no scatter.
     assert any("height shows no scatter" in note for note in notes)
     assert study.case({}, seed=1, scene="fast").scene.lift_speed == 0.25
+
+
+@pytest.mark.parametrize(
+    ("asked", "leading"),
+    [
+        ('observable = "t75"', "t75"),
+        ('observable = "angle"', "angle"),
+        ('observable = "angle"\nscene = "fast"', "angle_fast"),
+        ('observable = "t75"\nscene = "base"', "t75"),
+    ],
+)
+def test_the_observable_that_a_target_asks_its_file_for_leads(
+    from_source, tmp_path: Path, asked: str, leading: str
+) -> None:
+    (tmp_path / "measured.csv").write_text(MEASURED, encoding="utf-8")
+    study, _ = with_measurements(from_source(f'{asked}\nfile = "measured.csv"', CONDITIONS))
+    assert study.target.leading.name == leading
+    names = {response.name for response in study.target.responses}
+    assert names == {"angle", "t75", "angle_fast", "angle_wide"}
+
+
+@pytest.mark.parametrize(
+    ("asked", "told"),
+    [
+        ('observable = "height"', r"two values .* height shows no scatter.* \(received height \("),
+        ('observable = "r90"', r"measured.csv has angle \(base\), t75 \(base\), angle \(fast\) \(rec"),
+        ('observable = "t75"\nscene = "fast"', r"received t75 \(fast\)"),
+        ('observable = "angle"\nscene = "wide"', r"received angle \(wide\)"),
+    ],
+)
+def test_an_observable_that_the_file_does_not_have_is_refused(
+    from_source, tmp_path: Path, asked: str, told: str
+) -> None:
+    (tmp_path / "measured.csv").write_text(MEASURED, encoding="utf-8")
+    with pytest.raises(InputError, match=told) as error:
+        with_measurements(from_source(f'{asked}\nfile = "measured.csv"', CONDITIONS))
+    assert error.value.place.endswith("target.observable")
 
 
 def test_a_file_measured_under_held_out_conditions_alone_leads_nowhere(from_source, tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 import warp as wp
 from commandline import dem_warp
@@ -26,6 +27,7 @@ from experiments.cases.workers.speed import (
 )
 from experiments.cases.workers.wave import WaveProgress
 from experiments.commands.console import describe_progress
+from imaging import save_picture
 
 Write = Callable[..., Path]
 
@@ -188,6 +190,22 @@ def test_the_plan_of_a_search_reads_the_data(tmp_path: Path) -> None:
         code, out, err = dem_warp(*words)
         assert (code, out) == (2, "")
         assert said in err
+
+
+def test_plans_tell_what_was_set_aside(
+    write_study: Write, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    save_picture(tmp_path / "wall.png", np.full((300, 500), 200, np.uint8))
+    rows = "condition,replicate,observable,value,unit,picture\nbase,1,angle,25,deg,\nbase,2,angle,26,deg,\n"
+    rows += "base,1,height,40,m,\nbase,2,flank_angle,,,wall.png\n"
+    (tmp_path / "measured.csv").write_text(rows, encoding="utf-8")
+    target = ('mean = "30 deg"\nsd = "0.5 deg"\nn = 5\n', 'file = "measured.csv"\n')
+    planned("calibrate", write_study(target, add="[condition.base]\n"))
+    calibration, _ = caplog.text, caplog.clear()
+    planned("discover", TRIAL, "--scale", "bench", tmp_path / "measured.csv")
+    for said in (calibration, caplog.text):
+        assert "row 4: height lies between" in said
+        assert "row 5: the picture shows nothing to measure" in said
 
 
 def test_a_heap_is_planned_with_its_settings(write_study: Write) -> None:
