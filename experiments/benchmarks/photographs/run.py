@@ -47,15 +47,16 @@ def measured(picture: Picture) -> tuple[str, ReposeAngle | None, str]:
 
 def with_heap(seed: int) -> tuple[Row, Picture]:
     """Row of a photograph of a heap, with what is to be shown of it."""
-    return _row_of(photograph(seed), seed)
+    return row_of(photograph(seed), seed)
 
 
 def in_hard_light(seed: int) -> tuple[Row, Picture]:
     """The same for a heap that throws a sharp shadow on the wall beside it."""
-    return _row_of(photograph_in_hard_light(seed), seed)
+    return row_of(photograph_in_hard_light(seed), seed)
 
 
-def _row_of(shot: Photograph, seed: int) -> tuple[Row, Picture]:
+def row_of(shot: Photograph, seed: int) -> tuple[Row, Picture]:
+    """Row of a photograph, and the picture with what was seen in it."""
     outcome, angle, why = measured(shot.picture)
     row: Row = {
         "kind": shot.setting,
@@ -124,19 +125,20 @@ def contact_sheet(tiles: list[tuple[str, Picture]]) -> Picture:
 def summary(heaps: list[Row], others: list[Row], hard: list[Row]) -> str:
     """The figures, as lines of Markdown."""
     silent = Counter(row["outcome"] for row in others)
-    table = {f"pictures of heaps{name}": value for name, value in _figures(heaps).items()}
+    table = {f"pictures of heaps{name}": value for name, value in figures(heaps).items()}
     table["pictures without a heap"] = len(others)
     counts = ", ".join(str(silent[outcome]) for outcome in ("refused", "marked", "measured"))
     table["of these refused, marked, measured"] = counts
     if hard:
         table |= {
-            f"heaps with a sharp shadow on the wall{name}": value for name, value in _figures(hard).items()
+            f"heaps with a sharp shadow on the wall{name}": value for name, value in figures(hard).items()
         }
     lines = [f"| {name} | {value} |" for name, value in table.items()]
     return "\n".join(["| | |", "|---|---|", *lines])
 
 
-def _figures(heaps: list[Row]) -> dict[str, Any]:
+def figures(heaps: list[Row]) -> dict[str, Any]:
+    """Say how well photographs of heaps were measured."""
     clear = [row for row in heaps if row["outcome"] == "measured"]
     errors = np.abs([row["error"] for row in clear])
     marked = [abs(row["error"]) for row in heaps if row["outcome"] == "marked"]
@@ -179,9 +181,9 @@ def main() -> None:
     for name, pairs in seen.items():
         if pairs:
             write(chosen.out, name, pairs)
-    figures = summary(*([row for row, _ in pairs] for pairs in seen.values()))
-    (chosen.out / "README.md").write_text(page(figures, chosen), encoding="utf-8")
-    print(figures)
+    table = summary(*([row for row, _ in pairs] for pairs in seen.values()))
+    (chosen.out / "README.md").write_text(page(table, chosen), encoding="utf-8")
+    print(table)
 
 
 def write(folder: Path, name: str, pairs: list[tuple[Row, Picture]]) -> None:
@@ -197,7 +199,7 @@ def write(folder: Path, name: str, pairs: list[tuple[Row, Picture]]) -> None:
         writer.writerows({key: _short(value) for key, value in row.items()} for row, _ in pairs)
 
 
-def page(figures: str, chosen: argparse.Namespace) -> str:
+def page(table: str, chosen: argparse.Namespace) -> str:
     """Page of a record, with the notes that its folder has."""
     command = f"--first {chosen.first} --heaps {chosen.heaps} --others {chosen.others} --hard {chosen.hard}"
     file = chosen.out / "notes.md"
@@ -206,7 +208,7 @@ def page(figures: str, chosen: argparse.Namespace) -> str:
 
     python -m experiments.benchmarks.photographs.run {command} --out RECORD
 
-{figures}
+{table}
 
 Seeds below 1000, 800000 to 800299 and those of earlier series were used while the rules were made; these
 are others. A *marked* angle is shown with its doubt and left out of a mean. Every picture has a row in

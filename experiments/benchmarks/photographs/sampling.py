@@ -43,8 +43,15 @@ def photograph_in_hard_light(seed: int) -> Photograph:
     return _shot(np.random.default_rng([22, seed]), seed, hard=True)
 
 
-def _shot(rng: np.random.Generator, seed: int, hard: bool = False) -> Photograph:
+def photograph_of_a_low_heap(seed: int) -> Photograph:
+    """Draw a photograph whose heap has 6 to 15 degrees."""
+    return _shot(np.random.default_rng([23, seed]), seed, low=True)
+
+
+def _shot(rng: np.random.Generator, seed: int, hard: bool = False, low: bool = False) -> Photograph:
     heap = _heap(rng, seed)
+    if low:
+        heap = replace(heap, angle=float(rng.uniform(6.0, 15.0)))
     setting = str(rng.choice(SETTINGS, p=(0.35, 0.4, 0.25)))
     camera = _camera(rng, heap)
     around = _surroundings(rng, setting)
