@@ -35,6 +35,7 @@ from doe.discrepancy.verdict.conclusion import (
     Conclusion,
     conclude,
     explained_share,
+    objections,
     withdrawn,
 )
 from doe.discrepancy.verdict.discovery import (
@@ -271,9 +272,10 @@ class _Parts:
         before_after: Sequence[BeforeAfter] = (),
     ) -> Discovery:
         """The record of all that was found."""
-        best = min(assessments, key=lambda one: one.score, default=None)
+        # of unequal models scores do not compare where fresh runs stand behind the ones alone
+        closest = assessments[0] if assessments else None
         chosen = None if conclusion.chosen is None else assessments[conclusion.chosen]
-        shown = best if chosen is None else chosen
+        shown = closest if chosen is None else chosen
         fit = None if shown is None else fit_record(shown.fitted, shown.gap, self.evidence)
         failures = self.laboratory.failures
         notes = [f"{failures} of {self.laboratory.cases} fresh runs failed"] if failures else []
@@ -305,11 +307,16 @@ class _Parts:
     ) -> NextExperiment | None:
         """For the two best explanations, where there are two; else for the best against the base.
 
-        Those of a tie are both of the tie.
+        Those of a tie are both of the tie. Of two models that are both refused neither is worth a measurement.
         """
         if conclusion.verdict in (Verdict.NONE, Verdict.NOT_IDENTIFIABLE) or not assessments:
             return None
-        ranked = [one.fitted for one in sorted(assessments, key=lambda one: one.score)]
+        ordered = sorted(assessments, key=lambda one: one.score)
+        if conclusion.verdict is Verdict.UNKNOWN:
+            ordered.sort(key=lambda one: bool(objections(one, self.settings)))
+            if objections(ordered[0], self.settings):
+                return None
+        ranked = [one.fitted for one in ordered]
         if conclusion.verdict is Verdict.TIE:
             ranked = [one for one in ranked if set(one.mechanisms) <= set(conclusion.named)]
         second = ranked[1] if len(ranked) > 1 else base.fitted
