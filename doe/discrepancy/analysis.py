@@ -33,9 +33,11 @@ from doe.discrepancy.verdict.before_after import BeforeAfter, compare
 from doe.discrepancy.verdict.conclusion import (
     Assessment,
     Conclusion,
+    closest_first,
     conclude,
     explained_share,
     objections,
+    unexplained,
     withdrawn,
 )
 from doe.discrepancy.verdict.discovery import (
@@ -145,8 +147,9 @@ def _search(parts: _Parts, base: _Base) -> Analysis:
         with_two = conclude(pairs, settings) if pairs else conclusion
         if with_two.chosen is not None:
             conclusion, assessments = with_two, [*pairs, *singles]
-        else:
-            assessments = [*singles, *pairs]
+        elif pairs:
+            assessments = closest_first([*singles, *pairs], settings)
+            conclusion = unexplained(assessments[0], conclusion, with_two, settings)
     if conclusion.chosen is None:
         return parts.discovery(base, conclusion, assessments)
     chosen = assessments[conclusion.chosen].fitted
@@ -272,7 +275,6 @@ class _Parts:
         before_after: Sequence[BeforeAfter] = (),
     ) -> Discovery:
         """The record of all that was found."""
-        # of unequal models scores do not compare where fresh runs stand behind the ones alone
         closest = assessments[0] if assessments else None
         chosen = None if conclusion.chosen is None else assessments[conclusion.chosen]
         shown = closest if chosen is None else chosen
@@ -307,7 +309,7 @@ class _Parts:
     ) -> NextExperiment | None:
         """For the two best explanations, where there are two; else for the best against the base.
 
-        Those of a tie are both of the tie. Of two models that are both refused neither is worth a measurement.
+        Those of a tie are both of the tie. Two models that are both refused are not worth a measurement.
         """
         if conclusion.verdict in (Verdict.NONE, Verdict.NOT_IDENTIFIABLE) or not assessments:
             return None
