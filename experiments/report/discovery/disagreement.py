@@ -78,7 +78,7 @@ def slip_sentences(found: Discovery) -> Iterator[str]:
             yield f"{_slip(slip)} {lies} {trimmed(slip.q_with**0.5, 2)} standard deviations from the others."
         else:
             after = "once they are exchanged back" if slip.exchanged else "without these values"
-            least = f"The least Q of the base and of one effect is {trimmed(slip.q_with, 3)}"
+            least = f"The least Q of the base, alone or with one effect, is {trimmed(slip.q_with, 3)}"
             yield f"{_slip(slip)} {least}, and {trimmed(slip.q_without, 3)} {after}."
 
 
@@ -129,7 +129,8 @@ class _Miss:
 def _missed(found: Discovery, fit: Fit) -> list[_Miss]:
     """Find what a model misses: single means beyond chance, and what is off alike in all conditions."""
     single = _standing_out(found, fit)
-    if single and fit.clearest.question is not Question.COMMON:
+    passes = bool(found.candidates) and found.candidates[0].admitted
+    if passes or (single and fit.clearest.question is not Question.COMMON):
         return single
     names = {one.observable for one in single}
     return [*single, *(one for one in _off_alike(found, fit) if one.observable not in names)][:SHOWN]

@@ -208,7 +208,7 @@ def _unknown(found: Discovery, terms: Terms) -> str:
     why = (
         f", but {_one_name(best.objection, terms).rstrip('.')}"
         if best.objection
-        else ", but it does not stand out"
+        else f", but {'they do' if many else 'it does'} not stand out"
     )
     come = "come" if many else "comes"
     text += f". {capital(terms.titles(best.mechanisms))} {come} closest ({does}){why}."
