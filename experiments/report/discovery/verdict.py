@@ -101,14 +101,14 @@ def changes(found: Discovery, terms: Terms, settings: Settings) -> list[str]:
 
 def next_step(found: Discovery, terms: Terms) -> str:
     """Describe the next experiment; empty where none is proposed."""
-    if slip_decides(found):
+    step, unknown = found.next_experiment, found.verdict is Verdict.UNKNOWN
+    if slip_decides(found) or (found.slips and unknown and step is None):
         return (
             "Look at the data first: put these values right, or leave them out, and search again. No more"
             " heaps need be measured before."
         )
-    step = found.next_experiment
     if step is None:
-        return measure_again(found) if found.verdict is Verdict.UNKNOWN else ""
+        return measure_again(found) if unknown else ""
     pair = " from ".join(
         "the base" if name == "base" else f"the model with {terms.titles(name.split(BOTH))}"
         for name in step.separates

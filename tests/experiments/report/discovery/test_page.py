@@ -228,9 +228,13 @@ def test_a_slip_heads_the_page_only_where_the_verdict_hangs_on_it(
     page = read_page(render_discovery(heads, whole_study, terms, Settings()))
     assert next_step(heads, terms).startswith("Look at the data first")
     assert next_step(heads, terms) in page.text
+    # what is missed may be that value
+    unknown = discovered(Verdict.UNKNOWN)
+    beside = replace(unknown, slips=(value,), without_slips=unknown, next_experiment=None)
+    assert headline(beside, terms) == headline(unknown, terms)
+    assert next_step(beside, terms).startswith("Look at the data first")
     # a unit makes the whole misfit, whatever verdict it gets
     unit = Slip(("r50", "fill_height"), none.data.conditions, None, 10.0, False, 27105.0, 28.0)
-    unknown = discovered(Verdict.UNKNOWN)
     gross = replace(unknown, slips=(unit,), without_slips=unknown)
     assert headline(gross, terms) == "A likely slip in the data"
     assert "r50 and fill height look as if multiplied by 10" in verdict_sentence(gross, terms)
