@@ -33,8 +33,11 @@ from doe.discrepancy.verdict.before_after import BeforeAfter, compare
 from doe.discrepancy.verdict.conclusion import (
     Assessment,
     Conclusion,
+    closest_first,
     conclude,
     explained_share,
+    objections,
+    unexplained,
     withdrawn,
 )
 from doe.discrepancy.verdict.discovery import (
@@ -144,8 +147,9 @@ def _search(parts: _Parts, base: _Base) -> Analysis:
         with_two = conclude(pairs, settings) if pairs else conclusion
         if with_two.chosen is not None:
             conclusion, assessments = with_two, [*pairs, *singles]
-        else:
-            assessments = [*singles, *pairs]
+        elif pairs:
+            assessments = closest_first([*singles, *pairs], settings)
+            conclusion = unexplained(assessments[0], conclusion, with_two, settings)
     if conclusion.chosen is None:
         return parts.discovery(base, conclusion, assessments)
     chosen = assessments[conclusion.chosen].fitted
@@ -271,9 +275,9 @@ class _Parts:
         before_after: Sequence[BeforeAfter] = (),
     ) -> Discovery:
         """The record of all that was found."""
-        best = min(assessments, key=lambda one: one.score, default=None)
+        closest = assessments[0] if assessments else None
         chosen = None if conclusion.chosen is None else assessments[conclusion.chosen]
-        shown = best if chosen is None else chosen
+        shown = closest if chosen is None else chosen
         fit = None if shown is None else fit_record(shown.fitted, shown.gap, self.evidence)
         failures = self.laboratory.failures
         notes = [f"{failures} of {self.laboratory.cases} fresh runs failed"] if failures else []
@@ -305,11 +309,16 @@ class _Parts:
     ) -> NextExperiment | None:
         """For the two best explanations, where there are two; else for the best against the base.
 
-        Those of a tie are both of the tie.
+        Those of a tie are both of the tie. Two models that are both refused are not worth a measurement.
         """
         if conclusion.verdict in (Verdict.NONE, Verdict.NOT_IDENTIFIABLE) or not assessments:
             return None
-        ranked = [one.fitted for one in sorted(assessments, key=lambda one: one.score)]
+        ordered = sorted(assessments, key=lambda one: one.score)
+        if conclusion.verdict is Verdict.UNKNOWN:
+            ordered.sort(key=lambda one: bool(objections(one, self.settings)))
+            if objections(ordered[0], self.settings):
+                return None
+        ranked = [one.fitted for one in ordered]
         if conclusion.verdict is Verdict.TIE:
             ranked = [one for one in ranked if set(one.mechanisms) <= set(conclusion.named)]
         second = ranked[1] if len(ranked) > 1 else base.fitted

@@ -1,7 +1,8 @@
-"""Slips: a gross misfit of one value, one kind of observable or one condition, which no effect makes.
+"""Slips: a gross misfit of one heap, one kind of observable or one condition, which no effect makes.
 
-They are looked for before anything else, each left out in turn. A slip is only named where no mechanism of
-the library takes most of the misfit up, and where leaving out or repairing does.
+They are looked for before anything else, each left out in turn. A slip is only named where neither the base
+nor the base with one mechanism of the library takes most of the misfit up, and where one of them agrees with
+what is left: so a slip shows beside an effect, too.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import numpy as np
 
 from doe.discrepancy.emulation.emulator import Emulator
 from doe.discrepancy.fitting.evidence import gather
-from doe.discrepancy.fitting.fit import Fitted, fit
+from doe.discrepancy.fitting.fit import Fitted, fit, glimpse
 from doe.discrepancy.fitting.model import Model, Stack
 from doe.discrepancy.problem.measured import Measured
 from doe.discrepancy.problem.settings import Settings
@@ -23,8 +24,21 @@ GROSS = 3.0
 """Q over its degrees of freedom that is looked into."""
 FITS = 2.0
 """Q over its degrees of freedom up to which a model may be right, as little as an emulator knows."""
+HOPELESS = 4.0
+"""Q at a first look over that of a model that fits, from which on it is not fitted: of six mechanisms in four
+data sets the fit brought it to 0.4 of that at least."""
 OUTLYING = 8.0
 """Standard deviations by which one value is an outlier that scatter never makes."""
+MANY = 3
+"""Outliers of one heap from which on it is the heap that is one."""
+STRANGE = 4.0
+"""Standard deviations by which half of what was measured of a heap is off where it is none of the others."""
+LEAST = 4
+"""Replicates of which each is compared with the others."""
+MOST = 3
+"""Slips that are looked for one after the other."""
+HELPS = 0.75
+"""Share of Q over its degrees of freedom that the largest of so many slips leaves at most: two thirds."""
 FACTORS = (1000.0, 100.0, 60.0, 25.4, 10.0, 3.0, 2.0, -1.0)
 """Factors of slips: of units, of an inch, of a digit, of a sign; their inverses as well."""
 NEAR = 0.15
@@ -37,16 +51,32 @@ class Slip:
 
     observables: tuple[str, ...]
     conditions: tuple[str, ...]
-    """Its place; of a condition all observables, of a kind of observable all conditions."""
+    """Its place; of a condition or a heap all observables, of a kind of observable all conditions."""
     replicate: int | None
-    """Number of the one measurement, from 1; None where it is all."""
+    """Number of the one heap, from 1; None where it is all."""
     factor: float | None
     """The values look as if multiplied by this; None where no usual factor does."""
     exchanged: bool
     """The two conditions look as if exchanged."""
     q_with: float
     q_without: float
-    """Q of the base with these values, and without them."""
+    """Least Q of the base and the base with one mechanism, with these values and without them; of a value or
+    a heap that differs from the others, its squared distance from them in standard deviations, and 0."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Tried:
+    """A slip that was tried, and what fits the rest best."""
+
+    slip: Slip
+    rest: Fitted
+    cost: int
+    """What it asks to be wrong: values; an exchange is one error."""
+
+    @property
+    def ratio(self) -> float:
+        """Q over its degrees of freedom."""
+        return self.rest.q / max(self.rest.freedom, 1)
 
 
 def without(measured: Measured, slips: Sequence[Slip]) -> Measured:
@@ -61,55 +91,102 @@ def without(measured: Measured, slips: Sequence[Slip]) -> Measured:
 
 
 def find_slips(measured: Measured, emulator: Emulator, settings: Settings) -> tuple[Slip, ...]:
-    """Look for slips: of single values first, then of one kind of observable, or of one or two conditions."""
-    found = list(_outliers(measured, emulator))
-    rest = without(measured, found)
-    whole = _fitted(rest, emulator, settings)
-    if whole is None or whole.q < GROSS * whole.freedom:
-        return tuple(found)
-    singles = (_fitted(rest, emulator, settings, (name,)) for name in emulator.space.names)
-    if any(one is not None and one.q < FITS * one.freedom for one in singles):
-        return tuple(found)  # a mechanism may explain it
-    others = [*_exchanges(rest, emulator, settings, whole), *_left_out(rest, emulator, settings, whole)]
-    return (*found, *sorted(others, key=_cost)[:1])
+    """Look for slips: of single values and heaps first, then of one kind of observable, or of conditions.
+
+    Where no one slip leaves a rest that fits, two kinds are tried together, and then the one of a usual
+    factor that helps most is set aside and others are looked for. They are named if in the end one fits.
+    """
+    outliers = _outliers(measured, emulator)
+    rest, found = without(measured, outliers), outliers
+    for _ in range(MOST):
+        whole = _closest(rest, emulator, settings)
+        if whole is None or whole.q < GROSS * whole.freedom:
+            return tuple(found)  # a mechanism may explain it
+        tried = [*_exchanges(rest, emulator, settings, whole), *_left_out(rest, emulator, settings, whole)]
+        if fitting := [one for one in tried if one.ratio < FITS]:
+            best = min(fitting, key=lambda one: (one.cost, one.ratio))
+            return _joined(found, [best.slip])
+        if both := _two_kinds(rest, emulator, settings, whole):
+            return _joined(found, both)
+        least = HELPS * whole.q / whole.freedom
+        helps = [one for one in tried if one.slip.factor is not None and one.ratio < least]
+        if not helps:
+            break
+        found = [*found, min(helps, key=lambda one: one.ratio).slip]
+        rest = without(rest, found[-1:])
+    return tuple(outliers)
 
 
-def _cost(slip: Slip) -> tuple[int, float]:
-    """Sort slips by what they ask to be wrong: an exchange is one error, then the fewest observables."""
-    return 0 if slip.exchanged else len(slip.observables) * len(slip.conditions), slip.q_without
+def _joined(found: Sequence[Slip], more: Sequence[Slip]) -> tuple[Slip, ...]:
+    """Join slips, less those whose values are all among those of a later one."""
+    fields = ("observables", "conditions")
+    held = [
+        one
+        for one in found
+        if any(all(set(getattr(one, of)) <= set(getattr(by, of)) for of in fields) for by in more)
+    ]
+    return (*(one for one in found if one not in held), *more)
 
 
-def _fitted(
-    measured: Measured, emulator: Emulator, settings: Settings, mechanisms: tuple[str, ...] = ()
-) -> Fitted | None:
-    """Fit a model to all conditions; None without degrees of freedom."""
+def _closest(measured: Measured, emulator: Emulator, settings: Settings) -> Fitted | None:
+    """Fit the base and, if that fails, the base with each mechanism; None without degrees of freedom."""
     evidence = gather(measured, emulator)
     blocks = (*evidence.training, *evidence.held_out)
-    model = Model(emulator, mechanisms, settings.systematic, views=measured.views)
-    if not blocks or sum(len(block.mean) for block in blocks) <= len(model.lower):
+    names = ((), *((name,) for name in emulator.space.names))
+    base, *singles = (
+        Stack(Model(emulator, one, settings.systematic, views=measured.views), blocks) for one in names
+    )
+    if not blocks or len(base.target) <= len(base.model.lower):
         return None
-    return fit(Stack(model, blocks), count=2)
+    best = fit(base, count=2)
+    for stack in singles:
+        limit = FITS * max(len(stack.target) - len(stack.model.lower), 0)
+        if best.q < FITS * best.freedom:
+            break
+        if glimpse(stack, best.x[: len(base.model.lower)]) < HOPELESS * limit:
+            best = min(best, fit(stack, count=2), key=lambda one: one.q)
+    return best
 
 
-def _outliers(measured: Measured, emulator: Emulator) -> Iterator[Slip]:
-    """Yield single values far from the others of their condition, by the scatter of these or the model."""
-    middle = np.zeros(len(emulator.space.factors))
+def _outliers(measured: Measured, emulator: Emulator) -> list[Slip]:
+    """Find single values, and heaps, far from the others of their condition."""
+    found = []
     for condition in (name for name in measured.conditions if name in emulator.surfaces):
-        variance = emulator.surfaces[condition].noise.variance(middle)
-        for column, name in enumerate(measured.observables):
-            values = measured.values[condition][:, column]
-            rows = np.flatnonzero(np.isfinite(values))
-            if name not in emulator.observables or len(rows) < 4:
-                continue
-            own = variance[emulator.observables.index(name)]
-            for row in rows:
-                others = values[rows[rows != row]]
-                sd = np.sqrt(max(own, others.var(ddof=1)) * (1.0 + 1.0 / len(others)))
-                away = abs(values[row] - others.mean())
-                if away > OUTLYING * sd:
-                    factor = _usual(values[row] / others.mean())
-                    square = float((away / sd) ** 2)
-                    yield Slip((name,), (condition,), int(row) + 1, factor, False, square, 0.0)
+        ratios, away = _from_the_others(measured, emulator, condition)
+        for row in np.flatnonzero(np.isfinite(away).any(axis=1)):
+            seen = np.flatnonzero(np.isfinite(away[row]))
+            far = seen[away[row][seen] > OUTLYING]
+            if len(far) >= MANY or np.median(away[row][seen]) > STRANGE:
+                groups = [(seen, far if len(far) else seen)]
+            else:
+                groups = [(far[[one]], far[[one]]) for one in range(len(far))]
+            for columns, telling in groups:
+                names = tuple(measured.observables[column] for column in columns)
+                factor = _usual(float(np.median(ratios[row][telling])))
+                square = float(np.mean(away[row][columns] ** 2))
+                found.append(Slip(names, (condition,), int(row) + 1, factor, False, square, 0.0))
+    return found
+
+
+def _from_the_others(measured: Measured, emulator: Emulator, condition: str) -> tuple[np.ndarray, np.ndarray]:
+    """Ratio of each value to the mean of the others, and its distance from it; NaN where unknown.
+
+    A distance is in standard deviations, by the scatter of the others or of the model.
+    """
+    rows = measured.values[condition]
+    ratios, away = np.full(rows.shape, np.nan), np.full(rows.shape, np.nan)
+    variance = emulator.surfaces[condition].noise.variance(np.zeros(len(emulator.space.factors)))
+    for column, name in enumerate(measured.observables):
+        present = np.flatnonzero(np.isfinite(rows[:, column]))
+        if name not in emulator.observables or len(present) < LEAST:
+            continue
+        own = variance[emulator.observables.index(name)]
+        for row in present:
+            others = rows[present[present != row], column]
+            sd = np.sqrt(max(own, others.var(ddof=1)) * (1.0 + 1.0 / len(others)))
+            ratios[row, column] = rows[row, column] / others.mean()
+            away[row, column] = abs(rows[row, column] - others.mean()) / sd
+    return ratios, away
 
 
 def _usual(ratio: float) -> float | None:
@@ -119,29 +196,48 @@ def _usual(ratio: float) -> float | None:
     return best if abs(ratio / best - 1.0) < NEAR else None
 
 
-def _exchanges(measured: Measured, emulator: Emulator, settings: Settings, whole: Fitted) -> Iterator[Slip]:
-    """Yield pairs of conditions that agree with the base once they are exchanged."""
+def _exchanges(measured: Measured, emulator: Emulator, settings: Settings, whole: Fitted) -> Iterator[_Tried]:
+    """Try pairs of conditions, each exchanged."""
     for first, second in combinations([c for c in measured.conditions if c in emulator.surfaces], 2):
         swapped = dict(measured.values) | {first: measured.values[second], second: measured.values[first]}
         reasons = dict(measured.reasons) | {first: measured.reasons[second], second: measured.reasons[first]}
-        fitted = _fitted(replace(measured, values=swapped, reasons=reasons), emulator, settings)
-        if fitted is not None and fitted.q < FITS * fitted.freedom:
-            yield Slip(measured.observables, (first, second), None, None, True, whole.q, fitted.q)
+        fitted = _closest(replace(measured, values=swapped, reasons=reasons), emulator, settings)
+        if fitted is not None:
+            slip = Slip(measured.observables, (first, second), None, None, True, whole.q, fitted.q)
+            yield _Tried(slip, fitted, 1)
 
 
-def _left_out(measured: Measured, emulator: Emulator, settings: Settings, whole: Fitted) -> Iterator[Slip]:
-    """Yield observables, kinds of them and conditions without which the rest agrees with the base."""
-    known = [name for name in measured.observables if name in emulator.observables]
+def _left_out(measured: Measured, emulator: Emulator, settings: Settings, whole: Fitted) -> Iterator[_Tried]:
+    """Try observables, kinds of them and conditions, each left out."""
+    known = tuple(name for name in measured.observables if name in emulator.observables)
     everywhere = measured.conditions
     groups: list[tuple[tuple[str, ...], tuple[str, ...]]] = [((name,), everywhere) for name in known]
-    groups += [(kind, measured.conditions) for kind in measured.kinds if len(kind) > 1]
-    groups += [(tuple(known), (condition,)) for condition in measured.conditions]
+    groups += [(kind, everywhere) for kind in measured.kinds if len(kind) > 1]
+    groups += [(known, (condition,)) for condition in everywhere]
+    count = sum(int(np.isfinite(rows).sum()) for rows in measured.values.values())
     for observables, conditions in groups:
         slip = Slip(observables, conditions, None, None, False, whole.q, 0.0)
-        fitted = _fitted(without(measured, [slip]), emulator, settings)
-        if fitted is not None and fitted.q < FITS * fitted.freedom:
+        rest = without(measured, [slip])
+        left = sum(int(np.isfinite(rows).sum()) for rows in rest.values.values())
+        fitted = _closest(rest, emulator, settings) if left < count else None
+        if fitted is not None:
             factor = _factor(measured, fitted, slip)
-            yield replace(slip, factor=factor, q_without=fitted.q)
+            yield _Tried(replace(slip, factor=factor, q_without=fitted.q), fitted, count - left)
+
+
+def _two_kinds(measured: Measured, emulator: Emulator, settings: Settings, whole: Fitted) -> list[Slip]:
+    """Find two kinds of observables that are both wrong by a usual factor.
+
+    The one does not show beside the other: what replicates scatter hides all.
+    """
+    for pair in combinations([kind for kind in measured.kinds if len(kind) > 1], 2):
+        slips = [Slip(kind, measured.conditions, None, None, False, whole.q, 0.0) for kind in pair]
+        fitted = _closest(without(measured, slips), emulator, settings)
+        if fitted is not None and fitted.q < FITS * fitted.freedom:
+            slips = [replace(s, factor=_factor(measured, fitted, s), q_without=fitted.q) for s in slips]
+            if all(slip.factor is not None for slip in slips):
+                return slips
+    return []
 
 
 def _factor(measured: Measured, fitted: Fitted, slip: Slip) -> float | None:
@@ -149,8 +245,12 @@ def _factor(measured: Measured, fitted: Fitted, slip: Slip) -> float | None:
     emulator, ratios = fitted.model.emulator, []
     for condition in (name for name in slip.conditions if name in emulator.surfaces):
         predicted = fitted.model.predict(fitted.x[None], condition)[0]
+        means = measured.mean(condition)
         for name in slip.observables:
-            value = measured.mean(condition)[measured.observables.index(name)]
-            if np.isfinite(value) and predicted[emulator.observables.index(name)]:
-                ratios.append(value / predicted[emulator.observables.index(name)])
+            value, model = (
+                means[measured.observables.index(name)],
+                predicted[emulator.observables.index(name)],
+            )
+            if np.isfinite(value) and model:
+                ratios.append(value / model)
     return _usual(float(np.median(ratios))) if ratios else None

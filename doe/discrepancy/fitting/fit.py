@@ -16,6 +16,8 @@ from doe.discrepancy.fitting.model import STEP, Model, Stack
 ITERATIONS = 40
 SCOUTING = 6
 """Steps after which only the best starts go on."""
+GLIMPSED = (0.3, 0.8)
+"""Coded sizes that a first look starts from."""
 FINALISTS = 3
 """Starts that go on, each with the weights of where it is."""
 DEEPEST = 10.0
@@ -235,6 +237,20 @@ def _least(stacks: Sequence[Stack], starts: np.ndarray) -> Fitted:
     best = _descend(leader)
     near_it = [each for each in others if each.score < best.score + DEEPEST]
     return min([best, *map(_descend, near_it)], key=lambda each: each.score)
+
+
+def glimpse(stack: Stack, x: np.ndarray) -> float:
+    """Find about the least q of a model in a few steps from a fitted smaller one, its sizes small or large.
+
+    The weights stay those of where it starts.
+    """
+    starts = np.array([np.append(x, np.full(len(stack.model.mechanisms), size)) for size in GLIMPSED])
+    facing = [_facing(stack, each) for each in (0.0, 180.0)] if stack.model.is_directed else [stack]
+    lower, upper = stack.model.lower, stack.model.upper
+    whitening = whiten(stack.covariance(starts[0]))
+    return min(
+        float(minimise(one, whitening, one.target, starts, lower, upper, SCOUTING)[1].min()) for one in facing
+    )
 
 
 def _turned(best: Fitted) -> Fitted:

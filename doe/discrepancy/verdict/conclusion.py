@@ -136,6 +136,25 @@ def conclude(assessments: Sequence[Assessment], settings: Settings) -> Conclusio
     return Conclusion(Verdict.UNKNOWN, (), f"{_title(best)} comes closest, but {failed[0]}", None)
 
 
+def closest_first(assessments: Sequence[Assessment], settings: Settings) -> list[Assessment]:
+    """Sort models none of which explains the gap: those with fresh runs first, each by their score.
+
+    Of a pair the second effect must bring as much as tells two models apart: some always brings a little.
+    """
+    margin = settings.tie_margin
+    return sorted(assessments, key=lambda one: (not one.simulated, one.score + margin * len(one.mechanisms)))
+
+
+def unexplained(
+    closest: Assessment, of_one: Conclusion, of_two: Conclusion, settings: Settings
+) -> Conclusion:
+    """Conclude that nothing explains the gap, by what is held against the closest single model or pair."""
+    failed = objections(closest, settings)
+    if failed:
+        return Conclusion(Verdict.UNKNOWN, (), f"{_title(closest)} comes closest, but {failed[0]}", None)
+    return of_two if len(closest.mechanisms) > 1 else of_one
+
+
 def _is_close(one: Assessment, best: Assessment, behind: float, margin: float) -> bool:
     apart = best.apart.get(one.mechanisms[0], math.inf)
     return one is best or is_open(behind, apart, margin, parting(one.whole, best.whole))

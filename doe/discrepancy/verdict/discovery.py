@@ -213,7 +213,7 @@ class Discovery:
     """Faults of the data or the runs, and what was done about them."""
     effort: Effort
     closest: Fit | None = None
-    """The candidate of the best score, where none was chosen."""
+    """The first of the candidates, where none was chosen."""
     slips: tuple[Slip, ...] = ()
     """Likely slips, which this verdict was given with."""
     without_slips: Discovery | None = None

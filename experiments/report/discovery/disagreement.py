@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
-from doe.discrepancy import Discovery, Fit, Slip, Verdict
+from doe.discrepancy import Discovery, Fit, Question, Slip, Verdict
 from experiments.measurement.observables import Instrument
 from experiments.report.discovery.terms import Terms, spaced
 from experiments.report.kit.numbers import enumeration, trimmed
 
 CLEAR = 0.05
 """Adjusted p value below which a residual is told."""
+CLEARLY = 2.0
+"""Standard errors that the mean over the conditions is off where it is told."""
 SHOWN = 4
 """Observables that are told of."""
 ALIKE = 1.0
@@ -28,74 +31,145 @@ _CONVENTIONS = {
 
 
 def misses(found: Discovery, terms: Terms) -> list[str]:
-    """Say which observables the closest model misses, where and by how much, the clearest first."""
+    """Say which observables the closest model misses, where and by how much, the clearest first.
+
+    Where it is refused for what is off alike in all conditions, or no single mean is clear, means over the
+    conditions say so.
+    """
     fit = found.closest or found.base
-    if fit is None:
-        return []
-    clear = np.where(np.nan_to_num(fit.adjusted_p, nan=1.0) < CLEAR, np.abs(fit.residuals), 0.0)
-    order = np.argsort(-clear.max(axis=0))
-    return [_missed(found, fit, terms, int(at)) for at in order[:SHOWN] if clear[:, at].any()]
+    return [] if fit is None else [one.told(terms) for one in _missed(found, fit)]
+
+
+def standing_out(found: Discovery, terms: Terms) -> list[str]:
+    """Say which single means a base that agrees on the whole misses."""
+    return [] if found.base is None else [one.told(terms) for one in _standing_out(found, found.base)]
 
 
 def conventions(found: Discovery, terms: Terms) -> list[str]:
     """Say which conventions or slips would look as what is missed does, one an instrument."""
     fit = found.closest or found.base
-    if fit is None:
-        return []
-    clear = (np.nan_to_num(fit.adjusted_p, nan=1.0) < CLEAR).any(axis=0)
     told: dict[str, list[str]] = {}
-    for at in np.flatnonzero(clear):
-        name = found.data.observables[at]
-        instrument = terms.observables[name].instrument
+    for one in [] if fit is None else _missed(found, fit):
+        instrument = terms.observables[one.observable].instrument
         if instrument is not None:
-            told.setdefault(_CONVENTIONS[instrument], []).append(spaced(name))
+            told.setdefault(_CONVENTIONS[instrument], []).append(spaced(one.observable))
     return [f"For {enumeration(names)}: {text} would look the same." for text, names in told.items()]
+
+
+def measure_again(found: Discovery) -> str:
+    """Say which measurement tells an effect from a fault of an instrument; empty where nothing is missed."""
+    fit = found.closest or found.base
+    missed = [] if fit is None else _missed(found, fit)
+    if not missed:
+        return ""
+    where = f"under “{missed[0].condition}”" if missed[0].condition else "under two conditions"
+    return (
+        f"Measure {spaced(missed[0].observable)} of a few more heaps {where} with another instrument, or by"
+        " another person: if it is off as much again, an effect is there that the library lacks, and if not,"
+        " the first measurement was off."
+    )
 
 
 def slip_sentences(found: Discovery) -> Iterator[str]:
     """Say what likely slips there are, each with what shows it."""
     for slip in found.slips:
         if slip.replicate is not None:
-            yield f"{_slip(slip)} It lies {trimmed(slip.q_with**0.5, 2)} standard deviations from the others."
+            lies = "It lies" if len(slip.observables) == 1 else "On average its values lie"
+            yield f"{_slip(slip)} {lies} {trimmed(slip.q_with**0.5, 2)} standard deviations from the others."
         else:
             after = "once they are exchanged back" if slip.exchanged else "without these values"
-            before = f"Q of the base is {trimmed(slip.q_with, 3)}"
-            yield f"{_slip(slip)} {before}, and {trimmed(slip.q_without, 3)} {after}."
+            least = f"The least Q of the base, alone or with one effect, is {trimmed(slip.q_with, 3)}"
+            yield f"{_slip(slip)} {least}, and {trimmed(slip.q_without, 3)} {after}."
 
 
 def _slip(slip: Slip) -> str:
-    names = enumeration(map(spaced, slip.observables))
     if slip.exchanged:
         return f"A likely slip: the conditions {enumeration(slip.conditions)} look exchanged."
-    where = ""
-    if slip.replicate is not None:
-        where = f" of heap {slip.replicate} under {slip.conditions[0]}"
-    elif len(slip.conditions) == 1:
+    names, many = enumeration(map(spaced, slip.observables)), len(slip.observables) > 1
+    heap = "" if slip.replicate is None else f"heap {slip.replicate} under {slip.conditions[0]}"
+    if not heap and len(slip.conditions) == 1:
         return f"A likely slip: what was measured under {slip.conditions[0]} fits nothing else."
-    how = "is far from all that the rest allows"
-    if slip.factor is not None:
-        how = f"looks as if multiplied by {trimmed(slip.factor, 3)}: a unit, a digit or a sign?"
-    return f"A likely slip: {names}{where} {how.rstrip('.')}{'' if how.endswith('?') else '.'}"
+    how = f"{'are' if many else 'is'} far from all that the rest allows"
+    if heap:
+        names, how = (heap, "is none of the others") if many else (f"{names} of {heap}", how)
+        many = False
+    if slip.factor is None:
+        return f"A likely slip: {names} {how}."
+    look = "look" if many else "looks"
+    factor = trimmed(slip.factor, 3)
+    return f"A likely slip: {names} {look} as if multiplied by {factor}: a unit, a digit or a sign?"
 
 
-def _missed(found: Discovery, fit: Fit, terms: Terms, at: int) -> str:
-    """``t55 is 7 ms late in all conditions``, or where it is off most."""
-    name = found.data.observables[at]
-    factor, unit = terms.scale(name)
-    away = factor * (found.data.means[:, at] - fit.predicted[:, at])
+@dataclass(frozen=True)
+class _Miss:
+    """Miss of one observable."""
+
+    observable: str
+    condition: str
+    """Where it is off most; empty if it is off alike in all."""
+    away: float
+    """Measured less predicted."""
+    deviations: float
+    error: str
+    """What the deviations are of."""
+
+    def told(self, terms: Terms) -> str:
+        """``t55 is 7 ms late in all conditions``, or where it is off most."""
+        factor, unit = terms.scale(self.observable)
+        late = terms.observables[self.observable].instrument is Instrument.FILM
+        more, less = ("late", "early") if late else ("too large", "too small")
+        size = f"{trimmed(abs(factor * self.away), 2)} {unit}".strip()
+        where = f"under {self.condition}" if self.condition else "in all conditions"
+        return (
+            f"{spaced(self.observable)} is {size} {more if self.away > 0.0 else less} {where}"
+            f" ({trimmed(self.deviations, 2)} {self.error})."
+        )
+
+
+def _missed(found: Discovery, fit: Fit) -> list[_Miss]:
+    """Find what a model misses: single means beyond chance, and what is off alike in all conditions."""
+    single = _standing_out(found, fit)
+    passes = bool(found.candidates) and found.candidates[0].admitted
+    if passes or (single and fit.clearest.question is not Question.COMMON):
+        return single
+    names = {one.observable for one in single}
+    return [*single, *(one for one in _off_alike(found, fit) if one.observable not in names)][:SHOWN]
+
+
+def _standing_out(found: Discovery, fit: Fit) -> list[_Miss]:
+    """Find the observables with means beyond chance, the clearest first."""
+    clear = np.where(np.nan_to_num(fit.adjusted_p, nan=1.0) < CLEAR, np.abs(fit.residuals), 0.0)
+    order = np.argsort(-clear.max(axis=0))
+    return [_worst(found, fit, int(at)) for at in order[:SHOWN] if clear[:, at].any()]
+
+
+def _worst(found: Discovery, fit: Fit, at: int) -> _Miss:
+    away = found.data.means[:, at] - fit.predicted[:, at]
     residuals, rows = fit.residuals[:, at], np.flatnonzero(np.isfinite(fit.residuals[:, at]))
     everywhere = len(rows) > 1 and ((residuals[rows] > ALIKE).all() or (residuals[rows] < -ALIKE).all())
     worst = rows[np.argmax(np.abs(residuals[rows]))]
+    condition = "" if everywhere else found.data.conditions[worst]
     value = float(np.mean(away[rows])) if everywhere else float(away[worst])
-    instrument = terms.observables[name].instrument
-    more, less = ("late", "early") if instrument is Instrument.FILM else ("too large", "too small")
-    where = "in all conditions" if everywhere else f"under {found.data.conditions[worst]}"
-    size = f"{trimmed(abs(value), 2)} {unit}".strip()
     deviations = np.abs(residuals[rows]).mean() if everywhere else abs(residuals[worst])
-    return (
-        f"{spaced(name)} is {size} {more if value > 0.0 else less} {where}"
-        f" ({trimmed(float(deviations), 2)} standard deviations)."
-    )
+    return _Miss(found.data.observables[at], condition, value, float(deviations), "standard deviations")
+
+
+def _off_alike(found: Discovery, fit: Fit) -> list[_Miss]:
+    """Find the observables whose mean over the conditions is off, the clearest first; at least one.
+
+    A mean is weighted by the variances of its residuals.
+    """
+    off = []
+    for at, name in enumerate(found.data.observables):
+        residuals, away = fit.residuals[:, at], found.data.means[:, at] - fit.predicted[:, at]
+        rows = np.isfinite(residuals) & (residuals != 0.0)
+        if rows.sum() > 1:
+            weights = (residuals[rows] / away[rows]) ** 2
+            mean = float(weights @ away[rows] / weights.sum())
+            error = "standard errors of the mean"
+            off.append(_Miss(name, "", mean, abs(mean) * float(weights.sum()) ** 0.5, error))
+    off.sort(key=lambda one: -one.deviations)
+    return [one for rank, one in enumerate(off[:SHOWN]) if not rank or one.deviations > CLEARLY]
 
 
 def heading_phrase(fit: Fit) -> str:
@@ -109,18 +183,31 @@ def heading_phrase(fit: Fit) -> str:
     return f", down {towards.get(fit.heading, other)}"
 
 
-def with_and_without(found: Discovery) -> str:
+def slip_decides(found: Discovery) -> bool:
+    """Say if what is found hangs on likely slips.
+
+    Those beyond one heap make the whole misfit, whichever verdict it gets with them and without them.
+    """
+    rest = found.without_slips
+    if rest is None:
+        return False
+    differs = (rest.verdict, set(rest.named)) != (found.verdict, set(found.named))
+    return differs or any(slip.replicate is None for slip in found.slips)
+
+
+def with_and_without(found: Discovery, terms: Terms) -> str:
     """Say the verdict with and without likely slips; empty where there is none."""
     rest = found.without_slips
     if rest is None:
         return ""
+    if (rest.verdict, set(rest.named)) == (found.verdict, set(found.named)):
+        return "Without these values the verdict is the same."
     words = {
         Verdict.NONE: "nothing is missing",
         Verdict.UNKNOWN: "something is missing that the library does not explain",
         Verdict.NOT_IDENTIFIABLE: "the data cannot tell",
     }
     told = [
-        words.get(one.verdict, f"{one.verdict.value}: {enumeration(map(spaced, one.named))}")
-        for one in (rest, found)
+        words.get(one.verdict, f"{one.verdict.value}: {terms.titles(one.named)}") for one in (rest, found)
     ]
     return f"Without the values of the likely slip: {told[0]}. With them: {told[1]}."

@@ -9,7 +9,7 @@ from typing import Any
 from doe.discrepancy import Discovery, Settings, Verdict
 from experiments.report.cautions import Caution, study_cautions
 from experiments.report.discovery import charts, tables
-from experiments.report.discovery.disagreement import conventions, misses
+from experiments.report.discovery.disagreement import conventions, misses, slip_decides
 from experiments.report.discovery.paper_text import search_pastes
 from experiments.report.discovery.terms import Terms, percent
 from experiments.report.discovery.verdict import (
@@ -92,10 +92,9 @@ def render_discovery(
         "terms": terms,
         "headline": headline(found, terms),
         "sentence": verdict_sentence(found, terms),
-        "reason": reason_sentence(found, terms),
-        "settled": found.verdict in SETTLED and not found.slips,
-        "misses": misses(found, terms) if found.verdict is Verdict.UNKNOWN else [],
-        "conventions": conventions(found, terms) if found.verdict is Verdict.UNKNOWN else [],
+        "reason": _further_reason(found, terms),
+        "settled": found.verdict in SETTLED and not slip_decides(found),
+        **_missed(found, terms),
         "cards": _cards(found, terms),
         "explained": found.named,
         "next_step": next_step(found, terms),
@@ -115,6 +114,22 @@ def render_discovery(
     }
     summary, chapters = "discovery/summary.html.j2", [*shown, *further, last]
     return render_page("report on a disagreement", study.name, summary, chapters, drawn_on)
+
+
+def _missed(found: Discovery, terms: Terms) -> dict[str, Any]:
+    """Collect what the summary says of a model that nothing explains; a likely slip is looked at before."""
+    unknown = found.verdict is Verdict.UNKNOWN and not slip_decides(found)
+    return {
+        "misses": misses(found, terms)[1:] if unknown else [],  # the sentence tells the first
+        "conventions": conventions(found, terms) if unknown else [],
+        "step_first": unknown or slip_decides(found),
+    }
+
+
+def _further_reason(found: Discovery, terms: Terms) -> str:
+    """The rule that gave the verdict, where its sentence does not say it."""
+    told = found.candidates[0].objection if found.candidates and found.verdict is Verdict.UNKNOWN else ""
+    return "" if told and told in found.reason else reason_sentence(found, terms)
 
 
 @dataclass(frozen=True)

@@ -19,8 +19,11 @@ from doe.discrepancy import (
 )
 from experiments.report.discovery.disagreement import (
     heading_phrase,
+    measure_again,
     misses,
+    slip_decides,
     slip_sentences,
+    standing_out,
     with_and_without,
 )
 from experiments.report.discovery.terms import Terms, percent, spaced
@@ -32,6 +35,12 @@ SETTLED = (Verdict.NONE, Verdict.NAMED)
 DRIFTS = 1e-3
 """P value of a drift below which a verdict that nothing is missing says a word about it."""
 
+ALL = 0.995
+"""Share of the excess that rounds to all: of a model that is refused nonetheless, what is left says more."""
+
+BOTH = " + "
+"""Sign between the two effects of one model in the next experiment."""
+
 SHOWN_RIVALS = 2
 """Refused mechanisms whose objection is told."""
 
@@ -39,7 +48,7 @@ SHOWN_RIVALS = 2
 def headline(found: Discovery, terms: Terms) -> str:
     """Say the verdict in a few words."""
     named = terms.titles(found.named)
-    if found.slips:
+    if slip_decides(found):
         return "A likely slip in the data"
     return {
         Verdict.NONE: "Nothing is missing that these data could show",
@@ -52,8 +61,12 @@ def headline(found: Discovery, terms: Terms) -> str:
 
 def verdict_sentence(found: Discovery, terms: Terms) -> str:
     """Say what was found, with its numbers, in one sentence or two."""
-    told = _SENTENCES[found.verdict](found, terms)
-    return " ".join([*slip_sentences(found), with_and_without(found), told]).strip() if found.slips else told
+    slips = [*slip_sentences(found), with_and_without(found, terms)] if found.slips else []
+    if found.without_slips is not None and slip_decides(found):
+        rest = found.without_slips
+        told = _SENTENCES[rest.verdict](rest, terms)
+        return " ".join([*slips, f"This is found without them, and all that follows with them: {told}"])
+    return " ".join([_SENTENCES[found.verdict](found, terms), *slips])
 
 
 def reason_sentence(found: Discovery, terms: Terms) -> str:
@@ -88,18 +101,30 @@ def changes(found: Discovery, terms: Terms, settings: Settings) -> list[str]:
 
 def next_step(found: Discovery, terms: Terms) -> str:
     """Describe the next experiment; empty where none is proposed."""
-    step = found.next_experiment
+    step, unknown = found.next_experiment, found.verdict is Verdict.UNKNOWN
+    if slip_decides(found) or (found.slips and unknown and step is None):
+        return (
+            "Look at the data first: put these values right, or leave them out, and search again. No more"
+            " heaps need be measured before."
+        )
     if step is None:
-        return ""
-    models = {name: f"the model with {terms.title(name)}" for name in step.separates} | {"base": "the base"}
-    pair = " from ".join(models[name] for name in step.separates)
+        return measure_again(found) if unknown else ""
+    pair = " from ".join(
+        "the base" if name == "base" else f"the model with {terms.titles(name.split(BOTH))}"
+        for name in step.separates
+    )
+    expected = f"after both are fitted again they are expected to lie Q = {trimmed(step.expected_q, 3)} apart"
+    if not step.settles:
+        return (
+            f"No condition of the study would tell {pair}, not with {step.replicates} more tests either:"
+            f" {expected}, where {trimmed(step.wanted_q, 3)} would tell them apart. It takes another"
+            " measurement than these."
+        )
     how = ", ".join(f"{place} = {value}" for place, value in step.changes)
     setting = f"“{step.condition}”" + (f" ({how})" if how else "")
-    settled = "" if step.settles else f", where {trimmed(step.wanted_q, 3)} would tell them apart"
     return (
-        f"Repeat the test {step.replicates} times under the condition {setting}. It tells {pair} best: after"
-        f" both are fitted again they are expected to lie Q = {trimmed(step.expected_q, 3)} apart there, most"
-        f" in the {spaced(step.observable)}{settled}."
+        f"Repeat the test {step.replicates} times under the condition {setting}. It tells {pair} best:"
+        f" {expected} there, most in the {spaced(step.observable)}."
     )
 
 
@@ -109,7 +134,18 @@ def _none(found: Discovery, terms: Terms) -> str:
     return (
         "Fitted as well as it can be, the model agrees with the data within their noise:"
         f" Q = {trimmed(found.base.q, 3)} at {fixed(found.base.degrees_of_freedom, 0)} degrees of freedom,"
-        f" p {p_clause(found.base.p_value)}.{_drifting(found, terms)}"
+        f" p {p_clause(found.base.p_value)}.{_drifting(found, terms)}{_single_means(found, terms)}"
+    )
+
+
+def _single_means(found: Discovery, terms: Terms) -> str:
+    """Say why a marked mean is no contradiction to a model that lacks nothing."""
+    told = standing_out(found, terms)
+    if not told:
+        return ""
+    return (
+        f" By itself {' And '.join(told)} All means together do not bear an effect out: chance marks a mean"
+        " somewhere in one of twenty data sets. Look at how it was measured."
     )
 
 
@@ -164,14 +200,18 @@ def _unknown(found: Discovery, terms: Terms) -> str:
     if not found.candidates:
         return f"{text}, and the library has nothing to explain it with."
     best = found.candidates[0]
-    share = f"it removes {percent(min(max(best.explained, 0.0), 1.0))} of the excess"
-    does = share if found.base.excess else f"it leaves Q = {trimmed(best.q, 3)}"
+    many = len(best.mechanisms) > 1
+    does = f"{'they leave' if many else 'it leaves'} Q = {trimmed(best.q, 3)}"
+    if found.base.excess and best.explained < ALL:
+        share = percent(max(best.explained, 0.0))
+        does = f"{'they remove' if many else 'it removes'} {share} of the excess"
     why = (
         f", but {_one_name(best.objection, terms).rstrip('.')}"
         if best.objection
-        else ", but it does not stand out"
+        else f", but {'they do' if many else 'it does'} not stand out"
     )
-    text += f". {capital(terms.titles(best.mechanisms))} comes closest ({does}){why}."
+    come = "come" if many else "comes"
+    text += f". {capital(terms.titles(best.mechanisms))} {come} closest ({does}){why}."
     return " ".join([text, *(capital(one) for one in misses(found, terms)[:1])])
 
 
@@ -224,10 +264,12 @@ def _room(found: Discovery, terms: Terms, settings: Settings) -> Iterator[str]:
 
 
 def _rivals(found: Discovery, terms: Terms, settings: Settings) -> Iterator[str]:
-    refused = [c for c in found.candidates if not c.admitted and c.objection]
+    told = found.candidates[:1] if found.verdict is Verdict.UNKNOWN else ()
+    refused = [c for c in found.candidates if not c.admitted and c.objection and c not in told]
     for rival in refused[:SHOWN_RIVALS]:
         objection = _one_name(rival.objection, terms).rstrip(".")
-        yield f"{capital(terms.titles(rival.mechanisms))} was refused: {objection}."
+        were = "were" if len(rival.mechanisms) > 1 else "was"
+        yield f"{capital(terms.titles(rival.mechanisms))} {were} refused: {objection}."
 
 
 def _unresolved(found: Discovery, terms: Terms, settings: Settings) -> Iterator[str]:
@@ -245,7 +287,8 @@ def _settle_by_experiment(found: Discovery, terms: Terms, settings: Settings) ->
         yield f"{capital(tests)} would settle it (see the next experiment)."
         return
     yield f"No condition of the study would settle it, not with {step.replicates} more tests either."
-    for name in found.named:
+    both = [name for model in step.separates for name in model.split(BOTH)]
+    for name in found.named or both:
         if name in terms.mechanisms:
             yield f"To see whether it is {terms.title(name)}: {terms.mechanisms[name].confirm}"
 
@@ -279,7 +322,7 @@ _CHANGES: dict[Verdict, tuple[str | Callable[[Discovery, Terms, Settings], Itera
     Verdict.NONE: (_smaller_effects,),
     Verdict.NAMED: (_margins, _room, _rivals, _unresolved, _OUTSIDE),
     Verdict.TIE: (_settle_by_experiment, _rivals, _unresolved),
-    Verdict.UNKNOWN: (_rivals, _WIDEN, _unresolved),
+    Verdict.UNKNOWN: (_settle_by_experiment, _rivals, _WIDEN, _unresolved),
     Verdict.NOT_IDENTIFIABLE: (_more_data,),
 }
 

@@ -153,6 +153,13 @@ def test_what_the_library_lacks_is_unknown() -> None:
     assert found.named == ()
     assert found.before_after == ()
     assert all(not candidate.admitted for candidate in found.candidates)
+    # one closest model in the map, the table and the verdict, and it was run
+    assert found.closest is not None
+    assert found.closest.mechanisms == found.candidates[0].mechanisms
+    assert found.candidates[0].simulated
+    assert found.reason.startswith(" with ".join(found.closest.mechanisms))
+    # both of any two models are refused: nothing is to be told apart
+    assert found.next_experiment is None
 
 
 def test_a_library_of_one_makes_no_pairs() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,8 @@ from doe.discrepancy.contest.rivals import certain, is_open, lag, parting, telli
 from doe.discrepancy.fitting.evidence import gather
 from doe.discrepancy.fitting.fit import fit, whiten
 from doe.discrepancy.fitting.model import Model, Stack
+from doe.discrepancy.problem.settings import Settings
+from doe.discrepancy.verdict.conclusion import closest_first
 
 MARGIN = 6.0
 DRAWS = 100_000
@@ -90,3 +93,13 @@ def test_models_that_far_apart_are_told_apart_with_the_power() -> None:
     behind = distance**2 + 2.0 * distance * rng.standard_normal(DRAWS)
     apart = np.mean([not is_open(value, 0.0, MARGIN) for value in behind])
     assert apart == pytest.approx(0.8, abs=4.0 * (0.8 * 0.2 / DRAWS) ** 0.5)
+
+
+def test_what_comes_closest_was_run_and_a_second_effect_brings_more_than_a_little() -> None:
+    one = SimpleNamespace(mechanisms=("alpha",), simulated=True, score=20.0)
+    far = SimpleNamespace(mechanisms=("alpha", "beta"), simulated=False, score=0.0)
+    for score, first in ((20.0 - 0.9 * MARGIN, one), (20.0 - 1.1 * MARGIN, None)):
+        pair = SimpleNamespace(mechanisms=("beta", "delta"), simulated=True, score=score)
+        ordered = closest_first([one, far, pair], Settings(tie_margin=MARGIN))  # type: ignore[list-item]
+        assert ordered[0] is (first or pair)
+        assert ordered[-1] is far

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from shutil import copy
 
 import numpy as np
 import pytest
@@ -36,6 +37,7 @@ from doe.discrepancy.verdict.conclusion import Conclusion, withdrawn
 from doe.discrepancy.verdict.records import calibration_uses
 from experiments.discover.search import Search
 from experiments.measurement.calibration import usual_calibration
+from experiments.measurement.measured_file import read_measured
 from experiments.measurement.observables import BY_NAME
 from experiments.studyfile import load_study
 from experiments.trials.emulated_simulator import EmulatedSimulator, emulated_heaps
@@ -152,6 +154,20 @@ def test_a_fit_ends_no_higher_than_the_truth_or_any_other_place(hidden: dict[str
             places.append(np.append(theta(seed), [hidden[name] for name in mechanisms]))
             # The descent ends where a step brings 0.01 or less.
             assert fit(stack).score <= min(weigh(stack, x).score for x in places) + 0.01
+
+
+@pytest.mark.parametrize(
+    "hidden", [{"plate_tilt": 0.5, "vibration": 0.9}, {"plate_tilt": 0.6, "size_spread": 0.9}]
+)
+def test_a_tilt_is_found_where_the_middle_of_the_ranges_leads_to_none(hidden: dict[str, float]) -> None:
+    # Two optima: down the score from the middle the tilt ends at 0, some 7 above the least.
+    evidence = gather(heaps(hidden, 2), known())
+    stack = Stack(Model(known(), tuple(sorted(hidden)), SYSTEMATIC), evidence.training)
+    fitted, truth = fit(stack), np.append(theta(2), [hidden[name] for name in sorted(hidden)])
+    assert fitted.score <= weigh(stack, truth).score
+    tilt = fitted.mechanisms.index("plate_tilt")
+    assert abs(fitted.coded_sizes[tilt] - hidden["plate_tilt"]) < 3.0 * fitted.coded_size_errors[tilt]
+    assert fitted.coded_sizes[tilt] > 0.3
 
 
 def test_an_interval_holds_its_size_even_where_nothing_fits() -> None:
@@ -277,6 +293,24 @@ def test_conditions_seen_from_different_sides_are_one_tilt() -> None:
         scores.append(fit(Stack(model, evidence.training)).score)
     # The same numbers with other signs: two descents end within a last step of each other.
     assert scores[1] == pytest.approx(scores[0], abs=0.01)
+
+
+def test_a_camera_of_the_study_mirrors_the_lean_of_its_condition(tmp_path: Path) -> None:
+    text = TRIAL.read_text(encoding="utf-8")
+    turned = text.replace("[condition.wide]", '[condition.wide]\ncamera = "180 deg"')
+    study_file = tmp_path / "study.toml"
+    study_file.write_text(turned, encoding="utf-8")
+    copy(TRIAL.with_name("clump.txt"), tmp_path)
+    tilted = TRIAL.with_name("tilted-bench.csv")
+    leans = []
+    for path in (TRIAL, study_file):
+        measured = read_measured(tilted, load_study(path, "bench"))
+        model = Model(known(), ("plate_tilt",), SYSTEMATIC, views=gather(measured, known()).views)
+        x, lean = np.array([[0.0, 0.0, 0.0, 0.8]]), known().observables.index("asymmetry")
+        leans.append([model.predict(x, name)[0, lean] for name in known().space.conditions])
+    seen = np.where(np.array(known().space.conditions) == "wide", -1.0, 1.0)
+    np.testing.assert_allclose(leans[1], seen * leans[0], rtol=1e-12)
+    assert min(leans[0]) > 0.0
 
 
 def test_the_same_heaps_from_behind_are_named_with_their_direction() -> None:

@@ -10,13 +10,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from doe.discrepancy import Answer, Discovery, Question, Settings, Verdict
+from doe.discrepancy import Answer, Discovery, Interval, Question, Settings, Slip, Verdict
 from experiments.report import HeapPicture
 from experiments.report.discovery import Terms, render_discovery, verdict_sentence
+from experiments.report.discovery.disagreement import conventions, misses, slip_sentences
 from experiments.report.discovery.paper_text import search_pastes
 from experiments.report.discovery.tables import SHOWN_PAIRS, data_table, shown_candidates
 from experiments.report.discovery.terms import percent
-from experiments.report.discovery.verdict import changes
+from experiments.report.discovery.verdict import changes, headline, next_step
 from experiments.studyfile import Study
 
 Discovered = Callable[[Verdict], Discovery]
@@ -205,3 +206,125 @@ def test_a_tie_names_what_would_settle_it_and_says_where_no_condition_does(
     # then what each of the two would do by itself
     for name in found.named:
         assert terms.mechanisms[name].confirm in told
+
+
+def test_a_slip_heads_the_page_only_where_the_verdict_hangs_on_it(
+    discovered: Discovered, whole_study: Study, terms: Terms, read_page: type
+) -> None:
+    none, tie, named = (discovered(v) for v in (Verdict.NONE, Verdict.TIE, Verdict.NAMED))
+    value = Slip(("height",), ("rough",), 5, 3.0, False, 361.0, 0.0)
+    noted = replace(named, slips=(value,), without_slips=named)
+    assert headline(noted, terms) == headline(named, terms)
+    sentence = verdict_sentence(noted, terms)
+    assert sentence.startswith(verdict_sentence(named, terms))
+    assert "height of heap 5 under rough looks as if multiplied by 3" in sentence
+    assert sentence.endswith("Without these values the verdict is the same.")
+    assert next_step(noted, terms) == next_step(named, terms)
+    heads = replace(tie, slips=(value,), without_slips=none)
+    assert headline(heads, terms) == "A likely slip in the data"
+    told = verdict_sentence(heads, terms)
+    assert "With them: tie: contact adhesion and liquid bridges." in told
+    assert told.endswith(verdict_sentence(none, terms))
+    page = read_page(render_discovery(heads, whole_study, terms, Settings()))
+    assert next_step(heads, terms).startswith("Look at the data first")
+    assert next_step(heads, terms) in page.text
+    # what is missed may be that value
+    unknown = discovered(Verdict.UNKNOWN)
+    beside = replace(unknown, slips=(value,), without_slips=unknown, next_experiment=None)
+    assert headline(beside, terms) == headline(unknown, terms)
+    assert next_step(beside, terms).startswith("Look at the data first")
+    # a unit makes the whole misfit, whatever verdict it gets
+    unit = Slip(("r50", "fill_height"), none.data.conditions, None, 10.0, False, 27105.0, 28.0)
+    gross = replace(unknown, slips=(unit,), without_slips=unknown)
+    assert headline(gross, terms) == "A likely slip in the data"
+    assert "r50 and fill height look as if multiplied by 10" in verdict_sentence(gross, terms)
+
+
+def test_a_heap_that_is_none_of_the_others_is_told_once(discovered: Discovered, terms: Terms) -> None:
+    none = discovered(Verdict.NONE)
+    heap = Slip(none.data.observables, ("wide",), 3, None, False, 254.0, 0.0)
+    [told] = slip_sentences(replace(none, slips=(heap,), without_slips=none))
+    assert told.startswith(
+        "A likely slip: heap 3 under wide is none of the others. On average its values lie 16"
+    )
+
+
+def off_alike(found: Discovery, deviations: float) -> Discovery:
+    """Let no mean be clear, and one observable be off alike; the closest model is refused for that."""
+    assert found.base is not None
+    data, quiet = found.data, np.where(np.isnan(found.data.means), np.nan, 0.1)
+    quiet[::2] *= -1.0
+    quiet[:, data.observables.index("t55")] = deviations
+    closest = replace(
+        found.base,
+        mechanisms=("plate_tilt",),
+        sizes=(Interval(1.2, 2.1, 3.1),),
+        residuals=quiet,
+        predicted=data.means - quiet * data.standard_errors,
+        adjusted_p=np.where(np.isnan(quiet), np.nan, 0.4),
+        clearest=Answer(Question.COMMON, 48.6, 18.5),
+    )
+    return replace(found, closest=closest)
+
+
+def test_an_unknown_that_is_off_alike_everywhere_names_the_observable_and_the_next_measurement(
+    discovered: Discovered, whole_study: Study, terms: Terms, read_page: type
+) -> None:
+    found = off_alike(discovered(Verdict.UNKNOWN), 1.4)
+    # 1.4 of 0.01 s; of five such residuals the mean is off by 1.4 root 5 of its standard errors
+    assert misses(found, terms) == [
+        "t55 is 0.014 s late in all conditions (3.1 standard errors of the mean)."
+    ]
+    assert conventions(found, terms)[0].startswith("For t55: a start of the clock")
+    page = read_page(render_discovery(found, whole_study, terms, Settings()))
+    assert "T55 is 0.014 s late in all conditions" in page.text
+    assert "Measure t55 of a few more heaps" in page.text
+    # a model that passes every rule, though another does, too, misses nothing
+    passing = replace(found.candidates[0], admitted=True, objection="")
+    assert misses(replace(found, candidates=(passing, *found.candidates[1:])), terms) == []
+    # something is off though no observable stands out: the one that is off most is told
+    assert len(misses(off_alike(found, 0.2), terms)) == 1
+
+
+def test_the_summary_says_an_objection_once(
+    discovered: Discovered, whole_study: Study, terms: Terms, read_page: type
+) -> None:
+    found = discovered(Verdict.UNKNOWN)
+    objection = found.candidates[0].objection
+    told = replace(found, reason=f"contact adhesion comes closest, but {objection}")
+    text = render_discovery(told, whole_study, terms, Settings())
+    summary = text[text.index('id="summary"') : text.index("What was simulated")]
+    assert summary.count("comes closest, but") + summary.count("comes closest (") == 1
+    assert not any("Contact adhesion was refused" in one for one in changes(told, terms, Settings()))
+
+
+def test_models_of_two_effects_have_their_titles_in_the_next_experiment(
+    discovered: Discovered, terms: Terms
+) -> None:
+    found = discovered(Verdict.NAMED)
+    assert found.next_experiment is not None
+    step = replace(found.next_experiment, separates=("plate_tilt + size_spread", "plate_tilt"))
+    told = next_step(replace(found, next_experiment=step), terms)
+    assert (
+        "the model with tilt of the plate and spread of sizes from the model with tilt of the plate" in told
+    )
+    assert told.startswith("Repeat the test")
+    weak = next_step(replace(found, next_experiment=replace(step, expected_q=0.0)), terms)
+    assert weak.startswith("No condition of the study would tell the model with tilt of the plate and spread")
+    assert "Repeat the test" not in weak
+
+
+def test_a_mean_that_stands_out_of_a_model_that_lacks_nothing_is_told(
+    discovered: Discovered, terms: Terms
+) -> None:
+    found = discovered(Verdict.NONE)
+    assert found.base is not None
+    assert "By itself" not in verdict_sentence(found, terms)
+    residuals, p = found.base.residuals.copy(), found.base.adjusted_p.copy()
+    at = (found.data.conditions.index("wide"), found.data.observables.index("t55"))
+    residuals[at], p[at] = 4.0, 1e-3
+    told = verdict_sentence(
+        replace(found, base=replace(found.base, residuals=residuals, adjusted_p=p)), terms
+    )
+    assert "By itself t55 is" in told
+    assert "under wide (4 standard deviations)" in told
