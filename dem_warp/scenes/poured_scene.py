@@ -166,16 +166,8 @@ class PouredScene(ABC):
         Raises
         ------
         ValueError
-            If they are more than a world can have, or none could pass the opening.
+            If they are more than a world can have.
         """
-        thinnest = (
-            2.0 * case.grains.size_mean * min(shape.radii.max() for shape in case.grains.mixture.shapes)
-        )
-        if self.opening < thinnest:
-            raise ValueError(
-                f"{type(self).__name__}: must have an opening that lets grains through, {thinnest:.4g} m or "
-                f"wider, got {self.opening:.4g} m"
-            )
         mean_volume = case.grains.mean(lambda shape: shape.volume)
         count = self.grain_count or np.ceil(self.densest_fill * self.volume / mean_volume)
         most = max_partners(case.grains.sphere_count) // case.grains.sphere_count

@@ -264,6 +264,7 @@ class Physics(Section):
         )
         if isinstance(case.scene, PouredScene):
             _check_supply(case)
+            _check_opening(case)
         return case
 
     def wall_parts(self) -> tuple[WallPart, ...]:
@@ -283,3 +284,12 @@ def _check_supply(case: Case) -> None:
         raise TooManyGrains(f"{told[1]}: {advice}", f"{float(told[2]):,.0f}") from None
     if grains > MOST_GRAINS:
         raise TooManyGrains(f"must have at most {MOST_GRAINS:,} grains a case: {advice}", f"{grains:,}")
+
+
+def _check_opening(case: Case) -> None:
+    """Refuse an opening that no grain passes: every case would clog."""
+    radii = [float(shape.radii.max()) for shape in case.grains.mixture.shapes]
+    thinnest, opening = 2.0 * case.grains.size_mean * min(radii), case.scene.opening
+    if opening < thinnest:
+        rule = f"must let grains through, and be {1e3 * thinnest:.4g} mm wide or wider"
+        raise ValueError(f"the opening of the {case.scene.name} {rule}, got {1e3 * opening:.4g} mm")

@@ -8,9 +8,9 @@ from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
-from worlds import SMALL_TUBE, STEEL, assert_same_result, small_case
+from worlds import SMALL_TUBE, assert_same_result, small_case
 
-from dem_warp import Case, DrawDown, Hopper, simulate
+from dem_warp import Case, simulate
 from dem_warp.batch import Batch
 from dem_warp.checkpoint import Checkpoints
 from dem_warp.reading import read_arrays
@@ -33,8 +33,6 @@ IMPOSSIBLE = {
     "tall": (few(height=1.0e4, grain_count=None), "must hold at most"),
     "narrow": (few(diameter=0.002), "the rain finds no free place"),
     "many": (few(grain_count=10**9), "must hold at most 14,913,080 grains of 9 spheres"),
-    "clogged": (small_case(scene=Hopper(0.016, 0.01, 1e-4, STEEL)), "an opening that lets grains through"),
-    "slot": (small_case(scene=DrawDown(0.016, 0.016, 0.01, 1e-4, 0.01, STEEL)), "got 0.0001 m"),
     "fast": (few(rain_speed=100.0), "outran the neighbour lists"),
 }
 

@@ -71,6 +71,17 @@ high = "20 mm"
 
 
 @pytest.mark.parametrize(
+    ("kind", "wide", "narrow"), [(Hopper, "18 mm", "1 mm"), (DrawDown, 'slot = "20 mm"', 'slot = "1 mm"')]
+)
+def test_an_outlet_that_no_grain_passes_is_refused(
+    write_study: WriteStudy, kind: type, wide: str, narrow: str
+) -> None:
+    study = load_study(write_study((TUBE, OTHER_TESTS[kind].replace(wide, narrow)), ANGLE))
+    with pytest.raises(StudyError, match=r"opening of the [\w-]+ must let grains through.* got 1 mm"):
+        study.case({}, seed=1)
+
+
+@pytest.mark.parametrize(
     ("section", "key", "rule"),
     [
         (OTHER_TESTS[Hopper].replace('"18 mm"', '"41 mm"'), "scene.hopper", "outlet: must be below"),

@@ -1,4 +1,4 @@
-"""Slips: a gross misfit of one heap, one kind of observable or one condition, which no effect makes.
+"""Slips: a gross misfit of one replicate, one kind of observable or one condition, which no effect makes.
 
 They are looked for before anything else, each left out in turn. A slip is only named where neither the base
 nor the base with one mechanism of the library takes most of the misfit up, and where one of them agrees with
@@ -30,9 +30,9 @@ data sets the fit brought it to 0.4 of that at least."""
 OUTLYING = 8.0
 """Standard deviations by which one value is an outlier that scatter never makes."""
 MANY = 3
-"""Outliers of one heap from which on it is the heap that is one."""
+"""Outliers of one replicate from which on it is the replicate that is one."""
 STRANGE = 4.0
-"""Standard deviations by which half of what was measured of a heap is off where it is none of the others."""
+"""Standard deviations by which half of the values of a replicate is off where it is none of the others."""
 LEAST = 4
 """Replicates of which each is compared with the others."""
 MOST = 3
@@ -51,9 +51,9 @@ class Slip:
 
     observables: tuple[str, ...]
     conditions: tuple[str, ...]
-    """Its place; of a condition or a heap all observables, of a kind of observable all conditions."""
+    """Its place; of a condition or a replicate all observables, of a kind of observable all conditions."""
     replicate: int | None
-    """Number of the one heap, from 1; None where it is all."""
+    """Number of the one replicate, from 1; None where it is all."""
     factor: float | None
     """The values look as if multiplied by this; None where no usual factor does."""
     exchanged: bool
@@ -61,7 +61,7 @@ class Slip:
     q_with: float
     q_without: float
     """Least Q of the base and the base with one mechanism, with these values and without them; of a value or
-    a heap that differs from the others, its squared distance from them in standard deviations, and 0."""
+    a replicate that differs from the others, its squared distance from them in standard deviations, and 0."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +91,7 @@ def without(measured: Measured, slips: Sequence[Slip]) -> Measured:
 
 
 def find_slips(measured: Measured, emulator: Emulator, settings: Settings) -> tuple[Slip, ...]:
-    """Look for slips: of single values and heaps first, then of one kind of observable, or of conditions.
+    """Look for slips: of values and replicates first, then of one kind of observable, or of conditions.
 
     Where no one slip leaves a rest that fits, two kinds are tried together, and then the one of a usual
     factor that helps most is set aside and others are looked for. They are named if in the end one fits.
@@ -149,7 +149,7 @@ def _closest(measured: Measured, emulator: Emulator, settings: Settings) -> Fitt
 
 
 def _outliers(measured: Measured, emulator: Emulator) -> list[Slip]:
-    """Find single values, and heaps, far from the others of their condition."""
+    """Find single values, and replicates, far from the others of their condition."""
     found = []
     for condition in (name for name in measured.conditions if name in emulator.surfaces):
         ratios, away = _from_the_others(measured, emulator, condition)

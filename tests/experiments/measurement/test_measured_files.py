@@ -293,8 +293,8 @@ def test_copies_and_missing_scatter_are_noted(read) -> None:
 
 def test_one_gross_error_is_found_by_the_scatter_of_all_conditions(read) -> None:
     data = read(angles("base", 25, 26, 25.5, 24.5, 2.55) + angles("fast", 22, 23, 22.5, 21.5, 22.2))
-    assert noted(data, "base", "2.55", "kept")
-    assert not noted(data, "fast:", "kept")
+    assert noted(data, "base", "2.55", "counts like them")
+    assert not noted(data, "fast:", "counts like them")
     assert not noted(data, "contradict")
     np.testing.assert_array_equal(data.counts("base"), [5])
 
@@ -313,7 +313,7 @@ def test_sound_data_are_suspected_no_oftener_than_stated(read) -> None:
         data = read(
             "".join(angles(name, *row) for name, row in zip(("base", "fast", "wide"), rows, strict=True))
         )
-        suspected += bool(noted(data, "kept") or noted(data, "contradict"))
+        suspected += bool(noted(data, "counts like them") or noted(data, "contradict"))
     # At most 2 x SUSPICION = 2 % of 100; 7 or more then have a probability of 0.4 %.
     assert 2 * SUSPICION == 0.02
     assert suspected < 7
