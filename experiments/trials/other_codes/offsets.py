@@ -11,7 +11,7 @@ in its unit. The last column has the noise of the means and the emulator's error
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
 
@@ -26,7 +26,6 @@ from experiments.discover.search import Search
 from experiments.errors import InputError
 from experiments.files import copy_file
 from experiments.measurement.measured_file import read_measured
-from experiments.measurement.observables import OBSERVABLES
 from experiments.report.kit.markdown import markdown_table
 from experiments.studyfile import load_study
 from experiments.trials.declaration import read_declaration
@@ -55,12 +54,13 @@ def residuals(label: Label, measured: Measured, base: Model) -> tuple[np.ndarray
     return np.array(rows), np.array(runs)
 
 
-def offsets_table(observables: Sequence[str], off: np.ndarray, runs: np.ndarray) -> pd.DataFrame:
-    """Offset of each observable with its standard error over the nulls, and what is common of it.
+def offsets_table(observables: Mapping[str, str], off: np.ndarray, runs: np.ndarray) -> pd.DataFrame:
+    """Offset of each observable with its standard error over the nulls.
 
     Parameters
     ----------
     observables
+        Units by name.
     off, runs : array
         Differences and deviations of one run, (nulls, conditions, observables).
     """
@@ -68,14 +68,13 @@ def offsets_table(observables: Sequence[str], off: np.ndarray, runs: np.ndarray)
     each = np.nanmean(ratio, axis=1)
     count = np.isfinite(each).sum(axis=0)
     common, square = np.nanmean(each, axis=0), np.nanmean(ratio**2, axis=(0, 1))
-    units = {one.name: one.unit for one in OBSERVABLES}
     return pd.DataFrame(
         {
-            "observable": observables,
+            "observable": list(observables),
             "off, sd of one run": common,
             "standard error": np.nanstd(each, axis=0, ddof=1) / np.sqrt(count),
             "off": np.nanmean(off, axis=(0, 1)),
-            "unit": [units[name] for name in observables],
+            "unit": list(observables.values()),
             "rms of a condition's mean, sd of one run": np.sqrt(square),
         }
     )
@@ -101,7 +100,8 @@ def measured_offsets(record: Path) -> tuple[pd.DataFrame, int]:
         unpack_heaps(record / HEAPS, folder)
         found = [residuals(n, read_measured(folder.measured(n.trial), search.study), base) for n in nulls]
     off, runs = (np.array(each) for each in zip(*found, strict=True))
-    return offsets_table(base.emulator.observables, off, runs), len(nulls)
+    units = {one.name: one.unit for one in search.study.measurable}
+    return offsets_table({name: units[name] for name in base.emulator.observables}, off, runs), len(nulls)
 
 
 def main(record: Annotated[Path, typer.Argument(help="Record of a second reality, with its heaps.")]) -> None:

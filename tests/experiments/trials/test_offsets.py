@@ -16,7 +16,7 @@ def test_a_drawn_offset_comes_back_with_its_error() -> None:
     runs = np.broadcast_to([2.0, 0.01], shape)
     off = runs * (np.array([0.5, 0.0]) + 0.3 * rng.standard_normal(shape))
     off[3, 1, 0] = np.nan
-    table = offsets_table(["flank_angle", "t55"], off, runs).set_index("observable")
+    table = offsets_table({"flank_angle": "deg", "t55": "s"}, off, runs).set_index("observable")
     # 60 nulls of five conditions: an error of .3 / sqrt(300) = .017; four of them
     assert table["off, sd of one run"].tolist() == pytest.approx([0.5, 0.0], abs=0.07)
     assert table["standard error"].tolist() == pytest.approx([0.017, 0.017], rel=0.4)
