@@ -15,7 +15,7 @@ REPEATS = "repeats are of separate heaps, never copies of one another"
 
 @dataclass
 class Repeats:
-    """What was given for heaps so far, and where."""
+    """Contents that were given for heaps so far, and their places."""
 
     _given: dict[Hashable, tuple[Hashable, str]] = field(default_factory=dict)
     """Heap of each content, and name and place of the content."""

@@ -71,7 +71,7 @@ class _Tried:
     slip: Slip
     rest: Fitted
     cost: int
-    """What it asks to be wrong: values; an exchange is one error."""
+    """Number of values that would be wrong; an exchange is one error."""
 
     @property
     def ratio(self) -> float:

@@ -106,12 +106,12 @@ class _Miss:
 
     observable: str
     condition: str
-    """Where it is off most; empty if it is off alike in all."""
+    """Condition in which it is off most; empty if it is off alike in all."""
     away: float
     """Measured less predicted."""
     deviations: float
     error: str
-    """What the deviations are of."""
+    """Distribution that the deviations are of."""
 
     def told(self, terms: Terms) -> str:
         """``t55 is 7 ms late in all conditions``, or where it is off most."""
