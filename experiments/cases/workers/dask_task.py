@@ -19,6 +19,7 @@ from dem_warp import Case, CaseResult, Progress
 from dem_warp.device import resolve_device
 from dem_warp.provenance import engine_fingerprint
 from experiments.cases.engine import Engine
+from experiments.cases.workers.outbox import Outbox
 from experiments.cases.workers.own import OwnWorkers
 from experiments.errors import InputError
 
@@ -91,13 +92,14 @@ def simulate_batch(order: Order) -> None:
         line = _Line(order, Queue(order.channel), get_worker())
         wanted = line.ask()
         folder = order.checkpoint
-        OwnWorkers(own_device(), 1).simulate(
-            [order.cases[index] for index in wanted],
-            order.engine,
-            lambda number, result: line.send(index=wanted[number], result=result),
-            line.report,
-            folder if folder and Path(folder).is_dir() else None,
-        )
+        with line.outbox:
+            OwnWorkers(own_device(), 1).simulate(
+                [order.cases[index] for index in wanted],
+                order.engine,
+                lambda number, result: line.send(index=wanted[number], result=result),
+                line.report,
+                folder if folder and Path(folder).is_dir() else None,
+            )
 
 
 def fingerprint_of(cases: Sequence[Case]) -> str:
@@ -106,12 +108,17 @@ def fingerprint_of(cases: Sequence[Case]) -> str:
 
 
 class _Line:
-    """The way from a worker to the client."""
+    """The way from a worker to the client.
+
+    The scheduler takes some milliseconds for a message, in which a GPU would stand still: so the outbox sends
+    what the simulation says, while it goes on.
+    """
 
     def __init__(self, order: Order, queue: Any, worker: Any) -> None:
         self._order, self._queue, self._worker = order, queue, worker
         self._task = worker.get_current_task()
         self._reported = time.monotonic()
+        self.outbox = Outbox(self._put)
 
     def ask(self) -> list[int]:
         """Ask which cases are wanted: another worker may have sent some before it was lost."""
@@ -119,7 +126,7 @@ class _Line:
 
         reply = Queue(f"{self._order.channel}-{uuid.uuid4().hex}")
         try:
-            self.send(reply=reply.name)
+            self._put([Message(self._order.number, reply=reply.name)])
             return list(reply.get(timeout=PATIENCE))
         except TimeoutError:
             raise GoneError("the client gave no answer") from None
@@ -127,11 +134,15 @@ class _Line:
             reply.close()
 
     def send(self, **said: Any) -> None:
-        """Send a message; GoneError where nobody listens."""
+        """Leave a message to the outbox; GoneError where nobody listens."""
         task = self._worker.state.tasks.get(self._task)
         if task is None or task.state == "cancelled":
             raise GoneError("the batch was taken back")
-        self._queue.put(pickle.dumps(Message(self._order.number, **said)))
+        self.outbox.give(Message(self._order.number, **said))
+
+    def _put(self, messages: list[Message]) -> None:
+        """Send messages as one, and wait until the scheduler has it."""
+        self._queue.put(pickle.dumps(messages))
 
     def report(self, progress: Progress) -> None:
         """Send how far the batch is, now and then."""

@@ -199,20 +199,26 @@ class _Session:
     def _listen(self) -> None:
         """Take what the workers say, waiting a while for a first word."""
         try:
-            self._hear(self._queue.get(timeout=LISTEN))
+            said = self._queue.get(timeout=LISTEN)
         except TimeoutError:
             self.wave.report()
+        else:
+            self._hear_each(said)
         self._hear_all()
 
     def _hear_all(self) -> None:
         """Take all that has been said."""
         for said in self._queue.get(batch=True):
-            self._hear(said)
+            self._hear_each(said)
 
-    def _hear(self, said: bytes) -> None:
+    def _hear_each(self, said: bytes) -> None:
+        """Take messages that a worker sent as one."""
+        for message in pickle.loads(said):
+            self._hear(message)
+
+    def _hear(self, message: Message) -> None:
         from distributed import Queue
 
-        message: Message = pickle.loads(said)
         members = self.batches[message.number]
         if message.reply:
             places = [place for place, index in enumerate(members) if index not in self.wave.results]

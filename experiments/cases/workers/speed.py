@@ -28,7 +28,7 @@ from dem_warp import (
 )
 from experiments.cases.cost import Cost, cost_of
 from experiments.cases.engine import Engine
-from experiments.cases.workers.batches import FULL_GRAINS, WORLDS, rounds_of
+from experiments.cases.workers.batches import WORLDS, rounds_of
 from experiments.cases.workers.workers import Workers
 from experiments.files import read_file, write_text
 
@@ -60,27 +60,49 @@ class Speed:
     """Of a neighbour list's entry, for each skin that the fastest grain uses up [s]; see `Cost.looked`."""
     mesh: float = 1.0
     """Times that a step of grains takes where a wall is a mesh."""
+    world_step: float = 0.0
+    """Of a world in a step of a launch on a GPU: its scene is looked after by the host, one world after
+    another, while the device waits [s]."""
 
     @property
     def text(self) -> str:
         """Its numbers, as a phrase."""
         sphere, look = 1e9 * self.sphere_step, 1e9 * self.look_step
         more = f"{look:.3g} ns a neighbour and skin" if look > 0.0 else f"{sphere:.3g} ns a sphere"
+        world = f", {1e9 * self.world_step:.3g} ns a world" if self.world_step > 0.0 else ""
         return (
-            f"{1e6 * self.step:.3g} us a step, {1e9 * self.grain_step:.3g} ns a grain and {more} beyond, "
-            f"{self.mesh:.3g} times that where walls are meshes, {self.start:.2g} s to start"
+            f"{1e6 * self.step:.3g} us a step{world}, {1e9 * self.grain_step:.3g} ns a grain and {more} "
+            f"beyond, {self.mesh:.3g} times that where walls are meshes, {self.start:.2g} s to start"
         )
 
     def seconds(self, cost: Cost) -> float:
         """Wall time of a case on a worker of its own [s]."""
+        return cost.steps * (self.step + self._grains_seconds(cost))
+
+    def launch_seconds(self, costs: Sequence[Cost], launches: int = 1) -> float:
+        """Wall time of a launch on a GPU, one of so many like it that some cases are dealt out to [s].
+
+        Notes
+        -----
+        A step of a launch waits for its kernels, one after another, however little they do; beside that its
+        grains take time only as far as they fill the device. The longer of the two hides the other, but for
+        the corner, which the root of the sum of squares rounds off. The host's looks hide nothing. This form
+        was chosen on the first twelve waves of `experiments.benchmarks.cluster.waves`, run on an H100.
+        """
+        grains = sum(self._grains_seconds(cost) for cost in costs) / launches
+        step = self.world_step * len(costs) / launches + math.hypot(self.step, grains)
+        return max(cost.steps for cost in costs) * step
+
+    def _grains_seconds(self, cost: Cost) -> float:
+        """Time of the grains of a step, by themselves [s]."""
         each = self.grain_step * cost.moved + self.look_step * cost.looked
         dearer = cost.law * (self.mesh if cost.meshed else 1.0)
-        return cost.steps * (self.step + dearer * (each + self.sphere_step * cost.spheres))
+        return dearer * (each + self.sphere_step * cost.spheres)
 
 
 TYPICAL = {
     False: Speed(1.0e-5, 0.0, 3.0, grain_step=2.5e-7, look_step=7.0e-7, mesh=1.8),
-    True: Speed(1.0e-5, 1.0e-10, 5.0),
+    True: Speed(3.0e-5, 1.0e-10, 5.0, grain_step=1.5e-9, mesh=2.0, world_step=2.5e-7),
 }
 """Speeds of a core and of a large GPU, where none was measured: a first guess of the time left."""
 
@@ -91,10 +113,14 @@ def user_folder() -> Path:
 
 
 def stored_speed(machine: str) -> Speed | None:
-    """Speed that was measured of a machine; None where it never was, or before meshes were."""
+    """Speed that was measured of a machine; None where it never was, or in an earlier form.
+
+    The earlier ones had no meshes, and on a GPU, where nobody counts neighbours, no worlds.
+    """
     try:
         stored = _stored()[machine]
-        return Speed(**stored) if "mesh" in stored else None
+        earlier = "mesh" not in stored or not ("world_step" in stored or stored["look_step"])
+        return None if earlier else Speed(**stored)
     except (KeyError, TypeError):
         return None
 
@@ -120,13 +146,8 @@ def wave_seconds(costs: Sequence[Cost], speed: Speed, workers: int, on_gpu: bool
     if not costs:
         return 0.0
     if on_gpu:
-        grains, spheres = (sum(getattr(cost, name) for cost in costs) for name in ("grains", "spheres"))
-        rounds, longest = rounds_of(len(costs), grains, workers), max(cost.steps for cost in costs)
-        share = min(rounds * workers, len(costs))
-        dearest, meshed = max(cost.law for cost in costs), any(cost.meshed for cost in costs)
-        size = math.ceil(grains / share), math.ceil(spheres / share)
-        launch = Cost(*size, longest, law=dearest, meshed=meshed)
-        return speed.start + rounds * speed.seconds(launch)
+        rounds = rounds_of(len(costs), sum(cost.grains for cost in costs), workers)
+        return speed.start + rounds * speed.launch_seconds(costs, min(rounds * workers, len(costs)))
     alone = np.array([speed.seconds(cost) for cost in costs])
     return speed.start + max(float(alone.sum()) / workers, float(alone.max()))
 
@@ -159,42 +180,123 @@ BALLS_LOOKED, CLUMPS_LOOKED, BOX_LOOKED = 17.7, 64.1, 43.1
 FEW = 30
 """Balls of the case whose steps cost least."""
 
+SOME, CROWD = 32, 3.0
+"""Worlds of a launch that is far from full, each with its own seed, so that one or another always makes its
+lists anew, as in a study; and the duration of the same in as many worlds as a launch holds [s]."""
+
+WIDE_BOX, WIDE_BOXES = 2.0, 64
+"""Times that the box on a GPU is as wide, and its worlds: few, since meshes are made for each by the host."""
+
 
 def measure_speed(workers: Workers, clock: Clock = time.perf_counter) -> Speed:
-    """Measure workers by five waves of reference cases, as many as there are workers or fill them.
+    """Measure workers by waves of reference cases, as many as there are workers or fill them.
 
     A few balls for short and for long give the start of a wave and the step; waves of many balls and of
     clumps of nine spheres give what a grain costs, and what its neighbours (on a GPU its spheres); a box of
-    balls whose walls are meshes gives what those cost. Another clock than that of the wall gives times of its
-    own.
+    balls whose walls are meshes gives what those cost. On a GPU a launch of as many worlds as it holds, of a
+    few balls each, gives what a world costs. Another clock than that of the wall gives times of its own.
     """
-    count = workers.count
-    few, long = few_spheres(), _reference(FEW, 1, duration=12.0)
-    workers.simulate([few])  # compiles what the next one would
-    short_seconds, short_steps = _timed(workers, [few] * count, clock)
-    long_seconds, long_steps = _timed(workers, [long] * count, clock)
-    least = max((long_seconds - short_seconds) / max(long_steps - short_steps, 1), 1e-7)
-    start = max(short_seconds - short_steps * least, 0.0)
-    sizes, taken = [(float(FEW), FEW if workers.on_gpu else 0.0)], [least]
+    workers.simulate([few_spheres()])  # compiles what the next ones would
+    speed = _measured_gpus(workers, clock) if workers.on_gpu else _measured_cores(workers, clock)
+    count = f"{workers.count} {'worker' if workers.count == 1 else 'workers'}"
+    return replace(speed, on=f"{time.strftime('%Y-%m-%d')}, {count}")
+
+
+def _measured_cores(workers: Workers, clock: Clock) -> Speed:
+    """Speed of workers on CPUs, of which each has one case of a wave."""
+
+    def copies(case: Case[Any]) -> list[Case[Any]]:
+        return [case] * workers.count
+
+    start, least = _start_and_step(workers, clock, copies)
+    sizes, taken = [(float(FEW), 0.0)], [least]
     references: list[tuple[float, Case[Any]]] = [
         (BALLS_LOOKED, _reference(*BALLS)),
         (CLUMPS_LOOKED, _reference(*CLUMPS)),
         (BOX_LOOKED, _box()),
     ]
     for looked, case in references:
-        cost = cost_of(case)
-        copies = min(math.ceil(FULL_GRAINS / cost.grains), WORLDS) if workers.on_gpu else 1
         workers.simulate([case])
-        seconds, steps = _timed(workers, [case] * (count * copies), clock)
-        third = cost.spheres if workers.on_gpu else looked
-        sizes.append((copies * cost.moved, copies * third))
+        seconds, steps = _timed(workers, copies(case), clock)
+        sizes.append((cost_of(case).moved, looked))
         taken.append((seconds - start) / steps)
-    step, grain, third = split_costs(sizes[:3], taken[:3])
-    mesh = (taken[3] - step) / max(grain * sizes[3][0] + third * sizes[3][1], 1e-9)
-    day = time.strftime("%Y-%m-%d")
-    on = f"{day}, {count} {'worker' if count == 1 else 'workers'}"
-    sphere, look = (third, 0.0) if workers.on_gpu else (0.0, third)
-    return Speed(step, sphere, start, on, grain, look, max(mesh, 1.0))
+    step, grain, look = split_costs(sizes[:3], taken[:3])
+    mesh = (taken[3] - step) / max(grain * sizes[3][0] + look * sizes[3][1], 1e-9)
+    return Speed(step, 0.0, start, grain_step=grain, look_step=look, mesh=max(mesh, 1.0))
+
+
+def _measured_gpus(workers: Workers, clock: Clock) -> Speed:
+    """Speed of GPUs, of which each has one launch of a wave."""
+
+    def seeds(case: Case[Any], worlds: int = SOME) -> list[Case[Any]]:
+        return [replace(case, seed=1 + number) for number in range(worlds * workers.count)]
+
+    start, least = _start_and_step(workers, clock, seeds)
+    sizes, taken = [_launch(few_spheres(), SOME)], [least]
+    references: list[tuple[Case[Any], int]] = [
+        (_reference(FEW, 1, duration=CROWD), WORLDS),
+        (_reference(*BALLS), WORLDS),
+        (_reference(*CLUMPS), WORLDS),
+        (_box(WIDE_BOX), WIDE_BOXES),
+    ]
+    for case, worlds in references:
+        workers.simulate([case])
+        seconds, steps = _timed(workers, seeds(case, worlds), clock)
+        sizes.append(_launch(case, worlds))
+        taken.append((seconds - start) / steps)
+    step, world, grain, sphere = split_launches(sizes[:4], taken[:4])
+    boxes, grains, spheres = sizes[4]
+    by_grains = math.sqrt(max(taken[4] - world * boxes, step) ** 2 - step**2)
+    mesh = by_grains / max(grain * grains + sphere * spheres, 1e-9)
+    return Speed(step, sphere, start, "", grain, mesh=max(mesh, 1.0), world_step=world)
+
+
+def _start_and_step(
+    workers: Workers, clock: Clock, copies: Callable[[Case[Any]], list[Case[Any]]]
+) -> tuple[float, float]:
+    """Time to the first step of a wave, and of a step of a few balls [s]."""
+    short_seconds, short_steps = _timed(workers, copies(few_spheres()), clock)
+    long_seconds, long_steps = _timed(workers, copies(_reference(FEW, 1, duration=12.0)), clock)
+    least = max((long_seconds - short_seconds) / max(long_steps - short_steps, 1), 1e-7)
+    return max(short_seconds - short_steps * least, 0.0), least
+
+
+def _launch(case: Case[Any], worlds: int) -> tuple[float, float, float]:
+    """Worlds of a launch, the grains that it moves and their spheres."""
+    cost = cost_of(case)
+    return float(worlds), worlds * cost.moved, float(worlds * cost.spheres)
+
+
+def split_launches(
+    sizes: Sequence[tuple[float, float, float]], taken: Sequence[float]
+) -> tuple[float, float, float, float]:
+    """Split times of launches' steps into those of a step, a world, a grain and a sphere, as they add up.
+
+    Parameters
+    ----------
+    sizes
+        Worlds, grains and spheres of a launch.
+    taken
+        Time of its step [s].
+
+    See Also
+    --------
+    Speed.launch_seconds : how they add up.
+    """
+    from scipy.optimize import least_squares
+
+    worlds, grains, spheres = np.array(sizes, dtype=np.float64).T
+    guess = TYPICAL[True]
+
+    def off(logarithms: np.ndarray) -> np.ndarray:
+        step, world, grain, sphere = np.exp(logarithms)
+        told = world * worlds + np.hypot(step, grain * grains + sphere * spheres)
+        return np.asarray(np.log(told / np.array(taken)))
+
+    # logarithms, as no time is negative
+    first = np.log([guess.step, guess.world_step, guess.grain_step, guess.sphere_step])
+    step, world, grain, sphere = np.exp(least_squares(off, first).x)
+    return float(step), float(world), float(grain), float(sphere)
 
 
 def split_costs(sizes: Sequence[tuple[float, float]], taken: Sequence[float]) -> tuple[float, float, float]:
@@ -216,11 +318,12 @@ def split_costs(sizes: Sequence[tuple[float, float]], taken: Sequence[float]) ->
     return max(float(step), 1e-7), float(grain), float(other)
 
 
-def _timed(workers: Workers, cases: Sequence[Case], clock: Clock) -> tuple[float, int]:
-    """Time of a wave [s], and steps of a case."""
+def _timed(workers: Workers, cases: Sequence[Case], clock: Clock) -> tuple[float, float]:
+    """Time of a wave [s], and steps of its cases in the mean, as a prediction has them."""
     started = clock()
     results = workers.simulate(cases)
-    return clock() - started, _steps(results[0])
+    seconds = clock() - started
+    return seconds, sum(map(_steps, results)) / len(results)
 
 
 def _steps(result: CaseResult) -> int:
@@ -251,7 +354,8 @@ def _reference(grains: int, spheres: int, duration: float | None = None) -> Case
     )
 
 
-def _box() -> Case[DrawDown]:
-    """Case of a small box of balls with a slot, whose walls are meshes."""
+def _box(times: float = 1.0) -> Case[DrawDown]:
+    """Case of a small box of balls with a slot, whose walls are meshes; so many times as wide."""
     like: Case[Any] = _reference(*BALLS)
-    return replace(like, scene=DrawDown(0.04, 0.016, 0.02, 0.024, 0.03, like.scene.wall_material))
+    width, depth, height, slot, drop = (times * size for size in (0.04, 0.016, 0.02, 0.024, 0.03))
+    return replace(like, scene=DrawDown(width, depth, height, slot, drop, like.scene.wall_material))

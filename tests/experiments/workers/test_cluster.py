@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import pickle
 import signal
 import subprocess
 import sys
@@ -70,10 +69,9 @@ def test_workers_that_are_killed_lose_no_case_and_none_is_done_twice(
     told: Counter[int] = Counter()
     begun: list[int] = []
 
-    def kill(session: dask_workers._Session, said: bytes) -> None:
+    def kill(session: dask_workers._Session, message: dask_task.Message) -> None:
         """Hear what a worker says; as the third batch has just begun, kill all workers."""
-        hear(session, said)
-        message = pickle.loads(said)
+        hear(session, message)
         if message.reply:
             begun.append(message.number)
             if len(begun) == 3:

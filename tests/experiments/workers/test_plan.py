@@ -3,23 +3,28 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
-from dataclasses import replace
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 import warp as wp
 from commandline import dem_warp
 
-from dem_warp import Progress
+from dem_warp import Case, Progress
 from experiments import api
 from experiments.cases import OwnWorkers
-from experiments.cases.cost import EMPTY, Cost
+from experiments.cases.cost import EMPTY, Cost, cost_of
 from experiments.cases.workers.speed import (
     SPEEDS,
     Speed,
+    measure_speed,
     split_costs,
+    split_launches,
     store_speed,
     stored_speed,
     user_folder,
@@ -52,9 +57,72 @@ def test_a_wave_takes_what_its_workers_share_and_no_less_than_its_longest_case()
     one = 1000.0 * 2.0e-4
     assert wave_seconds([small] * 8, SPEED, 2, on_gpu=False) == pytest.approx(2.0 + 4 * one)
     assert wave_seconds([small, large], SPEED, 2, on_gpu=False) == pytest.approx(2.0 + 10000.0 * 1.0e-3)
-    # On a GPU all worlds of a launch take their steps together.
-    assert wave_seconds([small] * 8, SPEED, 1, on_gpu=True) == pytest.approx(2.0 + 1000.0 * 9.0e-4)
     assert wave_seconds([], SPEED, 1, on_gpu=True) == 0.0
+
+
+GPU = Speed(3.0e-5, 1.0e-10, 0.5, grain_step=1.5e-9, mesh=2.0, world_step=2.5e-7)
+
+
+def launched(grains: int, worlds: int = 1, **about: Any) -> float:
+    """Time of a step of a wave of balls on one GPU, beyond the looks of the host [s]."""
+    wave = [Cost(grains, grains, 1000.0, **about)] * worlds
+    return (wave_seconds(wave, GPU, 1, on_gpu=True) - GPU.start) / 1000.0 - worlds * GPU.world_step
+
+
+def test_a_launch_that_fills_no_gpu_takes_its_kernels_time_whatever_its_grains() -> None:
+    assert launched(10) == pytest.approx(GPU.step, rel=1e-5)
+    # a few grains hide behind the kernels, even those that meshes or a law make dearer
+    for more in (launched(2_000), launched(1_000, meshed=True), launched(1_000, law=2.0)):
+        assert GPU.step < more < 1.01 * GPU.step
+
+
+def test_a_full_gpu_takes_twice_as_long_for_twice_as_many_grains_or_dearer_ones() -> None:
+    full = launched(1_000, worlds=300)
+    for twice in (launched(1_000, 600), launched(1_000, 300, meshed=True), launched(1_000, 300, law=2.0)):
+        assert twice == pytest.approx(2.0 * full, rel=0.01)
+    # it makes no difference to the device which worlds grains are in, and grains that are gone cost less
+    assert launched(3_000, worlds=100) == pytest.approx(full)
+    assert launched(1_000, worlds=300, present=0.0) < 0.25 * full
+
+
+def test_every_world_of_a_launch_takes_the_host_its_time() -> None:
+    wave = [Cost(1, 1, 1000.0)]
+    alone, many = (wave_seconds(wave * worlds, GPU, 1, on_gpu=True) for worlds in (1, 1001))
+    assert many - alone == pytest.approx(1000.0 * 1000 * GPU.world_step, rel=0.01)
+    # two GPUs have half of the worlds each, and more than a launch holds come one launch after another
+    two = wave_seconds(wave * 2000, GPU, 2, on_gpu=True)
+    assert two == pytest.approx(wave_seconds(wave * 1000, GPU, 1, on_gpu=True))
+    rounds = wave_seconds(wave * 2000, GPU, 1, on_gpu=True)
+    assert rounds - GPU.start == pytest.approx(2.0 * (two - GPU.start))
+
+
+def test_the_measurement_finds_the_speed_of_gpus_that_keep_to_it() -> None:
+    now = [0.0]
+
+    def simulate(cases: Sequence[Case[Any]]) -> list[Any]:
+        costs = [cost_of(case) for case in cases]
+        now[0] += wave_seconds(costs, GPU, 2, on_gpu=True)
+        return [SimpleNamespace(phases=[{"steps": cost.steps}]) for cost in costs]
+
+    workers: Any = SimpleNamespace(count=2, on_gpu=True, simulate=simulate)
+    found = measure_speed(workers, lambda: now[0])
+    assert found.on.endswith(", 2 workers")
+    assert replace(found, on="") == replace(
+        GPU, **{name: pytest.approx(value, rel=0.01) for name, value in asdict(GPU).items() if name != "on"}
+    )
+
+
+def test_times_of_launches_are_split_into_what_they_were_made_of() -> None:
+    made = (2.7e-5, 3.1e-7, 1.7e-9, 1.3e-10)
+    sizes = [(32.0, 960.0, 960.0), *((1024.0, *each) for each in ((3e4, 3e4), (2.5e5, 2.5e5), (1e5, 9e5)))]
+    step, world, grain, sphere = made
+    taken = [
+        world * worlds + math.hypot(step, grain * grains + sphere * spheres)
+        for worlds, grains, spheres in sizes
+    ]
+    assert split_launches(sizes, taken) == pytest.approx(made, rel=1e-3)
+    # whatever noise there is, no time is negative
+    assert min(split_launches(sizes, [taken[0], *(0.2 * seconds for seconds in taken[1:])])) >= 0.0
 
 
 def test_the_cost_of_a_step_is_split_into_what_it_was_made_of() -> None:
@@ -85,6 +153,13 @@ def test_speeds_are_stored_for_each_machine_and_a_damaged_file_is_none() -> None
         '{"old": {"step": 1.0, "sphere_step": 1.0, "start": 1.0}}', encoding="utf-8"
     )
     assert stored_speed("old") is None
+    # and so is a GPU that was before its worlds were; a core has none
+    core = asdict(Speed(4.0e-6, 0.0, 2.0, grain_step=1.8e-7, look_step=4.4e-7, mesh=1.6))
+    gpu = asdict(Speed(2.5e-5, 3.0e-10, 0.03, grain_step=2.4e-9, mesh=2.5))
+    del core["world_step"], gpu["world_step"]
+    (user_folder() / "speeds.json").write_text(json.dumps({"core": core, "GPU": gpu}), encoding="utf-8")
+    assert stored_speed("core") == Speed(**core)
+    assert stored_speed("GPU") is None
     (user_folder() / "speeds.json").write_text('{"another": {"step": 1}', encoding="utf-8")
     assert stored_speed("another") is None
 
