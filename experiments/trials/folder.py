@@ -16,7 +16,7 @@ DECLARED, SEALED, LABELS = "declared.json", "sealed.csv", "labels.json"
 FINDINGS, RUNS, NOTES, PAGE = "findings.csv", "runs.csv", "notes.md", "README.md"
 REALITY, HEAPS = "reality.json", "heaps.zip"
 """Files of a record; labels are there of what has been analysed, notes where something is to be said beside,
-and the reality and the measured heaps where another code made them."""
+the reality where another code made the heaps, and these where they are kept."""
 
 
 class Folder:

@@ -5,6 +5,8 @@
 
 The first takes over what was published, found and, of what has been analysed, hidden; the second writes the
 page again from the files of the record. Of a second reality the measured heaps go with it: they took hours.
+Those of the engine go with it by ``--heaps``, for other methods
+to be tried on them (`experiments.trials.baselines`).
 """
 
 from __future__ import annotations
@@ -24,8 +26,10 @@ from experiments.trials.trials_page import write_trials_page
 from experiments.trials.truth import opened, read_labels, read_sealed, revealed, write_labels
 
 
-def gather(folder: Folder, record: Path) -> None:
+def gather(folder: Folder, record: Path, heaps: bool = False) -> None:
     """Take a folder's files over into a record, with the labels of the trials that have been analysed.
+
+    The measured heaps go with them where another code made them, or where they are asked for.
 
     Raises
     ------
@@ -43,7 +47,7 @@ def gather(folder: Folder, record: Path) -> None:
     for source in files:
         copy_file(source, record / source.name)
     write_labels(record / LABELS, list(labels.values()))
-    if reality.is_file():
+    if heaps or reality.is_file():
         pack_heaps(folder, record / HEAPS)
 
 
@@ -51,13 +55,14 @@ def main(
     out: Annotated[Path, typer.Option(help="The record.")],
     folder: Annotated[Path | None, typer.Argument(help="Folder of the trials.")] = None,
     page_only: Annotated[bool, typer.Option("--page-only", help="Write the page again.")] = False,
+    heaps: Annotated[bool, typer.Option("--heaps", help="Keep the engine's measured heaps, too.")] = False,
 ) -> None:
     """Write the record of the trials."""
     if (folder is None) != page_only:
         raise typer.BadParameter("give the folder of the trials, or --page-only")
     with clear_errors():
         if folder is not None:
-            gather(Folder(folder), out)
+            gather(Folder(folder), out, heaps)
         print(write_trials_page(out))
 
 

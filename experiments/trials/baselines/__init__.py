@@ -2,6 +2,6 @@
 
 python -m experiments.trials.baselines.draw                         # the benchmark's banks and trials, once
 python -m experiments.trials.baselines.run out/baselines            # every method on them
-python -m experiments.trials.baselines.run out/measured out/trials  # on a folder of measured trials
+python -m experiments.trials.baselines.run out/measured out/trials  # a folder of measured trials, or a record
 python -m experiments.trials.baselines.record out/baselines --out experiments/trials/record/baselines
 """

@@ -11,7 +11,7 @@ import pandas as pd
 from scipy import stats
 
 from experiments.trials.drawing import STRONG
-from experiments.trials.score import Share, share
+from experiments.trials.score import POWER_EDGES, Share, share
 from experiments.trials.truth import Kind, Label
 
 FOREIGN = (Kind.WITHHELD, Kind.STRANGER)
@@ -26,7 +26,7 @@ def judged(answers: pd.DataFrame, labels: Mapping[str, Label]) -> pd.DataFrame:
     They get ``kind``, ``multiple`` (of a pair the smaller), and the judgement: ``named_right`` (what is
     hidden and nothing else), ``tied_right`` (a tie with it among the rivals), ``wrong`` (a name, not a tie,
     that is not hidden, or not in the library), ``right`` (no alarm where nothing is hidden, the right name,
-    unknown where the library lacks it).
+    unknown where the library lacks it). A mechanism that was declared not resolvable is in the library.
     """
     rows = [_judged(row, labels[str(row["trial"])]) for row in answers.to_dict("records")]
     return pd.concat([answers.reset_index(drop=True), pd.DataFrame(rows)], axis=1)
@@ -34,7 +34,7 @@ def judged(answers: pd.DataFrame, labels: Mapping[str, Label]) -> pd.DataFrame:
 
 def _judged(answer: Mapping[Any, Any], label: Label) -> dict[str, object]:
     named, truth = set(str(answer["named"]).split()), set(label.mechanisms)
-    known = label.kind in (Kind.SINGLE, Kind.PAIR)
+    known = label.kind in (Kind.SINGLE, Kind.PAIR, Kind.UNRESOLVED)
     name_right = known and not answer["tied"] and named == truth
     right = name_right
     if label.kind is Kind.NULL:
@@ -49,6 +49,15 @@ def _judged(answer: Mapping[Any, Any], label: Label) -> dict[str, object]:
         "wrong": bool(named and not answer["tied"] and not (known and named <= truth)),
         "right": bool(right),
     }
+
+
+def held(answers: pd.DataFrame, allowed: Sequence[str]) -> pd.DataFrame:
+    """Hold answers to names that were declared resolvable: one that has another becomes *unknown*."""
+    names = answers["named"].astype(str).str.split()
+    other = names.map(lambda named: bool(set(named) - set(allowed))).astype(bool)
+    beyond = other & ~answers["tied"].astype(bool)
+    unknown = answers["unknown"].astype(bool) | beyond
+    return answers.assign(unknown=unknown, named=answers["named"].mask(beyond, ""))
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,9 +193,12 @@ def _area(positive: np.ndarray, negative: np.ndarray) -> str:
 def power(table: pd.DataFrame, column: str) -> pd.DataFrame:
     """Share of trials of one mechanism with something true (``alarm``, ``named_right``), by size.
 
-    Rows are multiples of the detectable size, columns methods; the first column is the number of trials.
+    Rows are classes of sizes by the mean of their multiples of the detectable one, columns methods; the first
+    column is the number of trials.
     """
     singles = table[table["kind"] == Kind.SINGLE]
+    classes = pd.cut(singles["multiple"], POWER_EDGES, labels=False)
+    singles = singles.assign(multiple=singles.groupby(classes)["multiple"].transform("mean").round(2))
     shares = singles.pivot_table(index="multiple", columns="method", values=column, aggfunc="mean", sort=True)
     shares = shares[list(dict.fromkeys(singles["method"]))]
     shares.insert(0, "trials", singles.groupby("multiple")["trial"].nunique())
@@ -219,6 +231,12 @@ def paired(first: pd.Series, second: pd.Series) -> Paired:
     return Paired(int((one & ~other).sum()), int((other & ~one).sum()), len(both))
 
 
+def due(answers: pd.DataFrame) -> pd.Series:
+    """True where one answer is due: all but weak effects, and what was declared not resolvable."""
+    weak = (answers["kind"] == Kind.SINGLE) & (answers["multiple"] < STRONG)
+    return ~weak & (answers["kind"] != Kind.UNRESOLVED)
+
+
 def comparisons(table: pd.DataFrame, reference: str) -> pd.DataFrame:
     """Paired comparisons of a reference with every other method, as text.
 
@@ -230,7 +248,7 @@ def comparisons(table: pd.DataFrame, reference: str) -> pd.DataFrame:
     for name, answers in table[table["method"] != reference].groupby("method", sort=False):
         other = answers.set_index("trial")
         nulls = own["kind"] == Kind.NULL
-        full = (own["kind"] != Kind.SINGLE) | (own["multiple"] >= STRONG)
+        full = due(own)
         rows.append(
             {
                 "method": name,

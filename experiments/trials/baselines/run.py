@@ -2,38 +2,32 @@
 
     python -m experiments.trials.baselines.run out/baselines --count 120
     python -m experiments.trials.baselines.run out/measured out/trials
+    python -m experiments.trials.baselines.run out/ninth experiments/trials/record/ninth
 
-The second takes a folder as `experiments.trials.generate` and `experiments.trials.run` leave it; what the
-search found there is not looked for again. Answers are kept as trials end; called again, it goes on.
+The second takes a folder as `experiments.trials.generate` and `experiments.trials.run` leave it, the third a
+record with its heaps; what the search found there is not looked for again. Answers are kept as trials end;
+called again, it goes on.
 """
 
 from __future__ import annotations
 
 import math
 import time
-import zlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from doe.discrepancy import fit_emulator
 from experiments.commands.console import clear_errors
-from experiments.discover.search import Search
 from experiments.errors import InputError
-from experiments.studyfile import load_study
 from experiments.trials.baselines import benchmark_files
 from experiments.trials.baselines.answers_table import add_answer, answered, file_of
 from experiments.trials.baselines.benchmark_files import load_benchmark
 from experiments.trials.baselines.draw import fresh_runs
 from experiments.trials.baselines.library import methods
+from experiments.trials.baselines.measured import measured_problems
 from experiments.trials.baselines.protocol import Method, Problem
-from experiments.trials.declaration import read_declaration
-from experiments.trials.desk import read_data
-from experiments.trials.folder import Folder
-from experiments.trials.generate import STUDY, bank_beside
-from experiments.trials.truth import read_sealed
 
 
 def emulated_problems(folder: Path, count: int | None) -> Iterator[Problem]:
@@ -41,19 +35,6 @@ def emulated_problems(folder: Path, count: int | None) -> Iterator[Problem]:
     benchmark = load_benchmark(folder)
     for trial in benchmark.trials[:count]:
         yield benchmark.problem(trial)
-
-
-def measured_problems(folder: Folder, bank: Path | None, count: int | None) -> Iterator[Problem]:
-    """Pose the first so many trials of a folder that have heaps."""
-    declaration = read_declaration(folder.declared)
-    study = load_study(STUDY, declaration.scale or None)
-    emulator = fit_emulator(Search.of(study).read_bank(bank or bank_beside(declaration.scale)))
-    sealed = [trial for trial in read_sealed(folder.sealed) if folder.measured(trial.trial).exists()][:count]
-    measured, _ = read_data(folder, sealed, study)
-    for trial in sealed:
-        if trial.trial in measured:
-            known, seed = emulator.without(*trial.withheld), zlib.crc32(trial.trial.encode())
-            yield Problem(trial.trial, known, measured[trial.trial], declaration.settings, seed)
 
 
 def answer_all(out: Path, problems: Iterator[Problem], wanted: Mapping[str, Method], seconds: float) -> int:
@@ -90,7 +71,9 @@ def chosen(names: str, known: Mapping[str, Method]) -> dict[str, Method]:
 
 def main(
     out: Annotated[Path, typer.Argument(help="Folder of the answers.")],
-    folder: Annotated[Path | None, typer.Argument(help="Folder of measured trials; left out: none.")] = None,
+    folder: Annotated[
+        Path | None, typer.Argument(help="Measured trials, or a record; left out: none.")
+    ] = None,
     benchmark: Annotated[Path, typer.Option(help="Folder of the benchmark.")] = benchmark_files.FOLDER,
     bank: Annotated[Path | None, typer.Option(help="Bank of measured trials; left out: its own.")] = None,
     names: Annotated[str, typer.Option("--methods", help="Names parted by ';'; left out: all.")] = "",
@@ -102,7 +85,7 @@ def main(
         if folder is None:
             problems, wanted = emulated_problems(benchmark, count), chosen(names, methods(fresh_runs))
         else:
-            problems, wanted = measured_problems(Folder(folder), bank, count), chosen(names, methods(None))
+            problems, wanted = measured_problems(folder, bank, count), chosen(names, methods(None))
         answers = answer_all(out, problems, wanted, seconds)
         print(f"{answers} trials have an answer of every method: {out}")
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import shutil
+import zlib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +30,8 @@ from experiments.trials.baselines.compare import (
     areas,
     auroc,
     comparisons,
+    due,
+    held,
     judged,
     paired,
     power,
@@ -35,15 +39,24 @@ from experiments.trials.baselines.compare import (
 )
 from experiments.trials.baselines.draw import round_of
 from experiments.trials.baselines.library import ALONE, methods
+from experiments.trials.baselines.measured import measured_problems, open_labels, opened_trials
 from experiments.trials.baselines.protocol import Answer
 from experiments.trials.declaration import Declaration
 from experiments.trials.drawing import STRONG, Declared, Plan
-from experiments.trials.findings import EVERYTHING, PHOTOGRAPHS, Finding, findings_table, write_findings
+from experiments.trials.findings import (
+    EVERYTHING,
+    PHOTOGRAPHS,
+    VIEWS,
+    Finding,
+    findings_table,
+    write_findings,
+)
 from experiments.trials.folder import Folder
 from experiments.trials.generate import STUDY
-from experiments.trials.truth import Kind, Label, Sealed, write_labels, write_sealed
+from experiments.trials.truth import Kind, Label, Sealed, read_labels, write_labels, write_sealed
 
-KEPT = Path(benchmark_files.FOLDER).parents[1] / "record" / "baselines"
+RECORDS = Path(benchmark_files.FOLDER).parents[1] / "record"
+KEPT = RECORDS / "baselines"
 
 
 @pytest.fixture(scope="module")
@@ -146,7 +159,7 @@ def test_measured_trials_are_posed_as_the_search_has_them(tmp_path: Path) -> Non
     )
     folder.data.mkdir()
     shutil.copy(STUDY.with_name("tilted-bench.csv"), folder.measured("alone-001"))
-    [problem] = run.measured_problems(folder, None, None)  # the second has no heaps yet
+    [problem] = measured_problems(tmp_path)  # the second has no heaps yet
     assert problem.trial == "alone-001"
     assert "vibration" not in problem.emulator.space.names
     assert problem.settings == settings
@@ -154,6 +167,43 @@ def test_measured_trials_are_posed_as_the_search_has_them(tmp_path: Path) -> Non
     answer = methods(None)["lasso"](problem)
     assert answer.alarm
     assert set(answer.named) <= {"plate_tilt"}
+
+
+@pytest.mark.parametrize("series", ["eighth", "ninth"])
+def test_a_record_with_its_heaps_is_posed_as_its_folder_is(series: str) -> None:
+    [problem] = measured_problems(RECORDS / series, count=1)
+    assert problem.trial == "alone-001"
+    # the search has no outlines with every observable
+    assert set(problem.measured.observables) <= set(VIEWS[EVERYTHING])
+    assert problem.measured.values["base"].shape[0] == 8  # noqa: PD011
+    assert problem.seed == zlib.crc32(b"alone-001.everything")
+    assert problem.settings.resolvable == ("liquid_bridges", "plate_tilt", "rolling_torque")
+
+
+def test_a_place_without_heaps_is_refused() -> None:
+    with pytest.raises(InputError, match="needs measured heaps"):
+        next(measured_problems(RECORDS / "seventh"))
+
+
+def test_labels_are_open_of_what_the_search_has_analysed_and_of_nothing_else(tmp_path: Path) -> None:
+    folder, labels = Folder(tmp_path), [_label("seen", Kind.NULL), _label("unseen", Kind.NULL)]
+    write_labels_of(folder, labels)
+    with pytest.raises(InputError, match="needs findings"):
+        open_labels(folder)
+    rows = [Finding("seen", EVERYTHING, "none"), Finding("unseen", PHOTOGRAPHS, "none")]
+    write_findings(folder.findings, findings_table(rows))
+    assert open_labels(folder) == labels[:1]
+    write_labels_of(folder, [replace(labels[0], seed=2)], seals=labels)
+    with pytest.raises(InputError, match="must have the hash"):
+        open_labels(folder)
+
+
+def write_labels_of(folder: Folder, labels: list[Label], seals: list[Label] | None = None) -> None:
+    """Hide labels in a folder, and seal them, or others."""
+    for place in (folder.hidden, folder.record):
+        place.mkdir(exist_ok=True)
+    write_labels(folder.hidden_labels, labels)
+    write_sealed(folder.sealed, [Sealed(one.trial, "alone", (), one.hash) for one in seals or labels])
 
 
 def test_findings_of_measured_trials_are_answers_of_the_search(tmp_path: Path) -> None:
@@ -232,6 +282,59 @@ def test_answers_are_judged_by_what_is_hidden(tmp_path: Path) -> None:
     [row] = comparisons(table, ALONE).to_dict("records")
     assert row["no false alarm"].startswith("1 : 0 of 1")
     assert row["right answer"].startswith("4 : 0 of 4")
+
+
+def test_what_was_declared_not_resolvable_may_be_named_where_it_is_hidden_and_no_answer_is_due() -> None:
+    labels = {name: _label(name, Kind.UNRESOLVED, "a") for name in ("right", "wrong")}
+    rows = [
+        {"trial": "right", "alarm": True, "named": "a", "tied": False, "unknown": False},
+        {"trial": "wrong", "alarm": True, "named": "b", "tied": False, "unknown": False},
+    ]
+    answers = pd.DataFrame(rows).assign(method="m")
+    table = judged(answers, labels)
+    assert list(table["wrong"]) == [False, True]
+    assert not due(table).any()
+    bound = held(answers, ["b"])
+    assert list(bound["named"]) == ["", "b"]
+    assert list(bound["unknown"]) == [True, False]
+
+
+def test_sizes_that_differ_are_classed(tmp_path: Path) -> None:
+    sizes = {"s": 1.6, "t": 1.8, "u": 2.4}
+    labels = {name: _label(name, Kind.SINGLE, "a", multiple=size) for name, size in sizes.items()}
+    rows = [
+        {"trial": name, "alarm": name != "s", "named": "", "tied": False, "unknown": False} for name in sizes
+    ]
+    shares = power(judged(pd.DataFrame(rows).assign(method="m"), labels), "alarm")
+    assert list(shares.index) == [1.7, 2.4]
+    assert list(shares["trials"]) == [2, 1]
+    assert list(shares["m"]) == [0.5, 1.0]
+
+
+def test_records_within_a_record_stand_beside_it(tmp_path: Path) -> None:
+    _kept(tmp_path)
+    _kept(tmp_path / "other")
+    page = record.write_methods_page(tmp_path).read_text(encoding="utf-8")
+    beside = page[page.index("## On other heaps") :]
+    first = "0 of 1 | 1 of 1 | 1 of 1 | 1 of 1 | 0 of 5 | 1.000 | 1.000 |  |"
+    for heaps in ("emulated", "[other](other/README.md)"):
+        assert f"| {ALONE} | {heaps} | {first}" in beside
+    assert (
+        "| BIC | emulated | 1 of 1 | 0 of 1 | 0 of 1 | 0 of 1 | 2 of 5 | 0.750 |  | 4 : 0, p = 0.12 |"
+        in beside
+    )
+
+
+@pytest.mark.parametrize("series", ["eighth", "ninth"])
+def test_the_records_of_measured_trials_have_the_searchs_findings(series: str, tmp_path: Path) -> None:
+    kept = KEPT / series
+    assert (kept / "labels.json").read_bytes() == (RECORDS / series / "labels.json").read_bytes()
+    with opened_trials(RECORDS / series) as trials:
+        record.gather_search(trials, tmp_path)
+    assert file_of(tmp_path, "search").read_bytes() == file_of(kept, "search").read_bytes()
+    shutil.copytree(kept, tmp_path / series)
+    assert record.write_methods_page(tmp_path / series).read_bytes() == (kept / "README.md").read_bytes()
+    assert set(record.read_record(kept)["trial"]) == {one.trial for one in read_labels(kept / "labels.json")}
 
 
 def test_the_page_is_written_from_the_record_alone(tmp_path: Path) -> None:
