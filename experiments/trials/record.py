@@ -5,8 +5,8 @@
 
 The first takes over what was published, found and, of what has been analysed, hidden; the second writes the
 page again from the files of the record. Of a second reality the measured heaps go with it: they took hours.
-Those of the engine go with it by ``--heaps``, for other methods
-to be tried on them (`experiments.trials.baselines`).
+Those of the engine go with it by ``--heaps``, for other methods to be tried on them
+(`experiments.trials.baselines`).
 """
 
 from __future__ import annotations

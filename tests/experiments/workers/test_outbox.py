@@ -1,4 +1,4 @@
-"""What a worker says leaves while it simulates: it never waits, all arrives in order, and a client may go."""
+"""Messages of a worker leave while it simulates: it never waits, all arrive in order, and a client may go."""
 
 from __future__ import annotations
 
