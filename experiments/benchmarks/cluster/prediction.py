@@ -81,7 +81,7 @@ def _row(name: str, cases: list[Case], workers: OwnWorkers, speed: Speed, clock:
     # a failed case does not tell the steps of its last phase
     ends = [result.phases for result in results if result.status == "finished"]
     steps = sum(phase["steps"] for phases in ends for phase in phases) / len(ends) if ends else math.nan
-    told = wave_seconds(costs, speed, workers.count, on_gpu=workers.on_gpu)
+    told = wave_seconds(costs, speed, workers.count, workers.on_gpu, workers.sharing)
     row = {
         "study": name,
         "cases": len(cases),
