@@ -56,6 +56,7 @@ def main(
     workers = OwnWorkers("cuda" if gpu else "cpu", None if wall or gpu else 1)
     clock = time.perf_counter if wall or gpu else time.process_time
     speed = measure_speed(workers, clock)
+    print(speed.text, flush=True)
     parts, good, waves = [], 0, 0
     for name in table or SETS:
         what, made = SETS[name]
