@@ -272,7 +272,7 @@ def _measured_gpus(workers: Workers, clock: Clock) -> Speed:
         workers.simulate([case])
         seconds, steps = timed(case, worlds)
         sizes.append(_launch(case, worlds))
-        taken.append((seconds - start - each * worlds) / steps)
+        taken.append(max((seconds - start - each * worlds) / steps, 1e-7))
     step, world, grain, sphere = split_launches(sizes[:4], taken[:4])
     boxes, grains, spheres = sizes[4]
     by_grains = math.sqrt(max(taken[4] - world * boxes, step) ** 2 - step**2)
