@@ -61,8 +61,8 @@ class Speed:
     mesh: float = 1.0
     """Times that a step of grains takes where a wall is a mesh."""
     world_step: float = 0.0
-    """Of a world in a step of a launch on a GPU: its scene is looked after by the host, one world after
-    another, while the device waits [s]."""
+    """Of a world with a heap in a step of a launch on a GPU: its scene is looked after by the host, one world
+    after another, while the device waits [s]; see `Cost.tended`."""
     world_start: float = 0.0
     """Of a world of a launch on a GPU, once: the host makes it and takes its result [s]."""
 
@@ -103,9 +103,9 @@ class Speed:
         a step of theirs takes as long as one alone, or as their kernels one after another.
         """
         grains = sum(self._grains_seconds(cost) for cost in costs) / launches
-        worlds, kernels = len(costs) / launches, math.hypot(self.step, grains)
-        step = max(self.world_step * worlds + kernels, sharing * kernels)
-        return self.world_start * worlds + max(cost.steps for cost in costs) * step
+        tended, kernels = sum(cost.tended for cost in costs) / launches, math.hypot(self.step, grains)
+        step = max(self.world_step * tended + kernels, sharing * kernels)
+        return self.world_start * len(costs) / launches + max(cost.steps for cost in costs) * step
 
     def _grains_seconds(self, cost: Cost) -> float:
         """Time of the grains of a step, by themselves [s]."""

@@ -90,6 +90,9 @@ def test_every_world_of_a_launch_takes_the_host_its_time() -> None:
     wave = [Cost(1, 1, 1000.0)]
     alone, many = (wave_seconds(wave * worlds, GPU, 1, on_gpu=True) for worlds in (1, 1001))
     assert many - alone == pytest.approx(1000.0 * (1000 * GPU.world_step + GPU.world_start), rel=0.01)
+    dear = [Cost(1, 1, 1000.0, tended=3.0)] * 1001
+    more = wave_seconds(dear, GPU, 1, on_gpu=True) - many
+    assert more == pytest.approx(1000.0 * 1001 * 2.0 * GPU.world_step, rel=1e-6)
     # two GPUs have half of the worlds each, and more than a launch holds come one launch after another
     two = wave_seconds(wave * 2000, GPU, 2, on_gpu=True)
     assert two == pytest.approx(wave_seconds(wave * 1000, GPU, 1, on_gpu=True))
