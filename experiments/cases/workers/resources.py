@@ -46,7 +46,7 @@ class Resources:
         Raises
         ------
         InputError
-            When a device is not there, or more workers are asked for than there are GPUs.
+            When a device is not there, or more GPUs are asked for than there are.
         """
         if self.cluster is not None and self.cluster.gpu is False:
             return []
@@ -58,7 +58,7 @@ class Resources:
         there = devices if self.device else [gpu.alias for gpu in wp.get_cuda_devices()]
         wanted = self.workers or (self.cluster.workers or len(there) if self.cluster else len(devices))
         if wanted > len(there):
-            rule = f"is one a GPU, of {len(there)} here; processes on the CPU are had with --device cpu"
+            rule = f"counts GPUs, of {len(there)} here; processes on the CPU are had with --device cpu"
             raise InputError(rule, wanted, "--workers")
         return there[:wanted]
 
@@ -102,7 +102,8 @@ class Resources:
             return f"the workers of {self.scheduler}"
         if self.submits_jobs and self.cluster is not None:
             return f"{number} of {self.cluster.kind}"
-        return ",".join(self.gpus) or (f"cpu, {number}" if self.cluster else "cpu")
+        each = f", {self.sharing} workers each" if self.sharing > 1 else ""
+        return ",".join(self.gpus) + each or (f"cpu, {number}" if self.cluster else "cpu")
 
 
 def resolve_devices(names: str | None) -> list[str]:

@@ -272,6 +272,7 @@ def test_a_gpu_has_one_worker_alone_and_several_beside_others_or_as_many_as_aske
     monkeypatch.setattr(resources.wp, "get_cuda_devices", lambda: [SimpleNamespace(alias=n) for n in names])
     assert asked.sharing == sharing
     assert asked.count == sharing * len(asked.gpus)
+    assert str(asked).endswith(f", {sharing} workers each") == (sharing > 1)
 
 
 def test_workers_of_a_gpu_share_its_memory(monkeypatch: pytest.MonkeyPatch) -> None:
