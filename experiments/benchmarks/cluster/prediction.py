@@ -7,7 +7,7 @@ The machine is measured first, by the waves of `dem-warp doctor --measure`; then
 is good where the ratio lies between 1 / 1.5 and 1.5. On a machine of its own, `--wall` times waves on all
 cores. On one that others use, wall time is theirs too: so the default is one worker, this process, and its
 time of the processor, in the measurement and in the waves. Neither counts the start of other processes then.
-On a GPU the time is that of the wall.
+On a GPU the time is that of the wall. The exit code is 1 unless all predictions are good.
 """
 
 from __future__ import annotations
