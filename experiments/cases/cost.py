@@ -58,6 +58,8 @@ class Cost:
     """Times that the contact law makes a grain's step dearer than the base law."""
     meshed: bool = False
     """A wall is a mesh: the kernels that know meshes are slower, whatever touches."""
+    tended: float = 1.0
+    """Time that a look at the scene takes the host, over that of a look at a heap, mean over the steps."""
 
     @property
     def moved(self) -> float:
@@ -92,6 +94,7 @@ def cost_of(case: Case[Any]) -> Cost:
         each * mean([stage.pace * stage.present for stage in course]),
         float(np.prod([LAW_COSTS.get(law.name, 1.0) for law in case.mechanisms])),
         any(isinstance(wall, Mesh) for wall in scene.walls(case.grains.grain_reach)),
+        mean([stage.tended for stage in course]),
     )
 
 

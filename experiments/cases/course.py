@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dem_warp import Case, DrawDown, Hopper, LiftedCylinder, effective_moduli
+from dem_warp import Case, DrawDown, Drum, Hopper, LiftedCylinder, effective_moduli
 from dem_warp.device import resolve_device
 from dem_warp.model import GRAVITY
 from dem_warp.scenes.lifted_cylinder import GONE
@@ -50,6 +50,10 @@ flow out fastest; and their speed then, over that of a fall from the bed's heigh
 BEVERLOO = 0.58, 1.4
 """C and k of Beverloo's law for a round hole: a flow of C (bulk density) sqrt(g) (D - k d)^(5/2)."""
 
+SURVEYED = 5.0
+"""Times that a look at a drum that turns, whose surface is measured at each, takes the host over a look at a
+heap: 300 to 360 us against 60 to 80 on one core (`experiments/benchmarks/README.md`)."""
+
 ROLLS = 2.0
 """Times that a rod rolls the length of a tilted plate before all are at rest: some start late."""
 
@@ -63,6 +67,8 @@ class Stage(NamedTuple):
     """Speed of its fastest grain, in the mean over the stage [m/s]."""
     present: float
     """Part of the grains kept ready that are there."""
+    tended: float = 1.0
+    """Time that a look at the scene takes the host, over that of a look at a heap."""
 
 
 def expected_course(case: Case[Any], grains: int) -> list[Stage]:
@@ -91,6 +97,9 @@ def _own_stages(case: Case[Any], share: float) -> list[Stage]:
     scene, pace = case.scene, FLOWING * case.scene.top_speed
     if isinstance(scene, Hopper):
         return [Stage(_flow_time(case), pace, 0.5 * share), Stage(TRICKLE_BIN, pace, LEFT * share)]
+    if isinstance(scene, Drum):
+        turns = scene.start_up / scene.rotation_rate, scene.revolutions / scene.rotation_rate
+        return [Stage(turns[0], pace, share), Stage(turns[1], pace, share, SURVEYED)]
     stages = [Stage(_own_phases(_Test(scene, case)), pace, share)]
     if isinstance(scene, DrawDown):
         stages.append(Stage(TRICKLE if _rolls(case) else TRICKLE_ANGULAR, pace, share))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -121,7 +121,8 @@ def measured_speed(resources: Resources, measure: bool = True) -> Speed:
 
 def measure_and_store(resources: Resources) -> Speed:
     """Measure the speed of workers, and store it for their user."""
-    with open_workers(resources) as workers:
+    # those that share a GPU would tell the speed of a part of it
+    with open_workers(replace(resources, gpu_workers=1)) as workers:
         speed = measure_speed(workers)
     store_speed(resources.machine, speed)
     return speed
@@ -248,7 +249,8 @@ def _sized_plan(
         most = max(wave.most for wave in planned)
         if on_gpu:
             grains = most * max(cost_of(case).grains for case in cases)
-            memory = each * -(-most // (resources.count * rounds_of(most, grains, resources.count)))
+            rounds = rounds_of(most, grains, resources.count, sharing=resources.sharing)
+            memory = each * resources.sharing * -(-most // (resources.count * rounds))
         else:
             memory = (each + PROCESS_BYTES) * min(resources.count, most) + PROCESS_BYTES
     disk = 5e6 + stored * sum(wave.most for wave in planned)
@@ -262,7 +264,7 @@ def _wave(
 
     def seconds(number: int) -> float:
         repeated = [costs[i % len(costs)] for i in range(number)]
-        return wave_seconds(repeated, speed, resources.count, resources.on_gpu)
+        return wave_seconds(repeated, speed, resources.count, resources.on_gpu, resources.sharing)
 
     mean = {
         key: round(float(np.mean([getattr(cost, key) for cost in costs])))

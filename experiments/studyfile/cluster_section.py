@@ -17,12 +17,12 @@ _LINE = re.compile(r"[^\n\r\0]*")
 
 
 class ClusterSection(Section):
-    """``[cluster]``: workers of Dask, on this machine or as jobs of a scheduler; one a GPU, or one a core."""
+    """``[cluster]``: workers of Dask, on this machine or as jobs of a scheduler; on GPUs, or one a core."""
 
     kind: Literal["local", "slurm", "pbs", "lsf", "sge", "oar", "htcondor"] = "local"
     """Place where they run: processes of this machine, or jobs of a scheduler."""
     workers: int | None = Field(default=None, ge=1)
-    """Workers in all; left out: of this machine one a GPU or else one a core, of a scheduler one."""
+    """Workers in all, or GPUs of this machine; left out: here all GPUs or one a core, of a scheduler one."""
     gpu: bool | None = None
     """Each worker has a GPU; left out: on this machine where there is one, in jobs not."""
     workers_per_job: int = Field(default=1, ge=1)

@@ -7,7 +7,7 @@ The machine is measured first, by the waves of `dem-warp doctor --measure`; then
 is good where the ratio lies between 1 / 1.5 and 1.5. On a machine of its own, `--wall` times waves on all
 cores. On one that others use, wall time is theirs too: so the default is one worker, this process, and its
 time of the processor, in the measurement and in the waves. Neither counts the start of other processes then.
-On a GPU the time is that of the wall.
+On a GPU the time is that of the wall. The exit code is 1 unless all predictions are good.
 """
 
 from __future__ import annotations
@@ -56,6 +56,7 @@ def main(
     workers = OwnWorkers("cuda" if gpu else "cpu", None if wall or gpu else 1)
     clock = time.perf_counter if wall or gpu else time.process_time
     speed = measure_speed(workers, clock)
+    print(speed.text, flush=True)
     parts, good, waves = [], 0, 0
     for name in table or SETS:
         what, made = SETS[name]
@@ -81,7 +82,7 @@ def _row(name: str, cases: list[Case], workers: OwnWorkers, speed: Speed, clock:
     # a failed case does not tell the steps of its last phase
     ends = [result.phases for result in results if result.status == "finished"]
     steps = sum(phase["steps"] for phases in ends for phase in phases) / len(ends) if ends else math.nan
-    told = wave_seconds(costs, speed, workers.count, on_gpu=workers.on_gpu)
+    told = wave_seconds(costs, speed, workers.count, workers.on_gpu, workers.sharing)
     row = {
         "study": name,
         "cases": len(cases),

@@ -3,11 +3,12 @@
     python -m experiments.benchmarks.cluster.scaling --cases 12
     python -m experiments.benchmarks.cluster.scaling --gpus --scale soft --cases 102
     python -m experiments.benchmarks.cluster.scaling --gpus --study STUDY.toml --scale "" --cases 2048
+    python -m experiments.benchmarks.cluster.scaling --gpus --gpu-workers 1 --gpu-workers 2
 
 The wave is of heaps of one study. On CPUs it runs on this machine's own processes and on workers of Dask,
-with one and with two of each; on GPUs with one of them and with two. Kernels are compiled and loaded before;
-processes of this machine's own start with each wave, which counts. The load of the machine is part of the
-answer: on one that others use, two workers get what is left.
+with one and with two of each; on GPUs with one of them and with two, each with as many workers as is said.
+Kernels are compiled and loaded before; processes of this machine's own start with each wave, which counts.
+The load of the machine is part of the answer: on one that others use, two workers get what is left.
 """
 
 from __future__ import annotations
@@ -53,10 +54,10 @@ def _seen(result: CaseResult) -> dict[str, float]:
     return {name: value for name, value in result.observables.items() if name != "rebuilds"}
 
 
-def resources(kind: str, count: int) -> Resources:
-    """So many workers of a kind."""
+def resources(kind: str, count: int, each: int | None = None) -> Resources:
+    """So many workers of a kind, or GPUs with so many workers each."""
     if kind == "GPUs":
-        return Resources(None, count)
+        return Resources(None, count, gpu_workers=each)
     section = ClusterSection(workers=count, gpu=False) if kind == "Dask" else None
     return Resources("cpu", count, None, section)
 
@@ -66,23 +67,28 @@ def main(
     study: Annotated[Path | None, typer.Option(help="Study of the heaps; left out: the paper's.")] = None,
     scale: Annotated[str, typer.Option(help="Scale of the study; empty: as written.")] = "bench",
     gpus: Annotated[bool, typer.Option("--gpus", help="Use GPUs, not cores.")] = False,
+    gpu_workers: Annotated[
+        list[int] | None, typer.Option(min=1, help="Workers a GPU, one number after another; as chosen else.")
+    ] = None,
     out: Annotated[Path, typer.Option(help="Folder of the table.")] = Path("out/scaling"),
 ) -> None:
-    """Run the wave on one worker and on two, and write the table."""
+    """Run the wave on one worker and on two, print each row as it is had, and write the table."""
     loaded = load_study(study, scale or None)
     wave = [loaded.case({}, seed) for seed in range(cases)]
     rows, reference = [], None
-    for kind in ("GPUs",) if gpus else ("own processes", "Dask"):
+    each: list[int | None] = list(gpu_workers) if gpu_workers else [None]
+    for kind, per in [("GPUs", n) for n in each] if gpus else [("own processes", None), ("Dask", None)]:
         alone = None
         for count in (1, 2):
-            with open_workers(resources(kind, count)) as workers:
+            with open_workers(resources(kind, count, per)) as workers:
                 seconds, results = timed(workers, wave)
-                machine = workers.machine
+                machine, launched = workers.machine, workers.count
             reference, alone = reference or results, alone or seconds
             bits = "same" if same_bits(results, reference) else "DIFFERENT"
             load = os.getloadavg()[0]
-            rows.append((kind, count, seconds, alone / seconds, bits, load))
-    columns = ["workers", "number", "seconds", "times as fast", "bits", "load at the end"]
+            rows.append((kind, count, launched, seconds, alone / seconds, bits, load))
+            print(rows[-1], flush=True)
+    columns = ["workers", "number", "processes", "seconds", "times as fast", "bits", "load at the end"]
     table = pd.DataFrame(rows, columns=columns)
     heaps = f"{cases} heaps of {loaded.name}, scale {scale or 'as written'}"
     text = f"{heaps}, on {machine}; the load counts this run too."

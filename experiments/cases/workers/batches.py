@@ -17,12 +17,21 @@ WORLDS = 1024
 FULL_GRAINS = 330_000
 """Grains with which a large GPU reaches 95 % of its speed (`experiments/benchmarks/README.md`, cost)."""
 
+GPU_WORKERS = 2
+"""Workers of a GPU, each with a launch of its own in a process of its own, where workers are processes that
+are started here: while the host makes the worlds of one launch, looks at them or sends their results, another
+has the GPU. One GPU without a cluster has one, this process."""
+
 MEMORY_SHARE = 0.8
 """Part of a device's free memory that the worlds of a launch may take, by what is predicted of them."""
 
 
 def plan_batches(
-    cases: Sequence[Case], costs: np.ndarray, workers: int = 1, memory: float | None = None
+    cases: Sequence[Case],
+    costs: np.ndarray,
+    workers: int = 1,
+    memory: float | None = None,
+    sharing: int = 1,
 ) -> list[list[int]]:
     """Deal cases out to batches, the costly ones first.
 
@@ -33,7 +42,10 @@ def plan_batches(
     workers : int
         Workers that take the batches.
     memory : float, optional
-        Free memory of a GPU [bytes]; None: of workers on CPUs, which simulate one case at a time.
+        Free memory that a GPU has for each of its workers [bytes]; None: of workers on CPUs, which simulate
+        one case at a time.
+    sharing : int
+        Workers that share a GPU.
 
     Returns
     -------
@@ -45,24 +57,26 @@ def plan_batches(
     dealt = []
     for group in batches(cases, one_each=False):
         members = np.array(group)[_falling(costs[group])]
-        some = [cases[i] for i in group]
-        grains = len(some) * max(cost_of(case).grains for case in some)
-        dealt += _dealt(members, rounds_of(len(some), grains, workers, _worlds_held(some, memory)), workers)
+        sizes = [cost_of(cases[i]) for i in group]
+        grains = len(group) * max(size.grains for size in sizes)
+        largest = cases[group[int(np.argmax([size.spheres for size in sizes]))]]
+        rounds = rounds_of(len(group), grains, workers, _worlds_held(largest, memory), sharing)
+        dealt += _dealt(members, rounds, workers)
     return sorted(dealt, key=lambda batch: -float(costs[batch].sum()))
 
 
-def rounds_of(count: int, grains: float, workers: int, most: int = WORLDS) -> int:
+def rounds_of(count: int, grains: float, workers: int, most: int = WORLDS, sharing: int = 1) -> int:
     """Rounds of a launch a worker, in which so many worlds, of so many grains in all, are simulated.
 
-    A launch fills a GPU as nearly as it can, since the last world of each runs alone at the end. It holds
-    `most` worlds at the most.
+    The launches of the workers that share a GPU fill it together as nearly as they can, since the last world
+    of each runs alone at the end. A launch holds `most` worlds at the most.
     """
-    return max(round(grains / (workers * FULL_GRAINS)), math.ceil(count / (workers * most)), 1)
+    full = FULL_GRAINS / sharing
+    return max(round(grains / (workers * full)), math.ceil(count / (workers * most)), 1)
 
 
-def _worlds_held(cases: Sequence[Case], memory: float) -> int:
-    """Worlds that the free memory of a GPU holds [bytes], `WORLDS` at the most."""
-    largest = max(cases, key=lambda case: cost_of(case).spheres)
+def _worlds_held(largest: Case, memory: float) -> int:
+    """Worlds no larger than a case that so much memory holds [bytes], `WORLDS` at the most."""
     return max(min(int(MEMORY_SHARE * memory / device_bytes(largest)), WORLDS), 1)
 
 

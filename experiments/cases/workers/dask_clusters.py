@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import logging
 import os
 from pathlib import Path
@@ -25,7 +26,7 @@ SYSTEMS = {
 
 
 def start_processes(gpus: list[str], count: int) -> SpecCluster:
-    """Start workers on this machine: one a GPU, which sees that GPU alone, or a number that see none."""
+    """Start so many workers on this machine: dealt out to GPUs, each sees one, or without them sees none."""
     from distributed import Nanny, Scheduler, Security, SpecCluster
 
     common = {"host": "127.0.0.1", "protocol": "tls://", "security": Security.temporary()}
@@ -33,7 +34,7 @@ def start_processes(gpus: list[str], count: int) -> SpecCluster:
     options = common | {"nthreads": 1, "memory_limit": 0, "silence_logs": logging.CRITICAL}
     workers = {
         number: {"cls": Nanny, "options": options | {"env": {"CUDA_VISIBLE_DEVICES": seen}}}
-        for number, seen in enumerate(visible(gpus) or [""] * count)
+        for number, seen in zip(range(count), itertools.cycle(visible(gpus) or [""]), strict=False)
     }
     scheduler = {"cls": Scheduler, "options": common}
     return SpecCluster(workers, scheduler, security=common["security"], silence_logs=logging.CRITICAL)

@@ -175,12 +175,13 @@ def _claimed(gpus: Iterable[tuple[str, str]]) -> tuple[str, FileLock | None]:
 
 
 def describe_worker() -> dict[str, Any]:
-    """Device of this worker, and its free memory where it is a GPU [bytes]."""
+    """Device of this worker; of a GPU, which others may share, its identity and free memory [bytes]."""
     name = own_device()
     on_gpu = name != "cpu"
     device = wp.get_device(name)
     return {
         "on_gpu": on_gpu,
         "device": str(device.name) if on_gpu else "CPU",
+        "identity": str(device.uuid) if on_gpu else None,
         "memory": float(device.free_memory) if on_gpu else None,
     }

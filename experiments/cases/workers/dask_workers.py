@@ -6,11 +6,12 @@ import logging
 import os
 import pickle
 import uuid
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from dem_warp import Case, CaseResult
 from dem_warp.result import OnProgress, OnResult
@@ -55,7 +56,7 @@ def _in_words() -> Iterator[None]:
 
 
 class DaskWorkers:
-    """Workers of a Dask cluster, one thread each: one a GPU, or one a core.
+    """Workers of a Dask cluster, one thread each: one or several a GPU, or one a core.
 
     Parameters
     ----------
@@ -83,7 +84,13 @@ class DaskWorkers:
     @property
     def on_gpu(self) -> bool:
         """Tell that the workers have GPUs."""
-        return self._memory() is not None
+        return self._shares() is not None
+
+    @property
+    def sharing(self) -> int:
+        """Most workers of a GPU; 1 on CPUs."""
+        shares = self._shares()
+        return 1 if shares is None else shares.workers
 
     @property
     def helpers(self) -> int:
@@ -117,8 +124,8 @@ class DaskWorkers:
             return []
         self._await_workers()
         wave = Wave(cases, on_result, on_progress, expected_seconds(cases, self, engine))
-        memory = self._memory() if engine is None else None
-        batches = plan_batches(cases, wave.costs, self.count, memory)
+        shares = self._shares() if engine is None else None
+        batches = plan_batches(cases, wave.costs, self.count, *(shares or ()))
         if checkpoint is not None:
             Path(checkpoint).mkdir(parents=True, exist_ok=True)
         folder = None if checkpoint is None else str(Path(checkpoint).resolve())
@@ -146,10 +153,23 @@ class DaskWorkers:
                 rule = "each worker must have one thread: dask worker --nthreads 1 --nworkers N"
                 raise InputError(rule, f"{facts['nthreads']} threads of {address}", "the cluster")
 
-    def _memory(self) -> float | None:
-        """Least free memory of the workers' GPUs [bytes]; None where a worker has none."""
-        found = [facts["memory"] for facts in self._client.run(describe_worker, on_error="ignore").values()]
-        return None if not found or None in found else min(found)
+    def _shares(self) -> _Shares | None:
+        """What the workers have of their GPUs; None where one has none."""
+        found = list(self._client.run(describe_worker, on_error="ignore").values())
+        if not found or any(facts["memory"] is None for facts in found):
+            return None
+        sharing = Counter(facts["identity"] for facts in found)
+        memory = min(facts["memory"] / sharing[facts["identity"]] for facts in found)
+        return _Shares(memory, max(sharing.values()))
+
+
+class _Shares(NamedTuple):
+    """What each worker has of a GPU."""
+
+    memory: float
+    """Its part of the free memory, where that is least [bytes]."""
+    workers: int
+    """Workers of a GPU, where these are most."""
 
 
 @dataclass

@@ -42,7 +42,7 @@ def open_workers(resources: Resources) -> Iterator[Workers]:
         When a device is not there, Dask is needed and is not installed, or a scheduler does not answer.
     """
     gpus = [] if resources.is_cluster else resources.gpus
-    if not resources.is_cluster and len(gpus) < 2:
+    if not resources.is_cluster and len(gpus) * resources.sharing < 2:
         yield OwnWorkers(gpus[0] if gpus else "cpu", None if gpus else resources.workers)
         return
     require_dask()

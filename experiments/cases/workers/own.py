@@ -55,6 +55,11 @@ class OwnWorkers:
         return 1 if self.on_gpu else self.workers or os.cpu_count() or 1
 
     @property
+    def sharing(self) -> int:
+        """1: this process has the GPU."""
+        return 1
+
+    @property
     def machine(self) -> str:
         """Name of the GPU, or of this machine and its number of processes."""
         return str(wp.get_device(self.name).name) if self.on_gpu else cpu_name(self.count)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import warp as wp
 
 from dem_warp.device import resolve_device
+from experiments.cases.workers.batches import GPU_WORKERS
 from experiments.cases.workers.speed import cpu_name
 from experiments.errors import InputError
 from experiments.studyfile.cluster_section import ClusterSection
@@ -20,11 +21,13 @@ class Resources:
     device: str | None = None
     """``"cpu"``, ``"cuda"``, ``"cuda:1"``, or several GPUs between commas; None: the GPU if there is one."""
     workers: int | None = None
-    """Processes on the CPU, GPUs, or workers of a cluster; None: one a core, one GPU, the cluster's own."""
+    """Processes on the CPU, GPUs, or workers of a cluster elsewhere; None: one a core, one GPU, its own."""
     scheduler: str | None = None
     """Address of a Dask scheduler whose workers are used."""
     cluster: ClusterSection | None = None
     """Workers that are started for the run."""
+    gpu_workers: int | None = None
+    """Processes a GPU of this machine; None: `GPU_WORKERS`, but of one GPU without a cluster this process."""
 
     @property
     def is_cluster(self) -> bool:
@@ -43,7 +46,7 @@ class Resources:
         Raises
         ------
         InputError
-            When a device is not there, or more workers are asked for than there are GPUs.
+            When a device is not there, or more GPUs are asked for than there are.
         """
         if self.cluster is not None and self.cluster.gpu is False:
             return []
@@ -55,9 +58,17 @@ class Resources:
         there = devices if self.device else [gpu.alias for gpu in wp.get_cuda_devices()]
         wanted = self.workers or (self.cluster.workers or len(there) if self.cluster else len(devices))
         if wanted > len(there):
-            rule = f"is one a GPU, of {len(there)} here; processes on the CPU are had with --device cpu"
+            rule = f"counts GPUs, of {len(there)} here; processes on the CPU are had with --device cpu"
             raise InputError(rule, wanted, "--workers")
         return there[:wanted]
+
+    @property
+    def sharing(self) -> int:
+        """Workers of a GPU, as far as is known before they are there; of a job, each has its own."""
+        if self.scheduler is not None or self.submits_jobs or not self.gpus:
+            return 1
+        alone = self.cluster is None and len(self.gpus) == 1
+        return self.gpu_workers or (1 if alone else GPU_WORKERS)
 
     @property
     def count(self) -> int:
@@ -65,7 +76,7 @@ class Resources:
         asked = self.workers or (self.cluster.workers if self.cluster else None)
         if self.scheduler is not None or self.submits_jobs:
             return asked or 1
-        return len(self.gpus) or asked or os.cpu_count() or 1
+        return len(self.gpus) * self.sharing or asked or os.cpu_count() or 1
 
     @property
     def on_gpu(self) -> bool:
@@ -91,7 +102,8 @@ class Resources:
             return f"the workers of {self.scheduler}"
         if self.submits_jobs and self.cluster is not None:
             return f"{number} of {self.cluster.kind}"
-        return ",".join(self.gpus) or (f"cpu, {number}" if self.cluster else "cpu")
+        each = f", {self.sharing} workers each" if self.sharing > 1 else ""
+        return ",".join(self.gpus) + each or (f"cpu, {number}" if self.cluster else "cpu")
 
 
 def resolve_devices(names: str | None) -> list[str]:

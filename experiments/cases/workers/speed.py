@@ -61,26 +61,36 @@ class Speed:
     mesh: float = 1.0
     """Times that a step of grains takes where a wall is a mesh."""
     world_step: float = 0.0
-    """Of a world in a step of a launch on a GPU: its scene is looked after by the host, one world after
-    another, while the device waits [s]."""
+    """Of a world with a heap in a step of a launch on a GPU: its scene is looked after by the host, one world
+    after another, while the device waits [s]; see `Cost.tended`."""
+    world_start: float = 0.0
+    """Of a world of a launch on a GPU, once: the host makes it and takes its result [s]."""
 
     @property
     def text(self) -> str:
         """Its numbers, as a phrase."""
         sphere, look = 1e9 * self.sphere_step, 1e9 * self.look_step
         more = f"{look:.3g} ns a neighbour and skin" if look > 0.0 else f"{sphere:.3g} ns a sphere"
-        world = f", {1e9 * self.world_step:.3g} ns a world" if self.world_step > 0.0 else ""
+        on_gpu = self.world_step > 0.0
+        world = f", {1e9 * self.world_step:.3g} ns a world" if on_gpu else ""
+        once = f" and {1e3 * self.world_start:.2g} ms a world" if on_gpu else ""
         return (
             f"{1e6 * self.step:.3g} us a step{world}, {1e9 * self.grain_step:.3g} ns a grain and {more} "
-            f"beyond, {self.mesh:.3g} times that where walls are meshes, {self.start:.2g} s to start"
+            f"beyond, {self.mesh:.3g} times that where walls are meshes, "
+            f"{self.start:.2g} s{once} to start"
         )
 
     def seconds(self, cost: Cost) -> float:
         """Wall time of a case on a worker of its own [s]."""
         return cost.steps * (self.step + self._grains_seconds(cost))
 
-    def launch_seconds(self, costs: Sequence[Cost], launches: int = 1) -> float:
+    def launch_seconds(self, costs: Sequence[Cost], launches: int = 1, sharing: int = 1) -> float:
         """Wall time of a launch on a GPU, one of so many like it that some cases are dealt out to [s].
+
+        Parameters
+        ----------
+        sharing
+            Launches that are on the GPU at once.
 
         Notes
         -----
@@ -88,10 +98,14 @@ class Speed:
         grains take time only as far as they fill the device. The longer of the two hides the other, but for
         the corner, which the root of the sum of squares rounds off. The host's looks hide nothing. This form
         was chosen on the first twelve waves of `experiments.benchmarks.cluster.waves`, run on an H100.
+
+        Launches that share a GPU take turns on it, each while the host looks after the worlds of the others:
+        a step of theirs takes as long as one alone, or as their kernels one after another.
         """
         grains = sum(self._grains_seconds(cost) for cost in costs) / launches
-        step = self.world_step * len(costs) / launches + math.hypot(self.step, grains)
-        return max(cost.steps for cost in costs) * step
+        tended, kernels = sum(cost.tended for cost in costs) / launches, math.hypot(self.step, grains)
+        step = max(self.world_step * tended + kernels, sharing * kernels)
+        return self.world_start * len(costs) / launches + max(cost.steps for cost in costs) * step
 
     def _grains_seconds(self, cost: Cost) -> float:
         """Time of the grains of a step, by themselves [s]."""
@@ -102,7 +116,7 @@ class Speed:
 
 TYPICAL = {
     False: Speed(1.0e-5, 0.0, 3.0, grain_step=2.5e-7, look_step=7.0e-7, mesh=1.8),
-    True: Speed(3.0e-5, 1.0e-10, 5.0, grain_step=1.5e-9, mesh=2.0, world_step=2.5e-7),
+    True: Speed(3.0e-5, 1.0e-10, 5.0, grain_step=1.5e-9, mesh=2.0, world_step=2.5e-7, world_start=1.0e-3),
 }
 """Speeds of a core and of a large GPU, where none was measured: a first guess of the time left."""
 
@@ -115,11 +129,11 @@ def user_folder() -> Path:
 def stored_speed(machine: str) -> Speed | None:
     """Speed that was measured of a machine; None where it never was, or in an earlier form.
 
-    The earlier ones had no meshes, and on a GPU, where nobody counts neighbours, no worlds.
+    The earlier ones had no meshes, and on a GPU, where nobody counts neighbours, no worlds that start.
     """
     try:
         stored = _stored()[machine]
-        earlier = "mesh" not in stored or not ("world_step" in stored or stored["look_step"])
+        earlier = "mesh" not in stored or not ("world_start" in stored or stored["look_step"])
         return None if earlier else Speed(**stored)
     except (KeyError, TypeError):
         return None
@@ -141,13 +155,14 @@ def _stored() -> dict[str, Any]:
 # ---- prediction --------------------------------------------------------------------------------------------
 
 
-def wave_seconds(costs: Sequence[Cost], speed: Speed, workers: int, on_gpu: bool) -> float:
-    """Predict the wall time of a wave on so many workers [s]."""
+def wave_seconds(costs: Sequence[Cost], speed: Speed, workers: int, on_gpu: bool, sharing: int = 1) -> float:
+    """Predict the wall time of a wave on so many workers, of which so many share a GPU [s]."""
     if not costs:
         return 0.0
     if on_gpu:
-        rounds = rounds_of(len(costs), sum(cost.grains for cost in costs), workers)
-        return speed.start + rounds * speed.launch_seconds(costs, min(rounds * workers, len(costs)))
+        rounds = rounds_of(len(costs), sum(cost.grains for cost in costs), workers, sharing=sharing)
+        launches = min(rounds * workers, len(costs))
+        return speed.start + rounds * speed.launch_seconds(costs, launches, sharing)
     alone = np.array([speed.seconds(cost) for cost in costs])
     return speed.start + max(float(alone.sum()) / workers, float(alone.max()))
 
@@ -160,7 +175,7 @@ def expected_seconds(cases: Sequence[Case], workers: Workers, engine: Engine | N
         return None
     on_gpu = workers.on_gpu and engine is None
     speed = stored_speed(workers.machine) or TYPICAL[on_gpu]
-    return wave_seconds(costs, speed, workers.count, on_gpu)
+    return wave_seconds(costs, speed, workers.count, on_gpu, workers.sharing)
 
 
 def cpu_name(workers: int) -> str:
@@ -180,11 +195,19 @@ BALLS_LOOKED, CLUMPS_LOOKED, BOX_LOOKED = 17.7, 64.1, 43.1
 FEW = 30
 """Balls of the case whose steps cost least."""
 
-SOME, CROWD = 32, 3.0
-"""Worlds of a launch that is far from full, each with its own seed, so that one or another always makes its
-lists anew, as in a study; and the duration of the same in as many worlds as a launch holds [s]."""
+SOFTENED = 50.0
+"""Times that the reference cases on a GPU are softened: their time steps, and the steps between two looks at
+the neighbour lists, are then those of most studies."""
 
-WIDE_BOX, WIDE_BOXES = 2.0, 64
+SOME, SHORT, LONG = 32, 0.6, 3.0
+"""Worlds of a launch that is far from full, each with its own seed, so that one or another always makes its
+lists anew, as in a study; and durations of the reference cases on a GPU [s]: all worlds of a launch then end
+together, so that none of its time is that of a last world."""
+
+CROWD = 1.0
+"""Longer duration of the few balls in as many worlds as a launch holds [s]."""
+
+WIDE_BOX, WIDE_BOXES = 2.0, 32
 """Times that the box on a GPU is as wide, and its worlds: few, since meshes are made for each by the host."""
 
 
@@ -193,8 +216,8 @@ def measure_speed(workers: Workers, clock: Clock = time.perf_counter) -> Speed:
 
     A few balls for short and for long give the start of a wave and the step; waves of many balls and of
     clumps of nine spheres give what a grain costs, and what its neighbours (on a GPU its spheres); a box of
-    balls whose walls are meshes gives what those cost. On a GPU a launch of as many worlds as it holds, of a
-    few balls each, gives what a world costs. Another clock than that of the wall gives times of its own.
+    balls whose walls are meshes gives what those cost. On a GPU launches of as many worlds as it holds, of a
+    few balls each, give what a world costs. Another clock than that of the wall gives times of its own.
     """
     workers.simulate([few_spheres()])  # compiles what the next ones would
     speed = _measured_gpus(workers, clock) if workers.on_gpu else _measured_cores(workers, clock)
@@ -208,7 +231,8 @@ def _measured_cores(workers: Workers, clock: Clock) -> Speed:
     def copies(case: Case[Any]) -> list[Case[Any]]:
         return [case] * workers.count
 
-    start, least = _start_and_step(workers, clock, copies)
+    short, long = few_spheres(), _reference(FEW, 1, duration=12.0)
+    start, least = _start_and_step(*(_timed(workers, copies(case), clock) for case in (short, long)))
     sizes, taken = [(float(FEW), 0.0)], [least]
     references: list[tuple[float, Case[Any]]] = [
         (BALLS_LOOKED, _reference(*BALLS)),
@@ -226,39 +250,40 @@ def _measured_cores(workers: Workers, clock: Clock) -> Speed:
 
 
 def _measured_gpus(workers: Workers, clock: Clock) -> Speed:
-    """Speed of GPUs, of which each has one launch of a wave."""
+    """Speed of GPUs, of which each has one launch of a wave and one worker."""
 
-    def seeds(case: Case[Any], worlds: int = SOME) -> list[Case[Any]]:
-        return [replace(case, seed=1 + number) for number in range(worlds * workers.count)]
+    def timed(case: Case[Any], worlds: int) -> tuple[float, float]:
+        case = replace(case, numerics=Numerics(modulus_scale=SOFTENED))
+        return _timed(workers, [replace(case, seed=1 + w) for w in range(worlds * workers.count)], clock)
 
-    start, least = _start_and_step(workers, clock, seeds)
-    sizes, taken = [_launch(few_spheres(), SOME)], [least]
+    few = {duration: _reference(FEW, 1, duration=duration) for duration in (SHORT, CROWD, LONG)}
+    timed(few[SHORT], SOME)  # the first launch of a process takes longer
+    begun, least = _start_and_step(timed(few[SHORT], SOME), timed(few[LONG], SOME))
+    crowded, crowd = _start_and_step(timed(few[SHORT], WORLDS), timed(few[CROWD], WORLDS))
+    each = max((crowded - begun) / (WORLDS - SOME), 0.0)
+    start = max(begun - SOME * each, 0.0)
+    sizes, taken = [_launch(few[LONG], SOME), _launch(few[CROWD], WORLDS)], [least, crowd]
     references: list[tuple[Case[Any], int]] = [
-        (_reference(FEW, 1, duration=CROWD), WORLDS),
-        (_reference(*BALLS), WORLDS),
-        (_reference(*CLUMPS), WORLDS),
+        (_reference(*BALLS, duration=SHORT), WORLDS),
+        (_reference(*CLUMPS, duration=SHORT), WORLDS),
         (_box(WIDE_BOX), WIDE_BOXES),
     ]
     for case, worlds in references:
         workers.simulate([case])
-        seconds, steps = _timed(workers, seeds(case, worlds), clock)
+        seconds, steps = timed(case, worlds)
         sizes.append(_launch(case, worlds))
-        taken.append((seconds - start) / steps)
+        taken.append(max((seconds - start - each * worlds) / steps, 1e-7))
     step, world, grain, sphere = split_launches(sizes[:4], taken[:4])
     boxes, grains, spheres = sizes[4]
     by_grains = math.sqrt(max(taken[4] - world * boxes, step) ** 2 - step**2)
     mesh = by_grains / max(grain * grains + sphere * spheres, 1e-9)
-    return Speed(step, sphere, start, "", grain, mesh=max(mesh, 1.0), world_step=world)
+    return Speed(step, sphere, start, "", grain, mesh=max(mesh, 1.0), world_step=world, world_start=each)
 
 
-def _start_and_step(
-    workers: Workers, clock: Clock, copies: Callable[[Case[Any]], list[Case[Any]]]
-) -> tuple[float, float]:
-    """Time to the first step of a wave, and of a step of a few balls [s]."""
-    short_seconds, short_steps = _timed(workers, copies(few_spheres()), clock)
-    long_seconds, long_steps = _timed(workers, copies(_reference(FEW, 1, duration=12.0)), clock)
-    least = max((long_seconds - short_seconds) / max(long_steps - short_steps, 1), 1e-7)
-    return max(short_seconds - short_steps * least, 0.0), least
+def _start_and_step(short: tuple[float, float], long: tuple[float, float]) -> tuple[float, float]:
+    """Time to the first step of a wave, and of a step [s], of times and steps of a short and a long one."""
+    least = max((long[0] - short[0]) / max(long[1] - short[1], 1), 1e-7)
+    return max(short[0] - short[1] * least, 0.0), least
 
 
 def _launch(case: Case[Any], worlds: int) -> tuple[float, float, float]:

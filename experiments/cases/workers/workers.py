@@ -25,7 +25,11 @@ class Workers(Protocol):
 
     @property
     def on_gpu(self) -> bool:
-        """Tell that they have GPUs, one each."""
+        """Tell that they have GPUs, each one or a share of it."""
+
+    @property
+    def sharing(self) -> int:
+        """Workers of a GPU; 1 on CPUs."""
 
     @property
     def machine(self) -> str:

@@ -124,6 +124,16 @@ def test_on_gpus_workers_get_batches_of_like_cost_that_their_memory_holds(
     assert list(map(len, plan_batches(cases, costs, 2, memory=1e12))) == [4, 4]
 
 
+def test_the_launches_of_workers_that_share_a_gpu_fill_it_together(
+    cases: list[Case], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(batches, "FULL_GRAINS", 4.0 * cost_of(cases[0]).grains)
+    costs = np.ones(8)
+    assert list(map(len, plan_batches(cases, costs, 1, 1e12))) == [4, 4]
+    assert list(map(len, plan_batches(cases, costs, 2, 1e12, sharing=2))) == [2] * 4
+    assert list(map(len, plan_batches(cases, costs, 4, 1e12, sharing=2))) == [2] * 4
+
+
 def test_what_needs_other_kernels_is_another_batch(cases: list[Case], small_study: Study) -> None:
     double = [replace(case, numerics=replace(case.numerics, precision="double")) for case in cases[:3]]
     planned = plan_batches([*cases, *double], np.ones(11), 1, memory=1e12)

@@ -9,6 +9,8 @@ import sys
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -19,7 +21,8 @@ from dem_warp import Case, CaseResult, Progress
 from experiments.cases import OwnWorkers, Resources, Store, Workers, open_workers, run_cases
 from experiments.cases.contract import command_program
 from experiments.cases.program import ProgramEngine
-from experiments.cases.workers import dask_clusters, dask_task, dask_workers, opening
+from experiments.cases.workers import dask_clusters, dask_task, dask_workers, opening, resources
+from experiments.cases.workers.batches import GPU_WORKERS
 from experiments.cases.workers.dask_workers import DaskWorkers
 from experiments.cases.workers.workers import WorkersLostError
 from experiments.cli import app
@@ -248,3 +251,46 @@ def test_a_worker_sees_its_gpu_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     assert dask_clusters.visible(["cuda:0", "cuda:3"]) == ["0", "3"]
     monkeypatch.setenv("CUDA_VISIBLE_DEVICES", "4,GPU-b")
     assert dask_clusters.visible(["cuda:0", "cuda:1"]) == ["4", "GPU-b"]
+
+
+@pytest.mark.parametrize(
+    ("gpus", "asked", "sharing"),
+    [
+        (1, Resources(), 1),
+        (1, Resources(gpu_workers=3), 3),
+        (1, Resources(cluster=ClusterSection()), GPU_WORKERS),
+        (2, Resources(), 1),
+        (2, Resources(workers=2), GPU_WORKERS),
+        (2, Resources(workers=2, gpu_workers=1), 1),
+    ],
+)
+def test_a_gpu_has_one_worker_alone_and_several_beside_others_or_as_many_as_asked(
+    monkeypatch: pytest.MonkeyPatch, gpus: int, asked: Resources, sharing: int
+) -> None:
+    names = [f"cuda:{number}" for number in range(gpus)]
+    monkeypatch.setattr(resources, "resolve_device", lambda name: name or "cuda:0")
+    monkeypatch.setattr(resources.wp, "get_cuda_devices", lambda: [SimpleNamespace(alias=n) for n in names])
+    assert asked.sharing == sharing
+    assert asked.count == sharing * len(asked.gpus)
+    assert str(asked).endswith(f", {sharing} workers each") == (sharing > 1)
+
+
+def test_workers_of_a_gpu_share_its_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    free = {"GPU-a": 8.0e10, "GPU-b": 5.0e10}
+    homes = ["GPU-a", "GPU-b", "GPU-a"]
+    told = {str(i): {"identity": home, "memory": free[home]} for i, home in enumerate(homes)}
+    client: Any = SimpleNamespace(run=lambda *_, **__: told)
+    workers = DaskWorkers(client, {}, "two GPUs", 3)
+    assert workers._shares() == (4.0e10, 2)
+    assert (workers.on_gpu, workers.sharing) == (True, 2)
+    told["3"] = {"identity": None, "memory": None}
+    assert (workers.on_gpu, workers.sharing) == (False, 1)
+
+
+def test_processes_are_dealt_out_to_the_gpus(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("CUDA_VISIBLE_DEVICES", raising=False)
+    started: dict[int, Any] = {}
+    monkeypatch.setattr("distributed.SpecCluster", lambda workers, *_, **__: started.update(workers))
+    for gpus, seen in ((["cuda:0", "cuda:1"], ["0", "1", "0", "1"]), ([], [""] * 4)):
+        dask_clusters.start_processes(gpus, 4)
+        assert [one["options"]["env"]["CUDA_VISIBLE_DEVICES"] for one in started.values()] == seen

@@ -30,6 +30,7 @@ from experiments.cases.course import (
     CALM,
     FALL,
     SLOPE,
+    SURVEYED,
     expected_course,
     hangs_on_walls,
     pull_on_walls,
@@ -109,6 +110,16 @@ def test_fewer_grains_are_there_where_a_container_is_struck_off_or_runs_out() ->
 def test_only_a_box_with_a_slot_has_meshes() -> None:
     meshed = {name: cost_of(sketch_case(sketch, 0.003)).meshed for name, sketch in SKETCHES.items()}
     assert meshed == {"lifted-cylinder": False, "hopper": False, "drum": False, "draw-down": True}
+
+
+def test_a_drum_that_turns_is_dearer_to_look_at() -> None:
+    tended = {name: cost_of(sketch_case(sketch, 0.003)).tended for name, sketch in SKETCHES.items()}
+    drum = tended.pop("drum")
+    assert set(tended.values()) == {1.0}
+    assert 1.0 < drum < SURVEYED
+    case = sketch_case(SKETCHES["drum"], 0.003)
+    brief = replace(case, scene=replace(case.scene, revolutions=1.0e-6))
+    assert cost_of(brief).tended == pytest.approx(1.0, abs=1e-3)
 
 
 # ---- plates and walls --------------------------------------------------------------------------------------

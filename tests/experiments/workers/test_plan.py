@@ -60,13 +60,14 @@ def test_a_wave_takes_what_its_workers_share_and_no_less_than_its_longest_case()
     assert wave_seconds([], SPEED, 1, on_gpu=True) == 0.0
 
 
-GPU = Speed(3.0e-5, 1.0e-10, 0.5, grain_step=1.5e-9, mesh=2.0, world_step=2.5e-7)
+GPU = Speed(3.0e-5, 1.0e-10, 0.5, grain_step=1.5e-9, mesh=2.0, world_step=2.5e-7, world_start=1.0e-3)
 
 
 def launched(grains: int, worlds: int = 1, **about: Any) -> float:
     """Time of a step of a wave of balls on one GPU, beyond the looks of the host [s]."""
     wave = [Cost(grains, grains, 1000.0, **about)] * worlds
-    return (wave_seconds(wave, GPU, 1, on_gpu=True) - GPU.start) / 1000.0 - worlds * GPU.world_step
+    begun = GPU.start + worlds * GPU.world_start
+    return (wave_seconds(wave, GPU, 1, on_gpu=True) - begun) / 1000.0 - worlds * GPU.world_step
 
 
 def test_a_launch_that_fills_no_gpu_takes_its_kernels_time_whatever_its_grains() -> None:
@@ -88,12 +89,31 @@ def test_a_full_gpu_takes_twice_as_long_for_twice_as_many_grains_or_dearer_ones(
 def test_every_world_of_a_launch_takes_the_host_its_time() -> None:
     wave = [Cost(1, 1, 1000.0)]
     alone, many = (wave_seconds(wave * worlds, GPU, 1, on_gpu=True) for worlds in (1, 1001))
-    assert many - alone == pytest.approx(1000.0 * 1000 * GPU.world_step, rel=0.01)
+    assert many - alone == pytest.approx(1000.0 * (1000 * GPU.world_step + GPU.world_start), rel=0.01)
+    dear = [Cost(1, 1, 1000.0, tended=3.0)] * 1001
+    more = wave_seconds(dear, GPU, 1, on_gpu=True) - many
+    assert more == pytest.approx(1000.0 * 1001 * 2.0 * GPU.world_step, rel=1e-6)
     # two GPUs have half of the worlds each, and more than a launch holds come one launch after another
     two = wave_seconds(wave * 2000, GPU, 2, on_gpu=True)
     assert two == pytest.approx(wave_seconds(wave * 1000, GPU, 1, on_gpu=True))
     rounds = wave_seconds(wave * 2000, GPU, 1, on_gpu=True)
     assert rounds - GPU.start == pytest.approx(2.0 * (two - GPU.start))
+
+
+def test_launches_that_share_a_gpu_hide_the_hosts_time_but_not_one_anothers_kernels() -> None:
+    def step(cost: Cost, worlds: int, sharing: int) -> float:
+        """Time of a step of the worlds, in as many launches as share the GPU [s]."""
+        wave = [cost] * worlds
+        seconds = wave_seconds(wave, GPU, sharing, on_gpu=True, sharing=sharing) - GPU.start
+        return (seconds - worlds / sharing * GPU.world_start) / cost.steps
+
+    # the host takes most of the time: two of them take half
+    looked_after = Cost(1, 1, 1000.0)
+    alone, shared = (step(looked_after, 1024, sharing) for sharing in (1, 2))
+    assert shared - GPU.step == pytest.approx(0.5 * (alone - GPU.step), rel=0.01)
+    # the device does: a launch waits for the other's kernels, which together take as long
+    full = Cost(3_000, 3_000, 1000.0)
+    assert step(full, 100, 2) == pytest.approx(step(full, 100, 1) - 100 * GPU.world_step, rel=0.02)
 
 
 def test_the_measurement_finds_the_speed_of_gpus_that_keep_to_it() -> None:
@@ -104,7 +124,7 @@ def test_the_measurement_finds_the_speed_of_gpus_that_keep_to_it() -> None:
         now[0] += wave_seconds(costs, GPU, 2, on_gpu=True)
         return [SimpleNamespace(phases=[{"steps": cost.steps}]) for cost in costs]
 
-    workers: Any = SimpleNamespace(count=2, on_gpu=True, simulate=simulate)
+    workers: Any = SimpleNamespace(count=2, on_gpu=True, sharing=1, simulate=simulate)
     found = measure_speed(workers, lambda: now[0])
     assert found.on.endswith(", 2 workers")
     assert replace(found, on="") == replace(
@@ -153,10 +173,10 @@ def test_speeds_are_stored_for_each_machine_and_a_damaged_file_is_none() -> None
         '{"old": {"step": 1.0, "sphere_step": 1.0, "start": 1.0}}', encoding="utf-8"
     )
     assert stored_speed("old") is None
-    # and so is a GPU that was before its worlds were; a core has none
+    # and so is a GPU that was before the start of its worlds was; a core has none
     core = asdict(Speed(4.0e-6, 0.0, 2.0, grain_step=1.8e-7, look_step=4.4e-7, mesh=1.6))
-    gpu = asdict(Speed(2.5e-5, 3.0e-10, 0.03, grain_step=2.4e-9, mesh=2.5))
-    del core["world_step"], gpu["world_step"]
+    gpu = asdict(Speed(2.5e-5, 3.0e-10, 0.03, grain_step=2.4e-9, mesh=2.5, world_step=2.5e-7))
+    del core["world_step"], core["world_start"], gpu["world_start"]
     (user_folder() / "speeds.json").write_text(json.dumps({"core": core, "GPU": gpu}), encoding="utf-8")
     assert stored_speed("core") == Speed(**core)
     assert stored_speed("GPU") is None
