@@ -22,6 +22,8 @@ class Prior:
     """Number of the factors; the other parameters are sizes."""
     coefficients: np.ndarray
     """Covariances of the errors of the coefficients, (observables, terms, terms)."""
+    chance: np.ndarray
+    """Covariances that the noise of the bank gives them, (observables, terms, terms)."""
     amplitude: np.ndarray
     """Variances of the smooth function, (observables,)."""
     length: np.ndarray
@@ -49,6 +51,8 @@ class Correction:
     """Inverse covariances of the runs, (observables, n, n)."""
     correlation: np.ndarray
     """Of errors, (observables, observables)."""
+    noise: np.ndarray
+    """Variances of the noise of the runs' means, (n, observables)."""
     noise_ratio: np.ndarray
     """Standard deviations of one run around the optimum over those of the emulator, (observables,)."""
 
@@ -63,6 +67,26 @@ class Correction:
         left = self.prior.covariance(x[None], x[None]) - known @ self.inverse @ np.swapaxes(known, 1, 2)
         sd = np.sqrt(np.maximum(left[:, 0, 0], 0.0))
         return np.asarray(sd[:, None] * self.correlation * sd)
+
+    def chance(self, x: np.ndarray) -> np.ndarray:
+        """Covariances that the noise of all runs, the bank's too, gives corrected predictions.
+
+        Parameters
+        ----------
+        x : (n, parameters) array
+            Coded.
+
+        Returns
+        -------
+        (observables, n, n) array
+        """
+        prior = self.prior
+        gain = prior.covariance(x, self.points) @ self.inverse
+        of_bank = all_terms(x, prior.factors) - gain @ all_terms(self.points, prior.factors)
+        of_runs = gain * self.noise.T[:, None, :]
+        return np.asarray(
+            of_bank @ prior.chance @ np.swapaxes(of_bank, 1, 2) + of_runs @ np.swapaxes(gain, 1, 2)
+        )
 
 
 def condition_on(
@@ -93,7 +117,7 @@ def condition_on(
     terms = all_terms(points, prior.factors)
     coefficients = np.einsum("jst,mt,mj->sj", prior.coefficients, terms, weights)
     smooth = prior.amplitude * weights
-    return Correction(prior, points, coefficients, smooth, inverse, correlation, noise_ratio)
+    return Correction(prior, points, coefficients, smooth, inverse, correlation, noise, noise_ratio)
 
 
 def log_likelihood(prior: Prior, points: np.ndarray, missed: np.ndarray, noise: np.ndarray) -> float:

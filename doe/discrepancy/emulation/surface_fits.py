@@ -86,6 +86,11 @@ class _Shrunk:
         leverage = np.einsum("ij,ji->i", terms, inverse)[:, None]
         return cls(gram_inverse, inverse, coefficients, response - terms @ coefficients, leverage)
 
+    @property
+    def chance(self) -> np.ndarray:
+        """Covariance that noise alone gives the coefficients, in variances of one run, (terms, terms)."""
+        return self.inverse @ self.inverse.T
+
 
 @dataclass(frozen=True, eq=False)
 class BaseRuns:
@@ -210,7 +215,8 @@ class _BaseFit:
         base = Polynomial(
             self.fitted.coefficients, misfit * self.noise.mean(axis=0) / repeats.mean(), kriging
         )
-        return Surfaces(base, self.fitted.gram_inverse, runs.noise, {}, np.zeros(len(misfit), dtype=bool))
+        fitted, silent = self.fitted, np.zeros(len(misfit), dtype=bool)
+        return Surfaces(base, fitted.gram_inverse, fitted.chance, runs.noise, {}, silent)
 
 
 @dataclass(frozen=True, eq=False)
@@ -316,7 +322,7 @@ def _fit_addition(runs: AddedRuns, scales: np.ndarray) -> Addition:
         Polynomial(fitted.coefficients, np.zeros(len(growth)), kriging),
         fitted.inverse @ cubic(theta),
         fitted.gram_inverse,
-        fitted.inverse @ fitted.inverse.T,
+        fitted.chance,
         growth,
         _mean_variance(runs, growth),
         runs.base.noise.correlation,

@@ -6,7 +6,7 @@ and the factors, nothing at g = 0. What a polynomial misses may be kriged. `surf
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import combinations_with_replacement
@@ -119,7 +119,8 @@ class Surfaces:
 
     base: Polynomial
     gram_inverse: np.ndarray
-    """Of the base's fit, (terms, terms)."""
+    chance: np.ndarray
+    """Of the base's fit, as of an `Addition`, (terms, terms)."""
     noise: Noise
     """Of one run near the base."""
     additions: Mapping[str, Addition]
@@ -211,16 +212,28 @@ class Surfaces:
 
         Terms are those of `all_terms`.
         """
+        own = [self.additions[name].gram_inverse for name in mechanisms]
+        return self._of_coefficients(theta, mechanisms, self.gram_inverse, own)
+
+    def coefficient_chance(self, theta: np.ndarray, mechanisms: tuple[str, ...]) -> np.ndarray:
+        """Covariances that noise gives all coefficients, as `coefficient_errors` has them of their errors."""
+        own = [self.additions[name].chance for name in mechanisms]
+        return self._of_coefficients(theta, mechanisms, self.chance, own)
+
+    def _of_coefficients(
+        self, theta: np.ndarray, mechanisms: tuple[str, ...], base: np.ndarray, own: Sequence[np.ndarray]
+    ) -> np.ndarray:
+        """Covariances of all coefficients, of those of the base and of each mechanism's own."""
         parts = [self.additions[name] for name in mechanisms]
-        shared = np.concatenate([np.eye(len(self.gram_inverse)), *(-part.base_terms for part in parts)])
+        shared = np.concatenate([np.eye(len(base)), *(-part.base_terms for part in parts)])
         variance = (self.noise.variance(theta) * ~self.silent)[:, None, None]
-        errors = variance * (shared @ self.gram_inverse @ shared.T)
-        end = len(self.gram_inverse)
-        for part in parts:
-            start, end = end, end + len(part.gram_inverse)
-            own = part.variance * ~part.silent
-            errors[:, start:end, start:end] += own[:, None, None] * part.gram_inverse
-        return np.asarray(errors)
+        whole = variance * (shared @ base @ shared.T)
+        end = len(base)
+        for part, of_part in zip(parts, own, strict=True):
+            start, end = end, end + len(of_part)
+            scale = part.variance * ~part.silent
+            whole[:, start:end, start:end] += scale[:, None, None] * of_part
+        return np.asarray(whole)
 
     def moved(self, mechanisms: tuple[str, ...]) -> np.ndarray:
         """True where a model with some mechanisms is more than noise, (observables,)."""

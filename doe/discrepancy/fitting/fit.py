@@ -37,6 +37,8 @@ CONVERGED = 1e-4
 AT_BOUND = 1e-3
 """A parameter so near an end of its range, in coded units, is at that end."""
 PROFILE_POINTS = 61
+LEAST_INFORMATION = 1e-9
+"""Of a parameter that no mean depends on; its range is worth a millionfold."""
 
 
 @dataclass(frozen=True)
@@ -71,12 +73,25 @@ class Fitted:
 
     @cached_property
     def spread(self) -> np.ndarray:
-        """Covariance of the parameters, but for the error of the model's shift, (parameters, parameters).
+        """Covariance of the parameters if slopes and the model's shift were known, (parameters, parameters).
 
         The ranges are what is known of a parameter that the data say nothing of.
         """
         information = self.slopes.T @ self.slopes + np.diag(model_width(self.model) ** -2)
         return np.asarray(np.linalg.inv(information))
+
+    @cached_property
+    def whole_spread(self) -> np.ndarray:
+        """Covariance of the parameters, (parameters, parameters).
+
+        Slopes are less than they seem by the noise in them, and a direction that they say no more of than
+        noise would is as open as its range.
+        """
+        precision = self.whitening.T @ self.whitening
+        seeming, feigned = self.slopes.T @ self.slopes, self.stack.feigned_information(self.x, precision)
+        shift = self.model.shift
+        known = np.linalg.inv(_left(seeming, feigned) + np.diag(model_width(self.model) ** -2))
+        return np.asarray(known if shift is None else known + shift.spread)
 
     @property
     def model(self) -> Model:
@@ -94,6 +109,16 @@ class Fitted:
         return self.x[len(self.x) - len(self.mechanisms) :]
 
     @property
+    def ratios(self) -> np.ndarray:
+        """Coded sizes over the standard errors that they would have if there were none.
+
+        Noise in the slopes of an effect moves nothing where the effect is nothing.
+        """
+        shift, start = self.model.shift, len(self.x) - len(self.mechanisms)
+        variances = np.diag(self.spread if shift is None else self.spread + shift.spread)
+        return np.asarray(self.coded_sizes / np.sqrt(variances[start:]))
+
+    @property
     def coded_size_errors(self) -> np.ndarray:
         """Standard errors of the coded sizes."""
         return self.errors[len(self.x) - len(self.mechanisms) :]
@@ -101,8 +126,7 @@ class Fitted:
     @property
     def errors(self) -> np.ndarray:
         """Standard errors of the coded parameters, (parameters,)."""
-        shift = self.model.shift
-        return np.sqrt(np.diag(self.spread) + (0.0 if shift is None else np.diag(shift.spread)))
+        return np.sqrt(np.diag(self.whole_spread))
 
     @property
     def promise(self) -> float:
@@ -323,6 +347,15 @@ def weigh(stack: Stack, x: np.ndarray) -> Fitted:
     q = float(residual @ residual)
     score = q - 2.0 * float(np.log(np.diag(whitening)).sum())
     return Fitted(stack, x, covariance, whitening, q, score)
+
+
+def _left(seeming: np.ndarray, feigned: np.ndarray) -> np.ndarray:
+    """Take feigned information out of what seems to be there; no direction keeps less than none."""
+    triangle = np.linalg.cholesky(seeming + LEAST_INFORMATION * np.eye(len(seeming)))
+    inverse = np.linalg.inv(triangle)
+    shares, directions = np.linalg.eigh(inverse @ feigned @ inverse.T)
+    whole = triangle @ directions
+    return np.asarray((whole * np.maximum(1.0 - shares, 0.0)) @ whole.T)
 
 
 def model_width(model: Model) -> np.ndarray:

@@ -100,7 +100,8 @@ class Misses:
     correlation: np.ndarray
     """Of the noise, (observables, observables)."""
     coefficients: np.ndarray
-    """Covariances of the emulator's errors, (observables, terms, terms)."""
+    chance: np.ndarray
+    """Covariances of the emulator's errors, and those that noise gives it, (observables, terms, terms)."""
     misfit: np.ndarray
     variance: np.ndarray
     """Its statement of what no coefficient follows, and variance of one run, both where symmetry lets it act,
@@ -112,7 +113,8 @@ class Misses:
         """Knowledge without the runs."""
         # Sizes run from 0 to 1, factors from -1 to 1.
         length = np.where(np.arange(self.x.shape[1]) < self.factors, LENGTH, LENGTH / 2.0)
-        return Prior(self.factors, self.coefficients, self.misfit + amplitude * self.variance, length)
+        smooth = self.misfit + amplitude * self.variance
+        return Prior(self.factors, self.coefficients, self.chance, smooth, length)
 
     def log_likelihood(self, amplitude: float) -> float:
         """Of what was missed."""
@@ -158,6 +160,7 @@ def misses(model: Model, runs: Runs, centre: np.ndarray, ratio: np.ndarray, cond
         np.array([_slope(model, x, step, condition) for step in np.eye(x.shape[1])]),
         surfaces.correlation(centre, model.mechanisms),
         surfaces.coefficient_errors(centre[:factors], model.mechanisms),
+        surfaces.coefficient_chance(centre[:factors], model.mechanisms),
         surfaces.misfit_variance(centre, model.mechanisms),
         variance * surfaces.moved(model.mechanisms),
         factors,

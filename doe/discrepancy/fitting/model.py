@@ -12,6 +12,7 @@ from scipy.linalg import block_diag
 
 from doe.discrepancy.emulation.correction import Correction
 from doe.discrepancy.emulation.emulator import Emulator
+from doe.discrepancy.emulation.surfaces import all_terms
 from doe.discrepancy.fitting.evidence import Block
 from doe.discrepancy.fitting.scatter import Excess, Scatter
 
@@ -133,6 +134,30 @@ class Model:
             error = error * np.outer(turn, turn)
         return np.asarray(error[np.ix_(block.columns, block.columns)])
 
+    def slope_chance(self, x: np.ndarray, block: Block) -> tuple[np.ndarray, np.ndarray]:
+        """Covariances that the noise of bank and fresh runs gives the slopes of the prediction of a block.
+
+        Returns
+        -------
+        of_each : (k, parameters, parameters) array
+        correlation : (k, k) array
+            Of the slopes of two means.
+        """
+        surfaces, size = self.emulator.surfaces[block.condition], len(x)
+        near = x + STEP * np.concatenate([np.eye(size), -np.eye(size)])
+        if block.condition in self.corrections:
+            chance = self.corrections[block.condition].chance(near)
+        else:
+            factors = len(self.emulator.space.factors)
+            terms = all_terms(near, factors)
+            chance = terms @ surfaces.coefficient_chance(x[:factors], self.mechanisms) @ terms.T
+        difference = np.concatenate([np.eye(size), -np.eye(size)], axis=1) / (2.0 * STEP)
+        of_each = difference @ chance @ difference.T
+        if self.is_directed:
+            of_each = of_each * self.turn(block.condition)[:, None, None] ** 2
+        correlation = surfaces.correlation(x, self.mechanisms)
+        return of_each[block.columns], correlation[np.ix_(block.columns, block.columns)]
+
     def error(self, x: np.ndarray, block: Block) -> np.ndarray:
         """Covariance of the error of the prediction of a block, with what is systematic, (k, k)."""
         theta = x[: len(self.emulator.space.factors)]
@@ -172,6 +197,34 @@ class Stack:
     def open_error(self, x: np.ndarray) -> np.ndarray:
         """Covariance of what is open of the predictions at one row of coded parameters, (means, means)."""
         return _blocks(self.model.open_error(x, block) for block in self.blocks)
+
+    def feigned_information(self, x: np.ndarray, precision: np.ndarray) -> np.ndarray:
+        """Information on the parameters that is none: noise in the slopes, squared with them.
+
+        Slopes J that noise of covariance S is in have an expected J' P J that is too large by that of the
+        noise (Fuller 1987, Measurement Error Models, chapter 1).
+
+        Parameters
+        ----------
+        x : (parameters,) array
+            Coded.
+        precision : (means, means) array
+            P, inverse covariance of measured less predicted means.
+
+        Returns
+        -------
+        (parameters, parameters) array
+        """
+        feigned, start = np.zeros((len(x), len(x))), 0
+        for block in self.blocks:
+            end = start + len(block.mean)
+            own, correlation = self.model.slope_chance(x, block)
+            sd = np.sqrt(np.maximum(np.einsum("jaa->j", own), np.finfo(float).tiny))
+            weights = precision[start:end, start:end] * correlation * np.outer(sd, sd)
+            # of two means the shape is taken as the mean of theirs
+            feigned += np.einsum("j,jab->ab", weights.sum(axis=0) / sd**2, own)
+            start = end
+        return feigned
 
     @cached_property
     def common(self) -> np.ndarray:

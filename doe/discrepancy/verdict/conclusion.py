@@ -54,8 +54,8 @@ class Assessment:
 
     @property
     def ratios(self) -> np.ndarray:
-        """Each size over its standard error."""
-        return np.asarray(self.fitted.coded_sizes / self.fitted.coded_size_errors)
+        """Each size over the standard error that it would have if there were none."""
+        return self.fitted.ratios
 
 
 @dataclass(frozen=True)

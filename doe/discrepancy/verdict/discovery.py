@@ -145,7 +145,7 @@ class Candidate:
     sizes: tuple[Interval, ...]
     """Size of each mechanism in the joint refit."""
     size_over_se: tuple[float, ...]
-    """Each size over its standard error."""
+    """Each size over the standard error that it would have if there were none."""
     q: float
     degrees_of_freedom: int
     p_value: float

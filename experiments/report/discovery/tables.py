@@ -112,7 +112,8 @@ def candidates_table(found: Discovery, terms: Terms) -> Table:
         "Q: squared residuals in standard deviations, after factors and size were fitted together to the"
         " training conditions; held-out conditions count by how far their forecast misses them."
         " p: of Q and of what is off alike in all conditions, among data sets that the model itself makes;"
-        " fit_level is the least. Held-out gain: rise of the log score of the conditions that took no part in"
+        " fit_level is the least. Size / se: over the standard error that it would have if there were none."
+        " Held-out gain: rise of the log score of the conditions that took no part in"
         f" any fit, with its 90 % interval.{share} What was too far behind was judged by the emulator, the"
         " others by fresh runs."
     )

@@ -247,7 +247,7 @@ def test_the_detectable_size_is_found_and_told_from_the_rest_with_80_percent_pro
         data = measure({name: size}, seed, theta=middle)
         one = _calibrated(data, name)
         behind = [_calibrated(data, rival).q - one.q for rival in rivals]
-        seen = one.coded_sizes[0] / one.coded_size_errors[0] >= SETTINGS.least_ratio
+        seen = one.ratios[0] >= SETTINGS.least_ratio
         found += seen and all(q >= SETTINGS.tie_margin for q in behind)
     assert stats.binom.ppf(1e-3, count, 0.8) <= found <= stats.binom.isf(1e-3, count, 0.8)
 

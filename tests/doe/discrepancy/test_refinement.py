@@ -7,8 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy import stats
-from synthetic import CONDITIONS, emulator, measure
+from synthetic import CONDITIONS, OBSERVABLES, SETTINGS, SyntheticSimulator, emulator, measure, space
 
+from doe.discrepancy import bank_points, fit_emulator, make_bank
+from doe.discrepancy.emulation.correction import Prior, condition_on
+from doe.discrepancy.emulation.surfaces import all_terms
 from doe.discrepancy.fitting.evidence import gather
 from doe.discrepancy.fitting.fit import coded_size_interval, fit, weigh
 from doe.discrepancy.fitting.misses import Runs, likeliest_shift
@@ -63,7 +66,7 @@ def test_a_corrected_model_predicts_the_world_that_is_off() -> None:
 def test_the_error_of_the_shift_widens_what_is_said_of_a_size() -> None:
     evidence = gather(measure({"delta": 0.6}, 3), model().emulator)
     plain = fit(Stack(model(), evidence.training))
-    spread = 3.0 * plain.spread
+    spread = 3.0 * plain.whole_spread
     shifted = weigh(Stack(replace(model(), shift=Shift(np.zeros(4), spread)), evidence.training), plain.x)
     np.testing.assert_allclose(shifted.errors, 2.0 * plain.errors, rtol=1e-9)
     widths = [np.diff(coded_size_interval(one, 0))[0] for one in (plain, shifted)]
@@ -76,3 +79,41 @@ def test_the_promise_of_a_model_is_its_score_but_for_what_is_uncertain_of_its_pr
     noise = fitted.stack.noise(fitted.x)
     assert fitted.promise < fitted.score
     assert fitted.promise == pytest.approx(fitted.q + np.linalg.slogdet(noise)[1])
+
+
+def test_information_is_larger_than_it_is_by_what_noise_in_the_slopes_feigns() -> None:
+    # Banks of a world that scatters ten times as much: slopes are as much noise as slopes. Two banks share no
+    # noise, so that slopes of the one times those of the other are as large as expected ones squared.
+    noisy, known = SyntheticSimulator(space(("delta",)), 10.0), space(("delta",))
+    evidence = gather(measure({"delta": 1.0}, 1), emulator()).training
+    slopes, feigned = [], []
+    precision = np.linalg.inv(Stack(model(), evidence).noise(CENTRE))
+    for seed in range(12):
+        points = bank_points(known, SETTINGS, seed)
+        of_bank = fit_emulator(make_bank(known, OBSERVABLES, points, noisy(points)))
+        stack = Stack(Model(of_bank, ("delta",), 0.0), evidence)
+        slopes.append(stack.jacobian(CENTRE[None])[0])
+        feigned.append(np.diag(stack.feigned_information(CENTRE, precision)))
+    seeming = np.einsum("bip,ij,cjp->bcp", slopes, precision, slopes)
+    own, count = np.einsum("bbp->bp", seeming), len(slopes)
+    too_much = own - (seeming.sum(axis=1) - own) / (count - 1)
+    error = too_much.std(axis=0, ddof=1) / count**0.5
+    # Student's t of 11 degrees of freedom passes 4.4 in one case of a thousand.
+    assert (np.abs(too_much.mean(axis=0) - np.mean(feigned, axis=0)) < 4.4 * error).all()
+    assert (too_much.mean(axis=0)[:3] > 4.4 * error[:3]).any()
+
+
+def test_noise_of_bank_and_fresh_runs_moves_a_corrected_prediction_as_much_as_is_said() -> None:
+    rng = np.random.default_rng(8)
+    points, at = rng.uniform(-0.5, 0.5, (6, 2)), rng.uniform(-0.5, 0.5, (2, 2))
+    terms, noise = all_terms(points, 1), np.full((6, 1), 0.3)
+    of_bank = np.linalg.inv(10.0 * np.eye(terms.shape[1]) + 1.0)
+    prior = Prior(1, 1.5 * of_bank[None], of_bank[None], np.array([0.2]), np.array([0.7, 0.35]))
+    moved = []
+    for _ in range(4000):
+        bank_error = rng.multivariate_normal(np.zeros(len(of_bank)), of_bank)
+        missed = rng.normal(0.0, noise**0.5) - (terms @ bank_error)[:, None]
+        learnt = condition_on(prior, points, missed, noise, np.eye(1), np.ones(1))
+        moved.append(all_terms(at, 1) @ bank_error + learnt.mean(at)[:, 0])
+    # A variance of 4000 has an error of 2.2 %; 5 of them.
+    np.testing.assert_allclose(np.diag(np.cov(np.transpose(moved))), np.diag(learnt.chance(at)[0]), rtol=0.11)

@@ -208,7 +208,8 @@ def _surfaces(
     coefficients, gram_inverse = np.zeros(terms), np.zeros((terms, terms))
     coefficients[: len(fitted)] = fitted
     gram_inverse[: len(fitted), : len(fitted)] = spread
-    return Surfaces(_exact(coefficients), gram_inverse, noise, additions, np.zeros(1, dtype=bool))
+    base, silent = _exact(coefficients), np.zeros(1, dtype=bool)
+    return Surfaces(base, gram_inverse, gram_inverse, noise, additions, silent)
 
 
 def _addition(signature: pd.Series, noise: Noise) -> Addition:
