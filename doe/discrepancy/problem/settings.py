@@ -31,9 +31,11 @@ class Settings:
     """Points for each mechanism, one run each."""
     false_alarm: float = 0.025
     """Probability that a model that lacks nothing is said to lack something."""
-    fit_level: float = 0.1
+    fit_level: float = 0.025
     """A model whose disagreement with the data has a smaller p value is not admitted. It is the share of true
-    models that are lost; the larger it is, the more of what the library lacks is seen to lack."""
+    models that are lost; the larger it is, the more of what the library lacks is seen to lack. In five series
+    of blind trials the hidden effect had a p value from here to 0.1 in 17 of 539, and where the library lacks
+    it the closest had one in 3 of 253."""
     least_ratio: float = 3.0
     """Least size over standard error of a mechanism that is named."""
     pair_ratio: float = 5.0
