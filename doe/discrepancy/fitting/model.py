@@ -137,6 +137,8 @@ class Model:
     def slope_chance(self, x: np.ndarray, block: Block) -> tuple[np.ndarray, np.ndarray]:
         """Covariances that the noise of bank and fresh runs gives the slopes of the prediction of a block.
 
+        That of what is kriged is not counted.
+
         Returns
         -------
         of_each : (k, parameters, parameters) array
