@@ -154,7 +154,7 @@ class DaskWorkers:
                 raise InputError(rule, f"{facts['nthreads']} threads of {address}", "the cluster")
 
     def _shares(self) -> _Shares | None:
-        """What the workers have of their GPUs; None where one has none."""
+        """Shares that the workers have of their GPUs; None where one has none."""
         found = list(self._client.run(describe_worker, on_error="ignore").values())
         if not found or any(facts["memory"] is None for facts in found):
             return None
@@ -164,7 +164,7 @@ class DaskWorkers:
 
 
 class _Shares(NamedTuple):
-    """What each worker has of a GPU."""
+    """Share of a GPU that each worker has."""
 
     memory: float
     """Its part of the free memory, where that is least [bytes]."""
