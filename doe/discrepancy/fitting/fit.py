@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy import stats
 from scipy.linalg import cholesky, solve_triangular
 
 from doe.discrepancy.emulation.bank import sobol_points
@@ -36,7 +35,6 @@ CONVERGED = 1e-4
 """Longest step of a fit that has arrived, in coded units."""
 AT_BOUND = 1e-3
 """A parameter so near an end of its range, in coded units, is at that end."""
-PROFILE_POINTS = 61
 LEAST_INFORMATION = 1e-9
 """Of a parameter that no mean depends on; its range is worth a millionfold."""
 
@@ -367,46 +365,3 @@ def whiten(covariance: np.ndarray) -> np.ndarray:
     """Lower triangle W with W' W the inverse of a covariance."""
     triangle = cholesky(covariance, lower=True)
     return np.asarray(solve_triangular(triangle, np.eye(len(triangle)), lower=True))
-
-
-def coded_size_interval(fitted: Fitted, number: int, coverage: float = 0.9) -> tuple[float, float]:
-    """Profile-likelihood interval of a coded size.
-
-    It ends where q, with all else refitted, has risen by the point of chi2 for the coverage. The weights stay
-    those of the optimum; what they contribute to the score's slope there is taken out of the residuals, so
-    that q is least at the optimum, too. Where nothing fits, the score may ask for another size than q does,
-    one whose predictions are more uncertain: the interval holds both.
-
-    Parameters
-    ----------
-    fitted : Fitted
-    number : int
-        Which of the model's mechanisms.
-    coverage : float
-    """
-    column = len(fitted.x) - len(fitted.mechanisms) + number
-    se = max(float(fitted.coded_size_errors[number]), 1e-3)
-    low, high = max(fitted.x[column] - 5.0 * se, 0.0), min(fitted.x[column] + 5.0 * se, 1.0)
-    grid = np.unique(np.append(np.linspace(low, high, PROFILE_POINTS), fitted.x[column]))
-    starts = np.repeat(fitted.x[None], len(grid), axis=0)
-    starts[:, column] = grid
-    lower = np.repeat(fitted.model.lower[None], len(grid), axis=0)
-    upper = np.repeat(fitted.model.upper[None], len(grid), axis=0)
-    lower[:, column] = upper[:, column] = grid
-    slopes = fitted.sensitivities
-    left = fitted.residuals - slopes @ (np.linalg.pinv(slopes) @ fitted.residuals)
-    target = fitted.stack.predict(fitted.x[None])[0] + np.linalg.solve(fitted.whitening, left)
-    _, q = minimise(fitted.stack, fitted.whitening, target, starts, lower, upper)
-    shifted = (fitted.errors[column] ** 2) / fitted.spread[column, column]
-    rise = q - q.min() - stats.chi2.ppf(coverage, 1) * shifted
-    inside, value = np.flatnonzero(rise <= 0.0), float(fitted.x[column])
-    ends = _crossing(grid, rise, inside[0], -1), _crossing(grid, rise, inside[-1], 1)
-    return min(ends[0], value), max(ends[1], value)
-
-
-def _crossing(grid: np.ndarray, rise: np.ndarray, inside: int, step: int) -> float:
-    outside = inside + step
-    if not 0 <= outside < len(grid):
-        return float(grid[inside])
-    share = rise[inside] / (rise[inside] - rise[outside])
-    return float(grid[inside] + share * (grid[outside] - grid[inside]))

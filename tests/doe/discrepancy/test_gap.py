@@ -25,8 +25,9 @@ from doe.discrepancy.contest.held_out import forecast
 from doe.discrepancy.contest.power import CODED_SIZES, Effects, powers
 from doe.discrepancy.contest.signatures import projector, secants, signatures
 from doe.discrepancy.fitting.evidence import gather
-from doe.discrepancy.fitting.fit import Fitted, coded_size_interval, fit, weigh
+from doe.discrepancy.fitting.fit import Fitted, fit, weigh
 from doe.discrepancy.fitting.model import Model, Stack
+from doe.discrepancy.fitting.size_interval import coded_size_interval
 
 NULLS = 100
 

@@ -13,10 +13,11 @@ from doe.discrepancy import bank_points, fit_emulator, make_bank
 from doe.discrepancy.emulation.correction import Prior, condition_on
 from doe.discrepancy.emulation.surfaces import all_terms
 from doe.discrepancy.fitting.evidence import gather
-from doe.discrepancy.fitting.fit import coded_size_interval, fit, weigh
+from doe.discrepancy.fitting.fit import fit, weigh
 from doe.discrepancy.fitting.misses import Runs, likeliest_shift
 from doe.discrepancy.fitting.model import Model, Shift, Stack
 from doe.discrepancy.fitting.refinement import correct
+from doe.discrepancy.fitting.size_interval import coded_size_interval
 
 OFF = np.array([0.1, -0.05, 0.08, -0.06])
 """The world is the emulator at parameters that are larger by this."""

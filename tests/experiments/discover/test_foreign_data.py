@@ -31,8 +31,9 @@ from doe.discrepancy.contest.held_out import forecast
 from doe.discrepancy.contest.signatures import signatures
 from doe.discrepancy.emulation.bank import sobol_points
 from doe.discrepancy.fitting.evidence import gather
-from doe.discrepancy.fitting.fit import coded_size_interval, fit, weigh
+from doe.discrepancy.fitting.fit import fit, weigh
 from doe.discrepancy.fitting.model import Model, Stack
+from doe.discrepancy.fitting.size_interval import coded_size_interval
 from doe.discrepancy.verdict.conclusion import Conclusion, withdrawn
 from doe.discrepancy.verdict.records import calibration_uses
 from experiments.discover.search import Search
