@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -139,6 +139,29 @@ def library_for(study: Study, files: Mapping[str, Path] = FILES) -> tuple[Mechan
     return tuple(mechanism for mechanism in found if mechanism is not None and _can_have(study, mechanism))
 
 
+def with_maximum(study: Study, mechanism: Mechanism, size: float | str) -> Mechanism:
+    """Give a mechanism of its `library_for` another largest size, written as in a study.
+
+    Raises
+    ------
+    StudyError
+        When the size is no quantity of its kind, not above its null, or more than the study can have.
+    """
+    place = f"{study.file}: discover.maxima.{mechanism.name}"
+    try:
+        maximum = _in_unit(mechanism.parameters[0], size, mechanism.unit)
+    except ValueError as error:
+        raise StudyError(str(error), size, place) from error
+    if maximum <= mechanism.null:
+        raise StudyError(f"must be above {mechanism.null:g}, where it has no effect", size, place)
+    changed = replace(mechanism, maximum=maximum)
+    try:
+        with_mechanisms(study, [changed])
+    except StudyError as error:
+        raise StudyError(f"must be a size that the study can have: {error.rule}", size, place) from error
+    return changed
+
+
 def grain_scales(case: Case) -> dict[str, float]:
     """Scales of the grains of a case: weight over radius [N/m], volume [m3], stiffness as simulated [Pa].
 
@@ -214,7 +237,11 @@ def _start(study: Study, path: tuple[str, ...], file: MechanismFile) -> float | 
         field = field_at(Physics, path)
         default = field.default if field else None
         return float(default) if isinstance(default, float) else file.null
-    return setter_at(".".join(path)).dimension.to_unit(written, "" if file.unit == "1" else file.unit)
+    return _in_unit(".".join(path), written, file.unit)
+
+
+def _in_unit(place: str, written: float | str, unit: str) -> float:
+    return setter_at(place).dimension.to_unit(written, "" if unit == "1" else unit)
 
 
 def _number(value: Any, scales: Mapping[str, float]) -> Any:

@@ -27,7 +27,7 @@ from doe.discrepancy import (
 from experiments.cases import engine_of
 from experiments.cases.key import engine_identity
 from experiments.cases.manifest import describe
-from experiments.discover.library import FORMER_NAMES, Mechanism, library_for
+from experiments.discover.library import FORMER_NAMES, Mechanism, library_for, with_maximum
 from experiments.discover.maker import notes_on
 from experiments.discover.mirror import odd_observables
 from experiments.errors import InputError, StudyError
@@ -148,8 +148,11 @@ def _wanted(study: Study) -> tuple[Mechanism, ...]:
     if not library:
         raise StudyError("a search needs a mechanism that the study can have", "none", str(study.file))
     names = [FORMER_NAMES.get(name, name) for name in study.discover.mechanisms or ()]
-    for name in names:
-        if name not in library:
-            rule = f"must name mechanisms that the study can have, {nearest_name(name, list(library))}"
-            raise StudyError(rule, name, f"{study.file}: discover.mechanisms")
+    maxima = {FORMER_NAMES.get(name, name): size for name, size in study.discover.maxima.items()}
+    for key, named in (("mechanisms", names), ("maxima", maxima)):
+        for name in named:
+            if name not in library:
+                rule = f"must name mechanisms that the study can have, {nearest_name(name, list(library))}"
+                raise StudyError(rule, name, f"{study.file}: discover.{key}")
+    library |= {name: with_maximum(study, library[name], size) for name, size in maxima.items()}
     return tuple(library[name] for name in sorted(names or library))

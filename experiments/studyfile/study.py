@@ -77,6 +77,8 @@ class DiscoverSection(Section):
 
     mechanisms: tuple[str, ...] | None = Field(default=None, min_length=1)
     """Names of the effects that are looked for; left out: all of the library that the study can have."""
+    maxima: dict[str, float | str] = Field(default={})
+    """Largest sizes that are searched, by the effect's name; left out: the library's."""
     settings: dict[str, int | float] = Field(default={})
     """Numbers of runs and levels that differ from the defaults, by name."""
 

@@ -237,14 +237,9 @@ def _tube(bench: Bench) -> str:
     return f"cylinder z 0 0 {scene.lower_radius:.9g} 0 {scene.height:.9g}"
 
 
-def _contacts(bench: Bench) -> tuple[Contact, Contact, Contact]:
-    # the lever of the torque is R* there, the distance to the centre here: half of it among grains
-    return bench.contacts((2.0 * bench.lever, bench.lever))
-
-
 def _pairs(bench: Bench) -> str:
     """Write the contacts among grains of each kind, with their adhesion."""
-    among, kinds = _contacts(bench)[0], (GRAIN, ODD) if bench.has_odd else (GRAIN,)
+    among, kinds = bench.contacts()[0], (GRAIN, ODD) if bench.has_odd else (GRAIN,)
     energy = surface_energy(bench.adhesion())
     return "\n".join(
         f"pair_coeff {first} {second} {_words(bench, among, first == ODD, second == ODD, energy)}"
@@ -254,7 +249,7 @@ def _pairs(bench: Bench) -> str:
 
 def _walls(bench: Bench, lot: _Lot) -> str:
     """Write the contacts of grains of a kind with tube and plate."""
-    _, tube, plate = _contacts(bench)
+    _, tube, plate = bench.contacts()
     return "\n".join(
         f"fix {name}_{lot.group} {lot.group} wall/gran/region granular {_words(bench, contact, lot.is_odd)} "
         f"region {name} contacts"

@@ -192,10 +192,7 @@ def _properties(tables: Mapping[str, str]) -> str:
 def _tables(bench: Bench) -> dict[str, str]:
     """Global properties of the types: grains, tube, plate, and grains of another kind."""
     scene = bench.scene
-    # torque R* against the distance to the centre: half of it among grains, all of it on walls
-    among, tube, plate = (
-        values(contact_terms(contact)) for contact in bench.contacts((2.0 * bench.lever, bench.lever))
-    )
+    among, tube, plate = (values(contact_terms(contact)) for contact in bench.contacts())
     material, *walls = (
         values(material_terms(part))
         for part in (bench.case.grain_material, scene.wall_material, scene.wall_material)

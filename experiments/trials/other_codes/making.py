@@ -15,9 +15,9 @@ MADE: Mapping[str, Mapping[str, str]] = {
         ),
         "plate_tilt": _TILT,
         "rolling_torque": (
-            "`sds` against the relative rotation, in place of a torque against each grain's own spin: a "
-            "spring with a dashpot and a slider; the coefficient gives the same mean torque, whose lever is "
-            "R* there and the distance to the grain's centre here"
+            "`sds` against the relative rotation with the lever R*: a spring with a dashpot and a slider; "
+            "where the study has a torque against each grain's own spin, whose lever is the distance to the "
+            "grain's centre, the coefficient gives the same mean torque"
         ),
         "size_spread": _SIZES,
         "vibration": "the plate, a region, moves as ours does, from the lift on for the same time",
@@ -33,9 +33,9 @@ MADE: Mapping[str, Mapping[str, str]] = {
         ),
         "plate_tilt": _TILT,
         "rolling_torque": (
-            "`cdt` or `epsd2` against the relative rotation, in place of a torque against each grain's own "
-            "spin; the coefficient gives the same mean torque, whose lever is R* there and the distance to "
-            "the grain's centre here; `cdt` acts for whole steps, `epsd2` is a spring"
+            "`cdt` or `epsd2` against the relative rotation with the lever R*: `cdt` acts for whole steps, "
+            "`epsd2` is a spring; where the study has a torque against each grain's own spin, whose lever is "
+            "the distance to the grain's centre, the coefficient gives the same mean torque"
         ),
         "size_spread": _SIZES,
         "vibration": "the plate, a mesh, wiggles as ours does, from the lift on for the same time",

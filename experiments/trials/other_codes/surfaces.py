@@ -16,11 +16,8 @@ from dem_warp.model import GRAVITY
 from experiments.errors import InputError
 from experiments.export import ExportedTest
 from experiments.export.contact import Contact, contacts_of
-from experiments.export.lift import FIRST_SEED, Lift, Template
+from experiments.export.lift import Lift, Template
 from experiments.trials.other_codes.odd_lift import OddLift, odd
-
-DIRECTIONS = 4096
-"""Directions that a grain is touched from, for the mean of its levers."""
 
 DENSEST_RAIN = 0.17
 """Largest solid fraction of the grains that come in at once: in a denser lot some find no place at random."""
@@ -130,27 +127,9 @@ class Bench:
         """Effective modulus E* of two grains [Pa]."""
         return effective_moduli(self.case.grain_material, self.case.grain_material)[0]
 
-    @cached_property
-    def lever(self) -> float:
-        """Mean distance of a grain's centre from where a plane touches it, over the radius there."""
-        [shape] = self.case.grains.mixture.shapes
-        directions = np.random.default_rng(FIRST_SEED).normal(size=(DIRECTIONS, 3))
-        directions /= np.linalg.norm(directions, axis=1)[:, None]
-        touched = np.argmax(directions @ shape.centers.T + shape.radii, axis=1)
-        points = shape.centers[touched] + directions * shape.radii[touched, None]
-        return float(np.mean(np.linalg.norm(points, axis=1) / shape.radii[touched]))
-
-    def contacts(self, levers: tuple[float, float] = (1.0, 1.0)) -> tuple[Contact, Contact, Contact]:
-        """Contacts of grains with grains, the tube and the plate.
-
-        Codes differ in the lever of rolling friction: the coefficients, among grains and on walls, are
-        multiplied by these.
-        """
-        among, wall = (
-            replace(pair, rolling_friction=factor * pair.rolling_friction)
-            for pair, factor in zip((self.case.grain_grain, self.case.grain_wall), levers, strict=True)
-        )
-        case = replace(self.case, mechanisms=(), grain_grain=among, grain_wall=wall)
+    def contacts(self) -> tuple[Contact, Contact, Contact]:
+        """Contacts of grains with grains, the tube and the plate."""
+        case = replace(self.case, mechanisms=())
         heaviest = max(template.mass for template in self.templates)
         with_grain, with_tube = contacts_of(case, self.lift.largest_radius, heaviest)
         plate = self.scene.contacts(case)[2]
