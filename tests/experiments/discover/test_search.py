@@ -83,12 +83,31 @@ def test_the_study_says_what_is_looked_for_and_how_hard() -> None:
         ({"settings": {"bank_point": 30}}, "bank_points"),
         ({"settings": {"bank_points": 3}}, "at least 10"),
         ({"mechanism": ["plate_tilt"]}, "mechanisms"),
+        ({"maxima": {"plate_tilted": "8 deg"}}, "plate_tilt"),
+        ({"maxima": {"plate_tilt": "8 mm"}}, "unit of angle"),
+        ({"maxima": {"plate_tilt": 8.0}}, "unit of angle"),
+        ({"maxima": {"plate_tilt": "0 deg"}}, "above 0, where it has no effect"),
+        ({"maxima": {"plate_tilt": "95 deg"}}, "a size that the study can have"),
     ],
 )
 def test_what_cannot_be_looked_for_is_an_error_with_its_place(discover: dict, said: str) -> None:
     with pytest.raises((InputError, RuleError), match=said) as error:
         Search.of(trial(discover=discover))
     assert "discover" in str(error.value) or "Settings" in str(error.value)
+
+
+def test_a_study_may_have_its_effects_searched_up_to_other_sizes() -> None:
+    search = Search.of(trial(discover={"maxima": {"plate_tilt": "0.1 rad", "rolling_torque": 0.4}}))
+    ends = {one.name: one.maximum for one in search.space.mechanisms}
+    theirs = {one.name: one.maximum for one in Search.of(trial()).space.mechanisms}
+    # 0.1 rad in degrees, to the six digits written here
+    assert ends == theirs | {"plate_tilt": pytest.approx(5.72958, rel=1e-6), "rolling_torque": 0.4}
+
+
+def test_a_bank_of_other_largest_sizes_does_not_know_the_effect(bank: Path) -> None:
+    search = Search.of(trial(discover={"maxima": {"rolling_torque": 0.4}}))
+    known = search.read_bank(bank).space.mechanisms
+    assert [one.name for one in search.space.mechanisms if one not in known] == ["rolling_torque"]
 
 
 def test_a_study_that_holds_everything_out_cannot_be_searched() -> None:

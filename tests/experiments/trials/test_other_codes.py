@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from dem_warp import Case
+from dem_warp import Case, ClumpShape, GrainPopulation
 from dem_warp.laws.capillary import CapillaryBridge
 from dem_warp.laws.jkr import JKR
 from dem_warp.scenes.surfaces import bed_level
@@ -62,6 +62,20 @@ def case_of(code: str = "liggghts") -> Case:
 
 
 SHAPE = case_of().grains.mixture.shapes[0]
+
+
+def test_rolling_friction_is_told_to_other_codes_with_the_lever_that_the_study_has() -> None:
+    # the lever is R* there: half a sphere's radius among spheres, all of it on a wall
+    sphere = ClumpShape.sphere(1e-3)
+    study = {"contact": {kind: {"rolling_friction": 0.1} for kind in ("grain-grain", "grain-wall")}}
+    told = {}
+    for laws in ("edem", "relative"):
+        case = load_study(STUDY, "bench", study | {"solver": {"laws": laws}}).case(THETA, seed=3)
+        case = replace(case, grains=GrainPopulation(sphere, case.grain_material))
+        theirs = SETTING.of(case, "liggghts")
+        told[laws] = [theirs.grain_grain.rolling_friction, theirs.grain_wall.rolling_friction]
+    assert told["edem"] == pytest.approx([0.2, 0.1], rel=1e-12)
+    assert told["relative"] == [0.1, 0.1]
 
 
 # ---- the film ----------------------------------------------------------------------------------------------
