@@ -139,8 +139,8 @@ def library_for(study: Study, files: Mapping[str, Path] = FILES) -> tuple[Mechan
     return tuple(mechanism for mechanism in found if mechanism is not None and _can_have(study, mechanism))
 
 
-def with_maximum(study: Study, mechanism: Mechanism, size: float | str) -> Mechanism:
-    """Give a mechanism of its `library_for` another largest size, written as in a study.
+def with_maximum(study: Study, mechanism: Mechanism, size: Quantity) -> Mechanism:
+    """Give a mechanism of its `library_for` another largest size.
 
     Raises
     ------
@@ -151,14 +151,15 @@ def with_maximum(study: Study, mechanism: Mechanism, size: float | str) -> Mecha
     try:
         maximum = _in_unit(mechanism.parameters[0], size, mechanism.unit)
     except ValueError as error:
-        raise StudyError(str(error), size, place) from error
+        raise StudyError(str(error), str(size), place) from error
     if maximum <= mechanism.null:
-        raise StudyError(f"must be above {mechanism.null:g}, where it has no effect", size, place)
+        raise StudyError(f"must be above {mechanism.null:g}, where it has no effect", str(size), place)
     changed = replace(mechanism, maximum=maximum)
     try:
         with_mechanisms(study, [changed])
     except StudyError as error:
-        raise StudyError(f"must be a size that the study can have: {error.rule}", size, place) from error
+        rule = f"must be a size that the study can have: {error.rule}"
+        raise StudyError(rule, str(size), place) from error
     return changed
 
 
@@ -240,7 +241,7 @@ def _start(study: Study, path: tuple[str, ...], file: MechanismFile) -> float | 
     return _in_unit(".".join(path), written, file.unit)
 
 
-def _in_unit(place: str, written: float | str, unit: str) -> float:
+def _in_unit(place: str, written: Any, unit: str) -> float:
     return setter_at(place).dimension.to_unit(written, "" if unit == "1" else unit)
 
 

@@ -35,7 +35,7 @@ from experiments.studyfile.factor_section import (
 from experiments.studyfile.places import KeyPath, Places
 from experiments.studyfile.reserved_names import check_factor_names
 from experiments.studyfile.scene_sections import SceneSection
-from experiments.studyfile.schema import Section, validated
+from experiments.studyfile.schema import RawQuantity, Section, validated
 from experiments.studyfile.sections import Physics, Scene, TooManyGrains
 from experiments.studyfile.setters import changed
 from experiments.studyfile.target_section import ResponseSection, TargetSection, build_target
@@ -77,7 +77,7 @@ class DiscoverSection(Section):
 
     mechanisms: tuple[str, ...] | None = Field(default=None, min_length=1)
     """Names of the effects that are looked for; left out: all of the library that the study can have."""
-    maxima: dict[str, float | str] = Field(default={})
+    maxima: dict[str, RawQuantity] = Field(default={})
     """Largest sizes that are searched, by the effect's name; left out: the library's."""
     settings: dict[str, int | float] = Field(default={})
     """Numbers of runs and levels that differ from the defaults, by name."""
