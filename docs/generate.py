@@ -150,7 +150,8 @@ def effects_page() -> str:
     return "\n\n".join(
         [
             "# Effects that a search knows",
-            "`dem-warp discover` tests each that the study can have. `[discover] mechanisms` names fewer.",
+            "`dem-warp discover` tests each that the study can have. `[discover] mechanisms` names fewer, "
+            "`[discover.maxima]` other largest sizes.",
             markdown_table(("name", "effect", "in words", "law and range", "what would confirm it"), rows),
         ]
     )
