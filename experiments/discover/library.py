@@ -17,6 +17,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from dem_warp import Case, effective_moduli
+from dem_warp.laws.conventions import Rolling
 from dem_warp.registry import Registry
 from dem_warp.scenes.poured_scene import GRAVITY
 from experiments.studyfile import Study, StudyError
@@ -30,6 +31,9 @@ from experiments.toml_files import read_toml
 
 FORMER_NAMES = {"contact_cohesion": "contact_adhesion"}
 """Names by which older studies and banks know mechanisms."""
+
+LONG_LEVER: frozenset[Rolling] = frozenset({"own_spin", "own_spin_whole_step", "deme"})
+"""Choices of rolling whose lever is the distance to the grain's centre; others have the reduced radius R*."""
 
 ScaleName = Literal["grain weight / radius", "grain volume", "grain stiffness"]
 
@@ -64,6 +68,8 @@ class MechanismFile(Section):
     """Size at which it has no effect; a study may start from more."""
     maximum: Scaled | Annotated[float, Field(gt=0.0)]
     """Largest size that is searched."""
+    reduced_maximum: float | None = Field(default=None, gt=0.0)
+    """The largest where the study's resistance to rolling has the lever R*; left out: the same."""
     source: str
     """Source of law and range."""
     confirm: str
@@ -205,7 +211,8 @@ def _mechanism(name: str, path: Path, study: Study, scales: Mapping[str, float])
     """Read a file for a study; None where the study cannot have the mechanism."""
     file = _read(path)
     null, *others = (_start(study, tuple(place.split(".")), file) for place in file.parameters)
-    maximum = _number(file.maximum, scales)
+    has_reduced = file.reduced_maximum is not None and study.solver.laws.rolling not in LONG_LEVER
+    maximum = _number(file.reduced_maximum if has_reduced else file.maximum, scales)
     if null is None or any(other != null for other in others) or null >= maximum:
         return None
     companions = tuple((place, _number(value, scales)) for place, value in file.companions.items())

@@ -10,6 +10,7 @@ import numpy as np
 
 from dem_warp import PRESETS, Case, ContactLaws, Interaction
 from dem_warp.laws.conventions import Rolling
+from experiments.discover.library import LONG_LEVER
 from experiments.export.lift import FIRST_SEED
 from experiments.trials.other_codes.odd_lift import odd
 
@@ -82,10 +83,9 @@ class Setting:
 def rolling_levers(case: Case[Any]) -> tuple[float, float]:
     """Levers of a case's rolling resistance over R*, that of the other codes: among grains, and on walls.
 
-    A torque against a grain's own spin has the distance to the grain's centre, here the mean of it; others
-    have R* themselves.
+    Some have the distance to the grain's centre, here the mean of it, others R* themselves.
     """
-    if not case.laws.rolling.startswith("own_spin"):
+    if case.laws.rolling not in LONG_LEVER:
         return 1.0, 1.0
     shape = case.grains.mixture.shapes[0]
     directions = np.random.default_rng(FIRST_SEED).normal(size=(DIRECTIONS, 3))

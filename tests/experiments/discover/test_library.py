@@ -76,6 +76,15 @@ def test_a_range_in_scales_of_the_grain_follows_the_grain(write_study: WriteStud
     assert cohesion(('"2 mm"', '"4 mm"')) / cohesion() == pytest.approx(4.0, rel=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("laws", "maximum"), [("edem", 0.1), ("deme", 0.1), ("relative", 0.4), ("liggghts", 0.4)]
+)
+def test_rolling_resistance_is_searched_further_where_its_lever_is_shorter(laws: str, maximum: float) -> None:
+    study = load_study(TRIAL, None, {"solver": {"laws": laws}})
+    [rolling] = [one for one in library_for(study) if one.name == "rolling_torque"]
+    assert rolling.maximum == maximum
+
+
 def test_a_study_with_a_mechanism_is_a_study_with_one_more_factor(trial: Study) -> None:
     [bridges] = [m for m in library_for(trial) if m.name == "liquid_bridges"]
     extended = with_mechanisms(trial, [bridges], {"liquid_bridges": (0.001, 0.003)})
