@@ -208,7 +208,7 @@ MANY, CROWD = 512, 1.8
 """Worlds of a launch that fills the device, and the longer duration of the few balls in them [s]."""
 
 RUNS = 2
-"""Counted runs of a launch, of which the least time is taken; one before finds no memory of its size yet."""
+"""Counted runs of a launch, of which the least time is taken; one before may have to find its memory."""
 
 WIDE_BOX, WIDE_BOXES = 2.0, 32
 """Times that the box on a GPU is as wide, and its worlds: few, since meshes are made for each by the host."""
