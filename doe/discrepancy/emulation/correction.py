@@ -61,10 +61,24 @@ class Correction:
         smooth = squared_exponential(x / self.prior.length, self.points / self.prior.length)
         return np.asarray(all_terms(x, self.prior.factors) @ self.coefficients + smooth @ self.weights)
 
+    def gain(self, x: np.ndarray) -> np.ndarray:
+        """Change of the addition by what the emulator misses at each point of the runs.
+
+        Parameters
+        ----------
+        x : (m, parameters) array
+            Coded.
+
+        Returns
+        -------
+        (observables, m, n) array
+        """
+        return np.asarray(self.prior.covariance(x, self.points) @ self.inverse)
+
     def error(self, x: np.ndarray) -> np.ndarray:
         """Covariance of the corrected prediction's error at one row of coded parameters."""
-        known = self.prior.covariance(x[None], self.points)
-        left = self.prior.covariance(x[None], x[None]) - known @ self.inverse @ np.swapaxes(known, 1, 2)
+        known = self.prior.covariance(self.points, x[None])
+        left = self.prior.covariance(x[None], x[None]) - self.gain(x[None]) @ known
         sd = np.sqrt(np.maximum(left[:, 0, 0], 0.0))
         return np.asarray(sd[:, None] * self.correlation * sd)
 
@@ -80,8 +94,7 @@ class Correction:
         -------
         (observables, n, n) array
         """
-        prior = self.prior
-        gain = prior.covariance(x, self.points) @ self.inverse
+        prior, gain = self.prior, self.gain(x)
         of_bank = all_terms(x, prior.factors) - gain @ all_terms(self.points, prior.factors)
         of_runs = gain * self.noise.T[:, None, :]
         return np.asarray(

@@ -83,13 +83,16 @@ class Fitted:
         """Covariance of the parameters, (parameters, parameters).
 
         Slopes are less than they seem by the noise in them, and a direction that they say no more of than
-        noise would is as open as its range.
+        noise would is as open as its range. An error of the model's shift moves the optimum by what the
+        corrections leave of it.
         """
         precision = self.whitening.T @ self.whitening
         seeming, feigned = self.slopes.T @ self.slopes, self.stack.feigned_information(self.x, precision)
-        shift = self.model.shift
         known = np.linalg.inv(_left(seeming, feigned) + np.diag(model_width(self.model) ** -2))
-        return np.asarray(known if shift is None else known + shift.spread)
+        if self.model.shift is None:
+            return np.asarray(known)
+        moved = self.spread @ self.slopes.T @ self.whitening @ self.stack.shift_slopes(self.x)
+        return np.asarray(known + moved @ self.model.shift.spread @ moved.T)
 
     @property
     def model(self) -> Model:

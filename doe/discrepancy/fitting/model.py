@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -160,6 +160,28 @@ class Model:
         correlation = surfaces.correlation(x, self.mechanisms)
         return of_each[block.columns], correlation[np.ix_(block.columns, block.columns)]
 
+    def shift_slopes(self, x: np.ndarray, block: Block) -> np.ndarray:
+        """Derivatives of the prediction of a block by the shift, (k, parameters).
+
+        Where there are fresh runs, the corrections take back what a shift does to the emulated.
+        """
+        slopes = self._emulated_slopes(x[None], block.condition)[0]
+        if block.condition in self.corrections:
+            correction = self.corrections[block.condition]
+            at_runs = self._emulated_slopes(correction.points, block.condition)
+            slopes = slopes - np.einsum("jn,njp->jp", correction.gain(x[None])[:, 0], at_runs)
+        if self.is_directed:
+            slopes = slopes * self.turn(block.condition)[:, None]
+        return np.asarray(slopes[block.columns])
+
+    def _emulated_slopes(self, x: np.ndarray, condition: str) -> np.ndarray:
+        """Derivatives without corrections at coded (n, parameters), (n, observables, parameters)."""
+        plain = replace(self, corrections={}, views={}, heading=0.0)
+        steps = STEP * np.eye(x.shape[1])
+        sides = [[plain.predict(x + side * step, condition) for step in steps] for side in (1.0, -1.0)]
+        ahead, behind = np.moveaxis(np.array(sides), 1, 3)
+        return np.asarray((ahead - behind) / (2.0 * STEP))
+
     def error(self, x: np.ndarray, block: Block) -> np.ndarray:
         """Covariance of the error of the prediction of a block, with what is systematic, (k, k)."""
         theta = x[: len(self.emulator.space.factors)]
@@ -199,6 +221,10 @@ class Stack:
     def open_error(self, x: np.ndarray) -> np.ndarray:
         """Covariance of what is open of the predictions at one row of coded parameters, (means, means)."""
         return _blocks(self.model.open_error(x, block) for block in self.blocks)
+
+    def shift_slopes(self, x: np.ndarray) -> np.ndarray:
+        """Derivatives of the predicted means by the model's shift, (means, parameters)."""
+        return np.concatenate([self.model.shift_slopes(x, block) for block in self.blocks])
 
     def feigned_information(self, x: np.ndarray, precision: np.ndarray) -> np.ndarray:
         """Information on the parameters that is none: noise in the slopes, squared with them.
