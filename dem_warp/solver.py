@@ -170,7 +170,7 @@ class Solver:
 
     def _step(self, read: int) -> None:
         slots = len(self._running) * self.layout.grain_count
-        threads = self._whole_warps(slots * self.lanes)
+        threads = self._whole_warps(slots * self.lanes) if self.device.is_cuda else 1
         inputs = [
             self.lanes, slots, self.model, self.running, self.grains[read], self.neighbours, self.alive,
             self.flags, self.grains[1 - read],

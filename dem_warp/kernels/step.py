@@ -113,8 +113,7 @@ def step_kernels(build: Build) -> SimpleNamespace:
                 alive[g] = LEAVING
         spread_spheres(model, world, out, g, center, motion.rounded(turned), lane, lanes)
 
-    @wp.kernel(module=module, grid_stride=False, **limits)
-    def step(
+    def warp_step(
         lanes: int,
         slot_count: int,
         # model
@@ -129,10 +128,7 @@ def step_kernels(build: Build) -> SimpleNamespace:
         # state out
         grains_out: Grains,
     ):
-        """Moves the `slot_count` grain slots of `running` worlds on by a step; `lanes` threads a grain.
-
-        On a CPU one thread takes the slots in their order, which the sums of their contacts rest on.
-        """
+        """Moves `slot_count` grain slots of `running` worlds on by a step; `lanes` threads a grain."""
         thread = wp.tid()
         slot = thread // lanes
         lane = thread - slot * lanes
@@ -174,6 +170,51 @@ def step_kernels(build: Build) -> SimpleNamespace:
         elif slot < slot_count and alive[g] < 0 and lane == 0:
             clear_spheres(model, grains_out, g)
             alive[g] = alive[g] + 1
+
+    def serial_step(
+        lanes: int,
+        slot_count: int,
+        # model
+        model: Model,
+        # state in
+        running: wp.array(dtype=int),
+        grains_in: Grains,
+        # state in and out
+        neighbours: Neighbours,
+        alive: wp.array(dtype=int),
+        flags: wp.array(dtype=int),
+        # state out
+        grains_out: Grains,
+    ):
+        """The same by a single thread, as each of many would read the arguments anew.
+
+        It takes the slots in their order, which the sums of their contacts rest on.
+        """
+        for slot in range(slot_count):
+            w = slot // model.grain_count
+            place = slot - w * model.grain_count
+            if slot_count < alive.shape[0]:
+                w = running[w]
+            g = w * model.grain_count + place
+            step = grains_in.step[w]
+            if place == 0:
+                grains_out.step[w] = step + 1
+            force, torque, rolling = sum_contacts(
+                model, grains_in, neighbours, w, g, neighbours.near.count[g], g * neighbours.capacity,
+                step, 0, 0, 1,
+            )  # fmt: skip
+            if alive[g] > 0:
+                move(
+                    model, grains_in, grains_out, neighbours, alive,
+                    flags, w, g, step, force, torque, rolling,
+                    0, 1,
+                )  # fmt: skip
+            elif alive[g] < 0:
+                clear_spheres(model, grains_out, g)
+                alive[g] = alive[g] + 1
+
+    own_step = warp_step if build.cooperative else serial_step
+    step = wp.kernel(own_step, module=module, grid_stride=False, **limits)
 
     @wp.kernel(module=module)
     def remove(model: Model, removed: wp.array(dtype=int), alive: wp.array(dtype=int), a: Grains, b: Grains):
