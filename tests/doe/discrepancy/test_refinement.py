@@ -69,7 +69,7 @@ def test_the_error_of_the_shift_widens_what_is_said_of_a_size() -> None:
     plain = fit(Stack(model(), evidence.training))
     spread = 3.0 * plain.whole_spread
     shifted = weigh(Stack(replace(model(), shift=Shift(np.zeros(4), spread)), evidence.training), plain.x)
-    # But for the ranges, which are known of the parameters and not of the shift: squared, 1e-3 of what is open.
+    # But for the ranges, known of the parameters, not of the shift: squared, 1e-3 of what is open.
     np.testing.assert_allclose(shifted.errors, 2.0 * plain.errors, rtol=1e-3)
     widths = [np.diff(coded_size_interval(one, 0))[0] for one in (plain, shifted)]
     # Twice as wide where the profile is a parabola.
@@ -110,7 +110,7 @@ def test_an_error_of_the_shift_opens_little_of_what_fresh_runs_have_shown() -> N
         weigh(Stack(one, evidence.training), CENTRE)
         for one in (certain, corrected, replace(corrected, corrections={}))
     )
-    # Without runs the shift's own error of 0.14 is all there is; sixteen points of two runs leave next to nothing.
+    # Without runs the error of 0.14 is all there is; sixteen points of two runs leave next to nothing.
     np.testing.assert_allclose(bare.errors, np.hypot(0.02**0.5, plain.errors), rtol=0.01)
     np.testing.assert_allclose(open_.errors, plain.errors, rtol=0.05)
 
