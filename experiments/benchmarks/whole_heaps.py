@@ -41,8 +41,9 @@ CODES = ("liggghts", "lammps")
 SHAPES = {
     "balls": ClumpShape.sphere(2e-3),
     "rods of 3": ClumpShape.from_spheres(np.array([[0.0, 0.0, z] for z in (-2e-3, 0.0, 2e-3)]), [1.5e-3] * 3),
+    "buckwheat of 9": ClumpShape.read(Path(__file__).parents[1] / "studies" / "buckwheat" / "clump.txt"),
 }
-"""Grains by name: 4 mm, and 7 mm long."""
+"""Grains by name: 4 mm, 7 mm long, and the clump of the buckwheat study."""
 
 
 @dataclass(frozen=True)
