@@ -19,6 +19,7 @@ from experiments import api
 from experiments.cases import OwnWorkers
 from experiments.cases.cost import EMPTY, Cost, cost_of
 from experiments.cases.workers.speed import (
+    OF_STUDIES,
     SPEEDS,
     TYPICAL,
     Speed,
@@ -133,7 +134,8 @@ def test_the_measurement_finds_the_factors_of_gpus_that_keep_to_them(factors: tu
         assert len({case.seed for case in cases}) == len(cases)
         told = cost_of(cases[0])
         costs = [replace(told, steps=4.0 / 3.0 * told.steps)] * len(cases)
-        now[0] += wave_seconds(costs, made, 2, on_gpu=True)
+        # the reference takes less than studies
+        now[0] += wave_seconds(costs, made, 2, on_gpu=True) / OF_STUDIES
         return [SimpleNamespace(phases=[{"steps": cost.steps}]) for cost in costs]
 
     workers: Any = SimpleNamespace(count=2, on_gpu=True, sharing=1, simulate=simulate)
