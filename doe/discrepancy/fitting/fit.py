@@ -111,13 +111,18 @@ class Fitted:
 
     @property
     def ratios(self) -> np.ndarray:
-        """Coded sizes over the standard errors that they would have if there were none.
+        """Coded sizes over the standard errors that they would have if there were none."""
+        return np.asarray(self.coded_sizes / self.null_size_errors)
+
+    @property
+    def null_size_errors(self) -> np.ndarray:
+        """Standard errors that coded sizes would have if there were none.
 
         Noise in the slopes of an effect moves nothing where the effect is nothing.
         """
         shift, start = self.model.shift, len(self.x) - len(self.mechanisms)
         variances = np.diag(self.spread if shift is None else self.spread + shift.spread)
-        return np.asarray(self.coded_sizes / np.sqrt(variances[start:]))
+        return np.sqrt(variances[start:])
 
     @property
     def coded_size_errors(self) -> np.ndarray:

@@ -15,8 +15,10 @@ def coded_size_interval(fitted: Fitted, number: int, coverage: float = 0.9) -> t
 
     It ends where q, with all else refitted, has risen by the point of chi2 for the coverage. The weights stay
     those of the optimum; what they contribute to the score's slope there is taken out of the residuals, so
-    that q is least at the optimum, too. Where nothing fits, the score may ask for another size than q does,
-    one whose predictions are more uncertain: the interval holds both.
+    that q is least at the optimum, too. An error that noise in the slopes makes grows with the size, as an
+    error of the divisor does in a quotient (Fieller 1954): it opens no way to the null. Where nothing fits,
+    the score may ask for another size than q does, one whose predictions are more uncertain: the interval
+    holds both.
 
     Parameters
     ----------
@@ -38,11 +40,18 @@ def coded_size_interval(fitted: Fitted, number: int, coverage: float = 0.9) -> t
     left = fitted.residuals - slopes @ (np.linalg.pinv(slopes) @ fitted.residuals)
     target = fitted.stack.predict(fitted.x[None])[0] + np.linalg.solve(fitted.whitening, left)
     _, q = minimise(fitted.stack, fitted.whitening, target, starts, lower, upper)
-    shifted = (fitted.errors[column] ** 2) / fitted.spread[column, column]
-    rise = q - q.min() - stats.chi2.ppf(coverage, 1) * shifted
+    wider = _variances(fitted, number, grid) / fitted.spread[column, column]
+    rise = q - q.min() - stats.chi2.ppf(coverage, 1) * wider
     inside, value = np.flatnonzero(rise <= 0.0), float(fitted.x[column])
     ends = _crossing(grid, rise, inside[0], -1), _crossing(grid, rise, inside[-1], 1)
     return min(ends[0], value), max(ends[1], value)
+
+
+def _variances(fitted: Fitted, number: int, sizes: np.ndarray) -> np.ndarray:
+    """Variances of the error of a coded size, if it were one of these."""
+    value, whole = fitted.coded_sizes[number], fitted.coded_size_errors[number] ** 2
+    none = min(fitted.null_size_errors[number] ** 2, whole)
+    return np.asarray(none + (whole - none) * (sizes / value if value > 0.0 else 1.0) ** 2)
 
 
 def _crossing(grid: np.ndarray, rise: np.ndarray, inside: int, step: int) -> float:
