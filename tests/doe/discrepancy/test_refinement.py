@@ -115,6 +115,21 @@ def test_an_error_of_the_shift_opens_little_of_what_fresh_runs_have_shown() -> N
     np.testing.assert_allclose(open_.errors, plain.errors, rtol=0.05)
 
 
+def test_what_noise_in_the_slopes_opens_does_not_reach_the_null() -> None:
+    fitted = fit(Stack(model(), gather(measure({"delta": 1.0}, 2), model().emulator).training))
+    value, none, whole = fitted.x[-1], fitted.null_size_errors[0], 0.45 * fitted.x[-1]
+    fitted.__dict__["whole_spread"] = fitted.spread * (whole / none) ** 2
+    low, high = coded_size_interval(fitted, 0)
+    # Fieller's lower end, where the profile is a parabola; an error of 0.45 of the size, the same for every
+    # size, would leave 0.26 of it. The upper end is open.
+    chi2 = stats.chi2.ppf(0.9, 1)
+    slope = (whole**2 - none**2) / value**2
+    ends = np.roots([1.0 - chi2 * slope, -2.0 * value, value**2 - chi2 * none**2])
+    assert low == pytest.approx(min(ends), rel=0.05)
+    assert low > 0.4 * value
+    assert high == 1.0
+
+
 def test_the_promise_of_a_model_is_its_score_but_for_what_is_uncertain_of_its_predictions() -> None:
     fitted = fit(Stack(model(), gather(measure({"delta": 1.0}, 2), model().emulator).training))
     noise = fitted.stack.noise(fitted.x)
