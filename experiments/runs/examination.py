@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
+import shutil
 import tempfile
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
@@ -17,6 +18,7 @@ from dem_warp.device import resolve_device
 from experiments.cases import Resources
 from experiments.cases.workers.opening import EXTRA, missing_libraries
 from experiments.cases.workers.speed import Speed, few_spheres, stored_speed
+from experiments.cases.workers.submissions import submit_command
 from experiments.version import program_version
 from imaging.opengl import opengl_works
 
@@ -50,6 +52,7 @@ def examine(resources: Resources) -> list[Finding]:
         _tried("simulation", _simulates, needed=True),
         _opengl(),
         _dask(),
+        *_submission(resources),
         Finding("will be used", True, _used(resources)),
         Finding("speed", speed is not None, _speed_text(speed)),
     ]
@@ -135,6 +138,18 @@ def _dask() -> Finding:
     import distributed
 
     return Finding("clusters", True, f"dask.distributed {distributed.__version__}")
+
+
+def _submission(resources: Resources) -> list[Finding]:
+    """See to it that jobs can be submitted from here, where the workers are jobs."""
+    if not resources.submits_jobs or resources.cluster is None or missing_libraries():
+        return []
+    command = submit_command(resources.cluster.kind)
+    place = shutil.which(command)
+    text = (
+        place or f"no {command} on the PATH: jobs of {resources.cluster.kind} cannot be submitted from here"
+    )
+    return [Finding("jobs", place is not None, text, needed=True)]
 
 
 def _speed_text(speed: Speed | None) -> str:

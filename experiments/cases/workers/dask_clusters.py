@@ -4,25 +4,33 @@ from __future__ import annotations
 
 import itertools
 import logging
+import math
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from experiments.cases.workers.submissions import (
+    Submissions,
+    cluster_class,
+    noted_jobs,
+    require_submit_command,
+    submit_command,
+)
+from experiments.cases.workers.workers import WorkersLostError
+from experiments.errors import InputError
 from experiments.studyfile.cluster_section import ClusterSection
 
 if TYPE_CHECKING:
     from dask_jobqueue import JobQueueCluster
     from distributed import SpecCluster
 
-SYSTEMS = {
-    "slurm": "SLURMCluster",
-    "pbs": "PBSCluster",
-    "lsf": "LSFCluster",
-    "sge": "SGECluster",
-    "oar": "OARCluster",
-    "htcondor": "HTCondorCluster",
-}
-"""Classes of dask-jobqueue by the kinds of `ClusterSection`."""
+LOOK = 0.5
+"""Time between two looks at a cluster whose jobs are being submitted [s]."""
+
+_log = logging.getLogger(__name__)
 
 
 def start_processes(gpus: list[str], count: int) -> SpecCluster:
@@ -47,16 +55,42 @@ def visible(gpus: list[str]) -> list[str]:
     return [seen[number] if seen else str(number) for number in numbers]
 
 
-def start_jobs(section: ClusterSection, count: int) -> JobQueueCluster:
-    """Submit jobs that are workers; one that is ended while there is work is submitted again."""
-    import dask_jobqueue
+@contextmanager
+def submitted_jobs(section: ClusterSection, count: int) -> Iterator[tuple[JobQueueCluster, Submissions]]:
+    """Submit jobs that are workers, and end them; one that is ended while there is work is submitted again.
+
+    Raises
+    ------
+    InputError
+        When the command that submits them is not here, or the batch system refuses all of them.
+    """
+    require_submit_command(section)
     from distributed import Security
 
-    cluster = getattr(dask_jobqueue, SYSTEMS[section.kind])(
-        **job_options(section), security=Security.temporary()
+    submissions = Submissions(math.ceil(count / section.workers_per_job))
+    kind = cluster_class(section.kind)
+    started = kind(
+        **job_options(section),
+        job_cls=noted_jobs(kind.job_cls, submissions, partial(_log.warning, "a job was refused: %s")),
+        security=Security.temporary(),
     )
-    cluster.adapt(minimum=count, maximum=count)
-    return cluster
+    with started as cluster:
+        cluster.adapt(minimum=count, maximum=count)
+        _await_an_answer(cluster, submissions)
+        if refusal := submissions.refusal:
+            rule = f"jobs must be taken by {submit_command(section.kind)}, which says: {refusal}"
+            value = f"kind {section.kind}, queue {section.queue or 'left out'}"
+            raise InputError(rule, value, "cluster")
+        yield cluster, submissions
+
+
+def _await_an_answer(cluster: JobQueueCluster, submissions: Submissions) -> None:
+    """Wait until the batch system takes a first job or has refused all."""
+    from distributed import Status
+
+    while not submissions.decided.wait(LOOK):
+        if cluster.status != Status.running:
+            raise WorkersLostError("the cluster ended before its jobs were submitted.")
 
 
 def job_options(section: ClusterSection) -> dict[str, Any]:

@@ -8,7 +8,7 @@ import pickle
 import uuid
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -25,6 +25,7 @@ from experiments.cases.workers.dask_task import (
     simulate_batch,
 )
 from experiments.cases.workers.speed import expected_seconds
+from experiments.cases.workers.submissions import Submissions
 from experiments.cases.workers.wave import Wave
 from experiments.cases.workers.workers import WorkersLostError
 from experiments.errors import InputError
@@ -68,13 +69,20 @@ class DaskWorkers:
         Name under which its speed is stored.
     expected : int, optional
         Workers that were asked for; None: those that are there.
+    submissions : Submissions, optional
+        What became of the jobs that are the workers.
     """
 
     def __init__(
-        self, client: Client, described: dict[str, Any], machine: str, expected: int | None = None
+        self,
+        client: Client,
+        described: dict[str, Any],
+        machine: str,
+        expected: int | None = None,
+        submissions: Submissions | None = None,
     ) -> None:
         self._client, self._described, self._expected = client, described, expected
-        self.machine = machine
+        self.machine, self._submissions = machine, submissions
 
     @property
     def count(self) -> int:
@@ -129,7 +137,7 @@ class DaskWorkers:
         if checkpoint is not None:
             Path(checkpoint).mkdir(parents=True, exist_ok=True)
         folder = None if checkpoint is None else str(Path(checkpoint).resolve())
-        session = _Session(self._client, wave, cases, engine, folder)
+        session = _Session(self._client, wave, cases, engine, folder, self._submissions)
         try:
             session.run(batches, AHEAD * self.count)
         finally:
@@ -147,7 +155,10 @@ class DaskWorkers:
         """Wait for the first worker, and see to it that each has one thread."""
         if not self._there():
             _log.warning("waiting for the first worker of the cluster")
-            self._client.wait_for_workers(1)
+        while not self._there():  # jobs wait in a queue for as long as it takes
+            _require_jobs(self._submissions)
+            with suppress(TimeoutError):
+                self._client.wait_for_workers(1, timeout=LISTEN)
         for address, facts in self._there().items():
             if facts["nthreads"] != 1:
                 rule = "each worker must have one thread: dask worker --nthreads 1 --nworkers N"
@@ -161,6 +172,12 @@ class DaskWorkers:
         sharing = Counter(facts["identity"] for facts in found)
         memory = min(facts["memory"] / sharing[facts["identity"]] for facts in found)
         return _Shares(memory, max(sharing.values()))
+
+
+def _require_jobs(submissions: Submissions | None) -> None:
+    """Refuse to wait for jobs of which none is left, and which the batch system does not take any more."""
+    if submissions is not None and (refusal := submissions.refusal):
+        raise WorkersLostError(f"the batch system refuses the jobs: {refusal}.")
 
 
 class _Shares(NamedTuple):
@@ -181,6 +198,7 @@ class _Session:
     cases: Sequence[Case]
     engine: Engine | None
     checkpoint: str | None
+    submissions: Submissions | None = None
     name: str = field(default_factory=lambda: f"dem-warp-{uuid.uuid4().hex}")
     batches: list[list[int]] = field(default_factory=list)
     running: dict[int, Future] = field(default_factory=dict)
@@ -221,6 +239,7 @@ class _Session:
         try:
             said = self._queue.get(timeout=LISTEN)
         except TimeoutError:
+            _require_jobs(self.submissions)
             self.wave.report()
         else:
             self._hear_each(said)

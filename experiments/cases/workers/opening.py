@@ -39,7 +39,8 @@ def open_workers(resources: Resources) -> Iterator[Workers]:
     Raises
     ------
     InputError
-        When a device is not there, Dask is needed and is not installed, or a scheduler does not answer.
+        When a device is not there, Dask is needed and is not installed, a scheduler does not answer, or a
+        batch system is not here or refuses all jobs.
     """
     gpus = [] if resources.is_cluster else resources.gpus
     if not resources.is_cluster and len(gpus) * resources.sharing < 2:
@@ -78,7 +79,7 @@ def missing_libraries() -> list[str]:
 def _opened(resources: Resources, stack: ExitStack) -> Workers:
     from distributed import Client
 
-    from experiments.cases.workers.dask_clusters import start_jobs, start_processes
+    from experiments.cases.workers.dask_clusters import start_processes, submitted_jobs
     from experiments.cases.workers.dask_workers import DaskWorkers
 
     told = {"device": str(resources)}
@@ -86,14 +87,13 @@ def _opened(resources: Resources, stack: ExitStack) -> Workers:
         client = stack.enter_context(_connected(resources.scheduler))
         return DaskWorkers(client, told, resources.machine, resources.workers)
     section = resources.cluster or ClusterSection()
-    started = (
-        start_jobs(section, resources.count)
-        if resources.submits_jobs
-        else start_processes(resources.gpus, resources.count)
-    )
-    cluster = stack.enter_context(started)
+    submissions = None
+    if resources.submits_jobs:
+        cluster, submissions = stack.enter_context(submitted_jobs(section, resources.count))
+    else:
+        cluster = stack.enter_context(start_processes(resources.gpus, resources.count))
     client = stack.enter_context(Client(cluster, set_as_default=False))
-    return DaskWorkers(client, told, resources.machine, resources.count)
+    return DaskWorkers(client, told, resources.machine, resources.count, submissions)
 
 
 def _connected(address: str) -> Client:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from dataclasses import dataclass
 
 import warp as wp
@@ -12,6 +13,9 @@ from experiments.cases.workers.batches import GPU_WORKERS
 from experiments.cases.workers.speed import cpu_name
 from experiments.errors import InputError
 from experiments.studyfile.cluster_section import ClusterSection
+
+_ADDRESS = re.compile(r"((tcp|tls|wss?|ucxx?)://)?([\w.-]+|\[[\da-fA-F:.]+(%[\w.-]+)?\]):(?P<port>\d{1,5})")
+"""Address of a scheduler, as Dask takes it: a name or number of a host, and a port."""
 
 
 @dataclass(frozen=True)
@@ -28,6 +32,12 @@ class Resources:
     """Workers that are started for the run."""
     gpu_workers: int | None = None
     """Processes a GPU of this machine; None: `GPU_WORKERS`, but of one GPU without a cluster this process."""
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be an address, of which Dask finds out late and with a traceback."""
+        if self.scheduler is not None and not _is_address(self.scheduler):
+            rule = "must be the address of a Dask scheduler, as tcp://HOST:8786"
+            raise InputError(rule, self.scheduler, "--scheduler")
 
     @property
     def is_cluster(self) -> bool:
@@ -104,6 +114,11 @@ class Resources:
             return f"{number} of {self.cluster.kind}"
         each = f", {self.sharing} workers each" if self.sharing > 1 else ""
         return ",".join(self.gpus) + each or (f"cpu, {number}" if self.cluster else "cpu")
+
+
+def _is_address(text: str) -> bool:
+    found = _ADDRESS.fullmatch(text)
+    return found is not None and 0 < int(found["port"]) < 65536
 
 
 def resolve_devices(names: str | None) -> list[str]:
