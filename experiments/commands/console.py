@@ -103,11 +103,15 @@ class Attempt:
 
     @classmethod
     def of(cls, command: str, *files: Path | None, out: Path, **options: object) -> Attempt:
-        """Write a command with its files and options; those that were not given are left out."""
+        """Write a command with its files and options: a list's once for each of its values.
+
+        Those that were not given are left out.
+        """
         words = ["dem-warp", command, *(str(file) for file in files if file)]
-        for name, value in {"out": out, **options}.items():
-            if value is not None and value is not False:
-                words += [f"--{name.replace('_', '-')}", *([] if value is True else [str(value)])]
+        for name, given in {"out": out, **options}.items():
+            for value in given if isinstance(given, list) else [given]:
+                if value is not None and value is not False:
+                    words += [f"--{name.replace('_', '-')}", *([] if value is True else [str(value)])]
         return cls(shell_line(words), out)
 
     def __str__(self) -> str:

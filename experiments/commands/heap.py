@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
-from typing import Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from experiments.commands.console import FAILED_RUN, CaseProgress, clear_errors, fail, messages
+from experiments.commands.console import FAILED_RUN, Attempt, CaseProgress, clear_errors, fail, messages
 from experiments.commands.early import check_study_file
 from experiments.commands.options import (
     AsJson,
@@ -25,6 +26,9 @@ from experiments.commands.options import (
 from experiments.commands.plans import show_heap
 from experiments.commands.results import print_measured, print_narrowness
 from experiments.live.server import live_page
+
+if TYPE_CHECKING:
+    from experiments.cases.heap import Heap
 
 HEAP_EXAMPLE = "Example: [bold]dem-warp heap --scale bench --set E=0.48 --set F=0.45 --seed 7 --frames 40[/]"
 
@@ -92,6 +96,12 @@ def heap(
         case = chosen.case(values, seed, place)  # what it refuses is refused before anything is written
         if dry_run:
             show_heap(chosen, resources, case, as_json)
+    go_on = Attempt.of(
+        "heap", study, out=folder, set=settings, seed=seed, scene=scene, frames=frames, movie=movie,
+        scale=chosen.scale, device=device, scheduler=scheduler, cluster=cluster, engine=engine, live=live,
+        json=as_json,
+    )  # fmt: skip
+    with clear_errors(go_on):
         require_unused(folder)
         require_folder(folder)
         print_narrowness(chosen)
@@ -105,6 +115,11 @@ def heap(
                 crew = watched_by(crew, notes.glimpses)
                 simulated = simulate_heap(chosen, values, seed, crew, progress, place, frames)
                 write_heap(simulated, folder, movie or MOVIES[0])
+    _tell_heap(simulated, folder, as_json)
+
+
+def _tell_heap(simulated: Heap, folder: Path, as_json: bool) -> None:
+    """Say where the files are, and what was measured; a case that failed ends the command."""
     if as_json:
         typer.echo(json.dumps(simulated.to_dict(), allow_nan=False))
     messages.print(f"Files: {folder}")

@@ -14,9 +14,9 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from experiments import api
+from experiments import api, cases
 from experiments.cli import app
-from experiments.commands.console import plain
+from experiments.commands.console import Attempt, plain
 from experiments.toml_files import read_toml, toml_text
 
 WriteStudy = Callable[..., Path]
@@ -86,6 +86,33 @@ def test_before_there_is_a_folder_a_command_begins_again(
     assert code == 130
     assert "Begin again with: dem-warp calibrate" in err
     assert "--resume" not in err
+
+
+@pytest.mark.parametrize(
+    ("ending", "ended", "said"),
+    [(signal.SIGTERM, 143, "Ended by SIGTERM."), (signal.SIGINT, 130, "Interrupted.")],
+)
+def test_a_heap_that_is_ended_tells_how_to_begin_again(
+    write_study: WriteStudy,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    ending: signal.Signals,
+    ended: int,
+    said: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(cases, "simulate_heap", lambda *_: os.kill(os.getpid(), ending))
+    study = write_study().rename(tmp_path / "my wheat.toml")
+    words = [study.name, "--out", "my heap", "--set", "E=0.5", "--seed", "3", "--device", "cpu", "--json"]
+    for _ in range(2):  # what is told is no folder that the next one refuses
+        result = CliRunner().invoke(app, ["heap", *words])
+        again = "dem-warp heap 'my wheat.toml' --out 'my heap' --set E=0.5 --seed 3 --device cpu --json"
+        assert (result.exit_code, f"{said} Begin again with: {again}\n" in result.stderr) == (ended, True)
+
+
+def test_an_option_with_several_values_is_told_once_for_each() -> None:
+    attempt = Attempt.of("heap", None, out=Path("out"), set=["E=0.5", "F=40 deg"], scene=None)
+    assert attempt.command == "dem-warp heap --out out --set E=0.5 --set 'F=40 deg'"
 
 
 @pytest.mark.parametrize("out", ["x[/x]", "[bold]", "a\x1b[31mb", "a\u202eb"])
