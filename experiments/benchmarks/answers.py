@@ -34,6 +34,9 @@ WRONG: dict[str, tuple[str, str]] = {
         'file = "words.txt"',
     ),
     "a decision on no factor": ("at_most = 3", 'at_most = 3\nkeep = ["Z"]'),
+    "more grains than a case can have": ("# grain_count = 400 ", "grain_count = 1_000_000_000 "),
+    "a tube that too many grains fill": ('height = "110 mm"', 'height = "10000 m"'),
+    "a tube narrower than two grains": ('diameter = "35 mm"', 'diameter = "7 mm"'),
 }
 """Mistakes of a study: the template's text, and what stands there instead."""
 

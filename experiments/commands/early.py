@@ -36,11 +36,36 @@ def check_calibration_file(path: Path | None, scale: str | None = None, engine: 
     """
     if (study := _readable(path, scale, engine)) is None:
         return
-    from experiments.calibrate.checks import check_calibration
     from experiments.measurement.target import find_pictured, with_measurements
+    from experiments.studyfile.campaign import TARGET_SCENE, scenes_of
 
-    if not find_pictured(study):
-        check_calibration(with_measurements(study)[0])
+    pictured = find_pictured(study)
+    measured = study if pictured else with_measurements(study)[0]
+    for scene in (TARGET_SCENE,) if pictured else scenes_of(measured.target.fitted):
+        study.case({}, 0, scene)  # refuses too many grains, before the simulator loads
+    if not pictured:
+        from experiments.calibrate.checks import check_calibration
+
+        check_calibration(measured)
+
+
+def check_heap_file(
+    path: Path | None, scale: str | None = None, engine: str | None = None, scene: str | None = None
+) -> None:
+    """Refuse besides a study whose scene cannot be built, for too many grains, whatever the settings are.
+
+    Raises
+    ------
+    InputError
+        With every fault and its place.
+    """
+    if (study := _readable(path, scale, engine)) is None:
+        return
+    from experiments.studyfile.campaign import TARGET_SCENE
+
+    varied = {path[0] for section in study.factor_sections for path in section.paths}
+    if not varied & {"grain", "scene"}:  # else the settings decide
+        study.case({}, 0, scene or TARGET_SCENE)
 
 
 def _readable(path: Path | None, scale: str | None, engine: str | None) -> Study | None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from experiments.commands.console import FAILED_RUN, Attempt, CaseProgress, clear_errors, fail, messages
-from experiments.commands.early import check_study_file
+from experiments.commands.early import check_heap_file
 from experiments.commands.options import (
     AsJson,
     Cluster,
@@ -76,7 +76,7 @@ def heap(
     scene of the study.
     """
     with clear_errors():
-        check_study_file(study, scale, engine)
+        check_heap_file(study, scale, engine, scene)
         from experiments.cases import open_workers, require_unused, simulate_heap, with_engine, write_heap
         from experiments.cases.heap import filmed_by
         from experiments.cases.movie import MOVIES, require_movie

@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 
 from experiments.benchmarks.answers import WRONG, wrong_study
+from experiments.commands.early import check_calibration_file, check_heap_file
+from experiments.errors import StudyError
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -59,6 +61,39 @@ def test_other_commands_check_a_study_as_early(tmp_path: Path) -> None:
         code, said, loaded = run(*words, folder=tmp_path)
         assert (code, HEAVY & loaded) == (2, set())
         assert "needs a unit of density" in said
+
+
+@pytest.mark.parametrize(
+    "kind",
+    [
+        "more grains than a case can have",
+        "a tube that too many grains fill",
+        "a tube narrower than two grains",
+    ],
+)
+def test_a_heap_that_cannot_be_is_refused_as_early(kind: str, tmp_path: Path) -> None:
+    study = wrong_study(tmp_path, kind)
+    code, said, loaded = run("heap", study.name, "--seed", "2", folder=tmp_path)
+    assert (code, HEAVY & loaded) == (2, set())
+    assert "grains" in said
+    assert "scene" in said
+
+
+def test_settings_may_make_a_heap_of_fewer_grains(tmp_path: Path) -> None:
+    path = wrong_study(tmp_path, "a tube that too many grains fill")
+    text = path.read_text(encoding="utf-8").replace('height = "10000 m"\n', "")
+    factor = """
+[[factor]]
+name = "h"
+label = "height"
+parameter = "scene.lifted-cylinder.height"
+low = "40 mm"
+high = "20000 m"
+"""
+    path.write_text(text + factor, encoding="utf-8")
+    check_heap_file(path)
+    with pytest.raises(StudyError, match="at most"):
+        check_calibration_file(path)
 
 
 def test_an_engine_that_is_none_is_answered_as_early(tmp_path: Path) -> None:
