@@ -17,6 +17,9 @@ from experiments.studyfile.cluster_section import ClusterSection
 _ADDRESS = re.compile(r"((tcp|tls|wss?|ucxx?)://)?([\w.-]+|\[[\da-fA-F:.]+(%[\w.-]+)?\]):(?P<port>\d{1,5})")
 """Address of a scheduler, as Dask takes it: a name or number of a host, and a port."""
 
+MOST_PER_CORE = 8
+"""Processes a core of this machine: more gain nothing, and a measurement of speed has a case for each."""
+
 
 @dataclass(frozen=True)
 class Resources:
@@ -82,11 +85,25 @@ class Resources:
 
     @property
     def count(self) -> int:
-        """Workers, as far as is known before they are there."""
+        """Workers, as far as is known before they are there.
+
+        Raises
+        ------
+        InputError
+            When a device is not there, or more processes are asked for than this machine's cores can serve.
+        """
         asked = self.workers or (self.cluster.workers if self.cluster else None)
         if self.scheduler is not None or self.submits_jobs:
             return asked or 1
-        return len(self.gpus) * self.sharing or asked or os.cpu_count() or 1
+        if self.gpus:
+            return len(self.gpus) * self.sharing
+        cores = os.cpu_count() or 1
+        if asked and asked > MOST_PER_CORE * cores:
+            rule = (
+                f"counts processes of this machine, at most {MOST_PER_CORE} a core: {MOST_PER_CORE * cores}"
+            )
+            raise InputError(rule, asked, "--workers" if self.workers else "cluster.workers")
+        return asked or cores
 
     @property
     def on_gpu(self) -> bool:

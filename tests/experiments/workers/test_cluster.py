@@ -214,6 +214,21 @@ def test_a_study_may_name_its_cluster_and_its_hash_stays(write_study: Callable[.
     assert resources_for(plain, chosen_resources()).cluster is None
 
 
+def test_more_processes_than_the_cores_serve_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from experiments.runs.choices import chosen_resources
+
+    monkeypatch.setattr(os, "cpu_count", lambda: 2)
+    profile = tmp_path / "many.toml"
+    profile.write_text("[cluster]\ngpu = false\nworkers = 17\n", encoding="utf-8")
+    assert chosen_resources("cpu", 16).count == 16
+    for place, asked in (("--workers", {"device": "cpu", "workers": 17}), ("workers", {"cluster": profile})):
+        with pytest.raises(InputError, match=f"{place}: .* processes of this machine, at most 8 a core: 16"):
+            chosen_resources(**asked)  # type: ignore[arg-type]
+    assert chosen_resources(workers=17, scheduler="tcp://elsewhere:8786").count == 17
+
+
 def test_jobs_ask_for_what_the_profile_says(tmp_path: Path) -> None:
     section = ClusterSection.model_validate(
         {
