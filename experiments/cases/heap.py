@@ -13,6 +13,7 @@ from typing import Any
 from dem_warp import CaseResult, Film, Progress, simulate_frames
 from experiments.cases.engines import engine_of
 from experiments.cases.frames import write_frames
+from experiments.cases.manifest import study_hash
 from experiments.cases.movie import NO_MOVIE, write_movie
 from experiments.cases.polydata import poly, save
 from experiments.cases.workers.own import THIS_MACHINE, OwnWorkers
@@ -91,7 +92,7 @@ class Heap:
             "observables": self.observed.observables,
             "observable_units": self.units,
             "filling": self.filling,
-            "provenance": with_version(self.result.provenance),
+            "provenance": {**with_version(self.result.provenance), "study": study_hash(self.study)},
         }
 
 

@@ -15,8 +15,10 @@ import pyvista
 from commandline import dem_warp
 
 from experiments import api
+from experiments.cases.manifest import study_hash
 from experiments.commands.console import CaseProgress, describe_progress, duration
 from experiments.runs import campaign as run
+from experiments.studyfile import load_study
 from imaging import save_picture
 
 WriteStudy = Callable[..., Path]
@@ -218,6 +220,7 @@ def test_a_small_real_heap_is_simulated_and_written(write_study: WriteStudy) -> 
     heap = json.loads(out)
     assert heap == json.loads(Path("one/angle.json").read_text(encoding="utf-8"))
     assert (heap["settings"], heap["seed"], heap["status"]) == ({"E": 0.5}, 3, "finished")
+    assert heap["provenance"]["study"] == study_hash(load_study(path))
     assert heap["observables"]["grain_count"] == 30
     views = [0.5 * (view["left"] + view["right"]) for view in heap["views"]]
     assert heap["angle"]["mean"] == pytest.approx(np.mean(views), rel=1e-12)
