@@ -28,7 +28,7 @@ from experiments.commands.results import print_measured, print_narrowness
 from experiments.live.server import live_page
 
 if TYPE_CHECKING:
-    from experiments.cases.heap import Heap
+    from experiments.cases import Heap
 
 HEAP_EXAMPLE = "Example: [bold]dem-warp heap --scale bench --set E=0.48 --set F=0.45 --seed 7 --frames 40[/]"
 
