@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -41,8 +42,7 @@ def check_calibration_file(path: Path | None, scale: str | None = None, engine: 
 
     pictured = find_pictured(study)
     measured = study if pictured else with_measurements(study)[0]
-    for scene in (TARGET_SCENE,) if pictured else scenes_of(measured.target.fitted):
-        study.case({}, 0, scene)  # refuses too many grains, before the simulator loads
+    _build(study, (TARGET_SCENE,) if pictured else scenes_of(measured.target.fitted))
     if not pictured:
         from experiments.calibrate.checks import check_calibration
 
@@ -63,9 +63,15 @@ def check_heap_file(
         return
     from experiments.studyfile.campaign import TARGET_SCENE
 
+    _build(study, (scene or TARGET_SCENE,))
+
+
+def _build(study: Study, scenes: Iterable[str]) -> None:
+    """Build scenes of a study before the simulator loads: too many grains are refused."""
     varied = {path[0] for section in study.factor_sections for path in section.paths}
     if not varied & {"grain", "scene"}:  # else the settings decide
-        study.case({}, 0, scene or TARGET_SCENE)
+        for scene in scenes:
+            study.case({}, 0, scene)
 
 
 def _readable(path: Path | None, scale: str | None, engine: str | None) -> Study | None:

@@ -22,7 +22,7 @@ SYSTEMS = {
 """Classes of dask-jobqueue by the kinds of `ClusterSection`."""
 
 _SAID = re.compile(r"\nstdout:\n(.*)\nstderr:\n(.*)", re.DOTALL)
-"""What a command said, in the error that dask-jobqueue makes of its exit code."""
+"""Words of a command, in the error that dask-jobqueue makes of its exit code."""
 
 
 def cluster_class(kind: str) -> Any:
@@ -52,7 +52,7 @@ def require_submit_command(section: ClusterSection) -> None:
 
 
 def words_of(error: Exception) -> str:
-    """What a batch system said of a job that it refused, on one line."""
+    """Words of a batch system about a job that it refused, on one line."""
     said = _SAID.search(str(error))
     printed, complained = said.groups() if said else ("", "")
     words = complained.strip() or printed.strip() or str(error) or type(error).__name__
@@ -60,7 +60,7 @@ def words_of(error: Exception) -> str:
 
 
 class Submissions:
-    """What became of the jobs that were submitted: threads of Dask note it, and the run looks.
+    """Fate of the jobs that were submitted: threads of Dask note it, and the run looks.
 
     Parameters
     ----------
