@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -42,7 +41,8 @@ def check_calibration_file(path: Path | None, scale: str | None = None, engine: 
 
     pictured = find_pictured(study)
     measured = study if pictured else with_measurements(study)[0]
-    _build(study, (TARGET_SCENE,) if pictured else scenes_of(measured.target.fitted))
+    for scene in (TARGET_SCENE,) if pictured else scenes_of(measured.target.fitted):
+        study.case({}, 0, scene)  # refuses too many grains, before the simulator loads
     if not pictured:
         from experiments.calibrate.checks import check_calibration
 
@@ -63,15 +63,9 @@ def check_heap_file(
         return
     from experiments.studyfile.campaign import TARGET_SCENE
 
-    _build(study, (scene or TARGET_SCENE,))
-
-
-def _build(study: Study, scenes: Iterable[str]) -> None:
-    """Build scenes of a study before the simulator loads: too many grains are refused."""
     varied = {path[0] for section in study.factor_sections for path in section.paths}
     if not varied & {"grain", "scene"}:  # else the settings decide
-        for scene in scenes:
-            study.case({}, 0, scene)
+        study.case({}, 0, scene or TARGET_SCENE)
 
 
 def _readable(path: Path | None, scale: str | None, engine: str | None) -> Study | None:
