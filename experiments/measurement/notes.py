@@ -82,7 +82,7 @@ def _contradictory(measured: Measured) -> Iterator[str]:
             rest = (groups[condition].sum() - value) / (len(groups[condition]) - 1)
             yield (
                 f"{condition}: {name} of one heap, {value:.4g}, stands far from the mean of the others, "
-                f"{rest:.4g}; it counts like them"
+                f"{rest:.4g}: a slip?"
             )
         calm = {condition: v for condition, v in groups.items() if condition not in dict(odd)}
         for condition, own, rest in _scattered(calm, level):

@@ -5,6 +5,7 @@ A field's type names its dimension; its bounds are the hard physical limits, for
 
 from __future__ import annotations
 
+import math
 import os
 import re
 from functools import lru_cache, partial
@@ -276,8 +277,11 @@ class Physics(Section):
 def _check_supply(case: Case) -> None:
     """Refuse a case of more grains than it can have, by the engine's rule or by that of the studies."""
     advice = "lower grain_count, or make the container smaller"
+    grains: float
     try:
         grains = case.scene.supply(case)
+    except OverflowError:  # a length whose square is beyond all floats
+        grains = math.inf
     except ValueError as error:
         if (told := _ENGINES_LIMIT.fullmatch(str(error))) is None:
             raise

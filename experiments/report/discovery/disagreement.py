@@ -20,6 +20,8 @@ SHOWN = 4
 """Observables that are told of."""
 ALIKE = 1.0
 """Standard deviations that a residual has at least where it is one of all conditions."""
+LEANING = 2.0
+"""Standard deviations of a calibration error beyond which a model leans on it."""
 
 _CONVENTIONS = {
     Instrument.FILM: "a start of the clock, or a frame rate, other than the definition's",
@@ -54,6 +56,16 @@ def conventions(found: Discovery, terms: Terms) -> list[str]:
         if instrument is not None:
             told.setdefault(_CONVENTIONS[instrument], []).append(spaced(one.observable))
     return [f"For {enumeration(names)}: {text} would look the same." for text, names in told.items()]
+
+
+def leaning(fit: Fit | None) -> str:
+    """Say which instruments a model needs to be off by more than was allowed, a sentence; empty for none."""
+    leans = [use for use in fit.calibration if use.deviations > LEANING] if fit else []
+    if not leans:
+        return ""
+    told = (f"{spaced(one.observable)} ({trimmed(one.deviations, 2)} standard deviations)" for one in leans)
+    which = "that instrument" if len(leans) == 1 else "those instruments"
+    return f"It leans on what was allowed for the calibration of {enumeration(told)}: check {which}."
 
 
 def measure_again(found: Discovery) -> str:

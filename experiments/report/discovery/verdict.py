@@ -11,6 +11,7 @@ from doe.discrepancy import (
     BeforeAfter,
     Candidate,
     Discovery,
+    Fit,
     Interval,
     Power,
     Question,
@@ -19,6 +20,7 @@ from doe.discrepancy import (
 )
 from experiments.report.discovery.disagreement import (
     heading_phrase,
+    leaning,
     measure_again,
     misses,
     slip_decides,
@@ -64,9 +66,15 @@ def verdict_sentence(found: Discovery, terms: Terms) -> str:
     slips = [*slip_sentences(found), with_and_without(found, terms)] if found.slips else []
     if found.without_slips is not None and slip_decides(found):
         rest = found.without_slips
-        told = _SENTENCES[rest.verdict](rest, terms)
+        told = _found(rest, terms)
         return " ".join([*slips, f"This is found without them, and all that follows with them: {told}"])
-    return " ".join([_SENTENCES[found.verdict](found, terms), *slips])
+    return " ".join([_found(found, terms), *slips])
+
+
+def _found(found: Discovery, terms: Terms) -> str:
+    """The sentence of a verdict, and what the model that it tells of leans on."""
+    told = found.base if found.verdict is Verdict.NONE else found.chosen or found.closest
+    return " ".join(filter(None, [_SENTENCES[found.verdict](found, terms), leaning(told)]))
 
 
 def reason_sentence(found: Discovery, terms: Terms) -> str:
@@ -133,8 +141,7 @@ def _none(found: Discovery, terms: Terms) -> str:
         return reason_sentence(found, terms)
     return (
         "Fitted as well as it can be, the model agrees with the data within their noise:"
-        f" Q = {trimmed(found.base.q, 3)} at {fixed(found.base.degrees_of_freedom, 0)} degrees of freedom,"
-        f" p {p_clause(found.base.p_value)}.{_drifting(found, terms)}{_single_means(found, terms)}"
+        f" {_q_and_p(found.base)}.{_drifting(found, terms)}{_single_means(found, terms)}"
     )
 
 
@@ -192,11 +199,7 @@ def _unknown(found: Discovery, terms: Terms) -> str:
         return reason_sentence(found, terms)
     within = found.base.q <= found.base.q_limit
     how = f", not by Q alone but in that {_beyond(found.base.clearest, terms)}" if within else ""
-    text = (
-        f"The model disagrees with the data (Q = {trimmed(found.base.q, 3)} at"
-        f" {fixed(found.base.degrees_of_freedom, 0)} degrees of freedom, p"
-        f" {p_clause(found.base.p_value)}){how}"
-    )
+    text = f"The model disagrees with the data ({_q_and_p(found.base)}){how}"
     if not found.candidates:
         return f"{text}, and the library has nothing to explain it with."
     best = found.candidates[0]
@@ -213,6 +216,15 @@ def _unknown(found: Discovery, terms: Terms) -> str:
     come = "come" if many else "comes"
     text += f". {capital(terms.titles(best.mechanisms))} {come} closest ({does}){why}."
     return " ".join([text, *(capital(one) for one in misses(found, terms)[:1])])
+
+
+def _q_and_p(base: Fit) -> str:
+    """Say how much a base misses, and how often chance does as much in the clearest of its tests."""
+    freedom = fixed(base.degrees_of_freedom, 0)
+    return (
+        f"Q = {trimmed(base.q, 3)} at {freedom} degrees of freedom; for the clearest of Q and two other"
+        f" tests, p {p_clause(base.p_value)}"
+    )
 
 
 def _beyond(answer: Answer, terms: Terms) -> str:

@@ -293,8 +293,8 @@ def test_copies_and_missing_scatter_are_noted(read) -> None:
 
 def test_one_gross_error_is_found_by_the_scatter_of_all_conditions(read) -> None:
     data = read(angles("base", 25, 26, 25.5, 24.5, 2.55) + angles("fast", 22, 23, 22.5, 21.5, 22.2))
-    assert noted(data, "base", "2.55", "counts like them")
-    assert not noted(data, "fast:", "counts like them")
+    assert noted(data, "base", "2.55", "a slip?")
+    assert not noted(data, "fast:", "a slip?")
     assert not noted(data, "contradict")
     np.testing.assert_array_equal(data.counts("base"), [5])
 

@@ -1,0 +1,54 @@
+"""What the page says beside the verdict: instruments that a model leans on, factors that drift."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+from doe.discrepancy import CalibrationUse, Discovery, Fit, Verdict
+from experiments.report.discovery import Terms, verdict_sentence
+
+Discovered = Callable[[Verdict], Discovery]
+
+
+def leaning_on(fit: Fit | None, **deviations: float) -> Fit:
+    """The fit with such uses of the allowances."""
+    assert fit is not None
+    uses = (CalibrationUse(name, 0.01, 0.0, 0.01 * sd, 0.0, sd) for name, sd in deviations.items())
+    return replace(fit, calibration=tuple(uses))
+
+
+@pytest.mark.parametrize("verdict", [Verdict.NONE, Verdict.NAMED, Verdict.UNKNOWN])
+def test_a_model_that_leans_on_an_allowance_says_so(
+    verdict: Verdict, discovered: Discovered, terms: Terms
+) -> None:
+    found = discovered(verdict)
+    part = {Verdict.NONE: "base", Verdict.NAMED: "chosen", Verdict.UNKNOWN: "closest"}[verdict]
+    fit = leaning_on(found.base, t55=2.6, fill_height=1.9)
+    sentence = verdict_sentence(replace(found, **{part: fit}), terms)
+    told = "It leans on what was allowed for the calibration of t55 (2.6 standard deviations): check that"
+    assert f"{told} instrument." in sentence
+    assert "fill height (" not in sentence
+
+
+def test_a_model_within_its_allowances_says_nothing_of_them(discovered: Discovered, terms: Terms) -> None:
+    found = discovered(Verdict.NAMED)
+    quiet = replace(found, chosen=leaning_on(found.chosen, t55=1.9))
+    assert verdict_sentence(quiet, terms) == verdict_sentence(found, terms)
+
+
+def test_factors_that_drift_are_no_contradiction_to_a_model_that_lacks_nothing(
+    discovered: Discovered, terms: Terms
+) -> None:
+    found = discovered(Verdict.NONE)
+    first, second = found.drifts
+    told = "would differ between conditions"
+    assert f"{terms.factors[first.factor].label} and" in verdict_sentence(found, terms)
+    assert told in verdict_sentence(found, terms)
+    one = verdict_sentence(replace(found, drifts=(first, replace(second, p_value=0.01))), terms)
+    assert terms.factors[second.factor].label not in one
+    assert told in one
+    calm = tuple(replace(drift, p_value=0.01) for drift in found.drifts)
+    assert told not in verdict_sentence(replace(found, drifts=calm), terms)
