@@ -136,6 +136,42 @@ def conclude(assessments: Sequence[Assessment], settings: Settings) -> Conclusio
     return Conclusion(Verdict.UNKNOWN, (), f"{_title(best)} comes closest, but {failed[0]}", None)
 
 
+def conclude_with_two(
+    of_one: Conclusion, singles: Sequence[Assessment], pairs: Sequence[Assessment], settings: Settings
+) -> tuple[Conclusion, list[Assessment]]:
+    """Conclude again once pairs were tried.
+
+    Where a single mechanism was chosen, a pair that passes every rule must be ahead of it by as much as tells
+    two models apart.
+
+    Parameters
+    ----------
+    of_one : Conclusion
+        Among the single mechanisms.
+    singles, pairs : sequence of Assessment
+    settings : Settings
+
+    Returns
+    -------
+    conclusion : Conclusion
+    assessments : list of Assessment
+        All that the conclusion counts among.
+    """
+    if of_one.chosen is not None:
+        passing = [one.score for one in pairs if not objections(one, settings)]
+        if singles[of_one.chosen].score - min(passing, default=math.inf) <= settings.tie_margin:
+            return of_one, [*singles, *pairs]
+    if not pairs:
+        return of_one, [*singles]
+    of_two = conclude(pairs, settings)
+    if of_two.chosen is not None:
+        return of_two, [*pairs, *singles]
+    ordered = closest_first([*singles, *pairs], settings)
+    return (
+        of_two if of_one.chosen is not None else _unexplained(ordered[0], of_one, of_two, settings)
+    ), ordered
+
+
 def closest_first(assessments: Sequence[Assessment], settings: Settings) -> list[Assessment]:
     """Sort models none of which explains the gap: those with fresh runs first, each by their score.
 
@@ -145,7 +181,7 @@ def closest_first(assessments: Sequence[Assessment], settings: Settings) -> list
     return sorted(assessments, key=lambda one: (not one.simulated, one.score + margin * len(one.mechanisms)))
 
 
-def unexplained(
+def _unexplained(
     closest: Assessment, of_one: Conclusion, of_two: Conclusion, settings: Settings
 ) -> Conclusion:
     """Conclude that nothing explains the gap, by what is held against the closest single model or pair."""

@@ -28,6 +28,10 @@ OBSERVABLES = (
 )  # fmt: skip
 CONDITIONS = ("base", "fast", "wide", "rough", "fast-wide")
 MECHANISMS = ("alpha", "beta", "gamma", "delta", "epsilon", "zeta", "twin")
+BLENDED = ("alpha", "delta")
+"""Mechanisms that ``blend`` acts as, both of its size."""
+BEYOND = 0.45
+"""Standard deviation of what it does besides, in that of one run at its largest size."""
 SETTINGS = Settings(bank_points=128, bank_mechanism_points=64)
 
 
@@ -47,7 +51,8 @@ def space(mechanisms: Sequence[str] = MECHANISMS) -> SearchSpace:
 class SyntheticSimulator:
     """Quadratic responses in coded units, in units of the noise, times an observable's own scale.
 
-    ``twin`` acts as ``alpha`` does, but for one part in a hundred; ``stranger`` is in no library.
+    ``twin`` acts as ``alpha`` does, but for one part in a hundred; ``blend`` nearly as ``alpha`` and
+    ``delta`` do together; ``stranger`` is in no library.
     """
 
     space: SearchSpace
@@ -106,6 +111,10 @@ def _signature(name: str, condition: str) -> tuple[np.ndarray, np.ndarray]:
         direct, turned = _signature("alpha", condition)
         nudge = np.random.default_rng([15, CONDITIONS.index(condition)]).standard_normal(len(OBSERVABLES))
         return direct + 0.05 * nudge, turned
+    if name == "blend":
+        parts = [_signature(part, condition) for part in BLENDED]
+        nudge = np.random.default_rng([18, CONDITIONS.index(condition)]).standard_normal(len(OBSERVABLES))
+        return sum(direct for direct, _ in parts) + BEYOND * nudge, sum(turned for _, turned in parts)
     number = (*MECHANISMS, "stranger").index(name)
     common = np.random.default_rng([13, number])
     own = np.random.default_rng([14, number, CONDITIONS.index(condition)])
@@ -132,9 +141,9 @@ def bank(mechanisms: tuple[str, ...] = MECHANISMS) -> Bank:
 
 
 @cache
-def emulator() -> Emulator:
+def emulator(mechanisms: tuple[str, ...] = MECHANISMS) -> Emulator:
     """The emulator of the synthetic world's bank."""
-    return fit_emulator(bank())
+    return fit_emulator(bank(mechanisms))
 
 
 def measure(

@@ -9,6 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 from synthetic import (
+    BLENDED,
     CONDITIONS,
     MECHANISMS,
     OBSERVABLES,
@@ -20,6 +21,7 @@ from synthetic import (
 )
 
 from doe.discrepancy import Discovery, Emulator, Measured, Outcomes, Point, Verdict, analyse
+from doe.discrepancy.analysis import DOUBTED
 from doe.errors import RuleError
 
 ALONE = emulator().without("twin")
@@ -123,8 +125,9 @@ def test_mechanisms_that_act_alike_are_a_tie_with_an_experiment_to_follow() -> N
 def test_a_leader_runs_at_last_against_what_might_overtake_it() -> None:
     _, waves = _run(measure({"alpha": 0.4}, 4), emulator())
     one_model = SETTINGS.finish_points * SETTINGS.refinement_repeats * len(CONDITIONS)
-    assert {tuple(name for name, _ in point.sizes) for point in waves[-2]} == {("alpha",), ("twin",)}
-    assert len(waves[-2]) == 2 * one_model
+    of_singles = [wave for wave in waves[:-1] if all(len(point.sizes) < 2 for point in wave)]
+    assert {tuple(name for name, _ in point.sizes) for point in of_singles[-1]} == {("alpha",), ("twin",)}
+    assert len(of_singles[-1]) == 2 * one_model
     # Nothing is like delta.
     _, waves = _named()
     assert all(len(wave) < one_model for wave in waves[1:])
@@ -134,6 +137,19 @@ def test_two_mechanisms_at_once_are_both_named() -> None:
     found, _ = _run(measure({"alpha": 0.6, "delta": 0.8}, 5))
     assert found.verdict == Verdict.NAMED
     assert set(found.named) == {"alpha", "delta"}
+
+
+@pytest.mark.parametrize("seed", [6, 7])
+def test_a_pair_is_named_in_place_of_one_effect_that_fits_and_is_far_behind(seed: int) -> None:
+    known = emulator((*BLENDED, "epsilon", "blend"))
+    found, _ = _run(measure(dict.fromkeys(BLENDED, 0.8), seed), known)
+    assert set(found.named) == set(BLENDED)
+    alone = next(one for one in found.candidates if one.mechanisms == ("blend",))
+    assert alone.admitted
+    assert SETTINGS.fit_level < alone.p_value < DOUBTED
+    # the other way round the one effect is ahead, or fits too well for pairs to be asked for
+    found, _ = _run(measure({"blend": 0.8}, seed), known)
+    assert found.named == ("blend",)
 
 
 def test_a_pair_that_cannot_be_simulated_is_not_named() -> None:
