@@ -132,7 +132,7 @@ def _quiet_torch(seed: int) -> Iterator[None]:
 
 
 class _NoTracker:
-    """What `sbi` tells of its training is not kept: by default it writes files into the working folder."""
+    """Tracker of a training that keeps nothing: that of `sbi` writes files into the working folder."""
 
     log_dir = None
 
