@@ -46,7 +46,7 @@ HIDDEN, SUMMARIES = 100, 12
 BATCH, RATE, PATIENCE = 500, 2e-3, 10
 """Draws in a step of training, its rate, and epochs without a gain that end it."""
 REFERENCES = 400
-"""Draws of the base that the summary of the means is compared with, and of the distance under the base."""
+"""Draws of the base that the measured summary is compared with, and draws of the distance under the base."""
 
 
 class Sbi:
