@@ -59,6 +59,7 @@ COMES_WITH = {
     "markupsafe": "jinja2",
     "pydantic_core": "pydantic",
     "threadpoolctl": "scikit-learn",
+    "torch": "sbi",
     "vtkmodules": "pyvista",
 }
 

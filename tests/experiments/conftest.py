@@ -6,6 +6,7 @@ import shutil
 import sys
 from collections.abc import Callable, Iterator
 from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -23,9 +24,15 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave out tests that run a program which is not installed: they do not count as skipped."""
-    programs = {item: [mark.args[0] for mark in item.iter_markers("program")] for item in items}
-    missing = [item for item, names in programs.items() if any(shutil.which(name) is None for name in names)]
+    """Leave out tests of a program or library that is not installed: they do not count as skipped."""
+    finders = {"program": shutil.which, "library": find_spec}
+    missing = [
+        item
+        for item in items
+        if any(
+            find(mark.args[0]) is None for kind, find in finders.items() for mark in item.iter_markers(kind)
+        )
+    ]
     if missing:
         config.hook.pytest_deselected(items=missing)
         items[:] = [item for item in items if item not in missing]

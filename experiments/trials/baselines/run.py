@@ -25,7 +25,7 @@ from experiments.trials.baselines import benchmark_files
 from experiments.trials.baselines.answers_table import add_answer, answered, file_of
 from experiments.trials.baselines.benchmark_files import load_benchmark
 from experiments.trials.baselines.draw import fresh_runs
-from experiments.trials.baselines.library import methods
+from experiments.trials.baselines.library import installed, methods
 from experiments.trials.baselines.measured import measured_problems
 from experiments.trials.baselines.protocol import Method, Problem
 
@@ -55,14 +55,14 @@ def answer_all(out: Path, problems: Iterator[Problem], wanted: Mapping[str, Meth
 
 
 def chosen(names: str, known: Mapping[str, Method]) -> dict[str, Method]:
-    """Pick methods by their names, parted by semicolons; all without any.
+    """Pick methods by their names, parted by semicolons; without any all that are installed.
 
     Raises
     ------
     InputError
         For a name that no method has.
     """
-    wanted = [name.strip() for name in names.split(";") if name.strip()] or list(known)
+    wanted = [name.strip() for name in names.split(";") if name.strip()] or list(installed(known))
     for name in wanted:
         if name not in known:
             raise InputError(f"must be one of {'; '.join(known)}", name, "--methods")
@@ -76,7 +76,9 @@ def main(
     ] = None,
     benchmark: Annotated[Path, typer.Option(help="Folder of the benchmark.")] = benchmark_files.FOLDER,
     bank: Annotated[Path | None, typer.Option(help="Bank of measured trials; left out: its own.")] = None,
-    names: Annotated[str, typer.Option("--methods", help="Names parted by ';'; left out: all.")] = "",
+    names: Annotated[
+        str, typer.Option("--methods", help="Names parted by ';'; left out: all installed.")
+    ] = "",
     count: Annotated[int | None, typer.Option(help="First so many trials; left out: all.", min=1)] = None,
     seconds: Annotated[float, typer.Option(help="Begin nothing after this time.")] = math.inf,
 ) -> None:

@@ -7,12 +7,10 @@ alarm). Beyond `ODDS` (Kass and Raftery 1995) it raises an alarm, or names.
 
 from __future__ import annotations
 
-from math import comb
-
 import numpy as np
 from scipy.special import logsumexp
 
-from experiments.trials.baselines.methods.contest import judged
+from experiments.trials.baselines.methods.contest import judged, prior_of_one
 from experiments.trials.baselines.methods.evidence import log_evidence
 from experiments.trials.baselines.protocol import ODDS, Answer, Problem
 
@@ -29,8 +27,7 @@ class BayesFactors:
         rng = np.random.default_rng(problem.seed)
         logs = {names: log_evidence(problem.fitted(names), rng) for names in problem.models}
         plain = logs.pop(())
-        count = len(problem.emulator.space.names)
-        share = {1: 0.5 / count, 2: 0.5 / max(comb(count, 2), 1)}
+        share = prior_of_one(len(problem.emulator.space.names))
         joint = {names: value + np.log(share[len(names)]) for names, value in logs.items()}
         total = float(logsumexp(list(joint.values())))
         weights = {names: float(np.exp(value - total)) for names, value in joint.items()}

@@ -8,6 +8,7 @@ Anderson 2002): a model that fails is not named, and what is missing is said to 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import comb
 
 import numpy as np
 from scipy import stats
@@ -22,6 +23,14 @@ def surprise(q: float, freedom: int) -> float:
     """Minus the decimal logarithm of the p value of a sum of squares; its asymptote where that underflows."""
     log_p = float(stats.chi2.logsf(q, freedom))
     return (-log_p if np.isfinite(log_p) else 0.5 * q) / float(np.log(10.0))
+
+
+def prior_of_one(count: int) -> dict[int, float]:
+    """Probability of one model of a number of mechanisms, of so many in the library, if any is right.
+
+    Single ones have half, pairs half, shared evenly (Scott and Berger 2010).
+    """
+    return {1: 0.5 / count, 2: 0.5 / max(comb(count, 2), 1)}
 
 
 def judged(

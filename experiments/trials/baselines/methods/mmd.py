@@ -29,16 +29,22 @@ class Mmd:
     def __call__(self, problem: Problem) -> Answer:
         """Compare the means with draws."""
         stack = problem.stack(())
-        drawn = predicted_means(stack, np.random.default_rng(problem.seed))
+        drawn = predicted_means(stack, np.random.default_rng(problem.seed), DRAWS)
         p, distance = misspecified(stack.target, drawn)
         return Answer(score=distance, alarm=p < LEVEL)
 
 
-def predicted_means(stack: Stack, rng: np.random.Generator) -> np.ndarray:
-    """Means as the model has them over its ranges, with their errors, (draws, means)."""
-    x = rng.uniform(stack.model.lower, stack.model.upper, (DRAWS, len(stack.model.lower)))
-    noise = [np.linalg.cholesky(stack.covariance(row)) @ rng.standard_normal(len(stack.target)) for row in x]
-    return np.asarray(stack.predict(x) + np.array(noise))
+def predicted_means(stack: Stack, rng: np.random.Generator, points: int, repeats: int = 1) -> np.ndarray:
+    """Means as the model has them at points in its ranges, with errors drawn so often at each.
+
+    Returns
+    -------
+    (points * repeats, means) array
+    """
+    size = len(stack.target)
+    x = rng.uniform(stack.model.lower, stack.model.upper, (points, len(stack.model.lower)))
+    noise = [rng.standard_normal((repeats, size)) @ np.linalg.cholesky(stack.covariance(row)).T for row in x]
+    return np.asarray(stack.predict(x)[:, None] + np.array(noise)).reshape(-1, size)
 
 
 def misspecified(seen: np.ndarray, drawn: np.ndarray) -> tuple[float, float]:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,9 +15,9 @@ from synthetic import CONDITIONS, OBSERVABLES, SETTINGS, emulator, measure
 from doe.discrepancy.fitting.fit import weigh
 from doe.errors import RuleError
 from experiments.errors import InputError
-from experiments.trials.baselines.library import ALONE, methods
-from experiments.trials.baselines.methods import discrepancy
-from experiments.trials.baselines.methods.contest import judged
+from experiments.trials.baselines.library import ALONE, installed, methods
+from experiments.trials.baselines.methods import discrepancy, inference
+from experiments.trials.baselines.methods.contest import judged, prior_of_one
 from experiments.trials.baselines.methods.evidence import log_evidence, smc
 from experiments.trials.baselines.methods.lasso import selected
 from experiments.trials.baselines.methods.mmd import misspecified
@@ -23,6 +25,8 @@ from experiments.trials.baselines.protocol import Answer, Problem
 
 KNOWN = emulator().without("delta", "epsilon", "zeta", "twin")
 NAMING = ("Bayes factors", "BIC", "lasso")
+SBI = pytest.param("sbi", marks=pytest.mark.library("sbi"))
+EVERY = [SBI if name == "sbi" else name for name in methods(None)]
 
 
 @pytest.fixture(scope="module")
@@ -40,14 +44,14 @@ def foreign() -> Problem:
     return Problem("foreign", KNOWN.without("beta"), measure({"beta": 2.0}, 3), SETTINGS, 3)
 
 
-@pytest.mark.parametrize("name", methods(None))
+@pytest.mark.parametrize("name", EVERY)
 def test_no_method_raises_an_alarm_where_nothing_is_hidden(name: str, nothing: Problem) -> None:
     answer = methods(None)[name](nothing)
     assert not answer.alarm
     assert answer.named == ()
 
 
-@pytest.mark.parametrize("name", [*NAMING, ALONE])
+@pytest.mark.parametrize("name", [*NAMING, ALONE, SBI])
 def test_a_strong_effect_is_named(name: str, strong: Problem) -> None:
     answer = methods(None)[name](strong)
     assert answer.alarm
@@ -170,6 +174,47 @@ def test_p_values_of_the_kernel_distance_are_uniform_under_the_prior() -> None:
     p_values = [misspecified(row, rng.standard_normal((100, 6)))[0] for row in rng.standard_normal((200, 6))]
     assert stats.kstest(p_values, "uniform").pvalue > 1e-3
     assert misspecified(np.full(6, 9.0), rng.standard_normal((100, 6)))[0] == pytest.approx(1.0 / 101.0)
+
+
+@pytest.mark.library("sbi")
+def test_sbi_answers_alike_and_leaves_no_file_and_no_word(
+    strong: Problem, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    import torch
+
+    monkeypatch.setattr(inference, "POINTS", 300)
+    monkeypatch.chdir(tmp_path)
+    state = torch.random.get_rng_state()
+    first, second = (methods(None)["sbi"](strong) for _ in range(2))
+    assert first == second
+    assert torch.equal(torch.random.get_rng_state(), state)
+    assert list(tmp_path.iterdir()) == []
+    assert capsys.readouterr() == ("", "")
+
+
+def test_draws_of_a_network_are_of_every_model_by_its_prior(
+    nothing: Problem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(inference, "POINTS", 600)
+    drawn = inference.drawn_means(nothing, np.random.default_rng(7))
+    pairs = (("alpha", "beta"), ("alpha", "gamma"), ("beta", "gamma"))
+    assert drawn.models == ((), ("alpha",), ("beta",), ("gamma",), *pairs)
+    shares = np.bincount(drawn.model) / len(drawn.model)
+    np.testing.assert_allclose(shares, [1 / 2, *[1 / 12] * 6], atol=1e-3)
+    assert drawn.means.shape == (len(drawn.model), len(nothing.stack(()).target))
+
+
+def test_all_single_mechanisms_have_the_prior_of_all_pairs() -> None:
+    assert {size: prior * {1: 6, 2: 15}[size] for size, prior in prior_of_one(6).items()} == {1: 0.5, 2: 0.5}
+
+
+def test_without_sbi_the_message_says_what_to_install_and_the_others_go_on(
+    nothing: Problem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(inference, "find_spec", lambda name: None)
+    with pytest.raises(InputError, match=re.escape("pip install 'dem-warp[sbi]'")):
+        methods(None)["sbi"](nothing)
+    assert list(installed(methods(None))) == [name for name in methods(None) if name != "sbi"]
 
 
 def test_models_that_share_the_weight_are_a_tie_and_what_most_have_is_named(strong: Problem) -> None:
