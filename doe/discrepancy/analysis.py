@@ -59,7 +59,8 @@ Analysis = Generator[list[Point], Outcomes, Discovery]
 
 DOUBTED = 0.25
 """P value of a named mechanism, or of a tie, below which pairs are tried as well. In the thirteenth blind
-trials contact adhesion among other shapes was three times taken for liquid bridges, at p of .07 to .21."""
+trials one mechanism was named in place of two at p of .05, .07, .14 and .21, and 9 of 111 right names had
+less than .25."""
 
 LEAST_FREEDOM = 2
 """Degrees of freedom that a calibration must leave: with one, every mechanism has the same signature."""
