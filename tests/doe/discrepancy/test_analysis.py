@@ -147,8 +147,13 @@ def test_a_pair_is_named_in_place_of_one_effect_that_fits_and_is_far_behind(seed
     alone = next(one for one in found.candidates if one.mechanisms == ("blend",))
     assert alone.admitted
     assert SETTINGS.fit_level < alone.p_value < DOUBTED
-    # the other way round the one effect is ahead, or fits too well for pairs to be asked for
-    found, _ = _run(measure({"blend": 0.8}, seed), known)
+
+
+def test_one_effect_keeps_its_name_where_no_pair_is_far_ahead_of_it() -> None:
+    found, _ = _run(measure({"blend": 0.8}, 15), emulator((*BLENDED, "epsilon", "blend")))
+    assert found.chosen is not None
+    assert found.chosen.p_value < DOUBTED
+    assert BLENDED in [candidate.mechanisms for candidate in found.candidates]
     assert found.named == ("blend",)
 
 
