@@ -167,9 +167,9 @@ def conclude_with_two(
     if of_two.chosen is not None:
         return of_two, [*pairs, *singles]
     ordered = closest_first([*singles, *pairs], settings)
-    return (
-        of_two if of_one.chosen is not None else _unexplained(ordered[0], of_one, of_two, settings)
-    ), ordered
+    if of_one.chosen is not None:
+        return of_two, ordered
+    return _unexplained(ordered[0], of_one, of_two, settings), ordered
 
 
 def closest_first(assessments: Sequence[Assessment], settings: Settings) -> list[Assessment]:
