@@ -65,7 +65,7 @@ def leaning(fit: Fit | None) -> str:
         return ""
     told = (f"{spaced(one.observable)} ({trimmed(one.deviations, 2)} standard deviations)" for one in leans)
     which = "that instrument" if len(leans) == 1 else "those instruments"
-    return f"It leans on what was allowed for the calibration of {enumeration(told)}: check {which}."
+    return f"The model leans on what was allowed for the calibration of {enumeration(told)}: check {which}."
 
 
 def measure_again(found: Discovery) -> str:

@@ -1,4 +1,4 @@
-"""What the page says beside the verdict: instruments that a model leans on, factors that drift."""
+"""Words of the page beside the verdict: instruments that a model leans on, factors that drift."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ def test_a_model_that_leans_on_an_allowance_says_so(
     part = {Verdict.NONE: "base", Verdict.NAMED: "chosen", Verdict.UNKNOWN: "closest"}[verdict]
     fit = leaning_on(found.base, t55=2.6, fill_height=1.9)
     sentence = verdict_sentence(replace(found, **{part: fit}), terms)
-    told = "It leans on what was allowed for the calibration of t55 (2.6 standard deviations): check that"
-    assert f"{told} instrument." in sentence
+    told = "The model leans on what was allowed for the calibration of t55 (2.6 standard deviations):"
+    assert f"{told} check that instrument." in sentence
     assert "fill height (" not in sentence
 
 
