@@ -22,7 +22,8 @@ class ClusterSection(Section):
     kind: Literal["local", "slurm", "pbs", "lsf", "sge", "oar", "htcondor"] = "local"
     """Place where they run: processes of this machine, or jobs of a scheduler."""
     workers: int | None = Field(default=None, ge=1)
-    """Workers in all, or GPUs of this machine; left out: here all GPUs or one a core, of a scheduler one."""
+    """Workers in all, which fill whole jobs, or GPUs of this machine; left out: here all GPUs or one a core,
+    of a scheduler those of a job."""
     gpu: bool | None = None
     """Each worker has a GPU; left out: on this machine where there is one, in jobs not."""
     workers_per_job: int = Field(default=1, ge=1)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import logging
-import math
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -67,7 +66,7 @@ def submitted_jobs(section: ClusterSection, count: int) -> Iterator[tuple[JobQue
     require_submit_command(section)
     from distributed import Security
 
-    submissions = Submissions(math.ceil(count / section.workers_per_job))
+    submissions = Submissions(count // section.workers_per_job)
     kind = cluster_class(section.kind)
     started = kind(
         **job_options(section),

@@ -90,11 +90,14 @@ class Resources:
         Raises
         ------
         InputError
-            When a device is not there, or more processes are asked for than this machine's cores can serve.
+            When a device is not there, more processes are asked for than this machine's cores can serve, or
+            a job would not be filled.
         """
         asked = self.workers or (self.cluster.workers if self.cluster else None)
-        if self.scheduler is not None or self.submits_jobs:
+        if self.scheduler is not None:
             return asked or 1
+        if self.submits_jobs and self.cluster is not None:
+            return self._in_whole_jobs(asked or self.cluster.workers_per_job, self.cluster.workers_per_job)
         if self.gpus:
             return len(self.gpus) * self.sharing
         cores = os.cpu_count() or 1
@@ -102,8 +105,18 @@ class Resources:
             rule = (
                 f"counts processes of this machine, at most {MOST_PER_CORE} a core: {MOST_PER_CORE * cores}"
             )
-            raise InputError(rule, asked, "--workers" if self.workers else "cluster.workers")
+            raise InputError(rule, asked, self._place_of_workers)
         return asked or cores
+
+    def _in_whole_jobs(self, asked: int, each: int) -> int:
+        # Dask would end what is over, with all of its job, and submit that job again, without end
+        if asked % each:
+            raise InputError(f"must fill whole jobs of {each} workers", asked, self._place_of_workers)
+        return asked
+
+    @property
+    def _place_of_workers(self) -> str:
+        return "--workers" if self.workers else "cluster.workers"
 
     @property
     def on_gpu(self) -> bool:

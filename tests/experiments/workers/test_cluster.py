@@ -229,6 +229,22 @@ def test_more_processes_than_the_cores_serve_are_refused(
     assert chosen_resources(workers=17, scheduler="tcp://elsewhere:8786").count == 17
 
 
+def test_workers_fill_whole_jobs(tmp_path: Path) -> None:
+    from experiments.runs.choices import chosen_resources
+
+    profile = tmp_path / "nodes.toml"
+    text = '[cluster]\nkind = "slurm"\nworkers_per_job = 4\n'
+    profile.write_text(text, encoding="utf-8")
+    assert chosen_resources(cluster=profile).count == 4
+    assert chosen_resources(cluster=profile, workers=8).count == 8
+    rule = "must fill whole jobs of 4 workers"
+    with pytest.raises(InputError, match=f"--workers: {rule}.* 6"):
+        chosen_resources(cluster=profile, workers=6)
+    profile.write_text(text + "workers = 3\n", encoding="utf-8")
+    with pytest.raises(InputError, match=f"cluster.workers: {rule}.* 3"):
+        chosen_resources(cluster=profile)
+
+
 def test_jobs_ask_for_what_the_profile_says(tmp_path: Path) -> None:
     section = ClusterSection.model_validate(
         {
