@@ -18,8 +18,9 @@ from experiments.sphere_files.sphere_file import (
 from experiments.studyfile.units import UNITS
 from experiments.texts import delimiter_of, is_number, read_text, split
 
-_NAMED_UNIT = re.compile(rf"^\s*#.*\bx,? y,? z,? r\b.*\bin ({'|'.join(UNITS['length'])})\b", re.MULTILINE)
-"""Comment that names the unit, as dem-warp writes it."""
+_COLUMNS = re.compile(r"\bx,? y,? z,? r\b")
+_NAMED_UNIT = re.compile(rf"\bin ({'|'.join(UNITS['length'])})\b")
+"""What a comment that names the unit has in this order, as dem-warp writes it."""
 
 
 def _recognises(head: str) -> bool:
@@ -41,9 +42,17 @@ def _read(path: Path) -> SphereFile:
         if len(cells) != 4:
             raise InputError(SPHERE_RULE, " ".join(cells), f"{path}, line {number}")
     spheres, _ = spheres_of(rows, Columns(0, 1, 2, 3), path, delimiter)
-    named = _NAMED_UNIT.search(text)
-    unit = UNITS["length"][named[1]] if named else None
-    return SphereFile("spheres (x y z r, as in multisphere templates of LIGGGHTS)", spheres, unit=unit)
+    told = "spheres (x y z r, as in multisphere templates of LIGGGHTS)"
+    return SphereFile(told, spheres, unit=_named_unit(text))
+
+
+def _named_unit(text: str) -> float | None:
+    """Size of the unit that a comment names [m]; None where none does."""
+    for line in text.splitlines():
+        columns = _COLUMNS.search(line) if line.lstrip().startswith("#") else None
+        if columns and (named := _NAMED_UNIT.search(line, columns.end())):
+            return UNITS["length"][named[1]]
+    return None
 
 
 PLAIN = Format("spheres, x y z r a line", _recognises, _read)

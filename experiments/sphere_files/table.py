@@ -45,7 +45,7 @@ _NAMES = {
 }
 SHEET_UNIT, SHEET_SHAPE = "unit", "shape"
 """Columns of a sheet of ``dem-warp export``: the unit, and the shape that a sphere is part of."""
-_UNIT = re.compile(r"[(\[]\s*([^)\]]*?)\s*[)\]]")
+_UNIT = re.compile(r"[(\[]([^()\[\]]*)[)\]]")
 
 
 def column_kind(name: str) -> str | None:
@@ -118,11 +118,12 @@ def _unit_of_rows(rows: Iterable[Row], column: int, path: Path) -> float:
 def _unit_of(name: str, place: str) -> float | None:
     """Size of the unit in a column's name [m]; None where it names none."""
     match = _UNIT.search(name)
-    if match is None or not match[1]:
+    unit = match[1].strip() if match else ""
+    if not unit:
         return None
-    if match[1] not in UNITS["length"]:
+    if unit not in UNITS["length"]:
         raise InputError(f"a unit of length ({', '.join(UNITS['length'])})", name, place)
-    return UNITS["length"][match[1]]
+    return UNITS["length"][unit]
 
 
 TABLE = Format("table with the columns x, y, z, radius", _looks_like_a_table, _read)

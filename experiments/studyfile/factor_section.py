@@ -34,7 +34,7 @@ Parameters = Annotated[tuple[str, ...], PlainValidator(_read_parameters)]
 class FactorSection(Section):
     """One factor. Its natural unit is the unit of ``low``."""
 
-    name: str = Field(pattern=r"^[A-Za-z_]\w*$")
+    name: str = Field(pattern=r"^[A-Za-z_]\w*$", max_length=100)
     """Short name: a column of every table, and what ``--set`` takes."""
     label: str
     """Its meaning, in words."""

@@ -23,6 +23,9 @@ STATISTICS = ("predicted", "mean", "sd", "n", "error", "error_percent", "half_wi
 DUMMY = "dummy"
 """Idle columns of screening designs, numbered."""
 
+_DERIVED = re.compile(r"(_coded|(?<!\d)\d+)$|_\d+$")
+"""Ending of a column that is made from another: of a factor's coded values, or a number."""
+
 RESERVED = frozenset({*LABELS, *RESULTS, *STATISTICS, *RESERVED_NAMES})
 """Names that are taken whatever the study measures."""
 
@@ -49,7 +52,7 @@ def check_factor_names(
 
 def _problems(names: Sequence[str], taken: Collection[str], places: Places) -> Iterator[Problem]:
     for index, name in enumerate(names):
-        base = re.sub(r"(_coded|_?\d+)$", "", name)
+        base = _DERIVED.sub("", name)
         derived = base != name and (
             base in taken or base == DUMMY or (name == f"{base}_coded" and base in names)
         )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import random
+import time
 from pathlib import Path
 
 import pandas as pd
@@ -12,7 +13,7 @@ import pytest
 from experiments.benchmarks.fuzz.mutations import mutated
 from experiments.benchmarks.fuzz.readers import CORPUS, READERS, Reader, accepted_change
 from experiments.benchmarks.fuzz.run import added, fuzz, rows_of
-from experiments.benchmarks.fuzz.worker import AT, FIELDS, READ, REFUSED, content_of, read_inputs
+from experiments.benchmarks.fuzz.worker import AT, FIELDS, READ, REFUSED, SECONDS, content_of, read_inputs
 from experiments.benchmarks.results import write_results
 from experiments.errors import InputError
 
@@ -103,5 +104,7 @@ def test_what_once_broke_a_reader_is_refused(path: Path, tmp_path: Path) -> None
     reader = READERS[path.name.partition(".")[0]](tmp_path)
     copy = tmp_path / f"again{path.suffix}"
     copy.write_bytes(path.read_bytes())
+    started = time.process_time()
     with pytest.raises(reader.refusals):
         reader.read(copy)
+    assert time.process_time() - started < SECONDS
