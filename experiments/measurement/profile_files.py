@@ -219,7 +219,7 @@ def _pictured(row: Row, fit: str, size: SizeOfTest) -> Iterator[np.ndarray]:
         if is_heap_file(path):
             heap = measure_heap_file(path, fit, HeapSettings())
             height = max(heap_shape(view.outline).height for view in heap.angle.views)
-            size.require_height(height, "is its unit of length right?", f" in {path}", place)
+            size.require_height(height, "is its unit of length right?", f" in {row['picture']}", place)
             yield from (heap_profile(view.outline) for view in heap.angle.views)
             return
         if not row["pixel"]:
@@ -233,7 +233,7 @@ def _pictured(row: Row, fit: str, size: SizeOfTest) -> Iterator[np.ndarray]:
     if seen.doubts:
         rule = "must show a heap without a doubt: crop it, or leave the row out"
         raise InputError(rule, "; ".join(map(str, seen.doubts)), place)
-    told = f" in {path}, with a pixel of {row['pixel']}"
+    told = f" in {row['picture']}, with a pixel of {row['pixel']}"
     question = "is the size of the pixels right?"
     height = heap_shape(seen.outline).height
     size.require_height(height, question, told, row.place("pixel"))
