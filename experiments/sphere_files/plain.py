@@ -20,7 +20,7 @@ from experiments.texts import delimiter_of, is_number, read_text, split
 
 _COLUMNS = re.compile(r"\bx,? y,? z,? r\b")
 _NAMED_UNIT = re.compile(rf"\bin ({'|'.join(UNITS['length'])})\b")
-"""What a comment that names the unit has in this order, as dem-warp writes it."""
+"""Parts of a comment that names the unit, in this order, as dem-warp writes it."""
 
 
 def _recognises(head: str) -> bool:

@@ -49,7 +49,7 @@ def test_numbers_are_known(text: str) -> None:
 
 
 def test_a_long_row_of_digits_takes_no_longer_than_reading_it() -> None:
-    # 0.06 s; where a search begins anew at each digit it is hours.
+    # 0.06 s; 21,000 digits took 0.8 s when each began a search anew.
     started = time.process_time()
     assert not is_number("9" * 1_000_000 + "x")
     assert time.process_time() - started < 2.0

@@ -7,6 +7,8 @@ scripts beside them.
 from __future__ import annotations
 
 import json
+import time
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -170,3 +172,12 @@ def test_a_vtk_file_without_radii_is_refused() -> None:
     code, _, err = dem_warp("angle", DATA / "liggghts_boundingBox_20000.vtk")
     assert code == 2
     assert "an array radius" in err
+
+
+def test_blank_lines_take_no_longer_than_reading_them(tmp_path: Path) -> None:
+    # 0.1 s; a search that began anew at each took most of a minute
+    (tmp_path / "heap.txt").write_text("0 0 0 1.5\n" + "\n" * 200_000, encoding="utf-8")
+    started = time.process_time()
+    with suppress(InputError):
+        read_spheres(tmp_path / "heap.txt")
+    assert time.process_time() - started < 2.0
