@@ -11,6 +11,7 @@ import numpy as np
 
 from doe import Factor
 from experiments.errors import InputError
+from experiments.trials.findings import EVERYTHING, VIEWS
 from experiments.trials.truth import Kind, Label, Sealed
 
 STRONG = 1.5
@@ -44,11 +45,15 @@ class Plan:
     """Heaps a condition."""
     mechanisms: tuple[str, ...] = ()
     """Those of the library that are hidden; none: all. The analysis knows the whole library."""
+    view: str = EVERYTHING
+    """View whose detectable sizes are declared: what is strong is counted in what it shows."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "mechanisms", tuple(self.mechanisms))  # a list, where it comes from a file
+        if self.view not in VIEWS:
+            raise InputError(f"must be one of {', '.join(VIEWS)}", self.view, "Plan.view")
         for field in fields(self):
-            if field.name == "mechanisms":
+            if field.name in ("mechanisms", "view"):
                 continue
             least = 2 if field.name == "replicates" else 0
             if (count := getattr(self, field.name)) < least:

@@ -20,9 +20,17 @@ EVERYTHING = "everything"
 PHOTOGRAPHS = "photographs"
 """View of an analysis that has only what a photograph shows."""
 
-VIEWS = {EVERYTHING: NAMES, PHOTOGRAPHS: (*PHOTOGRAPHED, *(each.name for each in OUTLINE))}
-"""Observables that an analysis has, by its view. What is strong is counted in what the first shows, as in all
-trials so far; of a bank without outlines the second has the others."""
+OUTLINED = "outlined"
+"""View of an analysis that has everything and the outline, as whoever brings numbers and pictures."""
+
+_OUTLINE = tuple(each.name for each in OUTLINE)
+
+VIEWS = {
+    EVERYTHING: NAMES,
+    OUTLINED: (*NAMES, *_OUTLINE),
+    PHOTOGRAPHS: (*PHOTOGRAPHED, *_OUTLINE),
+}
+"""Observables that an analysis has, by its view; of a bank without outlines all have the others."""
 
 CRASH = "crash"
 """Stands for the verdict of an analysis that raised."""

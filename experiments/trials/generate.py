@@ -37,6 +37,7 @@ from experiments.studyfile import Study, load_study
 from experiments.toml_files import read_toml
 from experiments.trials.declaration import Declaration, declared_effects, read_declaration, with_names
 from experiments.trials.drawing import Declared, Plan, draw
+from experiments.trials.findings import VIEWS
 from experiments.trials.folder import Folder, noted_run
 from experiments.trials.heaps import cases_of, write_heaps
 from experiments.trials.lockstep import dealt
@@ -88,7 +89,7 @@ def seal_trials(
         rule = "trials are sealed once: name a folder without any"
         raise InputError(rule, "sealed trials", str(folder.sealed))
     study = search.study
-    library = declared_effects(fit_emulator(bank), search.settings, plan.replicates)
+    library = declared_effects(fit_emulator(bank), search.settings, plan.replicates, VIEWS[plan.view])
     today, settings = time.strftime("%Y-%m-%d"), with_names(search.settings, library)
     scale, foreign = study.scale or "", tuple(strangers)
     declaration = Declaration(study.name, scale, today, plan, settings, library, foreign)

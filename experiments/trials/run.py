@@ -32,7 +32,7 @@ from experiments.studyfile import load_study
 from experiments.trials.cost import planned_cases
 from experiments.trials.declaration import read_declaration
 from experiments.trials.desk import Desk, OutOfTime, TimedSimulator, job_name, keep, read_data
-from experiments.trials.findings import VIEWS, read_findings
+from experiments.trials.findings import EVERYTHING, PHOTOGRAPHS, VIEWS, read_findings
 from experiments.trials.folder import Folder, noted_run
 from experiments.trials.generate import STUDY, bank_beside
 from experiments.trials.lockstep import in_step, process_crew
@@ -54,7 +54,7 @@ def run_trials(
     folder: Folder,
     trials: Sequence[Sealed],
     bank: Path | None = None,
-    views: Collection[str] = VIEWS,
+    views: Collection[str] = (EVERYTHING, PHOTOGRAPHS),
     device: str | None = None,
     workers: int | None = None,
     seconds: float = math.inf,
@@ -110,7 +110,7 @@ def main(
     bank: Annotated[Path | None, typer.Option(help="Bank of the trial study; left out: its own.")] = None,
     part: Annotated[str | None, typer.Option(help="Trials of one part; left out: all.")] = None,
     every: Annotated[int, typer.Option(help="One trial of so many, by their numbers.", min=1)] = 1,
-    view: Annotated[str | None, typer.Option(help="everything or photographs; left out: both.")] = None,
+    view: Annotated[str | None, typer.Option(help="Left out: the plan's, and photographs.")] = None,
     device: Annotated[str | None, typer.Option(help="cpu, cuda, or several GPUs, as cuda:0,cuda:1.")] = None,
     workers: Annotated[int | None, typer.Option(help="Processes.")] = None,
     seconds: Annotated[float, typer.Option(help="Begin no batch after this time.")] = math.inf,
@@ -120,7 +120,8 @@ def main(
     with clear_errors("Resume with the same command."):
         if view not in (None, *VIEWS):
             raise InputError(f"must be one of {', '.join(VIEWS)}", view, "--view")
-        place, views = Folder(folder), VIEWS if view is None else (view,)
+        place = Folder(folder)
+        views = (read_declaration(place.declared).plan.view, PHOTOGRAPHS) if view is None else (view,)
         if plan_only:
             print(plan_page(place, bank))
             return

@@ -14,7 +14,7 @@ from experiments.report.kit.figure import new_axes, save_figure
 from experiments.report.kit.markdown import markdown_table, write_page
 from experiments.trials.declaration import Declaration
 from experiments.trials.drawing import STRONG
-from experiments.trials.findings import EVERYTHING, PHOTOGRAPHS
+from experiments.trials.findings import EVERYTHING, OUTLINED, PHOTOGRAPHS
 from experiments.trials.folder import NOTES, PAGE, RUNS
 from experiments.trials.kept import Record, read_record
 from experiments.trials.score import (
@@ -27,7 +27,11 @@ from experiments.trials.score import (
     power_curve,
 )
 
-TITLES = {EVERYTHING: "With every observable", PHOTOGRAPHS: "With photographs only"}
+TITLES = {
+    EVERYTHING: "With every observable",
+    OUTLINED: "With every observable, and the outlines of the photographs",
+    PHOTOGRAPHS: "With photographs only",
+}
 
 _UNAIMED = {
     PHOTOGRAPHS: "No aims were set for photographs, which show less; gamma80 is that of every observable."

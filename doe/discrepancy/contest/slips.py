@@ -212,7 +212,7 @@ def _left_out(measured: Measured, emulator: Emulator, settings: Settings, whole:
     known = tuple(name for name in measured.observables if name in emulator.observables)
     everywhere = measured.conditions
     groups: list[tuple[tuple[str, ...], tuple[str, ...]]] = [((name,), everywhere) for name in known]
-    groups += [(kind, everywhere) for kind in measured.kinds if len(kind) > 1]
+    groups += [(kind, everywhere) for kind in _kinds(measured, emulator)]
     groups += [(known, (condition,)) for condition in everywhere]
     count = sum(int(np.isfinite(rows).sum()) for rows in measured.values.values())
     for observables, conditions in groups:
@@ -225,12 +225,17 @@ def _left_out(measured: Measured, emulator: Emulator, settings: Settings, whole:
             yield _Tried(replace(slip, factor=factor, q_without=fitted.q), fitted, count - left)
 
 
+def _kinds(measured: Measured, emulator: Emulator) -> list[tuple[str, ...]]:
+    """Kinds of several observables of which the emulator knows one; it may lack others, as outlines."""
+    return [kind for kind in measured.kinds if len(kind) > 1 and set(kind) & set(emulator.observables)]
+
+
 def _two_kinds(measured: Measured, emulator: Emulator, settings: Settings, whole: Fitted) -> list[Slip]:
     """Find two kinds of observables that are both wrong by a usual factor.
 
     The one does not show beside the other: what replicates scatter hides all.
     """
-    for pair in combinations([kind for kind in measured.kinds if len(kind) > 1], 2):
+    for pair in combinations(_kinds(measured, emulator), 2):
         slips = [Slip(kind, measured.conditions, None, None, False, whole.q, 0.0) for kind in pair]
         fitted = _closest(without(measured, slips), emulator, settings)
         if fitted is not None and fitted.q < FITS * fitted.freedom:
@@ -246,7 +251,7 @@ def _factor(measured: Measured, fitted: Fitted, slip: Slip) -> float | None:
     for condition in (name for name in slip.conditions if name in emulator.surfaces):
         predicted = fitted.model.predict(fitted.x[None], condition)[0]
         means = measured.mean(condition)
-        for name in slip.observables:
+        for name in (each for each in slip.observables if each in emulator.observables):
             value, model = (
                 means[measured.observables.index(name)],
                 predicted[emulator.observables.index(name)],

@@ -53,6 +53,20 @@ def test_a_slip_of_units_is_named_with_its_factor(names: tuple[str, ...], factor
     assert slip.q_without < slip.q_with / 1.5
 
 
+def test_a_slip_is_found_beside_observables_that_the_bank_lacks() -> None:
+    known = heaps(1)
+    outlines = {name: np.hstack([rows, rows[:, :1]]) for name, rows in known.values.items()}
+    measured = replace(
+        known,
+        observables=(*known.observables, "outline_1"),
+        values=outlines,
+        kinds=((*LENGTHS, "outline_1"), TIMES, ("outline_1", "outline_2")),
+    )
+    [slip] = find_slips(times(measured, (*LENGTHS, "outline_1"), 10.0), KNOWN, SEARCH.settings)
+    assert set(slip.observables) == {*LENGTHS, "outline_1"}
+    assert slip.factor == pytest.approx(10.0)
+
+
 def test_two_conditions_exchanged_are_named() -> None:
     measured = heaps(2)
     [slip] = find_slips(exchanged(measured, "fast", "wide"), KNOWN, SEARCH.settings)
