@@ -10,7 +10,7 @@ from doe.discrepancy import Settings
 from experiments.measurement.observables import BY_NAME, NAMES, OUTLINE, PHOTOGRAPHED
 from experiments.trials.camera import Camera
 from experiments.trials.declaration import declared_effects
-from experiments.trials.findings import EVERYTHING, PHOTOGRAPHS, VIEWS
+from experiments.trials.findings import EVERYTHING, OUTLINED, PHOTOGRAPHS, VIEWS
 from imaging.profile import profile_heights
 
 
@@ -55,8 +55,9 @@ def test_photographs_show_every_height_of_the_outline_and_nothing_of_a_balance()
     shown = {name for name, each in BY_NAME.items() if each.by_photograph and name == each.name}
     assert set(VIEWS[PHOTOGRAPHS]) == shown
     assert set(PHOTOGRAPHED) < shown
-    # the shipped banks know no outline, and all else stays in the other view
+    # what a balance, a film and a ruler show stays in the other views
     assert VIEWS[EVERYTHING] == NAMES
+    assert set(VIEWS[OUTLINED]) == {*NAMES, *shown}
 
 
 def test_what_is_seen_less_of_is_declared_from_a_larger_size_on() -> None:
