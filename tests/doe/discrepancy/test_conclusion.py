@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from doe.discrepancy.fitting.evidence import gather
 from doe.discrepancy.fitting.fit import fit, whiten
 from doe.discrepancy.fitting.model import Model, Stack
 from doe.discrepancy.problem.settings import Settings
-from doe.discrepancy.verdict.conclusion import closest_first
+from doe.discrepancy.verdict.conclusion import closest_first, open_pairs
 
 MARGIN = 6.0
 DRAWS = 100_000
@@ -103,3 +104,11 @@ def test_what_comes_closest_was_run_and_a_second_effect_brings_more_than_a_littl
         ordered = closest_first([one, far, pair], Settings(tie_margin=MARGIN))  # type: ignore[list-item]
         assert ordered[0] is (first or pair)
         assert ordered[-1] is far
+
+
+def test_open_pairs_say_what_is_in_all_of_them() -> None:
+    of = [("beta", "gamma"), ("beta", "delta_two"), ("alpha", "delta_two")]
+    pairs: list[Any] = [SimpleNamespace(mechanisms=names) for names in of]
+    stands = "no one pair stands out"
+    assert open_pairs(pairs[:2]) == f"{stands}: beta with gamma, beta with delta two; beta is in all of them"
+    assert open_pairs(pairs[::2]) == f"{stands}: beta with gamma, alpha with delta two"

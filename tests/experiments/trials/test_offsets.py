@@ -1,11 +1,21 @@
-"""Offsets of another code: a drawn offset comes back, and that of the record is there."""
+"""Offsets of another code: a drawn one comes back, that of the record is there, and only laws are changed."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import experiments.trials
+from dem_warp import PRESETS
+from doe.discrepancy import Point
+from experiments.cases import OwnWorkers
+from experiments.discover.engine import EngineSimulator
+from experiments.discover.library import library_for
+from experiments.discover.outcome_table import OutcomeTable
+from experiments.studyfile import load_study
+from experiments.trials.generate import STUDY
+from experiments.trials.other_codes.conventions import ERROR, OFF, OtherLaws, law_offsets, parted
 from experiments.trials.other_codes.offsets import measured_offsets, offsets_table
 
 RECORD = Path(experiments.trials.__file__).parent / "record" / "liggghts"
@@ -32,3 +42,29 @@ def test_heaps_of_liggghts_run_out_later_than_ours() -> None:
     # 4 ms in 270, less than a film's frame; seven standard errors
     assert 3.0 < late["off, sd of one run"] / late["standard error"] < 15.0
     assert 1e-3 < late["off"] < 1e-2
+
+
+def test_what_laws_make_is_told_from_what_is_left() -> None:
+    rng, shape = np.random.default_rng(2), (40, 5, 6, 1)
+    ours, theirs = 2.0 * rng.standard_normal(shape), 2.0 * rng.standard_normal(shape) + 0.6
+    theirs[4, 2, 1] = np.nan  # a heap that failed
+    laws = law_offsets(ours, theirs, {"t55": "s"})
+    # means of six heaps each, over 200: an error of sqrt(2 / 1200) = .041; four of them
+    assert laws.loc[0, OFF] == pytest.approx(0.3, abs=0.16)
+    assert laws.loc[0, ERROR] == pytest.approx(0.041, rel=0.5)
+    [row] = parted(laws.assign(**{OFF: 0.5, ERROR: 0.03}), laws).to_dict("records")
+    assert row["left"] == pytest.approx(0.5 - laws.loc[0, OFF])
+    assert row["error of what is left"] == pytest.approx(np.hypot(0.03, laws.loc[0, ERROR]))
+
+
+def test_other_laws_are_all_that_is_changed(tmp_path: Path) -> None:
+    study, workers = load_study(STUDY, "relative"), OwnWorkers("cpu")
+    library = library_for(study)
+    ours = EngineSimulator(study, library, OutcomeTable(tmp_path / "ours.sqlite"), workers)
+    theirs = OtherLaws(study, "liggghts", OutcomeTable(tmp_path / "theirs.sqlite"), workers)
+    point = Point((0.6, 0.5, 0.3), (), study.conditions[0].name, 7)
+    with ours, theirs:
+        own, other = ours.case(point), theirs.case(point)
+    assert other.laws == replace(PRESETS["liggghts"], rolling=own.laws.rolling)
+    assert own.laws != other.laws
+    assert replace(other, laws=own.laws) == own

@@ -154,6 +154,8 @@ def test_pairs_need_partners() -> None:
         draw(PLAN, FACTORS, LIBRARY[:2], (), np.random.default_rng(1), str)
     with pytest.raises(InputError, match=r"Plan.replicates: is at least 2"):
         Plan(replicates=1)
+    with pytest.raises(InputError, match=r"Plan.view: must be one of everything, outlined, photographs"):
+        Plan(view="everthing")
 
 
 def test_cases_of_a_trial_have_seeds_of_their_own() -> None:
