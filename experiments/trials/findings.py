@@ -61,6 +61,8 @@ class Finding:
     held_out_degrees: float = math.nan
     """Their degrees of freedom."""
     fresh_cases: int = 0
+    misfit: float = math.nan
+    """Score of *unknown* (`misfit_of`); NaN without an alarm, and in older records."""
     reason: str = ""
     """Rule that gave the verdict, or the last line of the crash."""
 
@@ -89,11 +91,23 @@ class Finding:
             held_out_after=held_out.after.value if held_out else math.nan,
             held_out_degrees=held_out.degrees_of_freedom if held_out else math.nan,
             fresh_cases=end.effort.fresh_cases,
+            misfit=misfit_of(end),
             reason=end.reason,
         )
 
 
 COLUMNS = tuple(field.name for field in fields(Finding))
+
+
+def surprise(p: float, ratio: float) -> float:
+    """Minus the logarithm of a p value; those that a bootstrap cannot part sort by Q over its freedom."""
+    return -math.log10(p) + 1e-3 * ratio
+
+
+def misfit_of(found: Discovery) -> float:
+    """Compute the `surprise` at the model that was chosen or comes closest, the score of *unknown*."""
+    best = found.chosen if found.chosen is not None else found.closest
+    return math.nan if best is None else surprise(best.p_value, best.q / max(best.degrees_of_freedom, 1))
 
 
 def findings_table(findings: Iterable[Finding]) -> pd.DataFrame:
@@ -108,7 +122,7 @@ def read_findings(paths: Sequence[Path]) -> pd.DataFrame:
         return findings_table([])
     text = dict.fromkeys(("trial", "view", "verdict", "named", "reason"), str)
     tables = [pd.read_csv(path, dtype=text, keep_default_na=False, na_values=["nan"]) for path in paths]
-    return pd.concat(tables).sort_values(["view", "trial"], ignore_index=True)
+    return pd.concat(tables).reindex(columns=COLUMNS).sort_values(["view", "trial"], ignore_index=True)
 
 
 def write_findings(path: Path, table: pd.DataFrame) -> None:

@@ -15,6 +15,7 @@ from doe.discrepancy import Verdict
 from experiments.discover.library import FORMER_NAMES
 from experiments.trials.drawing import STRONG, Declared
 from experiments.trials.findings import CRASH
+from experiments.trials.roc import area_text
 from experiments.trials.truth import Kind, Label, Sealed
 
 _JUDGED = ("kind", "truth", "true_size", "multiple", "right", "tied", "wrong")
@@ -235,6 +236,20 @@ def foreign_aims(table: pd.DataFrame) -> tuple[Aim, ...]:
         _limit("any trial: a wrong name", "at most 2 %", table["wrong"], most=0.02),
         _none("analyses that crashed", verdict == CRASH),
     )
+
+
+def unknown_area(table: pd.DataFrame) -> str:
+    """Area under the curve of *unknown*, by the misfit of the closest model, of one view's trials, as text.
+
+    What the library lacks against one or two strong mechanisms of it. A trial without an alarm has the least
+    score: nothing was said to be missing. Empty where no finding has a score, as in older records.
+    """
+    if not table["misfit"].notna().any():
+        return ""
+    strong = pd.concat([strong_singles(table), table[table["kind"] == Kind.PAIR]])
+    foreign = table[table["kind"].isin([Kind.WITHHELD, Kind.STRANGER])]
+    scores = (rows["misfit"].astype(float).fillna(-np.inf).to_numpy() for rows in (foreign, strong))
+    return area_text(*scores)
 
 
 MUST_RESOLVE = (

@@ -25,6 +25,7 @@ from experiments.trials.score import (
     confusion,
     declared_aim,
     power_curve,
+    unknown_area,
 )
 
 TITLES = {
@@ -140,6 +141,11 @@ def _view(record: Record, view: str, heading: str, folder: Path) -> list[str]:
     ]
     if len(outside := by_outsider(rows)):
         parts += ["### Effects that may not be named", markdown_table(outside.reset_index())]
+    if area := unknown_area(rows):
+        parts.append(
+            "By the misfit of the closest model what the library lacks is told from one or two strong effects"
+            f" of it with an area under the curve of {area}."
+        )
     return parts
 
 

@@ -10,12 +10,12 @@ import pandas as pd
 from experiments.trials.baselines.compare import (
     Parts,
     alarm_scores,
-    auroc,
     due,
     has_outside,
     outside_scores,
     paired,
 )
+from experiments.trials.roc import auroc
 from experiments.trials.score import share
 
 

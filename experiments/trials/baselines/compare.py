@@ -11,13 +11,12 @@ import pandas as pd
 from scipy import stats
 
 from experiments.trials.drawing import STRONG
+from experiments.trials.roc import area_text
 from experiments.trials.score import POWER_EDGES, Share, share
 from experiments.trials.truth import Kind, Label
 
 FOREIGN = (Kind.WITHHELD, Kind.STRANGER)
 """Kinds of trials whose hidden effect is not in the library."""
-DRAWS = 2000
-"""Of a bootstrap over trials."""
 
 
 def judged(answers: pd.DataFrame, labels: Mapping[str, Label]) -> pd.DataFrame:
@@ -98,25 +97,6 @@ class Parts:
         return self.table[self.table["kind"].isin(FOREIGN)]
 
 
-def auroc(positive: np.ndarray, negative: np.ndarray) -> float:
-    """Probability that a positive score is the larger, ties counting half (Mann and Whitney 1947)."""
-    if not len(positive) or not len(negative):
-        return float("nan")
-    ranks = stats.rankdata(np.concatenate([positive, negative]))
-    above = ranks[: len(positive)].sum() - len(positive) * (len(positive) + 1) / 2.0
-    return float(above / (len(positive) * len(negative)))
-
-
-def auroc_interval(positive: np.ndarray, negative: np.ndarray) -> tuple[float, float]:
-    """95 % interval of the area, by a bootstrap over the trials of each class."""
-    rng = np.random.default_rng(0)
-    drawn = [
-        auroc(rng.choice(positive, len(positive)), rng.choice(negative, len(negative))) for _ in range(DRAWS)
-    ]
-    low, high = np.quantile(drawn, [0.025, 0.975])
-    return float(low), float(high)
-
-
 def alarm_scores(parts: Parts) -> tuple[np.ndarray, np.ndarray]:
     """Scores of the alarm with and without something hidden."""
     return _scores(parts.hidden["score"]), _scores(parts.nulls["score"])
@@ -175,19 +155,12 @@ def areas(table: pd.DataFrame) -> pd.DataFrame:
         rows.append(
             {
                 "method": name,
-                "alarm, everything hidden": _area(hidden, nulls),
-                "alarm, weak effects": _area(_scores(weak["score"]), nulls),
-                "unknown": _area(*outside_scores(parts)) if has_outside(parts) else "no score",
+                "alarm, everything hidden": area_text(hidden, nulls),
+                "alarm, weak effects": area_text(_scores(weak["score"]), nulls),
+                "unknown": area_text(*outside_scores(parts)) if has_outside(parts) else "no score",
             }
         )
     return pd.DataFrame(rows)
-
-
-def _area(positive: np.ndarray, negative: np.ndarray) -> str:
-    if not len(positive) or not len(negative):
-        return "no trials"
-    low, high = auroc_interval(positive, negative)
-    return f"{auroc(positive, negative):.3f} ({low:.2f} to {high:.2f})"
 
 
 def power(table: pd.DataFrame, column: str) -> pd.DataFrame:

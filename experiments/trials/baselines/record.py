@@ -112,7 +112,7 @@ def gather(out: Path, record: Path, labels: Sequence[Label]) -> None:
 def gather_search(folder: Folder, record: Path) -> None:
     """Write what the search found in measured trials, with every observable, as answers of a method.
 
-    A record of trials keeps Q of the base, which is the score; *outside* has none.
+    A record of trials keeps Q of the base, which is the score, and of new ones that of *outside*.
     """
     findings = read_findings([folder.findings])
     path = file_of(record, SEARCH)
@@ -125,6 +125,7 @@ def gather_search(folder: Folder, record: Path) -> None:
             named=tuple(row.named.split()) if naming else (),
             tied=row.verdict == Verdict.TIE,
             unknown=row.verdict == Verdict.UNKNOWN,
+            outside=float(row.misfit),
         )
         add_answer(path, row.trial, answer, float("nan"))
 

@@ -17,6 +17,7 @@ from experiments.trials.findings import (
     PHOTOGRAPHS,
     Finding,
     findings_table,
+    read_findings,
     write_findings,
 )
 from experiments.trials.folder import Folder
@@ -31,6 +32,7 @@ from experiments.trials.score import (
     power_curve,
     removed,
     scored,
+    unknown_area,
 )
 from experiments.trials.trials_page import write_trials_page
 from experiments.trials.truth import Kind, Label, Sealed, write_labels, write_sealed
@@ -201,6 +203,27 @@ def test_a_strong_trial_ends_in_one_way() -> None:
         ends = by_mechanism(scored(changed, labels, [])).drop(columns="trials")
         assert (ends.sum(axis=1) == 15).all()
         assert ends.loc["a", column] == 1
+
+
+def test_unknown_has_the_area_of_its_misfits() -> None:
+    findings, labels = ideal_trials()
+    assert unknown_area(scored(findings, labels, [])) == ""  # as older records, without a score
+    kinds = findings["trial"].map({trial: label.kind for trial, label in labels.items()})
+    told = findings.assign(misfit=kinds.map({Kind.STRANGER: 3.0, Kind.SINGLE: 1.0, Kind.PAIR: 2.0}))
+    assert unknown_area(scored(told, labels, [])).startswith("1.000")
+    # half of what the library lacks raised no alarm: it is behind all the others
+    told.loc[kinds == Kind.STRANGER, "misfit"] = [3.0, float("nan")] * 30
+    assert unknown_area(scored(told, labels, [])).startswith("0.500")
+
+
+def test_findings_without_a_misfit_are_read_as_older_ones(tmp_path: Path) -> None:
+    table = findings_table([Finding("alone-001", EVERYTHING, "unknown", alarm=True, misfit=2.5)])
+    write_findings(tmp_path / "new.csv", table)
+    assert read_findings([tmp_path / "new.csv"]).loc[0, "misfit"] == 2.5
+    table.drop(columns="misfit").to_csv(tmp_path / "old.csv", index=False, na_rep="nan")
+    old = read_findings([tmp_path / "old.csv"])
+    assert list(old) == list(table)
+    assert old["misfit"].isna().all()
 
 
 def test_the_kept_record_scores_as_its_page_says(tmp_path: Path) -> None:

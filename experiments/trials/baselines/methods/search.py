@@ -10,6 +10,7 @@ import numpy as np
 
 from doe.discrepancy import Discovery, Outcomes, Point, Verdict, analyse, drive
 from experiments.trials.baselines.protocol import Answer, Problem
+from experiments.trials.findings import misfit_of, surprise
 
 Simulator = Callable[[Sequence[Point]], Outcomes]
 
@@ -41,21 +42,14 @@ def answer_of(found: Discovery) -> Answer:
         return Answer(-math.inf, False)
     naming = found.verdict in (Verdict.NAMED, Verdict.TIE)
     alarm = found.verdict not in (Verdict.NONE, Verdict.NOT_IDENTIFIABLE)
-    best = found.chosen if found.chosen is not None else found.closest
-    outside = math.nan if best is None else _surprise(best.p_value, best.q / max(best.degrees_of_freedom, 1))
     return Answer(
-        score=_surprise(found.base.p_value, found.base.q / max(found.base.degrees_of_freedom, 1)),
+        score=surprise(found.base.p_value, found.base.q / max(found.base.degrees_of_freedom, 1)),
         alarm=alarm,
         named=tuple(sorted(found.named)) if naming else (),
         tied=found.verdict is Verdict.TIE,
         unknown=found.verdict is Verdict.UNKNOWN,
-        outside=outside,
+        outside=misfit_of(found),
     )
-
-
-def _surprise(p: float, ratio: float) -> float:
-    """Sort p values, those that a bootstrap cannot part by Q over its degrees of freedom."""
-    return -math.log10(p) + 1e-3 * ratio
 
 
 def no_runs(observables: int) -> Simulator:

@@ -28,7 +28,6 @@ from experiments.trials.baselines.compare import (
     Paired,
     Parts,
     areas,
-    auroc,
     comparisons,
     due,
     held,
@@ -53,6 +52,7 @@ from experiments.trials.findings import (
 )
 from experiments.trials.folder import Folder
 from experiments.trials.generate import STUDY
+from experiments.trials.roc import auroc
 from experiments.trials.truth import Kind, Label, Sealed, read_labels, write_labels, write_sealed
 
 RECORDS = Path(benchmark_files.FOLDER).parents[1] / "record"
