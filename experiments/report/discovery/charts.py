@@ -74,7 +74,7 @@ def confounding_chart(confounding: Confounding, terms: Terms) -> Chart:
         "Correlation of what two mechanisms leave after calibration: near 1 or −1 these data cannot tell them"
         " apart, near 0 they cannot be taken for one another."
     )
-    return Chart("confounding-chart", caption, figure, height="tall", broad=True)
+    return Chart("confounding-chart", caption, figure, height="tall", columns=len(names))
 
 
 def gap_chart(found: Discovery) -> Chart:
@@ -158,7 +158,7 @@ def _residual_map(name: str, found: Discovery, fit: Fit, caption: str) -> Chart:
     _add_map(figure, fit.residuals, conditions, observables, MAP_REACH, texts)
     figure.update_xaxes(tickangle=-40)
     caption += f" * : beyond chance after Holm's adjustment (p < {SIGNIFICANT})."
-    return Chart(name, caption, figure, broad=True)
+    return Chart(name, caption, figure, columns=len(observables))
 
 
 def _add_map(

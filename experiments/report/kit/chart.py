@@ -23,8 +23,8 @@ class Chart:
     figure: go.Figure
     height: str = ""
     """"tall" or "low" where it takes more or less height than the usual."""
-    broad: bool = False
-    """True where its columns need more width than a phone has: it then scrolls in its box."""
+    columns: int = 0
+    """Columns with a number each, which need more width than a phone has: it then scrolls in its box."""
 
     @property
     def json(self) -> str:
