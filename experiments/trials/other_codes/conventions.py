@@ -39,17 +39,7 @@ OFF, ERROR = "off, sd of one run", "standard error"
 
 
 class OtherLaws(EngineSimulator):
-    """Our engine with the laws of another code, but for its resistance to rolling, which a null has not.
-
-    Parameters
-    ----------
-    study
-        The trial study.
-    code
-        Name of the code.
-    table, workers
-        As of `EngineSimulator`.
-    """
+    """Our engine with the laws of a code, but for its resistance to rolling, which a null has not."""
 
     def __init__(self, study: Study, code: str, table: OutcomeTable, workers: Workers) -> None:
         super().__init__(study, library_for(study), table, workers)
