@@ -9,7 +9,6 @@ code is off (`offsets`) is due to its filling, walls, time step and looks, or to
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -25,12 +24,13 @@ from experiments.commands.console import clear_errors
 from experiments.discover.engine import EngineSimulator
 from experiments.discover.library import library_for
 from experiments.discover.outcome_table import OutcomeTable
+from experiments.errors import InputError
 from experiments.report.kit.markdown import markdown_table
 from experiments.studyfile import Study, load_study
-from experiments.trials.declaration import read_declaration
-from experiments.trials.folder import DECLARED, LABELS, REALITY
+from experiments.trials.folder import LABELS
 from experiments.trials.generate import STUDY
 from experiments.trials.heaps import cases_of
+from experiments.trials.kept import read_record
 from experiments.trials.other_codes.offsets import measured_offsets, offsets_table
 from experiments.trials.other_codes.setting import LAWS
 from experiments.trials.truth import Kind, Label, read_labels
@@ -91,8 +91,10 @@ def main(
 ) -> None:
     """Print how much of the offsets of a record's code its laws make."""
     with clear_errors("Resume with the same command."):
-        code = str(json.loads((record / REALITY).read_text(encoding="utf-8"))["code"])
-        study = load_study(STUDY, read_declaration(record / DECLARED).scale or None)
+        kept = read_record(record)
+        if kept.reality is None:
+            raise InputError("must be a record of heaps that another code made", kept.title, str(record))
+        code, study = kept.reality["code"], load_study(STUDY, kept.declaration.scale or None)
         nulls = [label for label in read_labels(record / LABELS) if label.kind is Kind.NULL]
         measured, _ = measured_offsets(record)
         out.mkdir(parents=True, exist_ok=True)
