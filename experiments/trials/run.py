@@ -32,7 +32,7 @@ from experiments.studyfile import load_study
 from experiments.trials.cost import planned_cases
 from experiments.trials.declaration import read_declaration
 from experiments.trials.desk import Desk, OutOfTime, TimedSimulator, job_name, keep, read_data
-from experiments.trials.findings import EVERYTHING, PHOTOGRAPHS, VIEWS, read_findings
+from experiments.trials.findings import PHOTOGRAPHS, VIEWS, read_findings
 from experiments.trials.folder import Folder, noted_run
 from experiments.trials.generate import STUDY, bank_beside
 from experiments.trials.lockstep import in_step, process_crew
@@ -53,8 +53,8 @@ def open_jobs(folder: Folder, trials: Sequence[Sealed], views: Collection[str]) 
 def run_trials(
     folder: Folder,
     trials: Sequence[Sealed],
+    views: Collection[str],
     bank: Path | None = None,
-    views: Collection[str] = (EVERYTHING, PHOTOGRAPHS),
     device: str | None = None,
     workers: int | None = None,
     seconds: float = math.inf,
@@ -129,7 +129,7 @@ def main(
         # heaps may be made in chunks: what has none yet waits
         trials = [trial for trial in sealed if place.measured(trial.trial).exists()]
         try:
-            run_trials(place, trials, bank, views, device, workers, seconds)
+            run_trials(place, trials, views, bank, device, workers, seconds)
         except OutOfTime:
             print(f"time is up; {len(open_jobs(place, trials, views))} analyses have not ended: run it again")
             raise typer.Exit(UNFINISHED) from None
