@@ -3,7 +3,8 @@
 A file of measured heaps states them in rows of their own: ``calibration`` stands for the condition,
 ``offset`` or ``scale`` for the replicate, and the value is a standard deviation, in the observable's unit or
 as a share of the value (``0.002`` or ``0.2 %``). A row with ``none`` for the replicate says that nothing is
-off. What is not stated is as usual for the instrument.
+off. What is not stated is as usual for the instrument. Lengths, times and weights of one instrument are off
+by one scale, and by an offset each.
 """
 
 from __future__ import annotations
@@ -61,7 +62,14 @@ def usual_calibration(observable: Observable) -> Calibration:
         return _LEAN
     if observable.instrument is None:
         return Calibration()
-    return _USUAL.get((observable.instrument, observable.unit), Calibration())
+    usual = _USUAL.get((observable.instrument, observable.unit), Calibration())
+    return replace(usual, instrument=_with_one_scale(observable))
+
+
+def _with_one_scale(observable: Observable) -> str:
+    """Name of the instrument whose scale is in an observable; empty for an angle or a share."""
+    has_scale = observable.instrument is not None and observable.unit not in ("deg", "1")
+    return str(observable.instrument) if has_scale else ""
 
 
 def stated_calibration(
@@ -85,13 +93,17 @@ def stated_calibration(
     """
     found = {name: usual_calibration(known[name]) for name in measured}
     if any(_kind(row) == NONE for row in rows):
-        found = dict.fromkeys(measured, Calibration())
+        found = {name: Calibration(instrument=_with_one_scale(known[name])) for name in measured}
     for row in rows:
         if (kind := _kind(row)) != NONE:
             observable = _observable(row, known)
             if observable.name in found:
-                value = _value(row, observable.unit if kind == "offset" else "1")
-                found[observable.name] = replace(found[observable.name], **{kind: value})
+                known_so_far = found[observable.name]
+                if kind == "offset":
+                    stated = replace(known_so_far, offset=_value(row, observable.unit))
+                else:
+                    stated = replace(known_so_far, scale=_value(row, "1"))
+                found[observable.name] = stated
     return found
 
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from doe.discrepancy import Calibration
+from experiments.measurement.calibration import usual_calibration
 from experiments.measurement.observables import BY_NAME
 
 SCALE_ERROR = 0.002
@@ -16,6 +18,12 @@ ROLL = math.radians(0.3)
 """Standard deviation of the camera's roll that levelling leaves, one for all pictures of a trial [rad]."""
 READING = {"deg": 0.1, "m": 5.0e-5, "1": 0.002}
 """Standard deviations of reading one picture by unit: half a pixel or so."""
+
+
+def stated_scales(names: Sequence[str]) -> dict[str, Calibration]:
+    """Errors of scale that are known of such a camera, by observable that has its scale."""
+    shown = [BY_NAME[name] for name in names if BY_NAME[name].by_photograph and BY_NAME[name].unit == "m"]
+    return {one.name: replace(usual_calibration(one), offset=0.0, scale=SCALE_ERROR) for one in shown}
 
 
 @dataclass(frozen=True)

@@ -4,21 +4,20 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from doe.discrepancy import Emulator, MechanismRange, Settings
+from doe.discrepancy import Calibration, Emulator, MechanismRange, Settings
 from doe.discrepancy.contest.power import Effects, detectable_coded_size
 from doe.discrepancy.contest.signatures import signatures
 from doe.discrepancy.emulation.bank import sobol_points
 from doe.discrepancy.fitting.evidence import Block
 from doe.discrepancy.fitting.fit import weigh
 from doe.discrepancy.fitting.model import Model, Stack
-from doe.discrepancy.fitting.scatter import NOTHING
 from experiments.errors import InputError
 from experiments.files import write_text
 from experiments.measurement.observables import NAMES
@@ -88,18 +87,23 @@ def _effect(record: dict[str, Any]) -> Declared:
 
 
 def declared_effects(
-    emulator: Emulator, settings: Settings, replicates: int, observables: Collection[str] = NAMES
+    emulator: Emulator,
+    settings: Settings,
+    replicates: int,
+    observables: Collection[str] = NAMES,
+    calibration: Mapping[str, Calibration] | None = None,
 ) -> tuple[Declared, ...]:
     """Declare what so many replicates of every condition should show of each mechanism of the library.
 
-    They show the observables that are named: a bank may know more, as outlines.
+    They show the observables that are named: a bank may know more, as outlines; and are off in all conditions
+    alike by no more than a calibration has, by observable.
     The power is the mean over the ranges of the factors, as truths are drawn from all of them. A mechanism
     is told apart that the end of its range shows nearly everywhere in them.
     """
     space = emulator.space
     drawn, correlations = [], []
     for theta in 2.0 * sobol_points(THETAS, len(space.factors), seed=0) - 1.0:
-        means = perfect_means(emulator, theta, replicates, observables)
+        means = perfect_means(emulator, theta, replicates, observables, calibration or {})
         stack = Stack(Model(emulator, (), settings.systematic), means)
         fitted = weigh(stack, theta)
         effects = Effects.of(fitted, signatures(fitted))
@@ -127,17 +131,20 @@ def with_names(settings: Settings, library: Sequence[Declared]) -> Settings:
 
 
 def perfect_means(
-    emulator: Emulator, theta: np.ndarray, replicates: int, observables: Collection[str]
+    emulator: Emulator,
+    theta: np.ndarray,
+    replicates: int,
+    observables: Collection[str],
+    calibration: Mapping[str, Calibration],
 ) -> tuple[Block, ...]:
     """Means of so many replicates in every training condition that are exactly the model's at coded theta."""
     numbers = np.flatnonzero(np.isin(emulator.observables, list(observables)))
-    count = len(numbers)
-    weights, nothing = np.full((count, count), 1.0 / replicates), np.zeros((2, count))
-    return tuple(
-        Block(condition, numbers, surfaces.predict(theta[None], ())[0][numbers], weights, NOTHING, nothing)
+    means = [
+        Block.of_means(condition, numbers, surfaces.predict(theta[None], ())[0][numbers], replicates)
         for condition, surfaces in emulator.surfaces.items()
         if not emulator.space.is_held_out(condition)
-    )
+    ]
+    return tuple(block.calibrated(emulator.observables, calibration) for block in means)
 
 
 def _kin(names: Sequence[str], correlations: np.ndarray) -> dict[str, tuple[str, ...]]:

@@ -35,6 +35,7 @@ from experiments.errors import InputError
 from experiments.files import replacing
 from experiments.studyfile import Study, load_study
 from experiments.toml_files import read_toml
+from experiments.trials.camera import stated_scales
 from experiments.trials.declaration import Declaration, declared_effects, read_declaration, with_names
 from experiments.trials.drawing import Declared, Plan, draw
 from experiments.trials.findings import VIEWS
@@ -89,7 +90,9 @@ def seal_trials(
         rule = "trials are sealed once: name a folder without any"
         raise InputError(rule, "sealed trials", str(folder.sealed))
     study = search.study
-    library = declared_effects(fit_emulator(bank), search.settings, plan.replicates, VIEWS[plan.view])
+    seen = VIEWS[plan.view]
+    emulator, known = fit_emulator(bank), stated_scales(seen)
+    library = declared_effects(emulator, search.settings, plan.replicates, seen, known)
     today, settings = time.strftime("%Y-%m-%d"), with_names(search.settings, library)
     scale, foreign = study.scale or "", tuple(strangers)
     declaration = Declaration(study.name, scale, today, plan, settings, library, foreign)

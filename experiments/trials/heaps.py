@@ -15,7 +15,7 @@ from experiments.errors import InputError
 from experiments.files import replacing
 from experiments.measurement.calibration import CALIBRATION, NONE
 from experiments.measurement.observables import BY_NAME
-from experiments.trials.camera import Camera
+from experiments.trials.camera import Camera, stated_scales
 from experiments.trials.folder import Folder
 from experiments.trials.truth import Label, read_sealed
 
@@ -48,8 +48,9 @@ def write_heaps(
 
     The outcomes have a column for each of the observables, by their names.
     A tube that held its grains is written down as clogged; a case that failed in another way leaves no row,
-    as a test that went wrong in a laboratory. The label's seed draws the camera. The file says that nothing
-    is off in all conditions alike, or, of what is not `calibrated`, nothing of it, as most files do.
+    as a test that went wrong in a laboratory. The label's seed draws the camera. The file says how well
+    its scale is known, and that nothing else is off in all conditions alike; or, of what is not `calibrated`,
+    nothing of it, as most files do.
     """
     rng = np.random.default_rng([label.seed, 1])
     values = Camera.drawn(rng).read(outcomes.values, observables, rng)
@@ -58,8 +59,10 @@ def write_heaps(
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(("condition", "replicate", "observable", "value", "unit"))
         if calibrated:
-            # the cameras' errors are those that the rules' `systematic` stands for
+            # its roll, and what else it errs by, are what the rules' `systematic` stands for
             writer.writerow((CALIBRATION, NONE, "", "", ""))
+            for name, known in stated_scales(observables).items():
+                writer.writerow((CALIBRATION, "scale", name, known.scale, ""))
         for point, row, reason in zip(points, values, outcomes.reasons, strict=True):
             replicate = replicates[point.condition] = replicates.get(point.condition, 0) + 1
             if not reason:

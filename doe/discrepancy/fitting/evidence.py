@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -28,12 +28,28 @@ class Block:
     common: np.ndarray
     """Change of each mean by a standard deviation of the offset, and of the scale, of its observable, which
     all conditions share, (2, k)."""
+    scales: np.ndarray
+    """Number of the error of scale of each mean (`scale_numbers`), (k,)."""
 
     @classmethod
     def of_runs(cls, condition: str, columns: np.ndarray, count: int) -> Block:
         """Means of so many runs of a model, which scatter as the model does; they are nowhere needed."""
+        return cls.of_means(condition, columns, np.zeros(len(columns)), count)
+
+    @classmethod
+    def of_means(cls, condition: str, columns: np.ndarray, mean: np.ndarray, count: int) -> Block:
+        """Means of so many replicates that scatter as the model does, measured without error."""
         share = np.full((len(columns), len(columns)), 1.0 / count)
-        return cls(condition, columns, np.zeros(len(columns)), share, NOTHING, np.zeros((2, len(columns))))
+        return cls(condition, columns, mean, share, NOTHING, np.zeros((2, len(columns))), columns)
+
+    def calibrated(self, observables: Sequence[str], calibration: Mapping[str, Calibration]) -> Block:
+        """Return the same with what instruments may be off by, by observable of the emulator."""
+        known = [calibration.get(observables[column], Calibration()) for column in self.columns]
+        moved = np.array(
+            [[one.offset, one.scale * value] for one, value in zip(known, self.mean, strict=True)]
+        )
+        scales = scale_numbers(observables, calibration)[self.columns]
+        return replace(self, common=moved.reshape(-1, 2).T, scales=scales)
 
     @property
     def replicates(self) -> np.ndarray:
@@ -102,9 +118,12 @@ def _block(measured: Measured, emulator: Emulator, condition: str, scatter: Scat
     counts = present.sum(axis=0)
     mean = measured.mean(condition)[[names.index(emulator.observables[c]) for c in columns]]
     share = present.T @ present / np.outer(counts, counts)
-    known = [measured.calibration.get(emulator.observables[c], Calibration()) for c in columns]
-    common = np.array([[one.offset for one in known], [one.scale for one in known]]) * [
-        np.ones(len(mean)),
-        mean,
-    ]
-    return Block(condition, columns, mean, share, scatter, common)
+    block = replace(Block.of_means(condition, columns, mean, 1), share=share, scatter=scatter)
+    return block.calibrated(emulator.observables, measured.calibration)
+
+
+def scale_numbers(observables: Sequence[str], calibration: Mapping[str, Calibration]) -> np.ndarray:
+    """Number the errors of scale: each has that of the first observable of its instrument, (observables,)."""
+    first: dict[str, int] = {}
+    of = [calibration.get(name, Calibration()).instrument for name in observables]
+    return np.array([first.setdefault(name, at) if name else at for at, name in enumerate(of)], dtype=int)

@@ -258,12 +258,13 @@ class Stack:
     def common(self) -> np.ndarray:
         """Change of the means by a standard deviation of each calibration error, (2 observables, means).
 
-        Offsets of all observables, then their scales.
+        Offsets of all observables, then scales, by the numbers of their errors.
         """
-        numbers = np.arange(len(self.model.emulator.observables))
-        columns = np.concatenate([block.columns for block in self.blocks])
+        numbers = np.arange(len(self.model.emulator.observables))[:, None]
+        errors = np.concatenate([[block.columns, block.scales] for block in self.blocks], axis=1)
         moved = np.concatenate([block.common for block in self.blocks], axis=1)
-        return np.concatenate([np.where(columns == numbers[:, None], each, 0.0) for each in moved])
+        parts = zip(errors, moved, strict=True)
+        return np.concatenate([np.where(error == numbers, each, 0.0) for error, each in parts])
 
     def noise(self, x: np.ndarray) -> np.ndarray:
         """Covariance of the measured means alone, (means, means)."""

@@ -20,6 +20,9 @@ class Calibration:
     """Added to every value, in its natural unit."""
     scale: float = 0.0
     """Share of every value."""
+    instrument: str = ""
+    """Name of what it was measured by: all observables of one instrument have one error of scale, each by its
+    own standard deviation, as lengths that are read off one ruler; empty: the error is its own."""
 
     def __post_init__(self) -> None:
         for name in ("offset", "scale"):

@@ -9,10 +9,11 @@ from doe.discrepancy.contest.gap import GapTest, condition_fits, drift_p, holm
 from doe.discrepancy.contest.held_out import forecast
 from doe.discrepancy.contest.signatures import Signatures, projector
 from doe.discrepancy.emulation.emulator import Emulator
-from doe.discrepancy.fitting.evidence import Block, Evidence
+from doe.discrepancy.fitting.evidence import Block, Evidence, scale_numbers
 from doe.discrepancy.fitting.fit import AT_BOUND, Fitted, Interval, weigh
 from doe.discrepancy.fitting.model import Model, Stack
 from doe.discrepancy.fitting.size_interval import coded_size_interval
+from doe.discrepancy.problem.measured import Calibration
 from doe.discrepancy.problem.settings import Settings
 from doe.discrepancy.verdict.conclusion import Assessment, objections
 from doe.discrepancy.verdict.discovery import CalibrationUse, Candidate, Data, Drift, Fit
@@ -72,14 +73,16 @@ def fit_record(fitted: Fitted, gap: GapTest, evidence: Evidence) -> Fit:
 def calibration_uses(fitted: Fitted, evidence: Evidence) -> tuple[CalibrationUse, ...]:
     """Calibration errors that were allowed, each with its expected value given all residuals of a model."""
     whole = weigh(Stack(fitted.model, (*evidence.training, *evidence.held_out)), fitted.x)
-    common = whole.stack.common
-    asked = (common @ whole.whitening.T @ whole.residuals).reshape(2, -1)
+    offsets, scales = (whole.stack.common @ whole.whitening.T @ whole.residuals).reshape(2, -1)
+    observables = fitted.model.emulator.observables
+    asked = np.column_stack([offsets, scales[scale_numbers(observables, evidence.calibration)]])
+    measured = np.concatenate([block.columns for block in whole.stack.blocks])
     uses = []
-    for column, observable in enumerate(fitted.model.emulator.observables):
-        if not common.reshape(2, len(asked[0]), -1)[:, column].any():
+    for column, (observable, errors) in enumerate(zip(observables, asked, strict=True)):
+        one = evidence.calibration.get(observable, Calibration())
+        if column not in measured or not (one.offset or one.scale):
             continue
-        one = evidence.calibration[observable]
-        z = asked[:, column]
+        z = errors * [1.0, one.scale > 0.0]  # others of its instrument may be off in scale
         offset, scale = (float(each) for each in z * [one.offset, one.scale])
         length = float(np.hypot(*z))
         uses.append(CalibrationUse(observable, one.offset, one.scale, offset, scale, length))

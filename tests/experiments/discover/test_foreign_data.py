@@ -217,6 +217,34 @@ def test_the_record_says_how_much_of_an_allowance_a_model_uses() -> None:
     assert used.deviations == pytest.approx(abs(used.used_offset) / late)
 
 
+def test_lengths_of_one_instrument_are_off_by_one_scale() -> None:
+    # Pictures whose scale is off by 4 %, and one length alone that is: the first is what a scale does.
+    share, whole = 0.04, heaps({}, 1)
+    lengths = [
+        name for name in whole.observables if BY_NAME[name].by_photograph and BY_NAME[name].unit == "m"
+    ]
+    assert len(lengths) > 2
+    used = {}
+    for several, moved in ((True, lengths), (False, lengths[-1:])):
+        values = {
+            name: rows * np.where(np.isin(whole.observables, moved), 1.0 + share, 1.0)
+            for name, rows in whole.values.items()
+        }
+        for instrument in ("pictures", ""):
+            scale = Calibration(scale=share, instrument=instrument)
+            measured = replace(whole, values=values, calibration=dict.fromkeys(lengths, scale))
+            evidence = gather(measured, known())
+            fitted = fit(Stack(Model(known(), (), SYSTEMATIC), evidence.training))
+            used[several, instrument] = [one.used_scale for one in calibration_uses(fitted, evidence)]
+    of_all, of_one = used[True, "pictures"], used[False, "pictures"]
+    assert of_all == pytest.approx([of_all[0]] * len(lengths))
+    # the factors take up a part of it
+    assert share / 2.0 < of_all[0] < 1.5 * share
+    # other lengths of the pictures say that their scale is right; each with a scale of its own could not
+    assert abs(of_one[-1]) < share / 4.0
+    assert used[False, ""][-1] > share / 2.0
+
+
 def test_a_forecast_takes_over_what_the_fit_shows_to_be_off() -> None:
     measured = shifted(heaps({}, 2), "t55", 0.03)
     missed = []

@@ -38,14 +38,18 @@ def test_a_file_states_offset_and_scale_in_any_unit(tmp_path: Path) -> None:
         "calibration,offset,height,0.2,mm",
     )
     found = read(tmp_path, *rows).calibration
-    assert found["t55"] == Calibration(0.004)
-    assert found["height"] == Calibration(2.0e-4, 0.005)
+    assert found["t55"] == Calibration(0.004, instrument="film")
+    assert found["height"] == Calibration(2.0e-4, 0.005, "photograph")
     assert found["asymmetry"] == usual_calibration(BY_NAME["asymmetry"])
 
 
 def test_a_file_may_say_that_nothing_is_off_but_for_what_it_states(tmp_path: Path) -> None:
     found = read(tmp_path, "calibration,none,,,", "calibration,offset,t55,4,ms").calibration
-    assert found == {"height": Calibration(), "t55": Calibration(0.004), "asymmetry": Calibration()}
+    assert found == {
+        "height": Calibration(instrument="photograph"),
+        "t55": Calibration(0.004, instrument="film"),
+        "asymmetry": Calibration(),
+    }
 
 
 @pytest.mark.parametrize(
