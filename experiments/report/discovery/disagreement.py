@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from doe.discrepancy import Discovery, Fit, Question, Slip, Verdict
+from doe.discrepancy import CalibrationUse, Discovery, Fit, Question, Slip, Verdict
 from experiments.measurement.observables import Instrument
 from experiments.report.discovery.terms import Terms, spaced
 from experiments.report.kit.numbers import enumeration, trimmed
@@ -58,14 +58,23 @@ def conventions(found: Discovery, terms: Terms) -> list[str]:
     return [f"For {enumeration(names)}: {text} would look the same." for text, names in told.items()]
 
 
-def leaning(fit: Fit | None) -> str:
+def leaning(fit: Fit | None, terms: Terms) -> str:
     """Say which instruments a model needs to be off by more than was allowed, a sentence; empty for none."""
-    leans = [use for use in fit.calibration if use.deviations > LEANING] if fit else []
+    uses = fit.calibration if fit else ()
+    leans = dict(_leaned_on(use, terms) for use in uses if use.deviations > LEANING)
     if not leans:
         return ""
-    told = (f"{spaced(one.observable)} ({trimmed(one.deviations, 2)} standard deviations)" for one in leans)
+    told = (f"{what} ({trimmed(by, 2)} standard deviations)" for what, by in leans.items())
     which = "that instrument" if len(leans) == 1 else "those instruments"
     return f"The model leans on what was allowed for the calibration of {enumeration(told)}: check {which}."
+
+
+def _leaned_on(use: CalibrationUse, terms: Terms) -> tuple[str, float]:
+    """Name what is off, and by how many standard deviations: an observable, or the scale of an instrument."""
+    instrument = terms.observables[use.observable].instrument
+    if instrument is not None and abs(use.used_scale) > LEANING * use.scale > 0.0:
+        return f"the scale of the {instrument}", abs(use.used_scale) / use.scale
+    return spaced(use.observable), use.deviations
 
 
 def measure_again(found: Discovery) -> str:

@@ -206,8 +206,8 @@ def calibration_table(found: Discovery, terms: Terms) -> Table | None:
     note = (
         "Standard deviations of what an instrument may be off by in all conditions alike, as the file of"
         " measured heaps states them or as is usual for the instrument; and the likeliest offset, measured"
-        " less true, given all residuals of a model. Above 2 a model leans on an allowance: check that"
-        " instrument."
+        " less true, given all residuals of a model. Lengths, times or weights of one instrument are off by"
+        " one scale. Above 2 a model leans on an allowance: check that instrument."
     )
     return make_table("calibration", pd.DataFrame(rows), shown, "What instruments may be off by.", note)
 

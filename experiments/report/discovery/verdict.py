@@ -74,7 +74,7 @@ def verdict_sentence(found: Discovery, terms: Terms) -> str:
 def _found(found: Discovery, terms: Terms) -> str:
     """The sentence of a verdict, and what the model that it tells of leans on."""
     told = found.base if found.verdict is Verdict.NONE else found.chosen or found.closest
-    return " ".join(filter(None, [_SENTENCES[found.verdict](found, terms), leaning(told)]))
+    return " ".join(filter(None, [_SENTENCES[found.verdict](found, terms), leaning(told, terms)]))
 
 
 def reason_sentence(found: Discovery, terms: Terms) -> str:

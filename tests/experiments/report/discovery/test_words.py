@@ -33,6 +33,16 @@ def test_a_model_that_leans_on_an_allowance_says_so(
     assert "fill height (" not in sentence
 
 
+def test_lengths_that_lean_on_one_scale_are_one_instrument(discovered: Discovered, terms: Terms) -> None:
+    found = discovered(Verdict.NAMED)
+    assert found.chosen is not None
+    # off by 0.5 % of 0.2 % allowed, all lengths of the picture alike
+    uses = [CalibrationUse(name, 0.0, 0.002, 0.0, 0.005, 2.5) for name in ("height", "r50", "r90")]
+    sentence = verdict_sentence(replace(found, chosen=replace(found.chosen, calibration=tuple(uses))), terms)
+    told = "the calibration of the scale of the photograph (2.5 standard deviations): check that instrument."
+    assert sentence.endswith(told)
+
+
 def test_a_model_within_its_allowances_says_nothing_of_them(discovered: Discovered, terms: Terms) -> None:
     found = discovered(Verdict.NAMED)
     quiet = replace(found, chosen=leaning_on(found.chosen, t55=1.9))
