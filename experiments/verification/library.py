@@ -7,6 +7,7 @@ from experiments.verification.problems.friction_and_rolling import friction_and_
 from experiments.verification.problems.heap_angle import heap_angle
 from experiments.verification.problems.janssen import janssen
 from experiments.verification.problems.lammps_contacts import lammps_contacts
+from experiments.verification.problems.liggghts_clumps import liggghts_clumps
 from experiments.verification.problems.liggghts_contacts import liggghts_contacts
 from experiments.verification.problems.micro_slip import micro_slip
 from experiments.verification.problems.normal_impact import elastic_impact, restitution
@@ -25,6 +26,7 @@ PROBLEMS: dict[str, Problem] = {
     "friction-and-rolling": friction_and_rolling,
     "rigid-body": rigid_body,
     "liggghts-contacts": liggghts_contacts,
+    "liggghts-clumps": liggghts_clumps,
     "lammps-contacts": lammps_contacts,
     "yade-contacts": yade_contacts,
     "deme-contacts": deme_contacts,
@@ -35,7 +37,7 @@ PROBLEMS: dict[str, Problem] = {
     "stability": stability,
 }
 
-PEERS = ("liggghts-contacts", "lammps-contacts", "yade-contacts", "deme-contacts")
+PEERS = ("liggghts-contacts", "liggghts-clumps", "lammps-contacts", "yade-contacts", "deme-contacts")
 """Problems that run another code, which must be installed."""
 
 HEAVY = ("beverloo", "heap-angle", "stability", *PEERS)
