@@ -18,6 +18,7 @@ from experiments.export.liggghts import CONVENTIONS, contact_terms, material_ter
 from experiments.export.liggghts_input import grain_template
 from experiments.sphere_files import read_clump
 from experiments.verification.problems.contact_dumps import run_path
+from experiments.verification.problems.liggghts_contacts import HEAD
 from experiments.verification.problems.setups import bodies, world
 from experiments.verification.result import Result, Row, detection_row
 
@@ -50,15 +51,7 @@ Motion = tuple[np.ndarray, np.ndarray]
 """Velocities and spins of clumps, (grains, 3) each."""
 
 _INPUT = """\
-atom_style granular
-atom_modify map array sort 0 0
-boundary f f f
-newton off
-communicate single vel yes
-units si
-hard_particles yes
-soft_particles yes
-region box block {low} {high} -0.03 0.03 -0.03 0.03 units box
+{head}region box block {low} {high} -0.03 0.03 -0.03 0.03 units box
 create_box 1 box
 neighbor 0.001 bin
 neigh_modify delay 0 every 1 check yes
@@ -175,6 +168,7 @@ def _in_liggghts(meeting: Meeting, shape: ClumpShape, contact: Contact, folder: 
         lines.append(f"fix {name} all property/global {name} peratomtypepair 1 {value!r}")
     half = APART * (0.5 * PAIRS + 1.0)
     text = _INPUT.format(
+        head=HEAD,
         low=-half,
         high=half,
         properties="\n".join(lines),

@@ -24,7 +24,7 @@ Two spheres, and a sphere on a plate, are followed in LIGGGHTS (`liggghts`, Debi
 `dem-warp export` gives it, and here under the laws of the same name. An error is the largest difference of
 the two trajectories over their size."""
 
-_INPUT = """\
+HEAD = """\
 atom_style granular
 atom_modify map array sort 0 0
 boundary f f f
@@ -33,7 +33,11 @@ communicate single vel yes
 units si
 hard_particles yes
 soft_particles yes
-region box block {box} units box
+"""
+"""First commands of an input of LIGGGHTS."""
+
+_INPUT = """\
+{head}region box block {box} units box
 create_box 2 box
 neighbor 0.0005 bin
 neigh_modify delay 0 every 1 check yes
@@ -75,6 +79,7 @@ def follow(setup: PathSetup, folder: Path) -> Trajectory:
     for name, value in values(contact_terms(setup.contact)).items():
         lines.append(f"fix {name} all property/global {name} peratomtypepair 2" + 4 * f" {value!r}")
     text = _INPUT.format(
+        head=HEAD,
         box=box_of(setup),
         properties="\n".join(lines),
         model=model,
