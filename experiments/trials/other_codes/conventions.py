@@ -1,15 +1,20 @@
-"""Part of another code's offsets that its conventions of the contact law make: our engine with both.
+"""Part of another code's offsets that its laws make, and its way to run the test: our engine with both.
 
     python -m experiments.trials.other_codes.conventions experiments/trials/record/eleventh --out out/laws
+    python -m experiments.trials.other_codes.conventions experiments/trials/record/eleventh --out out/laws \\
+        --take laws --take rain --take step
 
-The revealed nulls of a record are simulated by our engine, at their own factors, with the laws of the study
-and with the other code's, from the same seeds. What differs is the work of the laws; the rest of what the
-code is off (`offsets`) is due to its filling, walls, time step and looks, or to the program.
+The revealed nulls of a record are simulated by our engine, at their own factors, as the study has it and with
+what is taken from the other workshop, from the same seeds: its contact laws, its rain of grains, its time
+step. What differs is the work of that; the rest of what the code is off (`offsets`) is due to other things,
+as its walls and looks, or to the program.
 """
 
 from __future__ import annotations
 
+from collections.abc import Collection, Sequence
 from dataclasses import replace
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -32,23 +37,63 @@ from experiments.trials.generate import STUDY
 from experiments.trials.heaps import cases_of
 from experiments.trials.kept import read_record
 from experiments.trials.other_codes.offsets import measured_offsets, offsets_table
-from experiments.trials.other_codes.setting import LAWS
+from experiments.trials.other_codes.setting import LAWS, Setting
+from experiments.trials.other_codes.surfaces import Bench
 from experiments.trials.truth import Kind, Label, read_labels
 
 OFF, ERROR = "off, sd of one run", "standard error"
 
 
-class OtherLaws(EngineSimulator):
-    """Our engine with the laws of a code, but for its resistance to rolling, which a null has not."""
+class Taken(StrEnum):
+    """Conventions that are taken from another workshop."""
 
-    def __init__(self, study: Study, code: str, table: OutcomeTable, workers: Workers) -> None:
+    LAWS = "laws"
+    """Of contact, but for the resistance to rolling, which a null has not."""
+    RAIN = "rain"
+    """Grains a second, of each trial."""
+    STEP = "step"
+    """Time step, of each trial."""
+
+
+class OtherWorkshop(EngineSimulator):
+    """Our engine with some conventions of a code's workshop.
+
+    Parameters
+    ----------
+    study, table, workers
+        As of `EngineSimulator`.
+    code
+        Name of the code.
+    taken
+        Conventions that are the other workshop's.
+    nulls
+        Trials whose points it answers: each has its own rain and time step.
+    """
+
+    def __init__(
+        self,
+        study: Study,
+        code: str,
+        taken: Collection[Taken],
+        nulls: Sequence[Label],
+        table: OutcomeTable,
+        workers: Workers,
+    ) -> None:
         super().__init__(study, library_for(study), table, workers)
-        self._laws = LAWS[code]
+        self._code, self._taken = code, taken
+        self._settings = {label.theta: Setting.drawn(code, label.seed) for label in nulls}
 
     def case(self, point: Point) -> Case[Any]:
         """Build the case of a point."""
-        case = super().case(point)
-        return replace(case, laws=replace(self._laws, rolling=case.laws.rolling))
+        case, setting = super().case(point), self._settings[tuple(point.theta)]
+        theirs = setting.of(case, self._code)
+        if Taken.RAIN in self._taken:
+            case = replace(case, scene=replace(case.scene, rain_rate=Bench(theirs).rain_rate))
+        if Taken.STEP in self._taken:
+            case = replace(case, numerics=theirs.numerics)
+        if Taken.LAWS in self._taken:
+            case = replace(case, laws=replace(LAWS[self._code], rolling=case.laws.rolling))
+        return case
 
 
 def heaps_of(nulls: list[Label], simulator: EngineSimulator, seeds: int) -> np.ndarray:
@@ -59,13 +104,13 @@ def heaps_of(nulls: list[Label], simulator: EngineSimulator, seeds: int) -> np.n
     return values.reshape(len(nulls), len(conditions), seeds, -1)
 
 
-def law_offsets(ours: np.ndarray, theirs: np.ndarray, observables: dict[str, str]) -> pd.DataFrame:
-    """Offsets that the laws make, as `offsets_table` has them.
+def made_offsets(ours: np.ndarray, theirs: np.ndarray, observables: dict[str, str]) -> pd.DataFrame:
+    """Offsets that what was taken makes, as `offsets_table` has them.
 
     Parameters
     ----------
     ours, theirs : (nulls, conditions, seeds, observables) array
-        Heaps with the laws of the study and with the others.
+        Heaps as the study has them and with what was taken.
     observables
         Units by name.
     """
@@ -75,21 +120,24 @@ def law_offsets(ours: np.ndarray, theirs: np.ndarray, observables: dict[str, str
 
 
 def parted(code: pd.DataFrame, laws: pd.DataFrame) -> pd.DataFrame:
-    """Set what a code is off beside what its laws make, and what is left, in deviations of one run."""
+    """Set what a code is off beside what of it is made, and what is left, in deviations of one run."""
     whole, part = (table.set_index("observable")[[OFF, ERROR]] for table in (code, laws))
     left = whole[OFF] - part[OFF]
     beside = {"left": left, "error of what is left": np.hypot(whole[ERROR], part[ERROR])}
-    return whole.join(part.add_suffix(", by the laws")).assign(**beside).reset_index()
+    return whole.join(part.add_suffix(", made")).assign(**beside).reset_index()
 
 
 def main(
     record: Annotated[Path, typer.Argument(help="Record of a second reality, with its heaps.")],
     out: Annotated[Path, typer.Option(help="Folder of what was simulated; a run goes on in it.")],
+    take: Annotated[
+        list[Taken] | None, typer.Option(help="What is the other workshop's; left out: its laws.")
+    ] = None,
     seeds: Annotated[int, typer.Option(help="Heaps of each null and condition.", min=2)] = 6,
     device: Annotated[str | None, typer.Option(help="cpu, cuda, or several GPUs, as cuda:0,cuda:1.")] = None,
     workers: Annotated[int | None, typer.Option(help="Processes.")] = None,
 ) -> None:
-    """Print how much of the offsets of a record's code its laws make."""
+    """Print how much of the offsets of a record's code its laws make, or its way to run the test."""
     with clear_errors("Resume with the same command."):
         kept = read_record(record)
         if kept.reality is None:
@@ -101,11 +149,13 @@ def main(
         with open_workers(Resources(device, workers)) as own:
             with EngineSimulator(study, library_for(study), OutcomeTable(out / "ours.sqlite"), own) as engine:
                 names, ours = engine.observables, heaps_of(nulls, engine, seeds)
-            with OtherLaws(study, code, OutcomeTable(out / "theirs.sqlite"), own) as engine:
+            taken, table = tuple(take or (Taken.LAWS,)), OutcomeTable(out / "theirs.sqlite")
+            with OtherWorkshop(study, code, taken, nulls, table, own) as engine:
                 theirs = heaps_of(nulls, engine, seeds)
         units = {one.name: one.unit for one in study.measurable}
-        table = parted(measured, law_offsets(ours, theirs, {name: units[name] for name in names}))
-        print(f"{len(nulls)} trials that hide nothing, {seeds} heaps each.\n\n{markdown_table(table)}")
+        beside = parted(measured, made_offsets(ours, theirs, {name: units[name] for name in names}))
+        title = f"{len(nulls)} trials that hide nothing, {seeds} heaps each; made by {', '.join(taken)}."
+        print(f"{title}\n\n{markdown_table(beside)}")
 
 
 if __name__ == "__main__":

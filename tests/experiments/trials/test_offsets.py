@@ -1,4 +1,4 @@
-"""Offsets of another code: a drawn one comes back, that of the record is there, and only laws are changed."""
+"""Offsets of another code: a drawn one comes back, that of the record is there, and nothing else changes."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -15,8 +15,9 @@ from experiments.discover.library import library_for
 from experiments.discover.outcome_table import OutcomeTable
 from experiments.studyfile import load_study
 from experiments.trials.generate import STUDY
-from experiments.trials.other_codes.conventions import ERROR, OFF, OtherLaws, law_offsets, parted
+from experiments.trials.other_codes.conventions import ERROR, OFF, OtherWorkshop, Taken, made_offsets, parted
 from experiments.trials.other_codes.offsets import measured_offsets, offsets_table
+from experiments.trials.truth import Kind, Label
 
 RECORD = Path(experiments.trials.__file__).parent / "record" / "liggghts"
 
@@ -48,7 +49,7 @@ def test_what_laws_make_is_told_from_what_is_left() -> None:
     rng, shape = np.random.default_rng(2), (40, 5, 6, 1)
     ours, theirs = 2.0 * rng.standard_normal(shape), 2.0 * rng.standard_normal(shape) + 0.6
     theirs[4, 2, 1] = np.nan  # a heap that failed
-    laws = law_offsets(ours, theirs, {"t55": "s"})
+    laws = made_offsets(ours, theirs, {"t55": "s"})
     # means of six heaps each, over 200: an error of sqrt(2 / 1200) = .041; four of them
     assert laws.loc[0, OFF] == pytest.approx(0.3, abs=0.16)
     assert laws.loc[0, ERROR] == pytest.approx(0.041, rel=0.5)
@@ -57,14 +58,27 @@ def test_what_laws_make_is_told_from_what_is_left() -> None:
     assert row["error of what is left"] == pytest.approx(np.hypot(0.03, laws.loc[0, ERROR]))
 
 
-def test_other_laws_are_all_that_is_changed(tmp_path: Path) -> None:
+@pytest.mark.parametrize("taken", [(Taken.LAWS,), (Taken.RAIN,), (Taken.STEP,), tuple(Taken)])
+def test_what_is_taken_from_the_other_workshop_is_all_that_changes(
+    tmp_path: Path, taken: tuple[Taken, ...]
+) -> None:
     study, workers = load_study(STUDY, "relative"), OwnWorkers("cpu")
-    library = library_for(study)
-    ours = EngineSimulator(study, library, OutcomeTable(tmp_path / "ours.sqlite"), workers)
-    theirs = OtherLaws(study, "liggghts", OutcomeTable(tmp_path / "theirs.sqlite"), workers)
-    point = Point((0.6, 0.5, 0.3), (), study.conditions[0].name, 7)
-    with ours, theirs:
+    library, table = library_for(study), OutcomeTable(tmp_path / "outcomes.sqlite")
+    null = Label("alone-001", Kind.NULL, (0.6, 0.5, 0.3), (), (), 7, "")
+    point = Point(null.theta, (), study.conditions[0].name, 7)
+    with (
+        EngineSimulator(study, library, table, workers) as ours,
+        OtherWorkshop(study, "liggghts", taken, [null], table, workers) as theirs,
+    ):
         own, other = ours.case(point), theirs.case(point)
-    assert other.laws == replace(PRESETS["liggghts"], rolling=own.laws.rolling)
-    assert own.laws != other.laws
-    assert replace(other, laws=own.laws) == own
+    parts = {
+        Taken.LAWS: (own.laws != other.laws, other.laws.sliding == PRESETS["liggghts"].sliding),
+        Taken.RAIN: (own.scene != other.scene, 100.0 < other.scene.rain_rate < own.scene.rain_rate),
+        Taken.STEP: (own.numerics != other.numerics, 0.6 <= other.time_step / own.time_step <= 1.0),
+    }
+    for part, (differs, as_theirs) in parts.items():
+        assert differs is (part in taken)
+        assert as_theirs or part not in taken
+    assert other.laws.rolling == own.laws.rolling
+    same = replace(other, laws=own.laws, numerics=own.numerics)
+    assert replace(same, scene=replace(same.scene, rain_rate=own.scene.rain_rate)) == own
