@@ -13,6 +13,7 @@ import synthetic
 
 from doe.discrepancy import (
     Analysis,
+    Calibration,
     Data,
     Discovery,
     Effort,
@@ -288,6 +289,17 @@ def test_a_batch_after_the_deadline_is_not_begun() -> None:
     with pytest.raises(OutOfTime):
         TimedSimulator(echo, deadline=-math.inf)(points)
     assert echo.calls == 3
+
+
+def test_effects_are_declared_from_larger_sizes_on_where_a_scale_may_be_off() -> None:
+    known, settings = synthetic.emulator(), Settings()
+    scale = dict.fromkeys(synthetic.OBSERVABLES, Calibration(scale=0.1, instrument="ruler"))
+    sizes = {
+        off: np.array([one.detectable for one in declared_effects(known, settings, 8, calibration=allowed)])
+        for off, allowed in ((False, None), (True, scale))
+    }
+    assert (sizes[True] >= sizes[False]).all()
+    assert (sizes[True] > 1.02 * sizes[False]).any()
 
 
 def test_what_is_declared_comes_back_with_its_hash(tmp_path: Path) -> None:

@@ -58,6 +58,14 @@ def test_heaps_of_a_trial_come_back_as_they_were_measured(measured: dict[str, Me
         assert all(np.isfinite(rows).all() for rows in heaps.values.values())
 
 
+def test_a_trial_states_the_scale_of_its_camera_and_nothing_else(measured: dict[str, Measured]) -> None:
+    for heaps in measured.values():
+        stated = {name: one.scale for name, one in heaps.calibration.items() if one.scale}
+        assert stated == dict.fromkeys(("height", "r50", "r90", *(each.name for each in OUTLINE)), 0.002)
+        assert {heaps.calibration[name].instrument for name in stated} == {"photograph"}
+        assert not any(one.offset for one in heaps.calibration.values())
+
+
 def test_only_the_hidden_effect_makes_the_analysis_ask_for_runs(measured: dict[str, Measured]) -> None:
     search = Search.of(load_study(STUDY, BENCH))
     emulator = fit_emulator(search.read_bank(bank_beside(BENCH)))
