@@ -76,6 +76,8 @@ class MechanismFile(Section):
     """The further experiment that would show it."""
     directed: bool = False
     """It has a direction: the test has it along x, a laboratory anywhere."""
+    saturation: float | None = Field(default=None, gt=0.0)
+    """Distance from the null over which what a step adds falls to 1/e; left out: all steps add the same."""
     companions: dict[str, Scaled | float | str] = Field(default_factory=dict)
     """Further settings that it needs in a study, by place; without effect while it is at its null."""
 
@@ -118,6 +120,8 @@ class Mechanism:
     """Source of law and range, and the further experiment that would show it."""
     directed: bool = False
     """It has a direction, which the study has along x."""
+    saturation: float | None = None
+    """Distance from the null over which what a step of the size adds falls to 1/e; None: it stays."""
     companions: tuple[tuple[str, float | str], ...] = ()
     """Further settings that it needs in the study, by place."""
 
@@ -216,7 +220,7 @@ def _mechanism(name: str, path: Path, study: Study, scales: Mapping[str, float])
     if null is None or any(other != null for other in others) or null >= maximum:
         return None
     companions = tuple((place, _number(value, scales)) for place, value in file.companions.items())
-    told = {"title", "sentence", "kind", "parameters", "unit", "source", "confirm", "directed"}
+    told = {"title", "sentence", "kind", "parameters", "unit", "source", "confirm", "directed", "saturation"}
     shared = file.model_dump(include=told)
     return Mechanism(name, **shared, null=null, maximum=maximum, companions=companions)
 

@@ -77,7 +77,10 @@ class Search:
             tuple(factor.high for factor in factors),
             tuple(condition.name for condition in conditions),
             tuple(condition.held_out for condition in conditions),
-            tuple(MechanismRange(one.name, one.null, one.maximum, one.directed) for one in self.library),
+            tuple(
+                MechanismRange(one.name, one.null, one.maximum, one.directed, one.saturation)
+                for one in self.library
+            ),
             odd_observables(self.study),
         )
 
@@ -112,7 +115,7 @@ class Search:
         InputError
             When the file is no bank, or that of another study.
         """
-        bank, mine = _symmetric(load_bank(path).renamed(FORMER_NAMES), self.space), self.space
+        bank, mine = _up_to_date(load_bank(path).renamed(FORMER_NAMES), self.space), self.space
         its = bank.space
         if bank.study not in ("", self.fingerprint) or its.without(*its.names) != mine.without(*mine.names):
             rule = (
@@ -135,8 +138,9 @@ class Search:
         return analyse(measured, emulator, self.settings, seed)
 
 
-def _symmetric(bank: Bank, space: SearchSpace) -> Bank:
-    """Return a bank, which older ones do not say, with what a mirror turns over."""
+def _up_to_date(bank: Bank, space: SearchSpace) -> Bank:
+    """Return a bank with what older ones do not say: what a mirror turns over, and what saturates."""
+    bank = bank.saturating({one.name: one.saturation for one in space.mechanisms})
     directed = {one.name for one in space.mechanisms if one.directed}
     mechanisms = tuple(replace(one, directed=one.name in directed) for one in bank.space.mechanisms)
     odd = tuple(name for name in space.odd if name in bank.observables)

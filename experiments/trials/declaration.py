@@ -120,7 +120,8 @@ def declared_effect(
     span: MechanismRange, powers: np.ndarray, settings: Settings, kin: tuple[str, ...] = ()
 ) -> Declared:
     """Declare a mechanism of some power, (points, `power.CODED_SIZES`), in the ranges of the factors."""
-    detectable = detectable_coded_size(powers.mean(axis=0), settings) * abs(span.maximum - span.null)
+    coded = detectable_coded_size(powers.mean(axis=0), settings)
+    detectable = abs(span.natural(coded) - span.null) if math.isfinite(coded) else math.inf
     told = math.isfinite(detectable_coded_size(np.quantile(powers, BLIND, axis=0), settings))
     return Declared(span.name, span.null, span.maximum, detectable, told, kin)
 

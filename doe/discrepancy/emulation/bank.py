@@ -131,6 +131,17 @@ class Bank:
         mechanisms = tuple(replace(one, name=names.get(one.name, one.name)) for one in self.space.mechanisms)
         return replace(self, space=replace(self.space, mechanisms=mechanisms))
 
+    def saturating(self, saturations: Mapping[str, float | None]) -> Bank:
+        """Return the same runs, their sizes coded by other saturations, by the names of the mechanisms."""
+        own = self.space.mechanisms
+        others = tuple(replace(one, saturation=saturations.get(one.name, one.saturation)) for one in own)
+        coded = self.coded_size.copy()
+        for number, (one, other) in enumerate(zip(own, others, strict=True)):
+            if one != other:
+                rows = self.mechanism == number
+                coded[rows] = [other.coded(one.natural(size)) for size in coded[rows]]
+        return replace(self, space=replace(self.space, mechanisms=others), coded_size=coded)
+
     def save(self, path: Path) -> None:
         """Write the bank to one compressed .npz file."""
         np.savez_compressed(

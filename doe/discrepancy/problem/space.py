@@ -1,8 +1,8 @@
 """The space of a search: factors, sizes of mechanisms, conditions.
 
-A size is in natural units, a coded size is 0 at the null and 1 at the maximum; coded factors run from
--1 to 1 over their range. A row of coded parameters is all factors, then the coded sizes of the mechanisms in
-the model.
+A size is in natural units; a coded size is 0 at the null and 1 at the maximum, and the effect grows evenly
+with it. Coded factors run from -1 to 1 over their range. A row of coded parameters is all factors, then the
+coded sizes of the mechanisms in the model.
 """
 
 from __future__ import annotations
@@ -29,10 +29,36 @@ class MechanismRange:
     """Size at which it is absent, and the end of its range, in its natural units."""
     directed: bool = False
     """It has a direction, an azimuth; the simulator has it at azimuth 0."""
+    saturation: float | None = None
+    """Distance from the null over which what a step adds falls to 1/e; None: it adds the same all the way."""
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.null) and math.isfinite(self.maximum)) or self.null == self.maximum:
             raise RuleError("needs a null and another maximum", (self.null, self.maximum), self.name)
+        if self.saturation is not None and not 0.0 < self.saturation < math.inf:
+            raise RuleError("saturates over a positive distance", self.saturation, self.name)
+
+    def coded(self, natural: float) -> float:
+        """Coded size of a size."""
+        share = (natural - self.null) / self.width
+        return share if self.saturation is None else math.expm1(-share * self._fall) / math.expm1(-self._fall)
+
+    def natural(self, coded: float) -> float:
+        """Size of a coded size."""
+        if self.saturation is None:
+            return self.null + coded * self.width
+        left = 1.0 + coded * math.expm1(-self._fall)
+        return self.null - math.log(max(left, math.exp(-self._fall))) / self._fall * self.width
+
+    @property
+    def width(self) -> float:
+        """Maximum less null."""
+        return self.maximum - self.null
+
+    @property
+    def _fall(self) -> float:
+        """Range of sizes, in saturations."""
+        return abs(self.width) / (self.saturation or math.inf)
 
 
 @dataclass(frozen=True)
@@ -100,13 +126,11 @@ class SearchSpace:
 
     def natural_size(self, name: str, coded: float) -> float:
         """Size of a mechanism in its natural units."""
-        mechanism = self.mechanism(name)
-        return mechanism.null + float(coded) * (mechanism.maximum - mechanism.null)
+        return self.mechanism(name).natural(float(coded))
 
     def coded_size(self, name: str, natural: float) -> float:
         """Size of a mechanism in coded units."""
-        mechanism = self.mechanism(name)
-        return (natural - mechanism.null) / (mechanism.maximum - mechanism.null)
+        return self.mechanism(name).coded(natural)
 
     def point(self, coded: np.ndarray, mechanisms: tuple[str, ...], condition: str, seed: int) -> Point:
         """Return the case of one row of coded parameters.

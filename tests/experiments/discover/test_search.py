@@ -201,13 +201,25 @@ def test_the_report_says_when_another_engine_made_the_bank(
 
 @pytest.mark.parametrize(
     ("scale", "day", "commit"),
-    [(None, "2026-11-26", "77dbb53"), ("bench", "2026-11-22", "a3053ca1121a-dirty")],
+    [(None, "2026-11-26", "940e4e3"), ("bench", "2026-11-22", "a3053ca1121a-dirty")],
 )
 def test_the_shipped_banks_know_what_made_them(scale: str | None, day: str, commit: str) -> None:
     file = f"bank-{scale}.npz" if scale else "bank.npz"
     maker = Search.of(load_study(TRIAL, scale)).read_bank(TRIAL.with_name(file)).maker
     assert (maker["day"], maker["commit"]) == (day, commit)
     assert len(maker["engine"]) == 64
+
+
+def test_a_bank_from_before_an_effect_saturated_is_read_with_the_same_sizes() -> None:
+    search, path = Search.of(load_study(TRIAL)), TRIAL.with_name("bank.npz")
+    before, read = load_bank(path), search.read_bank(path)
+    rows = read.mechanism == read.space.names.index("plate_roughness")
+    assert before.space.mechanism("plate_roughness").saturation is None
+    rough = read.space.mechanism("plate_roughness")
+    assert rough.saturation == 0.1
+    natural = [rough.natural(size) for size in read.coded_size[rows]]
+    assert natural == pytest.approx(0.6 * before.coded_size[rows], abs=1e-9)
+    assert np.array_equal(read.coded_size[~rows], before.coded_size[~rows])
 
 
 def test_no_bank_at_all_is_said_so(tmp_path: Path) -> None:
