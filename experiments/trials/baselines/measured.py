@@ -32,8 +32,17 @@ def opened_trials(place: Path) -> Iterator[Folder]:
     """Open a folder of trials, or a record: a folder with its files, for the time being.
 
     A record lies flat, and its heaps, where it keeps them, are packed.
+
+    Raises
+    ------
+    InputError
+        When it is neither.
     """
     if not (place / SEALED).is_file():
+        if not Folder(place).sealed.is_file():
+            raise InputError(
+                "must be a folder of trials, or a record of them", "no sealed trials", str(place)
+            )
         yield Folder(place)
         return
     with tempfile.TemporaryDirectory() as name:

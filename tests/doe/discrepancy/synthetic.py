@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -32,6 +32,8 @@ BLENDED = ("alpha", "delta")
 """Mechanisms that ``blend`` acts as, both of its size."""
 BEYOND = 0.45
 """Standard deviation of what it does besides, in that of one run at its largest size."""
+SATURATION = 0.3
+"""Of ``alpha`` in the saturating world, in a range of 2: the first third has nearly the whole effect."""
 SETTINGS = Settings(bank_points=128, bank_mechanism_points=64)
 
 
@@ -165,3 +167,22 @@ def measure(
         points = [Point(tuple(theta), tuple(sorted(sizes.items())), condition, int(s)) for s in seeds]
         values[condition] = simulator(points).values
     return Measured(tuple(conditions), OBSERVABLES, values)
+
+
+class Saturating(SyntheticSimulator):
+    """The synthetic world with an ``alpha`` that saturates."""
+
+    def __call__(self, points: Sequence[Point]) -> Outcomes:
+        evened = MechanismRange("alpha", 0.0, 2.0, saturation=SATURATION)
+        seen = [
+            replace(point, sizes=tuple((name, 2.0 * evened.coded(size)) for name, size in point.sizes))
+            for point in points
+        ]
+        return super().__call__(seen)
+
+
+def saturating_bank() -> tuple[Saturating, Bank]:
+    """A bank of that world, of sizes all over the range, which knows nothing of it."""
+    world = Saturating(space(("alpha",)))
+    points = bank_points(world.space, SETTINGS, seed=5)
+    return world, make_bank(world.space, OBSERVABLES, points, world(points))

@@ -1,25 +1,13 @@
 """Sizes in natural and in coded units, and what saturates."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
-from synthetic import OBSERVABLES, SETTINGS, SyntheticSimulator, space
+from synthetic import SATURATION, saturating_bank
 
-from doe.discrepancy import (
-    Bank,
-    MechanismRange,
-    Outcomes,
-    Point,
-    bank_points,
-    fit_emulator,
-    make_bank,
-)
+from doe.discrepancy import MechanismRange, fit_emulator
 from doe.errors import RuleError
-
-SATURATION = 0.3
-"""Of a range of 2: the first third of it has nearly the whole effect."""
 
 
 @pytest.mark.parametrize("saturation", [None, 0.5, 0.05])
@@ -43,25 +31,6 @@ def test_over_one_saturation_the_effect_of_a_step_falls_to_1_over_e() -> None:
 def test_a_saturation_is_a_positive_distance(saturation: float) -> None:
     with pytest.raises(RuleError, match="m: saturates over a positive distance"):
         MechanismRange("m", 0.0, 1.0, saturation=saturation)
-
-
-class Saturating(SyntheticSimulator):
-    """The synthetic world with an ``alpha`` that saturates."""
-
-    def __call__(self, points: list[Point]) -> Outcomes:  # type: ignore[override]
-        evened = MechanismRange("alpha", 0.0, 2.0, saturation=SATURATION)
-        seen = [
-            replace(point, sizes=tuple((name, 2.0 * evened.coded(size)) for name, size in point.sizes))
-            for point in points
-        ]
-        return super().__call__(seen)
-
-
-def saturating_bank() -> tuple[Saturating, Bank]:
-    """A bank of that world, of sizes all over the range, which knows nothing of it."""
-    world = Saturating(space(("alpha",)))
-    points = bank_points(world.space, SETTINGS, seed=5)
-    return world, make_bank(world.space, OBSERVABLES, points, world(points))
 
 
 def test_a_bank_keeps_its_sizes_under_another_saturation() -> None:
