@@ -3,8 +3,8 @@
     python -m experiments.trials.saturations
     python -m experiments.trials.saturations --scale small --share 0.5 --share 0.2
 
-An emulator has an effect grow evenly with its coded size. Where the effect levels off instead, noise makes the
-slopes there, and the interval of a size is wrong. The file of such a mechanism says so (``saturation``).
+An emulator has an effect grow evenly with its coded size. Where the effect levels off instead, noise makes
+the slopes there, and the interval of a size is wrong. The file of such a mechanism says so (``saturation``).
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def score_of(emulator: Emulator, told: Bank) -> pd.Series:
         for condition, surfaces in emulator.surfaces.items():
             rows = told.rows(told.space.conditions.index(condition), number)
             x = np.column_stack([told.theta[rows], told.coded_size[rows]])
-            left = np.asarray(told.values)[np.ix_(rows, emulator.columns)] - surfaces.predict(x, (name,))
+            left = np.asarray(told.values)[rows][:, list(emulator.columns)] - surfaces.predict(x, (name,))
             for each, residual in zip(x, left, strict=True):
                 covariance = surfaces.noise_covariance(each, (name,))
                 total += residual @ np.linalg.solve(covariance, residual) + np.linalg.slogdet(covariance)[1]
