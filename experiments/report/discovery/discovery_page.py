@@ -101,7 +101,7 @@ def render_discovery(
         "changes": changes(found, terms, settings),
         "cautions": [
             *study_cautions(study),
-            *(Caution(f"{note.rstrip('.')}.", "data") for note in found.notes),
+            *(Caution(f"{terms.in_words(note).rstrip('.')}.", "data") for note in found.notes),
         ],
         "pastes": search_pastes(found, study, terms, provenance or {}),
         "pictures": pictures,

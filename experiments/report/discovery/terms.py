@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -48,6 +49,11 @@ class Terms:
     def titles(self, names: Iterable[str], joined: str = "and") -> str:
         """Name mechanisms in words: "A", "A and B", "A, B and C"."""
         return enumeration(map(self.title, names), joined)
+
+    def in_words(self, text: str) -> str:
+        """Write a note with mechanisms and observables in words."""
+        known = {*self.observables, *self.mechanisms}
+        return re.sub(r"\w+", lambda word: self.title(word[0]) if word[0] in known else word[0], text)
 
     def value(self, name: str, value: float) -> str:
         """Write the size of a mechanism with its unit; `MISSING` where there is none."""

@@ -328,3 +328,16 @@ def test_a_mean_that_stands_out_of_a_model_that_lacks_nothing_is_told(
     )
     assert "By itself t55 is" in told
     assert "under wide (4 standard deviations)" in told
+
+
+def test_notes_are_told_in_words(discovered: Discovered, whole_study: Study, terms: Terms) -> None:
+    notes = (
+        "readings of flank_angle scatter 2.0 times as much",
+        "plate_tilt is not in the bank",
+        "out/my_run",
+    )
+    found = replace(discovered(Verdict.NONE), notes=notes)
+    text = render_discovery(found, whole_study, terms, Settings())
+    assert "readings of flank angle scatter 2.0 times as much." in text
+    assert f"{terms.title('plate_tilt')} is not in the bank." in text
+    assert "out/my_run." in text  # the names of others stay
