@@ -18,6 +18,9 @@ from doe.errors import RuleError
 CODED_DIGITS = 9
 """Decimals of the coded parameters of a case."""
 
+LEAST_SATURATION = 0.01
+"""Least saturation, in ranges of sizes: below it all sizes but the smallest are one size."""
+
 
 @dataclass(frozen=True)
 class MechanismRange:
@@ -35,8 +38,11 @@ class MechanismRange:
     def __post_init__(self) -> None:
         if not (math.isfinite(self.null) and math.isfinite(self.maximum)) or self.null == self.maximum:
             raise RuleError("needs a null and another maximum", (self.null, self.maximum), self.name)
-        if self.saturation is not None and not 0.0 < self.saturation < math.inf:
-            raise RuleError("saturates over a positive distance", self.saturation, self.name)
+        least = LEAST_SATURATION * abs(self.width)
+        if self.saturation is not None and not least <= self.saturation < math.inf:
+            raise RuleError(
+                f"saturates over a hundredth of its range ({least:.6g}) at least", self.saturation, self.name
+            )
 
     def coded(self, natural: float) -> float:
         """Coded size of a size."""
