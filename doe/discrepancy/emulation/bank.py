@@ -12,6 +12,7 @@ import json
 import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -117,7 +118,7 @@ class Bank:
         if self.reasons.dtype.kind != "U":
             raise RuleError("is text", self.reasons.dtype, "Bank.reasons")
 
-    @property
+    @cached_property
     def finished(self) -> np.ndarray:
         """True where a case has observables, (n,)."""
         return np.asarray(self.reasons == "")

@@ -6,16 +6,17 @@ Williams 2006, chapter 2).
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg.lapack import dpotri
+from scipy.optimize import minimize
 
 LENGTH_RANGE = (0.3, 6.0)
 """Lengths that a fit may find, in coded units: shorter ones would follow the noise."""
-START_LENGTH = 0.6
-"""Start of the search for lengths: from longer ones it may end where nothing is smooth."""
+START_AMPLITUDE, START_LENGTH = 0.5, 0.6
+"""Start of the search: from longer lengths it may end where nothing is smooth."""
 AMPLITUDE_RANGE = (1e-3, 1e2)
 """Amplitudes that a fit may find, in units of the variance of the data."""
 
@@ -87,17 +88,38 @@ def fit_kriging(points: np.ndarray, values: np.ndarray, noise: np.ndarray) -> Kr
     points : (n, parameters) array
     values, noise : (n,) array
     """
-    from sklearn.exceptions import ConvergenceWarning
-    from sklearn.gaussian_process import GaussianProcessRegressor
-    from sklearn.gaussian_process.kernels import RBF, ConstantKernel
-
     scale = float(np.sqrt(np.mean(values**2)))
-    kernel = ConstantKernel(0.5, AMPLITUDE_RANGE) * RBF(np.full(points.shape[1], START_LENGTH), LENGTH_RANGE)
-    process = GaussianProcessRegressor(kernel, alpha=noise / scale**2)
-    with warnings.catch_warnings():
-        # An amplitude or a length at the end of its range is an answer, not a failure.
-        warnings.simplefilter("ignore", ConvergenceWarning)
-        process.fit(points, values / scale)
-    constant, radial = process.kernel_.k1, process.kernel_.k2
-    lengths = np.broadcast_to(np.asarray(radial.length_scale), points.shape[1])
-    return krige(points, values, noise, float(constant.constant_value) * scale**2, np.array(lengths))
+    start = np.log([START_AMPLITUDE, *[START_LENGTH] * points.shape[1]])
+    bounds = np.log([AMPLITUDE_RANGE, *[LENGTH_RANGE] * points.shape[1]])
+    data = (points, values / scale, noise / scale**2)
+    found = np.exp(minimize(_misfit, start, data, method="L-BFGS-B", jac=True, bounds=bounds).x)
+    return krige(points, values, noise, float(found[0]) * scale**2, found[1:])
+
+
+def _misfit(
+    logarithms: np.ndarray, points: np.ndarray, values: np.ndarray, noise: np.ndarray
+) -> tuple[float, np.ndarray]:
+    """Compute minus the log marginal likelihood but for a constant, and its slopes (ibid., equation 5.9).
+
+    A bank has hundreds of such fits, of hundreds of runs each. The slope by a length is a sum over all pairs
+    of runs, of their squared distance times a weight: row sums of the weights spare a matrix of distances.
+
+    Parameters
+    ----------
+    logarithms : (1 + parameters,) array
+        Of the amplitude and the lengths.
+    points : (n, parameters) array
+    values, noise : (n,) array
+    """
+    amplitude, scaled = np.exp(logarithms[0]), points / np.exp(logarithms[1:])
+    smooth = amplitude * squared_exponential(scaled, scaled)
+    factor = cho_factor(smooth + np.diag(noise), lower=True, overwrite_a=True, check_finite=False)
+    weights = cho_solve(factor, values, check_finite=False)
+    inverse, _ = dpotri(factor[0], lower=1)  # its lower triangle: each pair of runs once
+    pull = np.tril(smooth * (np.outer(weights, weights) - inverse))
+    pull[np.diag_indices_from(pull)] *= 0.5
+    by_length = (pull.sum(axis=0) + pull.sum(axis=1)) @ scaled**2 - 2.0 * ((pull @ scaled) * scaled).sum(
+        axis=0
+    )
+    loss = 0.5 * values @ weights + np.log(np.diag(factor[0])).sum()
+    return float(loss), -np.append(pull.sum(), by_length)
