@@ -20,7 +20,7 @@ from experiments.studyfile import load_study
 from experiments.trials.baselines.protocol import Problem
 from experiments.trials.declaration import read_declaration
 from experiments.trials.desk import job_name, read_data
-from experiments.trials.findings import EVERYTHING, VIEWS, read_findings
+from experiments.trials.findings import VIEWS, read_findings
 from experiments.trials.folder import DECLARED, FINDINGS, HEAPS, LABELS, SEALED, Folder
 from experiments.trials.generate import STUDY, bank_beside
 from experiments.trials.heaps import unpack_heaps
@@ -60,9 +60,9 @@ def opened_trials(place: Path) -> Iterator[Folder]:
 
 
 def measured_problems(place: Path, bank: Path | None = None, count: int | None = None) -> Iterator[Problem]:
-    """Pose the first so many trials that have heaps, as the search has them with every observable.
+    """Pose the first so many trials that have heaps, as the search has them in the view of their plan.
 
-    Outlines are left to photographs; the seed is the search's. Left out, the bank is that of the scale.
+    The seed is the search's. Left out, the bank is that of the scale.
 
     Raises
     ------
@@ -71,6 +71,7 @@ def measured_problems(place: Path, bank: Path | None = None, count: int | None =
     """
     with opened_trials(place) as folder:
         declaration = read_declaration(folder.declared)
+        view = declaration.plan.view
         study = load_study(STUDY, declaration.scale or None)
         sealed = [one for one in read_sealed(folder.sealed) if folder.measured(one.trial).exists()][:count]
         if not sealed:
@@ -79,8 +80,8 @@ def measured_problems(place: Path, bank: Path | None = None, count: int | None =
         measured, _ = read_data(folder, sealed, study)
         for trial in sealed:
             if trial.trial in measured:
-                job, known = job_name(trial.trial, EVERYTHING), emulator.without(*trial.withheld)
-                heaps = measured[trial.trial].only(VIEWS[EVERYTHING])
+                job, known = job_name(trial.trial, view), emulator.without(*trial.withheld)
+                heaps = measured[trial.trial].only(VIEWS[view])
                 yield Problem(trial.trial, known, heaps, declaration.settings, zlib.crc32(job.encode()))
 
 
@@ -96,6 +97,6 @@ def open_labels(folder: Folder) -> list[Label]:
         if not file.is_file():
             raise InputError("needs findings of the search, and the truths", "no such file", str(file))
     findings = read_findings([folder.findings])
-    analysed = findings.loc[findings["view"] == EVERYTHING, "trial"]
+    analysed = findings.loc[findings["view"] == read_declaration(folder.declared).plan.view, "trial"]
     labels = read_labels(folder.hidden_labels)
     return list(revealed(labels, opened(read_sealed(folder.sealed), analysed)).values())

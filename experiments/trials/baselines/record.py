@@ -43,7 +43,7 @@ from experiments.trials.baselines.methods.search import Search
 from experiments.trials.baselines.pictures import draw_power, draw_roc
 from experiments.trials.baselines.protocol import Answer, Method
 from experiments.trials.declaration import read_declaration
-from experiments.trials.findings import EVERYTHING, read_findings
+from experiments.trials.findings import read_findings
 from experiments.trials.folder import DECLARED, LABELS, NOTES, PAGE, Folder
 from experiments.trials.truth import Label, read_labels, write_labels
 
@@ -110,14 +110,14 @@ def gather(out: Path, record: Path, labels: Sequence[Label]) -> None:
 
 
 def gather_search(folder: Folder, record: Path) -> None:
-    """Write what the search found in measured trials, with every observable, as answers of a method.
+    """Write what the search found in measured trials, in the view of their plan, as answers of a method.
 
     A record of trials keeps Q of the base, which is the score, and of new ones that of *outside*.
     """
-    findings = read_findings([folder.findings])
+    findings, view = read_findings([folder.findings]), read_declaration(folder.declared).plan.view
     path = file_of(record, SEARCH)
     path.unlink(missing_ok=True)
-    for row in findings[findings["view"] == EVERYTHING].itertuples():
+    for row in findings[findings["view"] == view].itertuples():
         naming = row.verdict in (Verdict.NAMED, Verdict.TIE)
         answer = Answer(
             score=float(row.q / row.degrees_of_freedom),
