@@ -52,7 +52,7 @@ def test_the_table_counts_alarms_and_says_where() -> None:
     assert "| 0.2 | 0 of 4 | 0.0 % (0.0 to 60.2) |  |" in page
 
 
-def test_trials_without_heaps_are_refused(tmp_path: Path) -> None:
+def test_trials_without_heaps_are_refused() -> None:
     with (
         opened_trials(EIGHTH.with_name("fourteenth")) as folder,
         pytest.raises(InputError, match="needs heaps"),
