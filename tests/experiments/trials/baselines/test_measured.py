@@ -134,7 +134,7 @@ def test_findings_of_measured_trials_are_answers_of_the_search(view: str, tmp_pa
     assert (unknown["trial"], unknown["named"], unknown["unknown"]) == ("alone-002", "", True)
 
 
-@pytest.mark.parametrize("series", ["eighth", "ninth"])
+@pytest.mark.parametrize("series", ["eighth", "ninth", "seventeenth"])
 def test_the_records_of_measured_trials_have_the_searchs_findings(series: str, tmp_path: Path) -> None:
     kept = KEPT / series
     assert (kept / "labels.json").read_bytes() == (RECORDS / series / "labels.json").read_bytes()
