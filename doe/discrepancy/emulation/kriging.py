@@ -92,11 +92,11 @@ def fit_kriging(points: np.ndarray, values: np.ndarray, noise: np.ndarray) -> Kr
     start = np.log([START_AMPLITUDE, *[START_LENGTH] * points.shape[1]])
     bounds = np.log([AMPLITUDE_RANGE, *[LENGTH_RANGE] * points.shape[1]])
     data = (points, values / scale, noise / scale**2)
-    found = np.exp(minimize(_misfit, start, data, method="L-BFGS-B", jac=True, bounds=bounds).x)
+    found = np.exp(minimize(_loss, start, data, method="L-BFGS-B", jac=True, bounds=bounds).x)
     return krige(points, values, noise, float(found[0]) * scale**2, found[1:])
 
 
-def _misfit(
+def _loss(
     logarithms: np.ndarray, points: np.ndarray, values: np.ndarray, noise: np.ndarray
 ) -> tuple[float, np.ndarray]:
     """Compute minus the log marginal likelihood but for a constant, and its slopes (ibid., equation 5.9).
@@ -118,8 +118,7 @@ def _misfit(
     inverse, _ = dpotri(factor[0], lower=1)  # its lower triangle: each pair of runs once
     pull = np.tril(smooth * (np.outer(weights, weights) - inverse))
     pull[np.diag_indices_from(pull)] *= 0.5
-    by_length = (pull.sum(axis=0) + pull.sum(axis=1)) @ scaled**2 - 2.0 * ((pull @ scaled) * scaled).sum(
-        axis=0
-    )
+    of_each = pull.sum(axis=0) + pull.sum(axis=1)
+    by_length = of_each @ scaled**2 - 2.0 * (scaled * (pull @ scaled)).sum(axis=0)
     loss = 0.5 * values @ weights + np.log(np.diag(factor[0])).sum()
     return float(loss), -np.append(pull.sum(), by_length)
