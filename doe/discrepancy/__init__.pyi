@@ -5,7 +5,7 @@ from .contest.gap import Answer, Question
 from .contest.power import Power
 from .contest.slips import Slip
 from .emulation.bank import Bank, bank_points, load_bank, make_bank
-from .emulation.emulator import Emulator, fit_emulator
+from .emulation.emulator import Emulator, fit_emulator, fitted
 from .fitting.fit import Interval
 from .problem.measured import Calibration, Measured
 from .problem.settings import Settings, settings_of
@@ -59,6 +59,7 @@ __all__ = [
     "bank_points",
     "drive",
     "fit_emulator",
+    "fitted",
     "load_bank",
     "make_bank",
     "settings_of",

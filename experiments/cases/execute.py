@@ -184,7 +184,7 @@ def _simulate_missing(
 def _measurers(workers: Workers, count: int) -> Executor:
     """Measure in processes where there is much to measure and the cores of this machine are free for it."""
     if count >= MANY and workers.leaves_cores:
-        return measuring_processes(workers.helpers)
+        return measuring_processes(workers.helpers, _measured, count)
     return ThreadPoolExecutor(max_workers=workers.helpers)
 
 

@@ -20,6 +20,7 @@ from doe.discrepancy import (
     analyse,
     bank_points,
     fit_emulator,
+    fitted,
     load_bank,
     make_bank,
     settings_of,
@@ -102,10 +103,16 @@ class Search:
         return hashlib.sha256(text.encode()).hexdigest()
 
     def make_bank(self, simulator: Simulator, maker: Mapping[str, str] | None = None) -> Bank:
-        """Run the library waves, all in one call; ``maker`` tells of the engine behind the simulator."""
+        """Run the library waves, all in one call; ``maker`` tells of the engine behind the simulator.
+
+        Raises
+        ------
+        RuleError
+            When too few of them finish for an emulator.
+        """
         points = bank_points(self.space, self.settings)
         outcomes = simulator(points)
-        return make_bank(self.space, simulator.observables, points, outcomes, self.fingerprint, maker)
+        return fitted(make_bank(self.space, simulator.observables, points, outcomes, self.fingerprint, maker))
 
     def read_bank(self, path: Path) -> Bank:
         """Read a bank that was made for this study.

@@ -6,7 +6,6 @@ import shutil
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
-from functools import cached_property
 from pathlib import Path
 
 from dem_warp import Case, CaseResult, Progress
@@ -53,11 +52,13 @@ class WaveRunner:
     ) -> None:
         self._settings, self._table, self._progress = settings, table, progress
         self._workers, self._engine, self._observables = workers, engine, tuple(observables)
+        self._measurers: ProcessPoolExecutor | None = None
 
     def close(self) -> None:
         """End its processes."""
-        if pool := self.__dict__.pop("_measurers", None):
-            pool.shutdown(cancel_futures=True)
+        if self._measurers is not None:
+            self._measurers.shutdown(cancel_futures=True)
+            self._measurers = None
 
     def heaps(self, cases: Sequence[Case]) -> list[CaseResult]:
         """Simulate a few cases, measure nothing and keep nothing."""
@@ -68,9 +69,12 @@ class WaveRunner:
         if not cases:
             return {}
         measured, keys = _Measured(self._table), list(cases)
+        if self._measurers is None:
+            self._measurers = measuring_processes(self._workers.helpers, measure, len(cases))
+        measurers = self._measurers
 
         def take(index: int, result: CaseResult) -> None:
-            outcome = self._measurers.submit(measure, self._settings, result, self._observables)
+            outcome = measurers.submit(measure, self._settings, result, self._observables)
             measured.add(keys[index], outcome, keep=result.status != NO_ANSWER)
 
         try:
@@ -83,10 +87,6 @@ class WaveRunner:
             raise
         finally:
             measured.keep()
-
-    @cached_property
-    def _measurers(self) -> ProcessPoolExecutor:
-        return measuring_processes(self._workers.helpers)
 
     @property
     def _unfinished(self) -> Path:

@@ -1,13 +1,14 @@
 """The generator of the trials, apart from the analysis: it draws and seals truths, and simulates their heaps.
 
     python -m experiments.trials.generate bank out/trials/bank.npz --device cuda
+    python -m experiments.trials.generate fit out/trials/bank.npz
     python -m experiments.trials.generate seal out/trials --bank out/trials/bank.npz
     python -m experiments.trials.generate measure out/trials --part alone --device cuda
 
-The first makes a bank that knows outlines, which the shipped ones do not. The second writes what is known
-beforehand (``declared.json``, ``sealed.csv``) into FOLDER/record, to be published before the third runs, and
-the labels into FOLDER/hidden, where no analysis looks. The third writes the file of measured heaps of every
-trial into FOLDER/data; interrupted, each goes on where it was.
+The first makes a bank that knows outlines. The second fits one anew, and keeps with it what takes longest
+to find. The third writes what is known beforehand (``declared.json``, ``sealed.csv``) into FOLDER/record, to
+be published before the fourth runs, and the labels into FOLDER/hidden, where no analysis looks. The fourth
+writes the file of measured heaps of every trial into FOLDER/data; interrupted, it goes on where it was.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ import numpy as np
 import typer
 
 from dem_warp.version import source_commit
-from doe.discrepancy import Bank, Simulator, fit_emulator
+from doe.discrepancy import Bank, Simulator, fit_emulator, fitted
 from experiments.cases import Resources, open_workers
 from experiments.commands.console import clear_errors
 from experiments.discover.engine import EngineSimulator
@@ -143,6 +144,19 @@ def make(
         with replacing(file) as temporary:
             made.save(temporary)
         print(f"{len(made.reasons)} cases, {int((~made.finished).sum())} of them failed: {file}")
+
+
+@app.command()
+def fit(
+    file: Annotated[Path, typer.Argument(help="File of the bank.")],
+    scale: Annotated[str, typer.Option(help="Scale of the trial study; left out: as written.")] = "",
+) -> None:
+    """Fit a bank of the trial study anew, and keep with it what takes longest to find."""
+    with clear_errors():
+        bank = fitted(replace(Search.of(load_study(STUDY, scale or None)).read_bank(file), kriged=None))
+        with replacing(file) as temporary:
+            bank.save(temporary)
+        print(f"{len(bank.kriged.table()) if bank.kriged else 0} parts kriged: {file}")
 
 
 @app.command()

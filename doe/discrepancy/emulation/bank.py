@@ -7,6 +7,7 @@ vary its size together with the factors.
 
 from __future__ import annotations
 
+import hashlib
 import io
 import json
 import zipfile
@@ -19,6 +20,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import qmc
 
+from doe.discrepancy.emulation.kriged_parts import KrigedParts
 from doe.discrepancy.problem.settings import Settings
 from doe.discrepancy.problem.simulator import Outcomes, Point
 from doe.discrepancy.problem.space import MechanismRange, SearchSpace
@@ -26,6 +28,9 @@ from doe.errors import RuleError
 
 LARGEST = 500_000_000
 """Bytes of the arrays of the largest bank that is read."""
+
+SURFACES = "base cubic, additions size times quadratic, rest squared exponential"
+"""Form of the surfaces that kriged parts belong to."""
 
 _PARTS = ("space", "observables", "theta", "mechanism", "size", "condition", "values", "reasons")
 """Arrays that every bank's file has."""
@@ -87,6 +92,8 @@ class Bank:
     """Fingerprint of what was simulated; empty where it is not known."""
     maker: Mapping[str, str] = field(default_factory=dict)
     """Maker of the runs, in the words of whoever ran them; empty where it is not known."""
+    kriged: KrigedParts | None = None
+    """Kriged parts of its emulator; None where it has not been fitted."""
 
     def __post_init__(self) -> None:
         if self.values.shape != (len(self.theta), len(self.observables)):
@@ -123,6 +130,22 @@ class Bank:
         """True where a case has observables, (n,)."""
         return np.asarray(self.reasons == "")
 
+    @cached_property
+    def runs_sha256(self) -> str:
+        """Hash of all that an emulator is fitted to, values as a file keeps them."""
+        odd = [name in self.space.odd for name in self.observables]
+        directed = [one.directed for one in self.space.mechanisms]
+        text = json.dumps([SURFACES, len(self.space.conditions), odd, directed])
+        numbers = (self.theta, self.mechanism, self.coded_size, self.condition, self.finished)
+        kept = [np.asarray(array, dtype=np.float64).tobytes() for array in numbers]
+        values = np.asarray(self.values, dtype=np.float32).tobytes()
+        return hashlib.sha256(b"".join([text.encode(), *kept, values])).hexdigest()
+
+    @property
+    def known_parts(self) -> KrigedParts | None:
+        """Kriged parts that were found from these runs; None: the runs are others since, or never fitted."""
+        return self.kriged if self.kriged and self.kriged.runs == self.runs_sha256 else None
+
     def rows(self, condition: int, mechanism: int) -> np.ndarray:
         """Numbers of the finished cases of a condition with a mechanism (-1: without)."""
         return np.flatnonzero(self.finished & (self.condition == condition) & (self.mechanism == mechanism))
@@ -157,6 +180,8 @@ class Bank:
             reasons=self.reasons,
             study=np.array(self.study),
             maker=np.array(json.dumps(dict(self.maker) or None)),
+            kriged=np.empty(0) if self.kriged is None else self.kriged.table(),
+            kriged_runs=np.array("" if self.kriged is None else self.kriged.runs),
         )
 
 
@@ -180,7 +205,9 @@ def load_bank(path: Path) -> Bank:
         columns["coded_size"] = columns.pop("size")
         made_for = str(columns.pop("study", ""))
         made_by = json.loads(str(columns.pop("maker", "null"))) or {}
-        return Bank(space, names, **columns, study=made_for, maker=made_by)
+        table, runs = columns.pop("kriged", None), str(columns.pop("kriged_runs", ""))
+        kriged = KrigedParts.from_table(runs, table) if runs else None
+        return Bank(space, names, **columns, study=made_for, maker=made_by, kriged=kriged)
     except Exception as error:
         # the libraries raise whatever their parsers happen to meet in a damaged file
         raise RuleError("must be a bank that this program wrote", str(error), str(path)) from error

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from doe.discrepancy.emulation.bank import Bank
+from doe.discrepancy.emulation.kriged_parts import BASE, KrigedParts
 from doe.discrepancy.emulation.noise import fit_noises
 from doe.discrepancy.emulation.surface_fits import (
     AddedRuns,
@@ -43,15 +44,28 @@ class Emulator:
     """Cases of the bank."""
     notes: tuple[str, ...] = ()
     """Remarks on what was left out of the bank, and why."""
+    kriged: KrigedParts | None = None
+    """Covariances of its kriged parts, also of those that symmetry took out; None where there is no bank."""
 
     def without(self, *mechanisms: str) -> Emulator:
         """Return the same emulator with some mechanisms withheld from the library."""
         return replace(self, space=self.space.without(*mechanisms))
 
 
+def fitted(bank: Bank) -> Bank:
+    """Return the same bank with what takes the longest of its fit, so that nobody need find it again.
+
+    Raises
+    ------
+    RuleError
+        When it cannot be fitted, as of `fit_emulator`.
+    """
+    return replace(bank, kriged=fit_emulator(bank).kriged)
+
+
 @in_one_thread
 def fit_emulator(bank: Bank) -> Emulator:
-    """Fit every surface to a bank.
+    """Fit every surface to a bank; parts that it says are kriged are not searched for.
 
     Raises
     ------
@@ -72,7 +86,10 @@ def fit_emulator(bank: Bank) -> Emulator:
     thin = _too_few(bank)
     notes += [f"{name} has too few finished cases in the bank: left out of the library" for name in thin]
     odd = np.array([bank.observables[column] in bank.space.odd for column in columns])
-    bases = [symmetric_base(base, odd) for base in _bases(bank, columns, RESOLUTION * spread[columns])]
+    known = bank.known_parts
+    found = _bases(bank, columns, RESOLUTION * spread[columns], known)
+    kriging = {(number, BASE): base.base.kriging for number, base in enumerate(found)}
+    bases = [symmetric_base(base, odd) for base in found]
     additions: list[dict[str, Addition]] = [{} for _ in bases]
     for index, name in enumerate(bank.space.names):
         if name in thin:
@@ -81,10 +98,12 @@ def fit_emulator(bank: Bank) -> Emulator:
         for number, base in enumerate(bases):
             rows = bank.rows(number, index)
             values = bank.values[np.ix_(rows, columns)]
-            runs.append(AddedRuns(base, bank.theta[rows], bank.coded_size[rows], values))
+            parts = None if known is None else known.of_surface(number, index)
+            runs.append(AddedRuns(base, bank.theta[rows], bank.coded_size[rows], values, parts))
         silent = odd & (not bank.space.mechanism(name).directed)
-        for own, addition in zip(additions, fit_additions(runs), strict=True):
-            own[name] = symmetric_addition(addition, odd, silent)
+        for number, addition in enumerate(fit_additions(runs)):
+            kriging[number, index] = addition.polynomial.kriging
+            additions[number][name] = symmetric_addition(addition, odd, silent)
     surfaces = {
         condition: replace(base, additions=own)
         for condition, base, own in zip(bank.space.conditions, bases, additions, strict=True)
@@ -97,10 +116,11 @@ def fit_emulator(bank: Bank) -> Emulator:
         tuple(int(column) for column in columns),
         len(bank.reasons),
         tuple(notes),
+        KrigedParts.of(bank.runs_sha256, kriging),
     )
 
 
-def _bases(bank: Bank, columns: np.ndarray, floor: np.ndarray) -> list[Surfaces]:
+def _bases(bank: Bank, columns: np.ndarray, floor: np.ndarray, known: KrigedParts | None) -> list[Surfaces]:
     """Surfaces of every condition without mechanisms."""
     data = []
     for number, condition in enumerate(bank.space.conditions):
@@ -111,7 +131,11 @@ def _bases(bank: Bank, columns: np.ndarray, floor: np.ndarray) -> list[Surfaces]
         except RuleError as error:
             raise RuleError(error.rule, error.value, f"condition {condition} of the bank") from error
     noises = fit_noises([repeats for _, _, repeats in data], floor)
-    runs = [BaseRuns.of(theta, values, noise) for (theta, values, _), noise in zip(data, noises, strict=True)]
+    parts = [None if known is None else known.of_surface(number, BASE) for number in range(len(data))]
+    runs = [
+        BaseRuns.of(theta, values, noise, kriged)
+        for (theta, values, _), noise, kriged in zip(data, noises, parts, strict=True)
+    ]
     return fit_bases(runs)
 
 

@@ -22,15 +22,26 @@ AMPLITUDE_RANGE = (1e-3, 1e2)
 
 
 @dataclass(frozen=True, eq=False)
+class Covariance:
+    """Covariance of a smooth function before the data."""
+
+    amplitude: float
+    """Variance of the function."""
+    length: np.ndarray
+    """Of each parameter, in coded units, (parameters,)."""
+
+    def __call__(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        """Covariance between points (m, parameters) and (n, parameters), (m, n)."""
+        return np.asarray(self.amplitude * squared_exponential(a / self.length, b / self.length))
+
+
+@dataclass(frozen=True, eq=False)
 class Kriging:
     """A smooth function known at noisy points."""
 
     points: np.ndarray
     """(n, parameters)."""
-    length: np.ndarray
-    """(parameters,)."""
-    amplitude: float
-    """Variance of the function before the data."""
+    covariance: Covariance
     weights: np.ndarray
     """Inverse covariance of the data times the data, (n,)."""
     inverse: np.ndarray
@@ -38,21 +49,18 @@ class Kriging:
 
     def mean(self, x: np.ndarray) -> np.ndarray:
         """Expected value at points (m, parameters), (m,)."""
-        return np.asarray(self._covariance(x) @ self.weights)
+        return np.asarray(self.covariance(x, self.points) @ self.weights)
 
     def variance(self, x: np.ndarray) -> np.ndarray:
         """Variance at points (m, parameters), (m,)."""
-        known = self._covariance(x)
+        known = self.covariance(x, self.points)
         explained = np.einsum("mi,ij,mj->m", known, self.inverse, known)
-        return np.asarray(np.maximum(self.amplitude - explained, 0.0))
+        return np.asarray(np.maximum(self.covariance.amplitude - explained, 0.0))
 
     @property
     def leave_one_out(self) -> np.ndarray:
         """Residual of each datum from the others (ibid., equation 5.12), (n,)."""
         return np.asarray(self.weights / np.diag(self.inverse))
-
-    def _covariance(self, x: np.ndarray) -> np.ndarray:
-        return self.amplitude * squared_exponential(x / self.length, self.points / self.length)
 
 
 def squared_exponential(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -61,23 +69,19 @@ def squared_exponential(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.asarray(np.exp(-0.5 * np.maximum(squares, 0.0)))
 
 
-def krige(
-    points: np.ndarray, values: np.ndarray, noise: np.ndarray, amplitude: float, length: np.ndarray
-) -> Kriging:
-    """Condition a function of known amplitude and lengths on data.
+def krige(points: np.ndarray, values: np.ndarray, noise: np.ndarray, covariance: Covariance) -> Kriging:
+    """Condition a function of known covariance on data.
 
     Parameters
     ----------
     points : (n, parameters) array
     values, noise : (n,) array
         Data and the variances of their noise.
-    amplitude : float
-    length : (parameters,) array
+    covariance : Covariance
     """
-    scaled = points / length
-    covariance = amplitude * squared_exponential(scaled, scaled) + np.diag(noise)
-    inverse = cho_solve(cho_factor(covariance), np.eye(len(points)))
-    return Kriging(points, length, amplitude, inverse @ values, inverse)
+    of_data = covariance(points, points) + np.diag(noise)
+    inverse = cho_solve(cho_factor(of_data), np.eye(len(points)))
+    return Kriging(points, covariance, inverse @ values, inverse)
 
 
 def fit_kriging(points: np.ndarray, values: np.ndarray, noise: np.ndarray) -> Kriging:
@@ -93,7 +97,7 @@ def fit_kriging(points: np.ndarray, values: np.ndarray, noise: np.ndarray) -> Kr
     bounds = np.log([AMPLITUDE_RANGE, *[LENGTH_RANGE] * points.shape[1]])
     data = (points, values / scale, noise / scale**2)
     found = np.exp(minimize(_loss, start, data, method="L-BFGS-B", jac=True, bounds=bounds).x)
-    return krige(points, values, noise, float(found[0]) * scale**2, found[1:])
+    return krige(points, values, noise, Covariance(float(found[0]) * scale**2, found[1:]))
 
 
 def _loss(

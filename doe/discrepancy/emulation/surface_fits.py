@@ -7,13 +7,13 @@ is kriged.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import special, stats
 
-from doe.discrepancy.emulation.kriging import fit_kriging
+from doe.discrepancy.emulation.kriging import Covariance, Kriging, fit_kriging, krige
 from doe.discrepancy.emulation.noise import (
     ALIKE,
     Noise,
@@ -104,14 +104,22 @@ class BaseRuns:
     """(n, observables)."""
     noise: Noise
     """Of one run."""
+    kriged: Mapping[int, Covariance] | None = None
+    """Covariances of the columns that an earlier fit kriged; None: to be found."""
 
     @classmethod
-    def of(cls, theta: np.ndarray, values: np.ndarray, noise: Noise) -> BaseRuns:
+    def of(
+        cls,
+        theta: np.ndarray,
+        values: np.ndarray,
+        noise: Noise,
+        kriged: Mapping[int, Covariance] | None = None,
+    ) -> BaseRuns:
         """Take the repeats among runs (n, factors), (n, observables) together."""
         points, groups, repeats = np.unique(theta, axis=0, return_inverse=True, return_counts=True)
         sums = np.zeros((len(points), values.shape[1]))
         np.add.at(sums, groups.reshape(-1), values)
-        return cls(points, repeats, sums / repeats[:, None], noise)
+        return cls(points, repeats, sums / repeats[:, None], noise, kriged)
 
     @property
     def terms(self) -> np.ndarray:
@@ -206,17 +214,48 @@ class _BaseFit:
         """Emulator, of a misfit in variances of one run; where it fails, what is smooth is kriged."""
         runs, repeats = self.runs, self.runs.repeats[:, None]
         missed, scatter = self.fitted.residual / np.sqrt(repeats), self.noise / repeats
-        kriging = {}
         fails = self.ratio > stats.f.isf(FAILURE_LEVEL, self.freedom, runs.noise.degrees_of_freedom)
-        for column in np.flatnonzero(fails):
-            smooth = fit_kriging(runs.theta, missed[:, column], scatter[:, column])
-            if np.mean(smooth.leave_one_out**2) < BETTER * np.mean(missed[:, column] ** 2):
-                kriging[int(column)] = smooth
+        rest = _Rest(runs.theta, missed, scatter, np.ones_like(missed))
+        kriging = rest.kriged(fails, runs.kriged)
         base = Polynomial(
             self.fitted.coefficients, misfit * self.noise.mean(axis=0) / repeats.mean(), kriging
         )
         fitted, silent = self.fitted, np.zeros(len(misfit), dtype=bool)
         return Surfaces(base, fitted.gram_inverse, fitted.chance, runs.noise, {}, silent)
+
+
+@dataclass(frozen=True, eq=False)
+class _Rest:
+    """What polynomials miss of some runs, all columns alike (n, observables)."""
+
+    points: np.ndarray
+    """(n, parameters)."""
+    missed: np.ndarray
+    noise: np.ndarray
+    """Variances."""
+    weights: np.ndarray
+    """Of the squares that are compared where a run is left out."""
+
+    def kriged(self, suspects: np.ndarray, known: Mapping[int, Covariance] | None) -> dict[int, Kriging]:
+        """Krige the columns that are known, or the suspects, and keep those of these that are the better."""
+        if known is not None:
+            return {column: self._as_known(column, covariance) for column, covariance in known.items()}
+        columns = np.flatnonzero(suspects).tolist()
+        found = {column: fit_kriging(*self._data(column)) for column in columns}
+        return {column: one for column, one in found.items() if self._is_better(column, one)}
+
+    def _as_known(self, column: int, covariance: Covariance) -> Kriging:
+        if column >= self.missed.shape[1] or len(covariance.length) != self.points.shape[1]:
+            rule = "needs kriged parts of its own columns and factors"
+            raise RuleError(rule, f"column {column}, {len(covariance.length)} lengths", "Bank.kriged")
+        return krige(*self._data(column), covariance)
+
+    def _data(self, column: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        return self.points, self.missed[:, column], self.noise[:, column]
+
+    def _is_better(self, column: int, smooth: Kriging) -> bool:
+        weights, plain = self.weights[:, column], self.missed[:, column]
+        return bool(np.mean(weights * smooth.leave_one_out**2) < BETTER * np.mean(weights * plain**2))
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,6 +270,8 @@ class AddedRuns:
     """Coded, (n,)."""
     values: np.ndarray
     """(n, observables)."""
+    kriged: Mapping[int, Covariance] | None = None
+    """Covariances of the columns that an earlier fit kriged; None: to be found."""
 
     @property
     def terms(self) -> np.ndarray:
@@ -302,22 +343,19 @@ def _fit_addition(runs: AddedRuns, scales: np.ndarray) -> Addition:
     theta, size, noise = runs.theta, runs.size, runs.noise
     fitted = _Shrunk.of(runs.terms, runs.difference, scales)
     growth = _growth(runs, fitted)
-    points = np.column_stack([theta, size])
     left_out = fitted.residual / (1.0 - fitted.leverage)
     freedom, kept = len(size) - fitted.leverage.sum(), size >= LEAST_SIZE
     suspect = (left_out**2 * (1.0 - fitted.leverage) / noise).mean(axis=0) > stats.f.isf(
         FAILURE_LEVEL, freedom, runs.base.noise.degrees_of_freedom
     )
-    kriging = {}
-    for column in np.flatnonzero(suspect):
-        scatter = noise[:, column] * np.exp(size * growth[column])
-        missed = fitted.residual[kept, column] / size[kept]
-        smooth = fit_kriging(points[kept], missed, scatter[kept] / size[kept] ** 2)
+    its_size = size[kept, None]
+    scatter = noise[kept] * np.exp(its_size * growth) / its_size**2
+    points = np.column_stack([theta, size])[kept]
+    rest = _Rest(points, fitted.residual[kept] / its_size, scatter, 1.0 / scatter)
+    kriging = rest.kriged(suspect, runs.kriged)
+    for column, smooth in kriging.items():
         alone = smooth.leave_one_out * size[kept]
-        plain = fitted.residual[kept, column]
-        if np.mean(alone**2 / scatter[kept]) < BETTER * np.mean(plain**2 / scatter[kept]):
-            kriging[int(column)] = smooth
-            growth[column] = fit_growth(size[kept], (alone**2 / noise[kept, column])[:, None])[0]
+        growth[column] = fit_growth(size[kept], (alone**2 / noise[kept, column])[:, None])[0]
     return Addition(
         Polynomial(fitted.coefficients, np.zeros(len(growth)), kriging),
         fitted.inverse @ cubic(theta),

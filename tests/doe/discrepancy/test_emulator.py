@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Never
 
 import numpy as np
 import pytest
@@ -12,8 +13,17 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel
 from synthetic import CONDITIONS, OBSERVABLES, SETTINGS, SyntheticSimulator, bank, emulator, measure, space
 
-from doe.discrepancy import Bank, Outcomes, bank_points, fit_emulator, load_bank, make_bank
-from doe.discrepancy.emulation.kriging import AMPLITUDE_RANGE, LENGTH_RANGE, START_LENGTH, fit_kriging, krige
+from doe.discrepancy import Bank, Outcomes, bank_points, fit_emulator, fitted, load_bank, make_bank
+from doe.discrepancy.emulation import surface_fits
+from doe.discrepancy.emulation.kriged_parts import KrigedParts
+from doe.discrepancy.emulation.kriging import (
+    AMPLITUDE_RANGE,
+    LENGTH_RANGE,
+    START_LENGTH,
+    Covariance,
+    fit_kriging,
+    krige,
+)
 from doe.discrepancy.emulation.noise import ALIKE, fit_noise
 from doe.discrepancy.emulation.surface_fits import (
     AddedRuns,
@@ -71,7 +81,7 @@ def test_the_emulator_errs_as_much_as_it_says() -> None:
 
 def test_kriging_goes_through_points_without_noise_and_forgets_far_from_them() -> None:
     points = np.array([[0.0], [1.0], [2.5]])
-    known = krige(points, np.array([1.0, -1.0, 0.5]), np.full(3, 1e-10), 2.0, np.array([0.7]))
+    known = krige(points, np.array([1.0, -1.0, 0.5]), np.full(3, 1e-10), Covariance(2.0, np.array([0.7])))
     np.testing.assert_allclose(known.mean(points), [1.0, -1.0, 0.5], atol=1e-8)
     np.testing.assert_allclose(known.variance(np.array([[0.0], [50.0]])), [0.0, 2.0], atol=1e-8)
 
@@ -79,16 +89,17 @@ def test_kriging_goes_through_points_without_noise_and_forgets_far_from_them() -
 def test_kriging_leaves_one_out_as_if_it_were_fitted_without() -> None:
     rng = np.random.default_rng(6)
     points, values, noise = rng.uniform(-1, 1, (12, 2)), rng.standard_normal(12), np.full(12, 0.1)
-    length = np.array([0.8, 1.2])
-    whole = krige(points, values, noise, 1.5, length)
+    covariance = Covariance(1.5, np.array([0.8, 1.2]))
+    whole = krige(points, values, noise, covariance)
     for left in range(12):
         kept = np.arange(12) != left
-        rest = krige(points[kept], values[kept], noise[kept], 1.5, length)
+        rest = krige(points[kept], values[kept], noise[kept], covariance)
         alone = values[left] - rest.mean(points[left : left + 1])[0]
         assert whole.leave_one_out[left] == pytest.approx(alone, abs=1e-9)
 
 
-def test_what_a_cubic_cannot_follow_is_kriged() -> None:
+def _bent_bank() -> Bank:
+    """Bank of a world in which a bump in one factor moves the observable 2, with and without `alpha`."""
     points, simulator = (
         bank_points(space(("alpha",)), SETTINGS, seed=1),
         SyntheticSimulator(space(("alpha",))),
@@ -96,9 +107,12 @@ def test_what_a_cubic_cannot_follow_is_kriged() -> None:
     values = simulator(points).values
     theta = space().coded_theta(np.array([point.theta for point in points]))
     values[:, 2] += 3.0 * np.exp(-8.0 * (theta[:, 0] - 0.3) ** 2) * np.std(values[:, 2])
-    bent = fit_emulator(
-        make_bank(space(("alpha",)), OBSERVABLES, points, Outcomes(values, ("",) * len(points)))
-    )
+    return make_bank(space(("alpha",)), OBSERVABLES, points, Outcomes(values, ("",) * len(points)))
+
+
+def test_what_a_cubic_cannot_follow_is_kriged() -> None:
+    points = bank_points(space(("alpha",)), SETTINGS, seed=1)
+    simulator, bent = SyntheticSimulator(space(("alpha",))), fit_emulator(_bent_bank())
     assert all(2 in surfaces.base.kriging for surfaces in bent.surfaces.values())
     grid = np.column_stack([np.linspace(-0.8, 0.8, 9), np.zeros((9, 2))])
     truth = np.array([simulator.mean(space().natural_theta(row), {}, "base")[2] for row in grid])
@@ -107,6 +121,53 @@ def test_what_a_cubic_cannot_follow_is_kriged() -> None:
     flat = replace(surfaces, base=replace(surfaces.base, kriging={}))
     kriged, cubic = (np.abs(one.predict(grid, ())[:, 2] - truth).max() for one in (surfaces, flat))
     assert kriged < 0.4 * cubic
+
+
+def test_a_bank_keeps_what_its_fit_kriged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    runs = _bent_bank()
+    fitted(runs).save(tmp_path / "bank.npz")
+    kept = load_bank(tmp_path / "bank.npz")
+    searched = fit_emulator(replace(kept, kriged=None))
+
+    def search(*_data: np.ndarray) -> Never:
+        raise AssertionError("searched again")
+
+    monkeypatch.setattr(surface_fits, "fit_kriging", search)
+    known = fit_emulator(kept)
+    x = np.random.default_rng(4).uniform(-0.9, 0.9, (20, 4))
+    for condition in CONDITIONS:
+        one, other = known.surfaces[condition], searched.surfaces[condition]
+        assert one.base.kriging.keys() == other.base.kriging.keys() >= {2}
+        # float32 in the file moves the lengths that a search finds, by less than noise by far
+        np.testing.assert_allclose(one.predict(x, ("alpha",)), other.predict(x, ("alpha",)), rtol=1e-3)
+        assert np.array_equal(one.additions["alpha"].silent, other.additions["alpha"].silent)
+
+
+def test_parts_that_other_runs_kriged_are_searched_for_again() -> None:
+    runs = fitted(_bent_bank())
+    assert runs.known_parts is not None
+    others = [
+        replace(runs, values=runs.values * 1.001),
+        replace(runs, theta=0.9 * runs.theta),
+        replace(runs, space=replace(runs.space, odd=(OBSERVABLES[0],))),
+    ]
+    assert [each.known_parts for each in others] == [None] * 3
+    again = fit_emulator(others[0])
+    assert again.surfaces["base"].base.kriging.keys() >= {2}
+    assert again.kriged is not None
+    assert again.kriged.runs == others[0].runs_sha256
+
+
+@pytest.mark.parametrize(
+    ("place", "value"), [(0, 0.5), (1, -2.0), (2, -1.0), (2, 99.0), (3, 0.0), (4, np.inf), (0, np.nan)]
+)
+def test_a_kriged_part_that_can_not_be_is_refused(place: int, value: float) -> None:
+    runs = fitted(_bent_bank())
+    assert runs.kriged is not None
+    table = runs.kriged.table()
+    table[0, place] = value
+    with pytest.raises(RuleError, match="kriged"):
+        fit_emulator(replace(runs, kriged=KrigedParts.from_table(runs.runs_sha256, table)))
 
 
 def _warped(theta: np.ndarray) -> np.ndarray:
@@ -138,7 +199,7 @@ def test_fitted_lengths_tell_a_flat_direction_from_a_steep_one() -> None:
     fitted = fit_kriging(
         points, np.sin(4.0 * points[:, 0]) + 0.01 * rng.standard_normal(80), np.full(80, 1e-4)
     )
-    assert fitted.length[1] > 3.0 * fitted.length[0]
+    assert fitted.covariance.length[1] > 3.0 * fitted.covariance.length[0]
 
 
 @pytest.mark.filterwarnings("ignore::sklearn.exceptions.ConvergenceWarning")  # of an end of a range
@@ -150,8 +211,8 @@ def test_the_fitted_lengths_are_as_likely_as_those_that_scikit_learn_finds(seed:
     scale = np.sqrt(np.mean(values**2))
     kernel = ConstantKernel(0.5, AMPLITUDE_RANGE) * RBF(np.full(3, START_LENGTH), LENGTH_RANGE)
     process = GaussianProcessRegressor(kernel, alpha=noise / scale**2).fit(points, values / scale)
-    fitted = fit_kriging(points, values, noise)
-    likelihood = process.log_marginal_likelihood(np.log([fitted.amplitude / scale**2, *fitted.length]))
+    found = fit_kriging(points, values, noise).covariance
+    likelihood = process.log_marginal_likelihood(np.log([found.amplitude / scale**2, *found.length]))
     # both stop where a step gains less than a millionth or so of the likelihood
     assert likelihood > process.log_marginal_likelihood_value_ - 1e-3
 
