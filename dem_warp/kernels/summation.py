@@ -28,37 +28,34 @@ SUMS = COMPONENTS * WARP // MIN_LANES
 
 @functools.cache
 def serial_sum(build: Build):
-    """Function that sums a grain's contacts on one thread, called for every grain of a world in order."""
-    vec3, vec4 = build.precision.vec3, build.precision.vec4
+    """Function that adds a grain's contacts to what it has got, called for the grains of a world in order."""
+    real, vec3, vec4 = build.precision.real, build.precision.vec3, build.precision.vec4
     types = device_structs(build.precision)
     Model, Grains, Neighbours = types.Model, types.Grains, types.Neighbours
     contacts = contact_functions(build)
     pack = packing(build.precision)
 
     @wp.func
-    def sum_contacts(
-        model: Model, grains: Grains, neighbours: Neighbours, w: int, g: int, count: int, first: int,
-        step: int, thread: int, lane: int, lanes: int,
-    ):  # fmt: skip
+    def add_contacts(model: Model, grains: Grains, neighbours: Neighbours, w: int, g: int, step: int):
         """A grain that waits to be released feels nothing, but it may be in the way of another."""
         f4 = pack.load_vec4(neighbours.reactions.force, g)
         t4 = pack.load_vec4(neighbours.reactions.torque, g)
-        pack.store_vec4(neighbours.reactions.force, g, vec4())
-        pack.store_vec4(neighbours.reactions.torque, g, vec4())
         force = vec3(f4[0], f4[1], f4[2])
         torque = vec3(t4[0], t4[1], t4[2])
         rolling = f4[3]
         world = model.world[w]
         is_free = step >= model.release_step[g]
-        for item in range(first, first + count):
+        first = g * neighbours.capacity
+        for item in range(first, first + neighbours.near.count[g]):
             if is_free or contacts.is_free(model, neighbours, w, item, step):
                 f, t, r = contacts.contact(model, world, grains, neighbours, w, g, item, step)
                 force += f
                 torque += t
                 rolling += r
-        return force, torque, rolling
+        pack.store_vec4(neighbours.reactions.force, g, vec4(force[0], force[1], force[2], rolling))
+        pack.store_vec4(neighbours.reactions.torque, g, vec4(torque[0], torque[1], torque[2], real(0.0)))
 
-    return sum_contacts
+    return add_contacts
 
 
 @functools.cache

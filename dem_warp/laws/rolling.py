@@ -21,11 +21,11 @@ def resist_spin(spin: Any, inertia: Any, torque: Any, time_step: Any, holds: Any
     Where `holds` is 0 instead of 1, the torque acts for the whole step: it reverses a slow spin each step, so
     that a grain that ought to stick creeps. Codes that take the formula at its word do so.
     """
+    none = type(torque)(0.0)
     speed = wp.length(spin)
-    if torque > type(torque)(0.0) and speed > type(torque)(0.0):
-        loss = wp.cw_div(spin, inertia) * (torque * time_step / speed)
-        if holds * wp.dot(loss, spin) >= speed * speed:
-            spin = spin * type(torque)(0.0)
-        else:
-            spin = spin - loss
+    loss = wp.cw_div(spin, inertia) * (torque * time_step / speed)
+    acts = torque > none and speed > none
+    stops = holds * wp.dot(loss, spin) >= speed * speed
+    for i in range(3):  # without a branch, so that a CPU turns several grains at once
+        spin[i] = wp.where(acts, wp.where(stops, spin[i] * none, spin[i] - loss[i]), spin[i])
     return spin
