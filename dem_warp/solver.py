@@ -102,6 +102,7 @@ class Solver:
         self._pace = np.array([(w.time_step, w.skin, np.linalg.norm(w.gravity)) for w in worlds]).T
         self._impulse_of_count = np.array([w.time_step / w.force_rate for w in worlds])
         self._graphs: dict[tuple[int, int, int, bool], Any] = {}
+        self._orders: tuple[Any, ...] = ()
         self._place()
 
     def _build_state(self, room: Sequence[tuple[int, int]]) -> None:
@@ -168,14 +169,19 @@ class Solver:
             lanes //= 2
         return lanes
 
-    def _step(self, read: int) -> None:
+    def _order(self, read: int) -> Any:
+        """Order of a step that may be given any number of times: to make one takes longer than to give it."""
         slots = len(self._running) * self.layout.grain_count
         threads = self._whole_warps(slots * self.lanes) if self.device.is_cuda else 1
         inputs = [
             self.lanes, slots, self.model, self.running, self.grains[read], self.neighbours, self.alive,
             self.flags, self.grains[1 - read],
         ]  # fmt: skip
-        self._launch(self._step_kernels.step, threads, inputs)
+        kernel = self._step_kernels.step
+        return wp.launch(kernel, threads, inputs=inputs, device=self.device, block_dim=BLOCK, record_cmd=True)
+
+    def _step(self, read: int) -> None:
+        self._orders[read].launch()
 
     def _place_walls(self, ahead: int, read: int = 0) -> None:
         frames = len(self.worlds) * self.layout.wall_count * (ahead + 1)
@@ -231,6 +237,7 @@ class Solver:
     def _cycle(self, steps: int, read: int = 0) -> None:
         """Take steps between two looks; a careful solver looks before each."""
         each = 1 if self.careful else steps
+        self._orders = self._order(0), self._order(1)
         for first in range(read, read + steps, each):
             self._look_ahead(each, first % 2)
             for step in range(first, first + each):

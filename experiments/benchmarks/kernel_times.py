@@ -7,6 +7,8 @@ Kernels are launched one by one with a pause between, which costs some microseco
 
 import time
 from collections import defaultdict
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -29,25 +31,28 @@ def kernel_times(solver: Solver) -> pd.DataFrame:
     """Mean time of each kernel, every world being rebuilt [ms]."""
     seconds: dict[str, float] = defaultdict(float)
     launches: dict[str, int] = defaultdict(int)
-    launch = solver._launch
+    launch, step = solver._launch, solver._step
 
-    def timed(kernel: wp.Kernel, dim: int, inputs: list[Any]) -> None:
+    def timed(name: str, act: Callable[..., None], *arguments: Any) -> None:
         wp.synchronize_device(solver.device)
         started = time.perf_counter()
-        launch(kernel, dim, inputs)
+        act(*arguments)
         wp.synchronize_device(solver.device)
-        name = kernel.key.split("__")[-1]
         seconds[name] += time.perf_counter() - started
         launches[name] += 1
 
-    solver._launch = timed  # type: ignore[method-assign]
+    def timed_launch(kernel: wp.Kernel, dim: int, inputs: list[Any]) -> None:
+        timed(kernel.key.split("__")[-1], launch, kernel, dim, inputs)
+
+    solver._launch = timed_launch  # type: ignore[method-assign]
+    solver._step = partial(timed, "step", step)  # type: ignore[method-assign]
     try:
         for _ in range(REPEATS):
             solver.stale.fill_(1)
             solver.any_stale.fill_(1)
             solver._cycle(2)
     finally:
-        solver._launch = launch  # type: ignore[method-assign]
+        solver._launch, solver._step = launch, step  # type: ignore[method-assign]
     rows = [(name, 1e3 * total / launches[name]) for name, total in seconds.items()]
     return pd.DataFrame(rows, columns=["kernel", "ms"])
 
