@@ -226,7 +226,7 @@ class _BaseFit:
 
 @dataclass(frozen=True, eq=False)
 class _Rest:
-    """What polynomials miss of some runs, all columns alike (n, observables)."""
+    """Part of some runs that polynomials miss, all columns alike (n, observables)."""
 
     points: np.ndarray
     """(n, parameters)."""
