@@ -235,7 +235,7 @@ def device_structs(precision: Precision) -> SimpleNamespace:
         moves: wp.array(dtype=int)  # 1: it used up much of the skin, (grains,) on a CPU, else (0,)
 
     @wp.struct
-    class Reactions:  # to the contacts, so far in a step, with grains before it; 0 between steps
+    class Reactions:  # of contacts with grains before it, then of all, so far in a step; 0 between steps
         force: wp.array(dtype=vec4)  # [N] and rolling torque [N m], (grains,) on a CPU, else (0,)
         torque: wp.array(dtype=vec4)  # [N m], as long
 

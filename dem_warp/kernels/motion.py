@@ -187,7 +187,7 @@ def motion_functions(build: Build) -> SimpleNamespace:
     ):  # fmt: skip
         """State of a block a step later, and speeds of its grains; bits of `free` tell who moves freely."""
         k = int(0)
-        while k < wp.static(BLOCK):
+        while k < wp.static(BLOCK):  # a compiler cannot take turns of Warp's loops over ranges together
             v, q, s = pushed(
                 world,
                 vec3(velocity[0, k], velocity[1, k], velocity[2, k]),
