@@ -84,6 +84,7 @@ def show_plan(resources: Resources, planned: Callable[[Speed], Plan], as_json: b
         f"In all {plan.cases:,} cases, at most {plan.most:,}: {duration(plan.seconds)}, at most "
         f"{duration(plan.seconds_most)}"
     )
+    typer.echo("Not counted: compiling kernels for a grain or law that is new here, 5 to 15 s, once.")
     what = "of each GPU" if plan.on_gpu else "of this machine"
     if resources.submits_jobs:
         what = "of the workers"

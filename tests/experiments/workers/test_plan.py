@@ -273,6 +273,7 @@ def test_a_plan_reads_well(write_study: Write, tmp_path: Path) -> None:
     assert "verification" in out
     assert "Nothing was run, nothing was written." in out
     assert "Speed measured on 2026-01-02, 2 workers" in " ".join(out.split())
+    assert "Not counted: compiling kernels for a grain or law that is new here" in out
 
 
 def test_a_plan_that_measures_the_speed_says_where_it_stored_it(
