@@ -248,7 +248,11 @@ class _Rest:
         if column >= self.missed.shape[1] or len(covariance.length) != self.points.shape[1]:
             rule = "needs kriged parts of its own columns and factors"
             raise RuleError(rule, f"column {column}, {len(covariance.length)} lengths", "Bank.kriged")
-        return krige(*self._data(column), covariance)
+        try:
+            return krige(*self._data(column), covariance)
+        except (np.linalg.LinAlgError, ValueError) as error:
+            rule = "needs kriged parts whose covariance can be inverted"
+            raise RuleError(rule, f"an amplitude of {covariance.amplitude:g}", "Bank.kriged") from error
 
     def _data(self, column: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         return self.points, self.missed[:, column], self.noise[:, column]

@@ -159,7 +159,8 @@ def test_parts_that_other_runs_kriged_are_searched_for_again() -> None:
 
 
 @pytest.mark.parametrize(
-    ("place", "value"), [(0, 0.5), (1, -2.0), (2, -1.0), (2, 99.0), (3, 0.0), (4, np.inf), (0, np.nan)]
+    ("place", "value"),
+    [(0, 0.5), (1, -2.0), (2, -1.0), (2, 99.0), (3, 0.0), (4, np.inf), (0, np.nan)],
 )
 def test_a_kriged_part_that_can_not_be_is_refused(place: int, value: float) -> None:
     runs = fitted(_bent_bank())
@@ -167,6 +168,15 @@ def test_a_kriged_part_that_can_not_be_is_refused(place: int, value: float) -> N
     table = runs.kriged.table()
     table[0, place] = value
     with pytest.raises(RuleError, match="kriged"):
+        fit_emulator(replace(runs, kriged=KrigedParts.from_table(runs.runs_sha256, table)))
+
+
+def test_a_kriged_part_as_of_equal_runs_is_refused() -> None:
+    runs = fitted(_bent_bank())
+    assert runs.kriged is not None
+    table = runs.kriged.table()
+    table[0, 3], table[0, 4:7] = 1e30, 1e9  # all runs alike, their noise nothing beside: no inverse
+    with pytest.raises(RuleError, match="can be inverted"):
         fit_emulator(replace(runs, kriged=KrigedParts.from_table(runs.runs_sha256, table)))
 
 
