@@ -1,6 +1,6 @@
 """Parts of an emulator that are kriged, as a fit chose them: kept with its bank, nobody need search again.
 
-The search for lengths takes nearly all of a fit, and on the threshold of `FAILURE_LEVEL` rounding may decide.
+The search for lengths takes nearly all of a fit, and whether a polynomial fails rounding may decide.
 """
 
 from __future__ import annotations
@@ -10,9 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from doe.discrepancy.emulation.kriging import Covariance, Kriging
+from doe.discrepancy.emulation.kriging import Covariance, Kriging, fit_kriging, krige
 from doe.errors import RuleError
 
+BETTER = 0.97
+"""Kriging is kept where it lowers the mean square of what is left out to less than this."""
 BASE = -1
 """Number that stands for no mechanism."""
 _PLACE = 3
@@ -70,3 +72,41 @@ class KrigedParts:
             condition, mechanism, column = (int(number) for number in row[:_PLACE])
             parts.setdefault((condition, mechanism), {})[column] = Covariance(float(scales[0]), scales[1:])
         return cls(runs, parts)
+
+
+@dataclass(frozen=True, eq=False)
+class Rest:
+    """Part of some runs that polynomials miss, all columns alike (n, observables)."""
+
+    points: np.ndarray
+    """(n, parameters)."""
+    missed: np.ndarray
+    noise: np.ndarray
+    """Variances."""
+    weights: np.ndarray
+    """Of the squares that are compared where a run is left out."""
+
+    def kriged(self, suspects: np.ndarray, known: Mapping[int, Covariance] | None) -> dict[int, Kriging]:
+        """Krige the columns that are known, or the suspects, and keep those of these that are the better."""
+        if known is not None:
+            return {column: self._as_known(column, covariance) for column, covariance in known.items()}
+        columns = np.flatnonzero(suspects).tolist()
+        found = {column: fit_kriging(*self._data(column)) for column in columns}
+        return {column: one for column, one in found.items() if self._is_better(column, one)}
+
+    def _as_known(self, column: int, covariance: Covariance) -> Kriging:
+        if column >= self.missed.shape[1] or len(covariance.length) != self.points.shape[1]:
+            rule = "needs kriged parts of its own columns and factors"
+            raise RuleError(rule, f"column {column}, {len(covariance.length)} lengths", "Bank.kriged")
+        try:
+            return krige(*self._data(column), covariance)
+        except (np.linalg.LinAlgError, ValueError) as error:
+            rule = "needs kriged parts whose covariance can be inverted"
+            raise RuleError(rule, f"an amplitude of {covariance.amplitude:g}", "Bank.kriged") from error
+
+    def _data(self, column: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        return self.points, self.missed[:, column], self.noise[:, column]
+
+    def _is_better(self, column: int, smooth: Kriging) -> bool:
+        weights, plain = self.weights[:, column], self.missed[:, column]
+        return bool(np.mean(weights * smooth.leave_one_out**2) < BETTER * np.mean(weights * plain**2))

@@ -13,7 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import special, stats
 
-from doe.discrepancy.emulation.kriging import Covariance, Kriging, fit_kriging, krige
+from doe.discrepancy.emulation.kriged_parts import Rest
+from doe.discrepancy.emulation.kriging import Covariance
 from doe.discrepancy.emulation.noise import (
     ALIKE,
     Noise,
@@ -28,8 +29,6 @@ FAILURE_LEVEL = 0.005
 """A polynomial fails if leave-one-out errors as large as its own have this probability under noise alone."""
 LEAST_RATIO = 1e-6
 """Residuals of smaller mean squares, in those of the noise, are as good as none."""
-BETTER = 0.97
-"""Kriging is kept where it lowers the mean square of what is left out to less than this."""
 EM_STEPS = 100
 FIRST_SCALE = 3.0
 """Standard deviation of a coefficient, in that of one run, before the runs have said how large they are."""
@@ -215,51 +214,13 @@ class _BaseFit:
         runs, repeats = self.runs, self.runs.repeats[:, None]
         missed, scatter = self.fitted.residual / np.sqrt(repeats), self.noise / repeats
         fails = self.ratio > stats.f.isf(FAILURE_LEVEL, self.freedom, runs.noise.degrees_of_freedom)
-        rest = _Rest(runs.theta, missed, scatter, np.ones_like(missed))
+        rest = Rest(runs.theta, missed, scatter, np.ones_like(missed))
         kriging = rest.kriged(fails, runs.kriged)
         base = Polynomial(
             self.fitted.coefficients, misfit * self.noise.mean(axis=0) / repeats.mean(), kriging
         )
         fitted, silent = self.fitted, np.zeros(len(misfit), dtype=bool)
         return Surfaces(base, fitted.gram_inverse, fitted.chance, runs.noise, {}, silent)
-
-
-@dataclass(frozen=True, eq=False)
-class _Rest:
-    """Part of some runs that polynomials miss, all columns alike (n, observables)."""
-
-    points: np.ndarray
-    """(n, parameters)."""
-    missed: np.ndarray
-    noise: np.ndarray
-    """Variances."""
-    weights: np.ndarray
-    """Of the squares that are compared where a run is left out."""
-
-    def kriged(self, suspects: np.ndarray, known: Mapping[int, Covariance] | None) -> dict[int, Kriging]:
-        """Krige the columns that are known, or the suspects, and keep those of these that are the better."""
-        if known is not None:
-            return {column: self._as_known(column, covariance) for column, covariance in known.items()}
-        columns = np.flatnonzero(suspects).tolist()
-        found = {column: fit_kriging(*self._data(column)) for column in columns}
-        return {column: one for column, one in found.items() if self._is_better(column, one)}
-
-    def _as_known(self, column: int, covariance: Covariance) -> Kriging:
-        if column >= self.missed.shape[1] or len(covariance.length) != self.points.shape[1]:
-            rule = "needs kriged parts of its own columns and factors"
-            raise RuleError(rule, f"column {column}, {len(covariance.length)} lengths", "Bank.kriged")
-        try:
-            return krige(*self._data(column), covariance)
-        except (np.linalg.LinAlgError, ValueError) as error:
-            rule = "needs kriged parts whose covariance can be inverted"
-            raise RuleError(rule, f"an amplitude of {covariance.amplitude:g}", "Bank.kriged") from error
-
-    def _data(self, column: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        return self.points, self.missed[:, column], self.noise[:, column]
-
-    def _is_better(self, column: int, smooth: Kriging) -> bool:
-        weights, plain = self.weights[:, column], self.missed[:, column]
-        return bool(np.mean(weights * smooth.leave_one_out**2) < BETTER * np.mean(weights * plain**2))
 
 
 @dataclass(frozen=True, eq=False)
@@ -355,7 +316,7 @@ def _fit_addition(runs: AddedRuns, scales: np.ndarray) -> Addition:
     its_size = size[kept, None]
     scatter = noise[kept] * np.exp(its_size * growth) / its_size**2
     points = np.column_stack([theta, size])[kept]
-    rest = _Rest(points, fitted.residual[kept] / its_size, scatter, 1.0 / scatter)
+    rest = Rest(points, fitted.residual[kept] / its_size, scatter, 1.0 / scatter)
     kriging = rest.kriged(suspect, runs.kriged)
     for column, smooth in kriging.items():
         alone = smooth.leave_one_out * size[kept]

@@ -14,7 +14,7 @@ from sklearn.gaussian_process.kernels import RBF, ConstantKernel
 from synthetic import CONDITIONS, OBSERVABLES, SETTINGS, SyntheticSimulator, bank, emulator, measure, space
 
 from doe.discrepancy import Bank, Outcomes, bank_points, fit_emulator, fitted, load_bank, make_bank
-from doe.discrepancy.emulation import surface_fits
+from doe.discrepancy.emulation import kriged_parts
 from doe.discrepancy.emulation.kriged_parts import KrigedParts
 from doe.discrepancy.emulation.kriging import (
     AMPLITUDE_RANGE,
@@ -132,7 +132,7 @@ def test_a_bank_keeps_what_its_fit_kriged(tmp_path: Path, monkeypatch: pytest.Mo
     def search(*_data: np.ndarray) -> Never:
         raise AssertionError("searched again")
 
-    monkeypatch.setattr(surface_fits, "fit_kriging", search)
+    monkeypatch.setattr(kriged_parts, "fit_kriging", search)
     known = fit_emulator(kept)
     x = np.random.default_rng(4).uniform(-0.9, 0.9, (20, 4))
     for condition in CONDITIONS:
