@@ -1,6 +1,6 @@
 """Parts of an emulator that are kriged, as a fit chose them: kept with its bank, nobody need search again.
 
-The search for lengths takes nearly all of a fit, and whether a polynomial fails rounding may decide.
+The search for lengths takes nearly all of a fit, and rounding may decide whether a polynomial fails.
 """
 
 from __future__ import annotations
