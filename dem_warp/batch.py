@@ -19,7 +19,7 @@ from dem_warp.room import neighbour_room
 from dem_warp.scenes.scene import course_of
 from dem_warp.snapshot import STEP, put_snapshot, take_snapshot
 from dem_warp.solver import CHUNK, Solver
-from dem_warp.types import WorldFlag
+from dem_warp.types import Care, WorldFlag
 
 _log = logging.getLogger(__name__)
 
@@ -104,15 +104,15 @@ class Batch:
     def _take_back_late(self, ahead: int) -> list[int]:
         """Count the steps that were taken, save those of worlds whose lists were outrun; return who is due.
 
-        Such a world goes back and takes them again, with lists made anew as often as can be. One that outruns
-        them even so is due at once: its end.
+        Such a world goes back and takes them again, with more care. One that outruns its lists even with the
+        greatest care is due at once: its end.
         """
         flags = self.solver.flags.numpy()
         late = {w for w in self.running if WorldFlag.LATE_REBUILD in WorldFlag(int(flags[w]))}
-        again = set() if self.solver.careful else late
+        again = set() if self.solver.care == Care.EVERY_STEP else late
         for w in again:
             self._rollback.restore(w)
-        self.solver.careful = bool(again)
+        self.solver.care = Care(self.solver.care + 1) if again else Care.USUAL
         for w in set(self.running) - again:
             self.steps[w] += ahead
         return [

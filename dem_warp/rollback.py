@@ -15,7 +15,11 @@ class Rollback:
 
     def __init__(self, solver: Solver) -> None:
         self._worlds, self._grains = solver.layout.world_count, solver.layout.grain_total
-        held = {"neighbours.list": solver.neighbours.list, "world.fastest": solver.fastest}
+        held = {
+            "neighbours.list": solver.neighbours.list,
+            "near.top": solver.neighbours.near.top,
+            "world.fastest": solver.fastest,
+        }
         self._state = {name: arrays[0] for name, arrays in state_arrays(solver).items()} | held
         self._kept = {name: wp.empty_like(array) for name, array in self._state.items()}
 

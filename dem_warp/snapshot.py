@@ -60,6 +60,7 @@ def put_snapshot(solver: Solver, world: int, snapshot: Snapshot) -> None:
     for field, whole in zip(fields, filled, strict=True):
         for part in field.parts:
             part.assign(whole)
+    solver.neighbours.near.top[world : world + 1].fill_(np.inf)
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ from dem_warp.kernels.neighbours import list_threads, neighbour_kernels
 from dem_warp.kernels.step import step_kernels
 from dem_warp.kernels.summation import MIN_LANES
 from dem_warp.kernels.walls import wall_kernels
-from dem_warp.kernels.watch import watch_kernels
+from dem_warp.kernels.watch import LONGEST_CYCLE, watch_kernels
 from dem_warp.laws.contact_law import memory_size
 from dem_warp.model import WorldSetup
 from dem_warp.room import neighbour_room
@@ -26,15 +26,15 @@ from dem_warp.state import (
     living_grains,
 )
 from dem_warp.triangles import place_triangles
-from dem_warp.types import FRAMES, PRECISIONS, Build, device_structs
+from dem_warp.types import FRAMES, PRECISIONS, Build, Care, device_structs
 from dem_warp.view import WorldView, overviews
 from dem_warp.walls import Motion
 
 CHUNK = 256
 """Steps that `advance` takes at the least; a multiple of every length of a cycle."""
 
-SHORTEST_CYCLE, LONGEST_CYCLE = 2, 64
-SKIN_PER_CYCLE, SKIN_PER_SERIAL_CYCLE = 0.1, 0.2
+SHORTEST_CYCLE = 2
+SKIN_PER_CYCLE, SKIN_PER_SERIAL_CYCLE = 0.1, 0.3
 """Part of the skin that the fastest grain of a world may use up between two looks at the neighbour list, on a
 GPU and on a CPU, where a rebuild costs what has moved alone."""
 
@@ -94,14 +94,13 @@ class Solver:
         room = [neighbour_room(world) for world in worlds]
         self._watch_kernels = watch_kernels(self.build)
         self.cycle_limit = LONGEST_CYCLE
-        self.careful = False
-        """Look before every step, with lists made for it: slow, and nothing is seen late."""
+        self.care = Care.USUAL
         with wp.ScopedDevice(self.device):
             self._build_state([(found, capacity or listed) for found, listed in room])
         self._running = list(range(len(worlds)))
         self._pace = np.array([(w.time_step, w.skin, np.linalg.norm(w.gravity)) for w in worlds]).T
         self._impulse_of_count = np.array([w.time_step / w.force_rate for w in worlds])
-        self._graphs: dict[tuple[int, int, int, bool], Any] = {}
+        self._graphs: dict[tuple[int, int, int, Care], Any] = {}
         self._orders: tuple[Any, ...] = ()
         self._place()
 
@@ -111,7 +110,8 @@ class Solver:
         self.model = build_model(self.worlds, room, layout, self.precision, device)
         self._trees = place_triangles(self.model, self.worlds, self.precision, device)
         first = build_grains(self.worlds, layout, self.precision, device)
-        self.grains = (first, copy_grains(first, self.precision))
+        # a single thread moves grains when it has all their forces, and needs no second copy
+        self.grains = (first, copy_grains(first, self.precision) if self.device.is_cuda else first)
         self.neighbours = build_neighbours(
             layout, capacity, memory_size(layout.mechanisms, layout.forms), self.precision, device
         )
@@ -190,14 +190,18 @@ class Solver:
     def _rebuild(self, read: int) -> None:
         spheres, grains = self.layout.sphere_total, self.grains[read]
         cells, lists = self._cell_kernels, self._list_kernels
-        self._launch(cells.bin_spheres, spheres, [self.model, grains, self.alive, self.stale, self.cells])
+        near = self.neighbours.near
+        self._launch(
+            cells.bin_spheres, spheres, [self.model, grains, self.alive, self.stale, near, self.cells]
+        )
         self._launch(cells.open_buckets, self._whole_warps(spheres), [self.model, self.stale, self.cells])
         self._launch(cells.fill_buckets, spheres, [self.model, grains, self.stale, self.cells])
-        near = self.neighbours.near
         self._launch(cells.search, spheres, [self.model, grains, self.stale, near, self.cells])
         threads = self.layout.grain_total * list_threads(self.build)
         self._launch(
-            lists.write_lists, threads, [self.model, self.stale, self.cells, self.neighbours, self.flags]
+            lists.write_lists,
+            threads,
+            [self.model, grains, self.stale, self.cells, self.neighbours, self.flags],
         )
         finish = [grains, self.cells, self.neighbours, self.stale, self.any_stale, self.rebuilds]
         self._launch(lists.finish, self.layout.world_count, finish)
@@ -211,7 +215,7 @@ class Solver:
         """See to it that the next steps meet every contact."""
         watch, grains, total = self._watch_kernels, self.grains[read], self.layout.grain_total
         self._place_walls(steps, read)
-        if self.careful:
+        if self.care == Care.EVERY_STEP:
             self.stale.fill_(1)
             self.any_stale.fill_(1)
         seen = [self.model, grains, self.alive, self.idle]
@@ -221,7 +225,7 @@ class Solver:
         threads = total * WARP if self.device.is_cuda else total
         striking = [steps, self.model, self.alive, self.idle, self.fastest, self.neighbours]
         self._launch(watch.heed_neighbours, threads, striking)
-        if self.careful:
+        if self.care == Care.EVERY_STEP:
             self.neighbours.near.pace.fill_(ANY_PACE)
         self._launch(watch.select_near, threads, [steps, *seen, self.neighbours, self.fastest])
 
@@ -235,8 +239,8 @@ class Solver:
         self._launch(self._watch_kernels.find_fastest, row * self.layout.world_count, inputs)
 
     def _cycle(self, steps: int, read: int = 0) -> None:
-        """Take steps between two looks; a careful solver looks before each."""
-        each = 1 if self.careful else steps
+        """Take steps between two looks, or with a look before each."""
+        each = 1 if self.care == Care.EVERY_STEP else steps
         self._orders = self._order(0), self._order(1)
         for first in range(read, read + steps, each):
             self._look_ahead(each, first % 2)
@@ -245,7 +249,7 @@ class Solver:
             self._look_back((first + each) % 2)
 
     def _graph(self, cycle: int) -> Any:
-        key = (self.lanes, len(self._running), cycle, self.careful)
+        key = (self.lanes, len(self._running), cycle, self.care)
         if key not in self._graphs:
             with wp.ScopedCapture(self.device) as capture:
                 for _ in range(self._cycles_captured(cycle)):
@@ -263,7 +267,7 @@ class Solver:
 
         Grains gain speed by their weight for some chunks; what else sets them in motion, the lists allow for.
         """
-        if self.careful:
+        if self.care != Care.USUAL:
             return SHORTEST_CYCLE
         time_step, skin, gravity = self._pace[:, self._running]
         speed = self.fastest.numpy()[self._running] + gravity * chunks * CHUNK * time_step

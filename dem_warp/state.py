@@ -247,6 +247,9 @@ def build_neighbours(
     near.travel = wp.zeros(layout.grain_total, dtype=precision.real, device=device)
     serial = 0 if wp.get_device(device).is_cuda else layout.grain_total
     near.moves = wp.zeros(serial, dtype=int, device=device)
+    near.first = wp.zeros(serial, dtype=int, device=device)
+    near.afar = wp.zeros(layout.grain_total, dtype=int, device=device)
+    near.top = wp.full(layout.world_count, np.inf, dtype=float, device=device)
     neighbours.near = near
     neighbours.reactions = device_structs(precision).Reactions()
     for name in ("force", "torque"):

@@ -7,7 +7,7 @@ the float64 build used for verification.
 import functools
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from enum import IntFlag
+from enum import IntEnum, IntFlag
 from types import SimpleNamespace
 from typing import Any
 
@@ -30,6 +30,17 @@ class WorldFlag(IntFlag):
     """A grain has more neighbours than the list holds."""
     LATE_REBUILD = 4
     """A grain came farther than its lists allow for, so a contact may have been seen late."""
+
+
+class Care(IntEnum):
+    """Frequency of the looks at the neighbour lists."""
+
+    USUAL = 0
+    """As seldom as the fastest grain allows."""
+    CLOSE = 1
+    """Every other step: a grain at rest may be struck, or begin to roll, sooner than its lists allow for."""
+    EVERY_STEP = 2
+    """Before every step, with lists made for it: slow, and nothing is seen late."""
 
 
 @dataclass(frozen=True)
@@ -233,6 +244,9 @@ def device_structs(precision: Precision) -> SimpleNamespace:
         wall_path: wp.array(dtype=real)  # and any wall [m], (worlds,)
         travel: wp.array(dtype=real)  # of a grain when this was written [m], (grains,)
         moves: wp.array(dtype=int)  # 1: it used up much of the skin, (grains,) on a CPU, else (0,)
+        first: wp.array(dtype=int)  # first item of a grain, (grains,) on a CPU, else (0,)
+        afar: wp.array(dtype=int)  # 1: it waits far above all that move freely, and has no list, (grains,)
+        top: wp.array(dtype=float)  # highest point of these [m], inf if unknown, (worlds,)
 
     @wp.struct
     class Reactions:  # of contacts with grains before it, then of all, so far in a step; 0 between steps

@@ -60,14 +60,15 @@ def cell_kernels(build: Build) -> SimpleNamespace:
 
     @wp.kernel(module=module)
     def bin_spheres(
-        model: Model, grains: Grains, alive: wp.array(dtype=int), stale: wp.array(dtype=int), cells: Cells
-    ):
+        model: Model, grains: Grains, alive: wp.array(dtype=int), stale: wp.array(dtype=int), near: Near,
+        cells: Cells,
+    ):  # fmt: skip
         i = wp.tid()
         g = i // spheres_each
         w = g // model.grain_count
         if stale[w] == 0:
             return
-        if not exists(model, alive, g, i - g * spheres_each):
+        if near.afar[g] != 0 or not exists(model, alive, g, i - g * spheres_each):
             cells.rank[i] = ABSENT
             return
         c = cell_of(pack.load_sphere(grains.spheres, i), model.world[w])

@@ -15,6 +15,7 @@ from types import SimpleNamespace
 import warp as wp
 
 from dem_warp.entries import max_partners, partner_bits
+from dem_warp.kernels.contacts import contact_functions
 from dem_warp.kernels.packing import packing
 from dem_warp.kernels.stale import ALL
 from dem_warp.laws.contact_law import memory_size
@@ -42,7 +43,9 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
     real, vec4 = precision.real, precision.vec4
     types = device_structs(precision)
     Model, Grains, Neighbours, Cells = types.Model, types.Grains, types.Neighbours, types.Cells
+    World = types.World
     pack = packing(precision)
+    contacts = contact_functions(build)
     spheres_each = wp.constant(build.sphere_count)
     bits = wp.constant(partner_bits(build.sphere_count))
     mask = wp.constant(max_partners(build.sphere_count) - 1)
@@ -71,7 +74,7 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
 
     @wp.kernel(module=module, grid_stride=False)
     def write_lists(
-        model: Model, stale: wp.array(dtype=int), cells: Cells, neighbours: Neighbours,
+        model: Model, grains: Grains, stale: wp.array(dtype=int), cells: Cells, neighbours: Neighbours,
         flags: wp.array(dtype=int),
     ):  # fmt: skip
         """A sphere's part of its grain's new list, shared out to some lanes.
@@ -133,12 +136,16 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
             array[first + place] = value
 
     @wp.func
-    def stays(model: Model, neighbours: Neighbours, w: int, entry: int) -> bool:
-        """Tell that the partner of an entry has not moved: a wall, or a grain that stays in its place."""
+    def stays(
+        model: Model, world: World, grains: Grains, neighbours: Neighbours, w: int, g: int, entry: int
+    ) -> bool:
+        """Tell that neither partner of an entry was searched, and that they are near: a grain or a wall."""
         partner = entry & mask
         if partner >= model.grain_count * spheres_each:
             return True
-        return neighbours.near.moves[w * model.grain_count + partner // spheres_each] == 0
+        if neighbours.near.moves[w * model.grain_count + partner // spheres_each] != 0:
+            return False
+        return contacts.nears(model, world, grains, w, g, entry, world.skin + world.reach, grains.step[w])
 
     @wp.func
     def put(neighbours: Neighbours, slot: int, entry: int, old: int):
@@ -153,21 +160,33 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
 
     @wp.kernel(module=module)
     def merge_lists(
-        model: Model, stale: wp.array(dtype=int), cells: Cells, neighbours: Neighbours,
+        model: Model, grains: Grains, stale: wp.array(dtype=int), cells: Cells, neighbours: Neighbours,
         flags: wp.array(dtype=int),
     ):  # fmt: skip
-        """A grain's new list by one thread: what was found, and of the old list what stays."""
+        """A grain's new list by one thread: what was found, and of the old list what stays.
+
+        The list of a grain that has not moved, and is a new partner of none that has, stays as it is. It may
+        have partners that have moved away, which do no harm: they go with the next change.
+        """
         g = wp.tid()
         w = g // model.grain_count
         if stale[w] == 0 or cells.rank[g * spheres_each] < 0:
             return
         world = model.world[w]
         moves = stale[w] == ALL or neighbours.near.moves[g] != 0
+        changes = bool(moves)
+        for i in range(g * spheres_each, g * spheres_each + model.shape_sphere_count[model.shape[g]]):
+            changes = changes or cells.found_count[i] > 0
+            # empty for the next time; every sphere of the bucket writes the same
+            cells.bucket_size[cells.bucket[i]] = 0
+        if not changes:
+            return
         grain_total = model.shape.shape[0]
-        old_row = neighbours.list[w] * grain_total + g
-        new_row = (1 - neighbours.list[w]) * grain_total + g
-        old_end = old_row * neighbours.capacity + neighbours.count[old_row]
-        old = old_row * neighbours.capacity
+        first = g * neighbours.capacity
+        # a row of the second list, which a single thread has no other use for
+        draft = (grain_total + w * model.grain_count) * neighbours.capacity
+        old = int(first)
+        old_end = first + neighbours.count[g]
         place = int(0)
         for s in range(model.shape_sphere_count[model.shape[g]]):
             i = g * spheres_each + s
@@ -189,18 +208,18 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
                     fresh = (s << bits) | cells.found[found]
                 entry = wp.min(listed, fresh)
                 if entry != NO_ENTRY:
-                    if entry == fresh or (not moves and stays(model, neighbours, w, entry)):
+                    if entry == fresh or (not moves and stays(model, world, grains, neighbours, w, g, entry)):
                         if place < world.most_listed:
-                            slot = new_row * neighbours.capacity + place
-                            put(neighbours, slot, entry, wp.where(entry == listed, old, -1))
+                            put(neighbours, draft + place, entry, wp.where(entry == listed, old, -1))
                         place += 1
                     old += wp.where(entry == listed, 1, 0)
                     found += wp.where(entry == fresh, 1, 0)
-            # empty for the next time; every sphere of the bucket writes the same
-            cells.bucket_size[cells.bucket[i]] = 0
         if place > world.most_listed:
             wp.atomic_or(flags, w, NEIGHBOUR_OVERFLOW)
-        neighbours.count[new_row] = wp.min(place, world.most_listed)
+        count = wp.min(place, world.most_listed)
+        for k in range(count):
+            put(neighbours, first + k, neighbours.entry[draft + k], draft + k)
+        neighbours.count[g] = count
         if moves:
             neighbours.travel[g] = real(0.0)
 
@@ -211,7 +230,8 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
     ):  # fmt: skip
         w = wp.tid()
         if stale[w] != 0:
-            neighbours.list[w] = 1 - neighbours.list[w]
+            if wp.static(build.cooperative):
+                neighbours.list[w] = 1 - neighbours.list[w]
             if stale[w] == ALL:
                 neighbours.rebuilt[w] = grains.step[w]
             stale[w] = 0

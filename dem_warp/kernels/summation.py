@@ -45,7 +45,7 @@ def serial_sum(build: Build):
         rolling = f4[3]
         world = model.world[w]
         is_free = step >= model.release_step[g]
-        first = g * neighbours.capacity
+        first = neighbours.near.first[g]
         for item in range(first, first + neighbours.near.count[g]):
             if is_free or contacts.is_free(model, neighbours, w, item, step):
                 f, t, r = contacts.contact(model, world, grains, neighbours, w, g, item, step)

@@ -19,6 +19,9 @@ from dem_warp.kernels.stale import ALL, SOME
 from dem_warp.kernels.walls import wall_functions
 from dem_warp.types import Build, WorldFlag, device_structs
 
+LONGEST_CYCLE = 64
+"""Steps between two looks at the most."""
+
 HEADROOM = 4.0
 """Speed that a grain is allowed to reach, over what it has: an impact makes a falling grain spin."""
 
@@ -31,12 +34,19 @@ SHAKEN = 0.25
 EXPECTED = 1.5
 """Speed that a grain is expected to reach, over what it has."""
 
+KEPT = 0.9
+"""Part of its speed at a look that a grain is taken to have at the next: one that rattles rests at times."""
+
 LEAST_PATH = 0.025
 """Part of the skin that is allowed for at the least: grains at rest may be set in motion."""
 
 JOINED, JOINED_ALONE = 0.25, 0.4
 """Part of the skin, up to one half, from which on a world joins a rebuild that another one calls for; and, on
 a CPU, a grain one that another grain of its world calls for."""
+
+CLEARANCE = 2.0
+"""Skins between a grain that waits and all that move freely, from which on it is left out of the lists: each
+of the two comes half a skin before the next look, and a skin is what lists are made for."""
 
 LATE_REBUILD = wp.constant(int(WorldFlag.LATE_REBUILD))
 
@@ -85,12 +95,27 @@ def watch_kernels(build: Build) -> SimpleNamespace:
         return real(walls.path(model.wall[index], frame, world, time))
 
     @wp.func
+    def waits(model: Model, grains: Grains, w: int, g: int) -> bool:
+        """Tell whether a grain is released after the longest cycle that may come."""
+        return model.release_step[g] > grains.step[w] + wp.static(LONGEST_CYCLE)
+
+    @wp.func
+    def waits_afar(
+        model: Model, world: World, grains: Grains, neighbours: Neighbours, w: int, g: int
+    ) -> bool:
+        """Tell whether a grain waits so high that none that moves freely meets it before the next look."""
+        lowest = float(grains.position[g][2]) - float(model.inertia[g][3])
+        clearance = wp.static(CLEARANCE) * float(world.skin) + float(world.reach)
+        return waits(model, grains, w, g) and lowest > neighbours.near.top[w] + clearance
+
+    @wp.func
     def uses_up(
         model: Model, world: World, grains: Grains, neighbours: Neighbours, g: int, ahead: int, part: real
     ) -> bool:
-        """Tell whether a grain may come farther than a part of the skin within some steps."""
-        speed = real(EXPECTED * speed_of(model, grains, g))
-        return neighbours.travel[g] + speed * real(ahead) * world.time_step > part * world.skin
+        """Tell whether a grain in the lists may come farther than a part of the skin within some steps."""
+        speed = real(EXPECTED * neighbours.near.speed[g])
+        path = wp.max(speed * real(ahead) * world.time_step, real(LEAST_PATH) * world.skin)
+        return neighbours.near.afar[g] == 0 and neighbours.travel[g] + path > part * world.skin
 
     @wp.kernel(module=module)
     def mark_stale(
@@ -125,9 +150,11 @@ def watch_kernels(build: Build) -> SimpleNamespace:
                 if real(2.0) * whole > world.skin:
                     stale[w] = ALL
                     any_stale[0] = 1
-        neighbours.near.speed[g] = speed_of(model, grains, g)
+        neighbours.near.speed[g] = wp.max(speed_of(model, grains, g), float(KEPT) * neighbours.near.speed[g])
         own = float(HEADROOM) * neighbours.near.speed[g]
         neighbours.near.pace[g] = wp.max(own, float(SHAKEN) * fastest[w])
+        afar = waits_afar(model, world, grains, neighbours, w, g)
+        neighbours.near.afar[g] = wp.where(afar, 1, 0)
         if wp.static(not build.cooperative):
             moves = uses_up(model, world, grains, neighbours, g, ahead, real(JOINED_ALONE))
             neighbours.near.moves[g] = wp.where(moves, 1, 0)
@@ -173,7 +200,7 @@ def watch_kernels(build: Build) -> SimpleNamespace:
         g = thread // lanes
         lane = thread - g * lanes
         w = g // model.grain_count
-        if idle[w] != 0 or alive[g] <= 0:
+        if idle[w] != 0 or alive[g] <= 0 or neighbours.near.afar[g] != 0:
             return
         world = model.world[w]
         pace = float(STRUCK) * fastest[w]
@@ -224,9 +251,15 @@ def watch_kernels(build: Build) -> SimpleNamespace:
         step = grains.step[w]
         row = neighbours.list[w] * model.shape.shape[0] + g
         count = neighbours.count[row]
-        if alive[g] <= 0:
+        if alive[g] <= 0 or neighbours.near.afar[g] != 0:
             count = 0
-        found = g * neighbours.capacity
+        first = g * neighbours.capacity
+        if wp.static(not build.cooperative):
+            # a single thread reads items that follow each other, and finds them in its cache
+            if g % model.grain_count != 0:
+                first = neighbours.near.first[g - 1] + neighbours.near.count[g - 1]
+            neighbours.near.first[g] = first
+        found = int(first)
         for k in range(lane, count + lane, lanes):
             slot = row * neighbours.capacity + k
             entry = int(0)
@@ -245,11 +278,12 @@ def watch_kernels(build: Build) -> SimpleNamespace:
                 neighbours.near.item[found + bit_count(bits & ((1 << lane) - 1))] = wp.vec2i(entry, slot)
             found += bit_count(bits)
         if lane == 0:
-            neighbours.near.count[g] = found - g * neighbours.capacity
+            neighbours.near.count[g] = found - first
             neighbours.near.path[g] = own
             neighbours.near.travel[g] = neighbours.travel[g]
             if g % model.grain_count == 0:
                 fastest[w] = 0.0
+                neighbours.near.top[w] = -wp.inf
 
     @wp.kernel(module=module, grid_stride=False)
     def find_fastest(
@@ -265,22 +299,26 @@ def watch_kernels(build: Build) -> SimpleNamespace:
         fastest: wp.array(dtype=float),
         flags: wp.array(dtype=int),
     ):
-        """Speed of the fastest grain or wall of each world; `row` threads a world, whole warps on a GPU.
+        """Speed of the fastest grain or wall of each world, and highest point of the grains that do not wait.
 
-        Flags the worlds in which a grain came farther than its lists allowed for.
+        `row` threads a world, whole warps on a GPU. Flags the worlds in which a grain came farther than its
+        lists allowed for.
         """
         thread = wp.tid()
         w = thread // row
         place = thread - w * row
         speed = float(0.0)
+        top = float(-wp.inf)
         if idle[w] == 0 and place < model.grain_count:
             world = model.world[w]
             g = w * model.grain_count + place
             if alive[g] > 0:
                 speed = speed_of(model, grains, g)
+                if not waits(model, grains, w, g):
+                    top = float(grains.position[g][2]) + float(model.inertia[g][3])
                 travel = neighbours.travel[g]
-                since = travel - neighbours.near.travel[g]
-                if since > neighbours.near.path[g] or real(2.0) * travel > world.skin:
+                outruns = neighbours.near.afar[g] == 0 and real(2.0) * travel > world.skin
+                if outruns or travel - neighbours.near.travel[g] > neighbours.near.path[g]:
                     wp.atomic_or(flags, w, LATE_REBUILD)
             if place == 0:
                 for i in range(walls_each):
@@ -289,8 +327,12 @@ def watch_kernels(build: Build) -> SimpleNamespace:
                         wp.atomic_or(flags, w, LATE_REBUILD)
                     speed = wp.max(speed, float(wall_path(model, world, grains, w, i, 1) / world.time_step))
         speed = largest_of_warp(speed)
-        if thread % lanes == 0 and speed > 0.0:
-            wp.atomic_max(fastest, w, speed)
+        top = largest_of_warp(top)
+        if thread % lanes == 0:
+            if speed > 0.0:
+                wp.atomic_max(fastest, w, speed)
+            if top > -wp.inf:
+                wp.atomic_max(neighbours.near.top, w, top)
 
     return SimpleNamespace(
         mark_stale=mark_stale,

@@ -1,6 +1,7 @@
 """Neighbour lists that a grain outruns: its world takes the steps again, or ends with the reason."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import pytest
 from worlds import PYRAMID, SMALL_TUBE, assert_same_result, run_batch, small_case
@@ -8,6 +9,7 @@ from worlds import PYRAMID, SMALL_TUBE, assert_same_result, run_batch, small_cas
 from dem_warp import Case, batch, simulate, solver
 from dem_warp.rollback import Rollback
 from dem_warp.scenes.poured_scene import default_skin
+from dem_warp.types import Care
 
 FEW = replace(SMALL_TUBE, grain_count=24)
 """Three layers, of which grains outrun their lists in the rain and at the lift, two dozen times."""
@@ -43,6 +45,23 @@ def test_a_world_that_outran_its_lists_takes_its_steps_again(heap, restored, mon
     [result] = simulate([few()], device="cpu", workers=1)
     assert len(restored) > 1
     assert_same_result(result, heap)
+
+
+def test_steps_are_taken_again_with_a_closer_look_first(heap, monkeypatch):
+    # A skin of four steps of the fall: what the looks of a usual stretch miss, mostly those of every other
+    # step see, and only for the rest is there one before each step.
+    cares, advance = [], solver.Solver.advance
+
+    def note(self, chunks):
+        cares.append(self.care)
+        advance(self, chunks)
+
+    monkeypatch.setattr(solver.Solver, "advance", note)
+    monkeypatch.setattr(solver, "SKIN_PER_SERIAL_CYCLE", 4.0)
+    [result] = simulate([few()], device="cpu", workers=1)
+    assert_same_result(result, heap)
+    assert Care.CLOSE in cares
+    assert all(now <= before + 1 for before, now in pairwise(cares))
 
 
 def test_a_world_that_is_taken_back_changes_no_other(heap, restored, monkeypatch):

@@ -1,5 +1,7 @@
 """Neighbour lists: complete, in order, and without influence on the motion."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from worlds import (
@@ -7,11 +9,13 @@ from worlds import (
     PILE_STEP,
     PILE_TUBE,
     PYRAMID,
+    SMALL_TUBE,
     assert_same_bits,
     grains,
     pair,
     pile,
     run_for,
+    small_case,
     solve,
     spheres_of,
     state,
@@ -153,6 +157,27 @@ def test_contacts_keep_their_history_over_a_thousand_rebuilds(settled):
     assert_same_bits(state(solver), settled)
 
 
+def test_grains_that_wait_high_above_are_in_no_list():
+    # Sixty grains come down in a column of 0.1 m, so close that each has others about it when it is released.
+    case = small_case(scene=replace(SMALL_TUBE, grain_count=60, rain_rate=300.0))
+    [setup] = case.scene.prepare([case], "cpu")
+    solver, left_out = Solver([setup], "cpu"), []
+    owner = np.arange(60 * SPHERES) // SPHERES
+    while solver.grains[0].step.numpy()[0] < setup.grains.release_steps.max():
+        solver.advance(1)
+        free = (setup.grains.release_steps <= solver.grains[0].step.numpy()[0])[owner]
+        afar = (solver.neighbours.near.afar.numpy() > 0)[owner]
+        assert not (afar & free).any()
+        travel = solver.neighbours.travel.numpy().astype(float)
+        travel[afar[::SPHERES]] = 0.0
+        pairs = {(i, j) for i, j in near(solver, setup.skin, travel) if j < len(owner)}
+        assert {(i, j) for i, j in pairs if free[i] or free[j]} <= set(listed(solver))
+        left_out.append(afar.mean())
+    assert max(left_out) > 0.5
+    assert min(left_out) == 0.0
+    assert solver.flags.numpy()[0] == 0
+
+
 def test_a_list_that_is_too_short_is_flagged():
     solver = solve(pile(), precision="mixed", capacity=8)
     solver.advance(12)
@@ -177,9 +202,9 @@ def test_lists_that_are_made_anew_in_part_miss_nobody(settled):
         travel = solver.neighbours.travel.numpy().astype(float)
         assert near(solver, skin, travel) <= set(listed(solver))
         moved.append(solver.neighbours.near.moves.numpy().mean())
-    # most rebuilds were of some grains alone
+    # many rebuilds were of some grains alone
     assert solver.rebuilds.numpy()[0] > 20
-    assert 0.0 < np.mean(moved) < 0.5
+    assert sum(0.0 < part < 0.3 for part in moved) >= 5
     run_for(solver, FALL - chunks * CHUNK * PILE_STEP)
     assert solver.flags.numpy()[0] == 0
     assert_same_bits(state(solver), settled)
