@@ -191,18 +191,14 @@ class Solver:
         spheres, grains = self.layout.sphere_total, self.grains[read]
         cells, lists = self._cell_kernels, self._list_kernels
         near = self.neighbours.near
-        self._launch(
-            cells.bin_spheres, spheres, [self.model, grains, self.alive, self.stale, near, self.cells]
-        )
+        binned = [self.model, grains, self.alive, self.stale, near, self.cells]
+        self._launch(cells.bin_spheres, spheres, binned)
         self._launch(cells.open_buckets, self._whole_warps(spheres), [self.model, self.stale, self.cells])
         self._launch(cells.fill_buckets, spheres, [self.model, grains, self.stale, self.cells])
         self._launch(cells.search, spheres, [self.model, grains, self.stale, near, self.cells])
         threads = self.layout.grain_total * list_threads(self.build)
-        self._launch(
-            lists.write_lists,
-            threads,
-            [self.model, grains, self.stale, self.cells, self.neighbours, self.flags],
-        )
+        written = [self.model, grains, self.stale, self.cells, self.neighbours, self.flags]
+        self._launch(lists.write_lists, threads, written)
         finish = [grains, self.cells, self.neighbours, self.stale, self.any_stale, self.rebuilds]
         self._launch(lists.finish, self.layout.world_count, finish)
 
@@ -365,7 +361,10 @@ class Solver:
 
     def view(self, worlds: Sequence[int]) -> list[WorldView]:
         """State of some worlds for their scenes, copied from the device."""
-        n, grains, chosen = self.layout.grain_count, self.grains[0], list(worlds)
+        n, grains = self.layout.grain_count, self.grains[0]
+        chosen: Any = list(worlds)
+        if self.device.is_cuda and chosen == list(range(self.layout.world_count)):
+            chosen = slice(None)  # all are copies from the device already
         steps = grains.step.numpy()[chosen]
         alive = self.alive.numpy().reshape(-1, n)[chosen] > 0
         released = self.model.release_step.numpy().reshape(-1, n)[chosen] <= steps[:, None]

@@ -111,8 +111,8 @@ class PouredController(ABC, Generic[CourseT]):
         if self.poured.grain_count is not None or view.highest <= self.poured.brim:
             return False
         above = view.alive & view.released & (view.positions[:, 2] > self.poured.brim)
-        slow = np.linalg.norm(view.velocities, axis=1) < 0.5 * self.poured.rain_speed
-        return bool(np.count_nonzero(above & slow) >= HEAPED)
+        slow = np.linalg.norm(view.velocities[above], axis=1) < 0.5 * self.poured.rain_speed
+        return bool(np.count_nonzero(slow) >= HEAPED)
 
     def _settle(self, view: WorldView) -> Decision:
         if view.time - self.course.phase_start > self.SETTLE_LIMIT:
