@@ -155,6 +155,8 @@ def watch_kernels(build: Build) -> SimpleNamespace:
         neighbours.near.pace[g] = wp.max(own, float(SHAKEN) * fastest[w])
         afar = waits_afar(model, world, grains, neighbours, w, g)
         neighbours.near.afar[g] = wp.where(afar, 1, 0)
+        if afar:
+            neighbours.travel[g] = world.skin  # it is searched as soon as it needs a list
         if wp.static(not build.cooperative):
             moves = uses_up(model, world, grains, neighbours, g, ahead, real(JOINED_ALONE))
             neighbours.near.moves[g] = wp.where(moves, 1, 0)
