@@ -24,6 +24,7 @@ from dem_warp.checkpoint import Checkpoints
 from dem_warp.device import resolve_device
 from dem_warp.scenes.lifted_cylinder import Lift
 from dem_warp.snapshot import put_snapshot, take_snapshot
+from dem_warp.solver import CHUNK
 from dem_warp.walls import Motion
 
 NEVER, ALWAYS = 1e9, 0.0
@@ -328,3 +329,18 @@ def test_a_snapshot_of_another_world_is_refused_and_changes_nothing():
         with pytest.raises(ValueError, match=message):
             put_snapshot(solver, 0, bad)
         assert_same_bits(take_snapshot(solver, 0), untouched)
+
+
+def test_a_world_goes_on_in_the_rain_where_another_had_hardly_begun():
+    """Grains that wait high above the others are in no list; how high is that of the snapshot, at once."""
+    case = small_case(scene=replace(SMALL_TUBE, grain_count=60, rain_rate=300.0))
+    first, second = start(case), start(case)
+    released = int(first.setups[0].grains.release_steps[20])
+    first.solver.advance(released // CHUNK)
+    second.solver.advance(1)
+    assert 0.2 < first.solver.neighbours.near.afar.numpy().mean() < 0.8
+    put_snapshot(second.solver, 0, take_snapshot(first.solver, 0))
+    for batch in (first, second):
+        batch.solver.advance(2)
+        assert batch.solver.flags.numpy()[0] == 0
+    assert_same_bits(state(second.solver), state(first.solver))
