@@ -31,7 +31,7 @@ def take_snapshot(solver: Solver, world: int) -> Snapshot:
     """Everything that the next steps of a world follow from, beside its setup.
 
     To be called between two calls of `Solver.advance`: the first copy of the grains is then the present one,
-    and the next step writes the second.
+    and the next step writes the second, or on a CPU the only one.
     """
     counts = _counts(solver, world)
     snapshot = {field.name: field.read() for field in _fields(solver, world, counts)}

@@ -256,7 +256,7 @@ def device_structs(precision: Precision) -> SimpleNamespace:
     @wp.struct
     class Neighbours:
         capacity: int  # entries a grain
-        list: wp.array(dtype=int)  # which of the two lists holds, (worlds,)
+        list: wp.array(dtype=int)  # which of the two lists holds, (worlds,); the first on a CPU
         count: wp.array(dtype=int)  # (2 * grains,)
         entry: wp.array(dtype=int)  # own sphere's number and partner, (2 * grains * capacity,)
         history: wp.array(dtype=vec4)  # tangential displacement [m] and the step of it, one an entry

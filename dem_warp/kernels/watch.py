@@ -3,7 +3,8 @@
 All is done for some steps ahead. From the speeds of a grain and of its neighbours, which may strike it,
 follows how far it may come in that time, so that only the entries of a list that are nearer than the paths of
 the two can touch: the step looks at these alone. Afterwards it is seen whether all kept to it; a world whose
-grains did not is flagged.
+grains did not is flagged. Grains that wait high above all others, as most do when a rain begins, touch nobody
+and are left out.
 """
 
 import functools

@@ -148,7 +148,7 @@ def test_the_cycle_does_not_change_the_motion(settled, cycle):
 
 def test_contacts_keep_their_history_over_a_thousand_rebuilds(settled):
     # The fall and the impacts use this skin up within a few cycles of two steps; it is late in none
-    # (measured: 3053).
+    # (measured: 4073).
     solver = solve(pile(skin=1e-4), precision="mixed")
     solver.cycle_limit = 2
     run_for(solver, FALL)
