@@ -9,6 +9,7 @@ from .laws.mechanism import Mechanism
 from .materials import Interaction, Material, WallPart, effective_moduli, rayleigh_time
 from .parameters import Parameter
 from .population import GrainPopulation, ShapeMixture, SizeClasses
+from .processes import Processes
 from .result import CaseResult, Progress
 from .scenes.draw_down import DrawDown
 from .scenes.drum import Drum
@@ -40,6 +41,7 @@ __all__ = [
     "Mechanism",
     "Numerics",
     "Parameter",
+    "Processes",
     "Progress",
     "ShapeMixture",
     "SizeClasses",

@@ -1,10 +1,14 @@
 """Cases spread over processes on a CPU: one world a task, as Warp's CPU kernels use one thread."""
 
+from __future__ import annotations
+
+import ctypes
 import multiprocessing
 import os
+import signal
 import threading
 from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from typing import Any
 
 from dem_warp.batch import Onlooker, begin
@@ -19,15 +23,44 @@ REPORT_EVERY = 0.5
 PHASE_LENGTH = 16
 """Characters of a phase's name that travel between processes."""
 
+NO_CASE = -1
+"""Index of the case of a process that has none."""
+
 Report = Callable[[Sequence[float], Sequence[str]], None]
 """Takes the fraction done and the phase of every case."""
 
-_shared: dict[str, Any] = {}
+_CONTEXT = multiprocessing.get_context("spawn")
 
 
-def _start_worker(fractions: Any, phases: Any) -> None:
-    _shared.update(fractions=fractions, phases=phases)
+class _Stand(ctypes.Structure):
+    """What a process is at, which its parent reads at any time.
+
+    No lock guards it: a process that is killed would keep it. So what is read may be half of it old.
+    """
+
+    _fields_ = (
+        ("case", ctypes.c_int),
+        ("fraction", ctypes.c_double),
+        ("phase", ctypes.c_char * PHASE_LENGTH),
+    )
+
+    def put(self, case: int, fraction: float, phase: str) -> None:
+        """Tell of a case how far it is."""
+        self.fraction, self.phase, self.case = fraction, phase.encode()[:PHASE_LENGTH], case
+
+
+_own: list[_Stand] = []
+"""Where this process tells what it is at."""
+
+
+def _start(stands: Any, started: Any) -> None:
+    """Begin a process: its parent ends it, not Ctrl-C, which reaches every process of a terminal."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     end_with_parent()
+    with started.get_lock():
+        number = started.value
+        started.value += 1
+    _own.append(stands[number])
 
 
 def end_with_parent() -> None:
@@ -44,64 +77,117 @@ def _wait_for_parent() -> None:
 def _run_case(
     index: int, case: Case, checkpoints: Checkpoints | None, onlooker: Onlooker | None
 ) -> CaseResult:
-    """Run one case in a worker, leaving its progress in the shared memory."""
+    """Run one case in a process, which tells how far it is."""
     batch, _, refused = begin([case], resolve_device("cpu"), checkpoints, onlooker)
     if batch is None:
         return refused[0]
-    while True:
-        ended = batch.advance()
-        if ended:
-            return ended[0][1]
-        _shared["fractions"][index] = batch.fraction(0)
-        name = batch.phase(0).encode()[:PHASE_LENGTH].ljust(PHASE_LENGTH)
-        _shared["phases"][index * PHASE_LENGTH : (index + 1) * PHASE_LENGTH] = name
+    try:
+        while not (ended := batch.advance()):
+            _own[0].put(index, batch.fraction(0), batch.phase(0))
+    finally:
+        _own[0].case = NO_CASE
+    return ended[0][1]
 
 
-def run_in_processes(
-    cases: Sequence[Case],
-    workers: int,
-    on_result: OnResult,
-    report: Report,
-    checkpoints: Checkpoints | None = None,
-    onlooker: Onlooker | None = None,
-) -> None:
-    """Run cases, `workers` at a time.
+class Processes:
+    """Processes that simulate cases on a CPU, for one call of `simulate` after another.
+
+    They start with the first cases, and stay until the block of a ``with`` ends.
 
     Parameters
     ----------
-    cases : sequence of Case
-    workers : int
-    on_result : callable
-        Called with index and result of each case as it ends.
-    report : callable
-        Called now and then with the fraction done and the phase of every case.
-    checkpoints : Checkpoints, optional
-        Where the processes save their cases and take them up.
-    onlooker : Onlooker, optional
-        Sees the batch of each case, in its process.
+    count : int
+        Cases that are simulated at once.
+
+    Examples
+    --------
+    >>> with Processes(2) as processes:
+    ...     first = simulate(cases, "cpu", processes)
+    ...     then = simulate(others, "cpu", processes)
     """
-    context = multiprocessing.get_context("spawn")
-    fractions = context.Array("d", len(cases))
-    phases = context.Array("c", b"waiting".ljust(PHASE_LENGTH) * len(cases))
-    with ProcessPoolExecutor(workers, context, _start_worker, (fractions, phases)) as pool:
-        futures: dict[Future[CaseResult], int] = {
-            pool.submit(_run_case, i, case, checkpoints, onlooker): i for i, case in enumerate(cases)
-        }
-        pending = set(futures)
+
+    def __init__(self, count: int) -> None:
+        self.count = count
+        self._pool: ProcessPoolExecutor | None = None
+        self._stands: Any = None
+
+    def __enter__(self) -> Processes:
+        """Return these processes, which start later."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """End the processes."""
+        self.end()
+
+    def run(
+        self,
+        cases: Sequence[Case],
+        on_result: OnResult,
+        report: Report,
+        checkpoints: Checkpoints | None = None,
+        onlooker: Onlooker | None = None,
+    ) -> None:
+        """Run cases, `count` at a time.
+
+        Parameters
+        ----------
+        cases : sequence of Case
+        on_result : callable
+            Called with index and result of each case as it ends.
+        report : callable
+            Called now and then with the fraction done and the phase of every case.
+        checkpoints : Checkpoints, optional
+            Where the processes save their cases and take them up.
+        onlooker : Onlooker, optional
+            Sees the batch of each case, in its process.
+
+        Raises
+        ------
+        concurrent.futures.process.BrokenProcessPool
+            When a process is lost. All end then, as they do at any other error, and the next call starts
+            new ones.
+        """
+        pool = self._started()
+        fractions, phases = [0.0] * len(cases), ["waiting"] * len(cases)
         try:
+            futures = {
+                pool.submit(_run_case, i, case, checkpoints, onlooker): i for i, case in enumerate(cases)
+            }
+            pending = set(futures)
             while pending:
                 finished, pending = wait(pending, REPORT_EVERY, FIRST_COMPLETED)
+                self._look(fractions, phases)
                 for future in finished:
                     fractions[futures[future]] = 1.0
                     on_result(futures[future], future.result())
-                report(fractions[:], _names(bytes(phases[:])))
+                report(fractions, phases)
         except BaseException:
+            self._give_up()
+            raise
+
+    def end(self) -> None:
+        """End the processes, none of which has a case."""
+        if pool := self._pool:
+            self._pool = None
+            pool.shutdown()
+
+    def _started(self) -> ProcessPoolExecutor:
+        if self._pool is None:
+            self._stands = _CONTEXT.RawArray(_Stand, [(NO_CASE, 0.0, b"")] * self.count)
+            begun = (self._stands, _CONTEXT.Value("i", 0))
+            self._pool = ProcessPoolExecutor(self.count, _CONTEXT, _start, begun)
+        return self._pool
+
+    def _look(self, fractions: list[float], phases: list[str]) -> None:
+        """Read how far the running cases are."""
+        for stand in self._stands:
+            if stand.case != NO_CASE:
+                fractions[stand.case], phases[stand.case] = stand.fraction, stand.phase.decode()
+
+    def _give_up(self) -> None:
+        """End the processes, whatever they are at."""
+        if pool := self._pool:
+            self._pool = None
             pool.shutdown(wait=False, cancel_futures=True)
             for process in multiprocessing.active_children():
                 process.terminate()
-            raise
-
-
-def _names(phases: bytes) -> list[str]:
-    starts = range(0, len(phases), PHASE_LENGTH)
-    return [phases[i : i + PHASE_LENGTH].rstrip(b" \0").decode() for i in starts]

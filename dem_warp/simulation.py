@@ -4,6 +4,7 @@ import os
 import time
 from collections import Counter
 from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -11,14 +12,14 @@ from dem_warp.batch import Onlooker, begin
 from dem_warp.case import Case
 from dem_warp.checkpoint import CHECKPOINT_EVERY, Checkpoints
 from dem_warp.device import resolve_device
-from dem_warp.processes import REPORT_EVERY, Report, run_in_processes
+from dem_warp.processes import REPORT_EVERY, Processes, Report
 from dem_warp.result import CaseResult, OnProgress, OnResult, Progress
 
 
 def simulate(
     cases: Sequence[Case],
     device: str | None = None,
-    workers: int | None = None,
+    workers: int | Processes | None = None,
     on_result: OnResult | None = None,
     on_progress: OnProgress | None = None,
     checkpoint: str | Path | None = None,
@@ -32,8 +33,9 @@ def simulate(
     cases : sequence of Case
     device : str, optional
         "cpu", "cuda" or "cuda:N"; by default the GPU if there is one.
-    workers : int, optional
-        Processes on a CPU; by default one a core. Warp's CPU kernels run on one thread.
+    workers : int or Processes, optional
+        Processes on a CPU; by default one a core. Warp's CPU kernels run on one thread. A number of them
+        start for this call; `Processes` stay for the next one.
     on_result : callable, optional
         Called with the index and the result of each case as it ends.
     on_progress : callable, optional
@@ -77,12 +79,19 @@ def simulate(
             share = sum(fractions) / len(fractions)
             on_progress(Progress(len(results), len(cases), share, dict(running), seconds))
 
-    count = min(workers or os.cpu_count() or 1, len(cases)) if name == "cpu" else 1
-    if count > 1:
-        run_in_processes(cases, count, keep, report, checkpoints, onlooker)
-    else:
-        _run_batches(cases, name, keep, report, checkpoints, onlooker)
+    with _processes(workers, len(cases)) as processes:
+        if name == "cpu" and min(processes.count, len(cases)) > 1:
+            processes.run(cases, keep, report, checkpoints, onlooker)
+        else:
+            _run_batches(cases, name, keep, report, checkpoints, onlooker)
     return [results[i] for i in range(len(cases))]
+
+
+def _processes(workers: int | Processes | None, cases: int) -> AbstractContextManager[Processes]:
+    """Processes for one call, or those of a caller, who ends them."""
+    if isinstance(workers, Processes):
+        return nullcontext(workers)
+    return Processes(min(workers or os.cpu_count() or 1, cases))
 
 
 def _run_batches(

@@ -7,8 +7,8 @@
 
 The wave is of heaps of one study. On CPUs it runs on this machine's own processes and on workers of Dask,
 with one and with two of each; on GPUs with one of them and with two, each with as many workers as is said.
-Kernels are compiled and loaded before; processes of this machine's own start with each wave, which counts.
-The load of the machine is part of the answer: on one that others use, two workers get what is left.
+Processes run a case each before, so that they are there and have their kernels. The load of the machine is
+part of the answer: on one that others use, two workers get what is left.
 """
 
 from __future__ import annotations

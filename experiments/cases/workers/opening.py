@@ -6,9 +6,11 @@ import logging
 import warnings
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
+from dem_warp import Processes
 from experiments.cases.workers.own import OwnWorkers
 from experiments.cases.workers.resources import Resources
 from experiments.cases.workers.workers import Workers
@@ -28,6 +30,11 @@ SETTINGS = {
     # A batch whose worker is lost goes to another one, and batch systems end jobs many times in a campaign.
     "distributed.scheduler.allowed-failures": 10,
     "distributed.worker.multiprocessing-method": "spawn",
+    # Looks of Dask at itself, up to a hundred a second, take 5 % of the time of cores that all simulate.
+    "distributed.worker.profile.enabled": False,
+    "distributed.worker.memory.monitor-interval": "10s",
+    "distributed.admin.tick.interval": "1s",
+    "distributed.admin.system-monitor.interval": "10s",
 }
 """Settings of the clusters that are started here."""
 
@@ -44,7 +51,9 @@ def open_workers(resources: Resources) -> Iterator[Workers]:
     """
     gpus = [] if resources.is_cluster else resources.gpus
     if not resources.is_cluster and len(gpus) * resources.sharing < 2:
-        yield OwnWorkers(gpus[0] if gpus else "cpu", None if gpus else resources.workers)
+        own = OwnWorkers(gpus[0] if gpus else "cpu", None if gpus else resources.workers)
+        with Processes(own.count) as processes:
+            yield replace(own, processes=processes)
         return
     require_dask()
     import dask

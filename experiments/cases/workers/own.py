@@ -11,7 +11,7 @@ from typing import Any
 
 import warp as wp
 
-from dem_warp import Case, CaseResult, simulate
+from dem_warp import Case, CaseResult, Processes, simulate
 from dem_warp.batch import Onlooker
 from dem_warp.checkpoint import CHECKPOINT_EVERY
 from dem_warp.device import resolve_device
@@ -38,6 +38,8 @@ class OwnWorkers:
     """Processes on the CPU; None: one a core."""
     onlooker: Onlooker | None = None
     """Onlooker of the batches of dem-warp's own engine."""
+    processes: Processes | None = None
+    """Processes that stay from wave to wave; None: a wave starts its own."""
 
     @cached_property
     def name(self) -> str:
@@ -95,11 +97,12 @@ class OwnWorkers:
 
         def run(batch: int, members: list[int]) -> None:
             every = checkpoint_interval(len(members) if self.on_gpu else 1)
-            simulator = engine or partial(simulate, onlooker=self.onlooker, checkpoint_every=every)
+            own = partial(simulate, onlooker=self.onlooker, checkpoint_every=every)
+            processes = self.processes or self.workers
+            simulator = partial(engine, workers=self.workers) if engine else partial(own, workers=processes)
             simulator(
                 [cases[index] for index in members],
                 device=self.name,
-                workers=self.workers,
                 on_result=lambda number, result: wave.take(members[number], result),
                 on_progress=partial(wave.follow, batch, members),
                 checkpoint=checkpoint,

@@ -1,0 +1,78 @@
+"""Processes that simulate cases: they stay from call to call, and are replaced when one is lost."""
+
+import multiprocessing
+import os
+import signal
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+from worlds import assert_same_result, small_case
+
+from dem_warp import Processes, Progress, simulate
+from dem_warp.batch import Batch
+
+CASES = [small_case(seed=seed) for seed in (1, 2, 3)]
+
+
+@dataclass(frozen=True)
+class Signature:
+    """Leaves a file with the number of each process that simulates."""
+
+    folder: Path
+
+    def __call__(self, batch: Batch) -> None:
+        """Leave the file."""
+        (self.folder / str(os.getpid())).touch()
+
+
+@dataclass(frozen=True)
+class Loss:
+    """Kills the process that simulates."""
+
+    def __call__(self, batch: Batch) -> None:
+        """Kill it."""
+        os.kill(os.getpid(), signal.SIGKILL)
+
+
+def signed(folder: Path, processes: Processes) -> set[str]:
+    """Numbers of the processes that simulate the cases."""
+    folder.mkdir()
+    simulate(CASES, "cpu", processes, onlooker=Signature(folder))
+    return {path.name for path in folder.iterdir()}
+
+
+def test_processes_stay_from_call_to_call_and_end_with_their_block(tmp_path: Path) -> None:
+    before = multiprocessing.active_children()
+    with Processes(2) as processes:
+        assert multiprocessing.active_children() == before
+        first, second = (signed(tmp_path / name, processes) for name in ("first", "second"))
+        assert len(first | second) <= 2
+    assert multiprocessing.active_children() == before
+
+
+def test_a_case_has_the_same_bits_whatever_its_process_has_simulated_before() -> None:
+    alone = [simulate([case], "cpu", 1)[0] for case in CASES]
+    with Processes(2) as processes:
+        simulate(CASES[:2], "cpu", processes)
+        for one, other in zip(alone, simulate(CASES[::-1], "cpu", processes)[::-1], strict=True):
+            assert_same_result(one, other)
+
+
+def test_a_call_after_one_that_lost_a_process_has_new_ones(tmp_path: Path) -> None:
+    with Processes(2) as processes:
+        first = signed(tmp_path / "first", processes)
+        with pytest.raises(BrokenProcessPool):
+            simulate(CASES, "cpu", processes, onlooker=Loss())
+        assert signed(tmp_path / "second", processes).isdisjoint(first)
+
+
+def test_each_call_tells_of_its_own_progress() -> None:
+    told: list[Progress] = []
+    with Processes(2) as processes:
+        for _ in range(2):
+            told.clear()
+            simulate(CASES, "cpu", processes, on_progress=told.append)
+            assert told[0].total == told[-1].done == len(CASES)
+            assert told[0].fraction < told[-1].fraction == 1.0
