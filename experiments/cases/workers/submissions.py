@@ -5,7 +5,10 @@ from __future__ import annotations
 import re
 import shlex
 import shutil
+import signal
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from experiments.errors import InputError
@@ -27,9 +30,20 @@ _SAID = re.compile(r"\nstdout:\n(.*)\nstderr:\n(.*)", re.DOTALL)
 
 def cluster_class(kind: str) -> Any:
     """Class of dask-jobqueue for a kind of `ClusterSection`."""
-    import dask_jobqueue
+    with _ctrl_c_kept():
+        import dask_jobqueue
 
     return getattr(dask_jobqueue, SYSTEMS[kind])
+
+
+@contextmanager
+def _ctrl_c_kept() -> Iterator[None]:
+    """Keep what Ctrl-C does: as dask-jobqueue is loaded, it lets it end Python with the exit code 0."""
+    before = signal.getsignal(signal.SIGINT)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def submit_command(kind: str) -> str:

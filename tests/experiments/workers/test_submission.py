@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import select
+import signal
 import subprocess
 import sys
 import threading
@@ -77,6 +79,30 @@ def test_jobs_that_are_refused_end_the_command_in_the_words_of_the_batch_system(
     assert "Traceback" not in done.stderr
     assert "non-zero exit code" not in done.stderr
     assert not out.exists()
+
+
+def test_ctrl_c_ends_a_command_whose_jobs_wait_as_any_other(
+    write_study: Callable[..., Path], profile: Path, tmp_path: Path
+) -> None:
+    taken = tmp_path / "taken"
+    os.mkfifo(taken)
+    path = install(tmp_path / "bin", f"echo yes > {taken}; echo Submitted batch job 7")
+    (path / "scancel").symlink_to("/bin/true")
+    words = ["calibrate", str(write_study()), "--cluster", str(profile), "--out", str(tmp_path / "out")]
+    # what a test is started from may ignore Ctrl-C
+    program = f"import signal; signal.signal(signal.SIGINT, signal.default_int_handler); {PROGRAM}"
+    with subprocess.Popen(
+        [sys.executable, "-c", program, *words],
+        stderr=subprocess.PIPE, text=True, env=os.environ | {"PATH": f"{path}:{os.environ['PATH']}"},
+    ) as process:  # fmt: skip
+        listening = os.open(taken, os.O_RDONLY | os.O_NONBLOCK)
+        assert select.select([listening], [], [], 60.0)[0]
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=60)
+    os.close(listening)
+    assert process.returncode == 130
+    assert "Interrupted. Begin again with: dem-warp calibrate" in " ".join(err.split())
+    assert "Traceback" not in err
 
 
 def test_jobs_in_a_queue_are_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
