@@ -217,7 +217,10 @@ class _Session:
         while pile or self.running:
             while pile and len(self.running) < most:
                 self._submit(pile.pop())
-            self._listen()
+            if self.wave.is_complete:
+                self._await_ends()
+            else:
+                self._listen()
             pile += self._collect()
 
     def close(self) -> None:
@@ -243,6 +246,14 @@ class _Session:
             self.wave.report()
         else:
             self._hear_each(said)
+        self._hear_all()
+
+    def _await_ends(self) -> None:
+        """Wait a while for batches that have said all; one that runs again asks what is wanted."""
+        from distributed import wait
+
+        with suppress(TimeoutError), self.client.as_current():
+            wait(list(self.running.values()), timeout=LISTEN)
         self._hear_all()
 
     def _hear_all(self) -> None:

@@ -52,6 +52,11 @@ class Wave:
         self._fractions = np.zeros(len(cases))
         self._phases: dict[int, Mapping[str, int]] = {}
 
+    @property
+    def is_complete(self) -> bool:
+        """Tell that every case has given its result."""
+        return len(self.results) == len(self.costs)
+
     def left(self, members: Sequence[int]) -> list[int]:
         """Members of a batch that have given no result yet."""
         return [index for index in members if index not in self.results]
@@ -88,7 +93,7 @@ class Wave:
             phases.update(counts)
         if (waiting := total - done - phases.total()) > 0:
             phases["waiting"] += waiting
-        fraction = 1.0 if done == total else float(self.costs @ self._fractions / self.costs.sum())
+        fraction = 1.0 if self.is_complete else float(self.costs @ self._fractions / self.costs.sum())
         seconds = time.perf_counter() - self._started
         progress = WaveProgress(done, total, fraction, dict(phases), seconds, self._expected)
         self._call(self._on_progress, progress)
