@@ -31,7 +31,7 @@ from dem_warp.scenes.scene import course_of
 from dem_warp.snapshot import put_snapshot, take_snapshot
 from dem_warp.solids import read_mesh
 from doe import DesignError
-from doe.discrepancy import Bank, MechanismRange, SearchSpace, load_bank
+from doe.discrepancy import Bank, MechanismRange, SearchSpace, fitted, load_bank
 from experiments.cases import Store
 from experiments.commands.shapes import ClumpRequest, make_clump
 from experiments.discover.outcome_table import OutcomeTable
@@ -148,25 +148,32 @@ def picture(folder: Path) -> Reader:
 def bank(folder: Path) -> Reader:
     """Banks of library waves."""
     rng = np.random.default_rng(1)
-    rows, space = (
-        24,
-        SearchSpace(("E",), (0.2,), (0.6,), ("test",), (False,), (MechanismRange("tilt", 0.0, 0.1),)),
-    )
+    space = SearchSpace(("E",), (0.2,), (0.6,), ("test",), (False,), (MechanismRange("tilt", 0.0, 0.1),))
+    rows, mechanisms = 36, np.repeat([-1, 0], [24, 12])
+    points = rng.uniform(-1, 1, (rows, 1))
+    points[16:24] = 0.0  # repeats
+    seen = np.column_stack([np.sin(6.0 * points[:, 0]), rng.normal(size=rows)])
     made = Bank(
         space,
         ("angle", "height"),
-        rng.uniform(-1, 1, (rows, 1)),
-        np.arange(rows) % 2 - 1,
-        rng.uniform(0, 1, rows),
+        points,
+        mechanisms,
+        np.where(mechanisms < 0, 0.0, rng.uniform(0, 1, rows)),
         np.zeros(rows, dtype=int),
-        rng.normal(size=(rows, 2)).astype(np.float32).astype(float),
+        seen.astype(np.float32).astype(float),
         np.full(rows, ""),
         "study",
         {"engine": "e", "day": "2026-11-22"},
     )
-    made.save(folder / "seed.npz")
-    content, whole = (folder / "seed.npz").read_bytes(), load_bank(folder / "seed.npz")
-    return Reader({"bank.npz": content}, lambda path: vars(load_bank(path)), checked=True, facts=vars(whole))
+    fitted(made).save(folder / "seed.npz")
+
+    def read(path: Path) -> dict[str, Any]:
+        found = load_bank(path)
+        parts = {} if found.kriged is None else {"runs": found.kriged.runs, "table": found.kriged.table()}
+        return {**vars(found), "kriged": parts}
+
+    content, whole = (folder / "seed.npz").read_bytes(), read(folder / "seed.npz")
+    return Reader({"bank.npz": content}, read, checked=True, facts=whole)
 
 
 def stored(folder: Path) -> Reader:
