@@ -169,8 +169,8 @@ def bank(folder: Path) -> Reader:
 
     def read(path: Path) -> dict[str, Any]:
         found = load_bank(path)
-        parts = {} if found.kriged is None else {"runs": found.kriged.runs, "table": found.kriged.table()}
-        return {**vars(found), "kriged": parts}
+        kriged = None if found.kriged is None else (found.kriged.runs, found.kriged.table())
+        return {**vars(found), "kriged": kriged}
 
     content, whole = (folder / "seed.npz").read_bytes(), read(folder / "seed.npz")
     return Reader({"bank.npz": content}, read, checked=True, facts=whole)
