@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import ctypes
+import logging
 import multiprocessing
 import os
 import signal
 import threading
 from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from multiprocessing.context import SpawnContext, SpawnProcess
 from typing import Any
 
 from dem_warp.batch import Onlooker, begin
@@ -26,10 +29,25 @@ PHASE_LENGTH = 16
 NO_CASE = -1
 """Index of the case of a process that has none."""
 
+LOSSES = 3
+"""Processes that are lost in a row, with no case ended between, before a call is given up."""
+
 Report = Callable[[Sequence[float], Sequence[str]], None]
 """Takes the fraction done and the phase of every case."""
 
-_CONTEXT = multiprocessing.get_context("spawn")
+_log = logging.getLogger(__name__)
+
+
+class _Process(SpawnProcess):
+    """A process that simulates, told from others that a program may have."""
+
+
+class _Context(SpawnContext):
+    Process = _Process
+
+
+_CONTEXT = _Context()
+"""Start of processes: one that has read a GPU's state must not be forked."""
 
 
 class _Stand(ctypes.Structure):
@@ -89,6 +107,20 @@ def _run_case(
     return ended[0][1]
 
 
+def _gather(futures: dict[Future[CaseResult], int], keep: OnResult, look: Callable[[], None]) -> list[int]:
+    """Take results as they are had, and look now and then; return those cases that were lost."""
+    lost, pending = [], set(futures)
+    while pending:
+        finished, pending = wait(pending, REPORT_EVERY, FIRST_COMPLETED)
+        for future in finished:
+            if isinstance(future.exception(), BrokenProcessPool):
+                lost.append(futures[future])
+            else:
+                keep(futures[future], future.result())
+        look()
+    return sorted(lost)
+
+
 class Processes:
     """Processes that simulate cases on a CPU, for one call of `simulate` after another.
 
@@ -127,7 +159,7 @@ class Processes:
         checkpoints: Checkpoints | None = None,
         onlooker: Onlooker | None = None,
     ) -> None:
-        """Run cases, `count` at a time.
+        """Run cases, `count` at a time; those of a process that is lost go on in another one.
 
         Parameters
         ----------
@@ -144,23 +176,29 @@ class Processes:
         Raises
         ------
         concurrent.futures.process.BrokenProcessPool
-            When a process is lost. All end then, as they do at any other error, and the next call starts
-            new ones.
+            When processes are lost again and again, with no case ended between.
         """
-        pool = self._started()
         fractions, phases = [0.0] * len(cases), ["waiting"] * len(cases)
+
+        def keep(index: int, result: CaseResult) -> None:
+            fractions[index] = 1.0
+            on_result(index, result)
+
+        def look() -> None:
+            self._read(fractions, phases)
+            report(fractions, phases)
+
+        left, losses = list(range(len(cases))), 0
         try:
-            futures = {
-                pool.submit(_run_case, i, case, checkpoints, onlooker): i for i, case in enumerate(cases)
-            }
-            pending = set(futures)
-            while pending:
-                finished, pending = wait(pending, REPORT_EVERY, FIRST_COMPLETED)
-                self._look(fractions, phases)
-                for future in finished:
-                    fractions[futures[future]] = 1.0
-                    on_result(futures[future], future.result())
-                report(fractions, phases)
+            while left:
+                futures = {self._submit(i, cases[i], checkpoints, onlooker): i for i in left}
+                lost = _gather(futures, keep, look)
+                losses = losses + 1 if len(lost) == len(left) else 0
+                if losses == LOSSES:
+                    raise BrokenProcessPool("processes are lost again and again")
+                if lost:
+                    _log.warning("a process was lost: its cases, and those that waited, go on in others")
+                left = lost
         except BaseException:
             self._give_up()
             raise
@@ -178,7 +216,17 @@ class Processes:
             self._pool = ProcessPoolExecutor(self.count, _CONTEXT, _start, begun)
         return self._pool
 
-    def _look(self, fractions: list[float], phases: list[str]) -> None:
+    def _submit(
+        self, index: int, case: Case, checkpoints: Checkpoints | None, onlooker: Onlooker | None
+    ) -> Future[CaseResult]:
+        """Give a case to the processes, or to new ones where one of them was lost."""
+        try:
+            return self._started().submit(_run_case, index, case, checkpoints, onlooker)
+        except BrokenProcessPool:
+            self._give_up()
+            return self._started().submit(_run_case, index, case, checkpoints, onlooker)
+
+    def _read(self, fractions: list[float], phases: list[str]) -> None:
         """Read how far the running cases are."""
         for stand in self._stands:
             if stand.case != NO_CASE:
@@ -190,4 +238,5 @@ class Processes:
             self._pool = None
             pool.shutdown(wait=False, cancel_futures=True)
             for process in multiprocessing.active_children():
-                process.terminate()
+                if isinstance(process, _Process):
+                    process.terminate()

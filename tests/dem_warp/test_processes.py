@@ -4,6 +4,7 @@ import multiprocessing
 import os
 import signal
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -29,11 +30,17 @@ class Signature:
 
 @dataclass(frozen=True)
 class Loss:
-    """Kills the process that simulates."""
+    """Kills the process that simulates, the first so many times."""
+
+    folder: Path
+    times: int
 
     def __call__(self, batch: Batch) -> None:
-        """Kill it."""
-        os.kill(os.getpid(), signal.SIGKILL)
+        """Kill it, and leave a file."""
+        for number in range(self.times):
+            with suppress(FileExistsError):
+                (self.folder / str(number)).touch(exist_ok=False)
+                os.kill(os.getpid(), signal.SIGKILL)
 
 
 def signed(folder: Path, processes: Processes) -> set[str]:
@@ -60,12 +67,34 @@ def test_a_case_has_the_same_bits_whatever_its_process_has_simulated_before() ->
             assert_same_result(one, other)
 
 
-def test_a_call_after_one_that_lost_a_process_has_new_ones(tmp_path: Path) -> None:
+def test_the_cases_of_a_lost_process_go_on_in_another_one(tmp_path: Path) -> None:
+    ended: list[int] = []
+    alone = [simulate([case], "cpu", 1)[0] for case in CASES]
+    found = simulate(CASES, "cpu", 2, lambda index, _: ended.append(index), onlooker=Loss(tmp_path, 2))
+    assert sorted(ended) == [0, 1, 2]
+    for one, other in zip(alone, found, strict=True):
+        assert_same_result(one, other)
+
+
+def test_a_call_whose_processes_are_lost_again_and_again_is_given_up(tmp_path: Path) -> None:
+    with Processes(2) as processes:
+        with pytest.raises(BrokenProcessPool, match="again and again"):
+            simulate(CASES, "cpu", processes, onlooker=Loss(tmp_path, 100))
+        assert {result.status for result in simulate(CASES, "cpu", processes)} == {"finished"}
+
+
+def test_a_process_that_is_lost_between_two_calls_is_replaced_and_others_are_left_alone(
+    tmp_path: Path,
+) -> None:
+    other = multiprocessing.get_context("spawn").Process(target=signal.pause)
+    other.start()
     with Processes(2) as processes:
         first = signed(tmp_path / "first", processes)
-        with pytest.raises(BrokenProcessPool):
-            simulate(CASES, "cpu", processes, onlooker=Loss())
-        assert signed(tmp_path / "second", processes).isdisjoint(first)
+        os.kill(int(min(first)), signal.SIGKILL)
+        assert signed(tmp_path / "second", processes) - first
+    assert other.is_alive()
+    other.terminate()
+    other.join()
 
 
 def test_each_call_tells_of_its_own_progress() -> None:
