@@ -72,8 +72,7 @@ class ForceProbe:
         solver, setup = self._solver, self._solver.worlds[world]
         layout, capacity = solver.layout, solver.neighbours.capacity
         grains = found // capacity
-        row = int(solver.neighbours.list.numpy()[world]) * layout.grain_total + world * layout.grain_count
-        entry = solver.neighbours.entry.numpy()[row * capacity + found]
+        entry = solver.neighbours.entry.numpy()[world * layout.grain_count * capacity + found]
         partner = entry % max_partners(layout.sphere_count)
         number = partner - layout.grain_count * layout.sphere_count
         is_wall = number >= 0

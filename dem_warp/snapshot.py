@@ -24,7 +24,6 @@ STEP, COUNT, ENTRY = "grains.step", "neighbours.count", "neighbours.entry"
 WALLS = "world.walls"
 FIXED_OF_WALLS = ("kind", "pair", "axis", "radius", "upper_radius", "length", "reach", "weighed")
 """Fields of a wall that no motion changes."""
-LISTS = 2
 
 
 def take_snapshot(solver: Solver, world: int) -> Snapshot:
@@ -96,7 +95,7 @@ class _Field:
 def _fields(solver: Solver, world: int, counts: np.ndarray) -> Iterator[_Field]:
     """Every array that has something of a world, whose grains have `counts` neighbours."""
     layout, capacity = solver.layout, solver.neighbours.capacity
-    slots, grains, held = layout.grain_count, solver.worlds[world].grains.count, _held(solver, world)
+    slots, grains = layout.grain_count, solver.worlds[world].grains.count
     if counts.shape != (grains,) or counts.max() > capacity:
         raise ValueError(f"{COUNT}: must be at most {capacity} for each of {grains} grains, got {counts}")
     listed = np.zeros((slots, capacity), dtype=bool)
@@ -104,11 +103,9 @@ def _fields(solver: Solver, world: int, counts: np.ndarray) -> Iterator[_Field]:
     walls = solver.model.wall.reshape((layout.world_count, -1))[world]
     yield _Field(WALLS, (walls,), (layout.wall_count,), slice(None))
     for name, arrays in state_arrays(solver).items():
-        of_lists = name.startswith("neighbours.") and arrays[0].size % (LISTS * layout.grain_total) == 0
-        lists, place = (LISTS, (held, world)) if of_lists else (1, (0, world))
-        parts = tuple(array.reshape((lists, layout.world_count, -1))[place] for array in arrays)
+        parts = tuple(array.reshape((layout.world_count, -1))[world] for array in arrays)
         each = parts[0].size // slots
-        if of_lists and each >= capacity:
+        if name.startswith("neighbours.") and each >= capacity:
             yield _Field(name, parts, (slots, capacity), listed)
         elif each:
             yield _Field(name, parts, (slots,), slice(grains))
@@ -146,19 +143,13 @@ def state_arrays(solver: Solver) -> dict[str, tuple[Any, ...]]:
     }
     state |= {f"neighbours.{name}": (array,) for name, array in arrays_of(solver.neighbours).items()}
     state |= {f"world.{name}": (getattr(solver, name),) for name in ("alive", "flags", "rebuilds")}
-    # which list holds: the snapshot's entries go into the one that holds in the batch
-    del state["neighbours.list"]
     return {name: arrays for name, arrays in state.items() if arrays[0].size}
-
-
-def _held(solver: Solver, world: int) -> int:
-    return int(solver.neighbours.list.numpy()[world])
 
 
 def _counts(solver: Solver, world: int) -> np.ndarray:
     """Neighbours of each of a world's grains; those of a grain that was taken out are never looked at."""
     shape, grains = (solver.layout.world_count, -1), solver.worlds[world].grains.count
-    counts = solver.neighbours.count.reshape((LISTS, *shape))[_held(solver, world), world].numpy()[:grains]
+    counts = solver.neighbours.count.reshape(shape)[world].numpy()[:grains]
     alive = solver.alive.reshape(shape)[world].numpy()[:grains] > 0
     return np.where(alive, counts, 0)
 

@@ -10,6 +10,7 @@ import warp as wp
 from dem_warp.kernels.cells import cell_kernels
 from dem_warp.kernels.lanes import BLOCK, WARP
 from dem_warp.kernels.neighbours import list_threads, neighbour_kernels
+from dem_warp.kernels.stale import ALL
 from dem_warp.kernels.step import step_kernels
 from dem_warp.kernels.summation import MIN_LANES
 from dem_warp.kernels.walls import wall_kernels
@@ -19,6 +20,7 @@ from dem_warp.model import WorldSetup
 from dem_warp.room import neighbour_room
 from dem_warp.state import (
     Layout,
+    build_cells,
     build_grains,
     build_model,
     build_neighbours,
@@ -26,7 +28,7 @@ from dem_warp.state import (
     living_grains,
 )
 from dem_warp.triangles import place_triangles
-from dem_warp.types import FRAMES, PRECISIONS, Build, Care, device_structs
+from dem_warp.types import FRAMES, PRECISIONS, Build, Care
 from dem_warp.view import WorldView, overviews
 from dem_warp.walls import Motion
 
@@ -112,40 +114,22 @@ class Solver:
         first = build_grains(self.worlds, layout, self.precision, device)
         # a single thread moves grains when it has all their forces, and needs no second copy
         self.grains = (first, copy_grains(first, self.precision) if self.device.is_cuda else first)
-        self.neighbours = build_neighbours(
-            layout, capacity, memory_size(layout.mechanisms, layout.forms), self.precision, device
-        )
+        remembered = memory_size(layout.mechanisms, layout.forms)
+        self.neighbours = build_neighbours(layout, capacity, remembered, self.precision, device)
+        self.cells = build_cells(layout, found_capacity, capacity, remembered, self.precision, device)
         self.alive = living_grains(self.worlds, layout, device)
         self.flags, self.stale, self.idle, self.rebuilds, self.running = (
             wp.zeros(layout.world_count, dtype=int) for _ in range(5)
         )
         self.any_stale = wp.zeros(1, dtype=int)
         self.fastest = wp.zeros(layout.world_count, dtype=float)
-        self.cells = self._build_cells(found_capacity)
-
-    def _build_cells(self, found_capacity: int) -> Any:
-        layout = self.layout
-        cells = device_structs(self.precision).Cells()
-        spheres = layout.grain_count * layout.sphere_count
-        bits = max(int(np.ceil(np.log2(2 * spheres))), 6)
-        across = bits // 3
-        cells.bits = wp.vec3i(across, across, bits - 2 * across)
-        cells.bucket_size = wp.zeros(layout.world_count << bits, dtype=int)
-        cells.bucket_start = wp.zeros(layout.world_count << bits, dtype=int)
-        cells.cursor = wp.zeros(layout.world_count, dtype=int)
-        for name in ("bucket", "rank", "order", "found_count"):
-            setattr(cells, name, wp.zeros(layout.sphere_total, dtype=int))
-        cells.ordered = wp.zeros(layout.sphere_total, dtype=self.precision.sphere)
-        cells.found = wp.zeros(layout.sphere_total * found_capacity, dtype=int)
-        cells.found_capacity = found_capacity
-        return cells
 
     def _place(self) -> None:
         for grains in self.grains:
             self._launch(self._step_kernels.place_spheres, self.layout.grain_total, [self.model, grains])
         self._set_running(self._running)
         self._place_walls(FRAMES - 1)
-        self.stale.fill_(1)
+        self.stale.fill_(ALL)
         self._rebuild(0)
         self._look_back(0)
 
@@ -212,7 +196,7 @@ class Solver:
         watch, grains, total = self._watch_kernels, self.grains[read], self.layout.grain_total
         self._place_walls(steps, read)
         if self.care == Care.EVERY_STEP:
-            self.stale.fill_(1)
+            self.stale.fill_(ALL)
             self.any_stale.fill_(1)
         seen = [self.model, grains, self.alive, self.idle]
         inputs = [steps, *seen, self.fastest, self.neighbours, self.stale, self.any_stale]
@@ -328,7 +312,7 @@ class Solver:
             row["point"], row["orientation"] = frame["origin"], frame["rotation"]
             for field in fields(motion):
                 row[field.name] = getattr(motion, field.name)
-            stale[world] = 1
+            stale[world] = ALL
         self.model.wall.assign(walls)
         self._place_walls(0)
         # the lists know of the old motion only

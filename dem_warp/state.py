@@ -225,10 +225,9 @@ def build_neighbours(
 ) -> Any:
     """Empty `Neighbours` of a batch, of which the mechanisms remember some values a contact."""
     neighbours = device_structs(precision).Neighbours()
-    slots = 2 * layout.grain_total * capacity
+    slots = layout.grain_total * capacity
     neighbours.capacity = capacity
-    neighbours.list = wp.zeros(layout.world_count, dtype=int, device=device)
-    neighbours.count = wp.zeros(2 * layout.grain_total, dtype=int, device=device)
+    neighbours.count = wp.zeros(layout.grain_total, dtype=int, device=device)
     neighbours.entry = wp.zeros(slots, dtype=int, device=device)
     # all zero is a displacement of zero, remembered at step 0: no history
     neighbours.history = wp.zeros(slots, dtype=precision.vec4, device=device)
@@ -246,7 +245,7 @@ def build_neighbours(
     near.wall_path = wp.zeros(layout.world_count, dtype=precision.real, device=device)
     near.travel = wp.zeros(layout.grain_total, dtype=precision.real, device=device)
     serial = 0 if wp.get_device(device).is_cuda else layout.grain_total
-    near.moves = wp.zeros(serial, dtype=int, device=device)
+    near.moves = wp.zeros(layout.grain_total, dtype=int, device=device)
     near.first = wp.zeros(serial, dtype=int, device=device)
     near.afar = wp.zeros(layout.grain_total, dtype=int, device=device)
     near.top = wp.full(layout.world_count, np.inf, dtype=float, device=device)
@@ -255,6 +254,30 @@ def build_neighbours(
     for name in ("force", "torque"):
         setattr(neighbours.reactions, name, wp.zeros(serial, dtype=precision.vec4, device=device))
     return neighbours
+
+
+def build_cells(
+    layout: Layout, found_capacity: int, capacity: int, remembered: int, precision: Precision, device: Any
+) -> Any:
+    """Empty `Cells` of a batch, with room for partners of a sphere and entries of a list."""
+    cells = device_structs(precision).Cells()
+    bits = max(int(np.ceil(np.log2(2 * layout.grain_count * layout.sphere_count))), 6)
+    across = bits // 3
+    cells.bits = wp.vec3i(across, across, bits - 2 * across)
+    cells.bucket_size = wp.zeros(layout.world_count << bits, dtype=int, device=device)
+    cells.bucket_start = wp.zeros(layout.world_count << bits, dtype=int, device=device)
+    cells.cursor = wp.zeros(layout.world_count, dtype=int, device=device)
+    for name in ("bucket", "rank", "order", "found_count"):
+        setattr(cells, name, wp.zeros(layout.sphere_total, dtype=int, device=device))
+    cells.ordered = wp.zeros(layout.sphere_total, dtype=precision.sphere, device=device)
+    cells.found = wp.zeros(layout.sphere_total * found_capacity, dtype=int, device=device)
+    cells.found_capacity = found_capacity
+    # a single thread drafts one list after another
+    drafts = capacity * (layout.grain_total if wp.get_device(device).is_cuda else 1)
+    cells.drafts = wp.zeros(drafts, dtype=int, device=device)
+    cells.draft_history = wp.zeros(drafts, dtype=precision.vec4, device=device)
+    cells.draft_memory = wp.zeros(drafts * remembered, dtype=precision.real, device=device)
+    return cells
 
 
 def _unit(quaternions: np.ndarray) -> np.ndarray:

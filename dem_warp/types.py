@@ -243,7 +243,7 @@ def device_structs(precision: Precision) -> SimpleNamespace:
         path: wp.array(dtype=real)  # farthest that a grain may come meanwhile [m], (grains,)
         wall_path: wp.array(dtype=real)  # and any wall [m], (worlds,)
         travel: wp.array(dtype=real)  # of a grain when this was written [m], (grains,)
-        moves: wp.array(dtype=int)  # 1: it used up much of the skin, (grains,) on a CPU, else (0,)
+        moves: wp.array(dtype=int)  # 1: it used up much of the skin, (grains,)
         first: wp.array(dtype=int)  # first item of a grain, (grains,) on a CPU, else (0,)
         afar: wp.array(dtype=int)  # 1: it waits far above all that move freely, and has no list, (grains,)
         top: wp.array(dtype=float)  # highest point of these [m], inf if unknown, (worlds,)
@@ -256,9 +256,8 @@ def device_structs(precision: Precision) -> SimpleNamespace:
     @wp.struct
     class Neighbours:
         capacity: int  # entries a grain
-        list: wp.array(dtype=int)  # which of the two lists holds, (worlds,); the first on a CPU
-        count: wp.array(dtype=int)  # (2 * grains,)
-        entry: wp.array(dtype=int)  # own sphere's number and partner, (2 * grains * capacity,)
+        count: wp.array(dtype=int)  # (grains,)
+        entry: wp.array(dtype=int)  # own sphere's number and partner, (grains * capacity,)
         history: wp.array(dtype=vec4)  # tangential displacement [m] and the step of it, one an entry
         memory: wp.array(dtype=real)  # what the mechanisms remember of a contact, in SI units
         rebuilt: wp.array(dtype=int)  # step of the last rebuild of all lists, (worlds,)
@@ -281,6 +280,10 @@ def device_structs(precision: Precision) -> SimpleNamespace:
         found: wp.array(dtype=int)  # partners of a sphere, unsorted, (spheres * found_capacity,)
         found_count: wp.array(dtype=int)  # (spheres,)
         found_capacity: int
+        # lists while they are written, each with its histories and memories, (lists * capacity,)
+        drafts: wp.array(dtype=int)
+        draft_history: wp.array(dtype=vec4)
+        draft_memory: wp.array(dtype=real)
 
     return SimpleNamespace(
         Cells=Cells,

@@ -12,7 +12,7 @@ import warp as wp
 
 from dem_warp.kernels.lanes import ALL_LANES, WARP, from_lane, lanes_with, running_sum
 from dem_warp.kernels.packing import packing
-from dem_warp.kernels.stale import ALL
+from dem_warp.kernels.stale import SOME
 from dem_warp.kernels.triangles import triangle_functions
 from dem_warp.kernels.walls import wall_functions
 from dem_warp.types import Build, device_structs
@@ -123,6 +123,13 @@ def cell_kernels(build: Build) -> SimpleNamespace:
         cells.found_count[i] = n + 1
 
     @wp.func
+    def append_shared(cells: Cells, i: int, partner: int):
+        """The same where other threads do so, too."""
+        n = wp.atomic_add(cells.found_count, i, 1)
+        if n < cells.found_capacity:
+            cells.found[i * cells.found_capacity + n] = partner
+
+    @wp.func
     def append_triangles(
         model: Model, cells: Cells, i: int, w: int, k: int, position: wp.vec3d, reach: real, step: int
     ):
@@ -149,10 +156,10 @@ def cell_kernels(build: Build) -> SimpleNamespace:
         """Partners of each sphere.
 
         Threads follow the buckets, so that neighbouring threads read the same memory. One thread alone meets
-        each pair once: in its own bucket, and in the half of the buckets ahead of it. Many at once find each
-        its own partners, so that nobody has to wait for a place in another one's list. Of the first, the
-        earlier grain alone has the other in its list; and where some grains have moved, these alone look
-        around, the earlier of two for both.
+        each pair once: in its own bucket, and in the half of the buckets ahead of it; the earlier grain alone
+        has the other in its list. Many at once find each its own partners, so that nobody has to wait for a
+        place in another one's list. Where some grains have moved, these alone look around, for those that
+        have not as well; of one thread the earlier of two for both.
         """
         slot = wp.tid()
         w = slot // (spheres_each * model.grain_count)
@@ -161,11 +168,12 @@ def cell_kernels(build: Build) -> SimpleNamespace:
             return
         i = cells.order[slot]
         g = i // spheres_each
+        alone = stale[w] == SOME
+        if alone and near.moves[g] == 0:
+            return
         halved = bool(False)
         if wp.static(not build.cooperative):
-            halved = stale[w] == ALL
-            if not halved and near.moves[g] == 0:
-                return
+            halved = not alone
         world = model.world[w]
         a = pack.load_sphere(cells.ordered, slot)
         reach = pack.last(a) + world.skin + world.reach
@@ -189,6 +197,8 @@ def cell_kernels(build: Build) -> SimpleNamespace:
                             if own < cells.found_capacity:
                                 cells.found[i * cells.found_capacity + own] = j - first
                             own += 1
+                            if alone and near.moves[h] == 0:
+                                append_shared(cells, j, i - first)
                         else:
                             if halved or h > g or near.moves[h] == 0:
                                 append(cells, wp.min(i, j), wp.max(i, j) - first)

@@ -149,9 +149,8 @@ def contact_functions(build: Build) -> SimpleNamespace:
         that does not touch, so it may be read.
         """
         entry = neighbours.entry[slot]
-        row = neighbours.list[w] * model.shape.shape[0] + g
-        first = row * neighbours.capacity
-        for k in range(first, first + neighbours.count[row]):
+        first = g * neighbours.capacity
+        for k in range(first, first + neighbours.count[g]):
             other = neighbours.entry[k]
             if other >> bits == entry >> bits and joined(model, w, entry, other):
                 if not touches_triangle(model, world, grains, w, g, other, step):

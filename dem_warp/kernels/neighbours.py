@@ -5,8 +5,8 @@ has the other. Walls are numbered after the spheres of their world.
 
 A list is sorted by the own sphere's number and then by the partner's, so its order, and with it the order of
 a grain's force sum, depends on the grains alone: not on cells, skin, moment of the rebuild or batch.
-Only worlds whose `stale` flag is set are rebuilt. A contact's history moves over to the new list with its
-entry.
+Only worlds whose `stale` flag is set are rebuilt, all lists or those that grains which have moved call for.
+A new list is drafted, with the histories of the old one, and then put into its place.
 """
 
 import functools
@@ -16,6 +16,7 @@ import warp as wp
 
 from dem_warp.entries import max_partners, partner_bits
 from dem_warp.kernels.contacts import contact_functions
+from dem_warp.kernels.lanes import WARP, bit_count, from_lane, lanes_with, running_sum, sync_warp
 from dem_warp.kernels.packing import packing
 from dem_warp.kernels.stale import ALL
 from dem_warp.laws.contact_law import memory_size
@@ -23,17 +24,13 @@ from dem_warp.types import Build, WorldFlag, device_structs
 
 NEIGHBOUR_OVERFLOW = wp.constant(int(WorldFlag.NEIGHBOUR_OVERFLOW))
 
-
 NO_ENTRY = wp.constant(2**31 - 1)
 """Above every entry."""
-
-LIST_LANES = 8
-"""Threads that share out the partners of a sphere on a GPU: about half as many as there are."""
 
 
 def list_threads(build: Build) -> int:
     """Threads a grain that `write_lists` is to be launched with."""
-    return LIST_LANES * build.sphere_count if build.cooperative else 1
+    return WARP if build.cooperative else 1
 
 
 @functools.cache
@@ -50,7 +47,6 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
     bits = wp.constant(partner_bits(build.sphere_count))
     mask = wp.constant(max_partners(build.sphere_count) - 1)
     memory_each = wp.constant(memory_size(build.mechanisms, build.forms))
-    lanes = wp.constant(LIST_LANES)
     module = wp.get_module(f"dem_warp_neighbours_{build.name}")
     wp.set_module_options({"enable_backward": False}, module)
 
@@ -71,58 +67,6 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
         for k in range(count):
             rank += wp.where(array[first + k] < value, 1, 0)
         return rank
-
-    @wp.kernel(module=module, grid_stride=False)
-    def write_lists(
-        model: Model, grains: Grains, stale: wp.array(dtype=int), cells: Cells, neighbours: Neighbours,
-        flags: wp.array(dtype=int),
-    ):  # fmt: skip
-        """A sphere's part of its grain's new list, shared out to some lanes.
-
-        A partner's place is found by counting, as they are few. Histories come over from the old list.
-        """
-        thread = wp.tid()
-        i = thread // lanes
-        lane = thread - i * lanes
-        g = i // spheres_each
-        s = i - g * spheres_each
-        w = g // model.grain_count
-        if stale[w] == 0 or cells.rank[i] < 0:
-            return
-        world = model.world[w]
-        before = int(0)
-        for k in range(s):
-            before += wp.min(cells.found_count[g * spheres_each + k], world.most_found)
-        own = wp.min(cells.found_count[i], world.most_found)
-        grain_total = model.shape.shape[0]
-        old_row = neighbours.list[w] * grain_total + g
-        new_row = (1 - neighbours.list[w]) * grain_total + g
-        old_count = neighbours.count[old_row]
-        old_first = old_row * neighbours.capacity
-        found = i * cells.found_capacity
-        for k in range(lane, own, lanes):
-            partner = cells.found[found + k]
-            place = before + rank_of(cells.found, found, own, partner)
-            if place < world.most_listed:
-                entry = (s << bits) | partner
-                slot = new_row * neighbours.capacity + place
-                history = vec4(real(0.0), real(0.0), real(0.0), real(-1.0))
-                old = place_of(neighbours.entry, old_first, old_count, entry, place)
-                if old < old_count and neighbours.entry[old_first + old] == entry:
-                    history = pack.load_vec4(neighbours.history, old_first + old)
-                    for m in range(memory_each):
-                        remembered = neighbours.memory[(old_first + old) * memory_each + m]
-                        neighbours.memory[slot * memory_each + m] = remembered
-                neighbours.entry[slot] = entry
-                pack.store_vec4(neighbours.history, slot, history)
-        if lane == 0:
-            # empty for the next time; every sphere of the bucket writes the same
-            cells.bucket_size[cells.bucket[i]] = 0
-            if cells.found_count[i] > world.most_found or before + own > world.most_listed:
-                wp.atomic_or(flags, w, NEIGHBOUR_OVERFLOW)
-            if s == model.shape_sphere_count[model.shape[g]] - 1:
-                neighbours.count[new_row] = wp.min(before + own, world.most_listed)
-                neighbours.travel[g] = real(0.0)
 
     @wp.func
     def sort(array: wp.array(dtype=int), first: int, count: int):
@@ -148,15 +92,44 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
         return contacts.nears(model, world, grains, w, g, entry, world.skin + world.reach, grains.step[w])
 
     @wp.func
-    def put(neighbours: Neighbours, slot: int, entry: int, old: int):
-        """Writes an entry, with the history of an old slot where there is one."""
+    def draft(neighbours: Neighbours, cells: Cells, place: int, entry: int, old: int):
+        """Writes an entry of a list to come, with the history of an old slot where there is one."""
         history = vec4(real(0.0), real(0.0), real(0.0), real(-1.0))
         if old >= 0:
             history = pack.load_vec4(neighbours.history, old)
             for m in range(memory_each):
-                neighbours.memory[slot * memory_each + m] = neighbours.memory[old * memory_each + m]
-        neighbours.entry[slot] = entry
-        pack.store_vec4(neighbours.history, slot, history)
+                cells.draft_memory[place * memory_each + m] = neighbours.memory[old * memory_each + m]
+        cells.drafts[place] = entry
+        pack.store_vec4(cells.draft_history, place, history)
+
+    @wp.func
+    def settle(neighbours: Neighbours, cells: Cells, slot: int, place: int):
+        """Puts an entry that was drafted into its list."""
+        neighbours.entry[slot] = cells.drafts[place]
+        pack.store_vec4(neighbours.history, slot, pack.load_vec4(cells.draft_history, place))
+        for m in range(memory_each):
+            neighbours.memory[slot * memory_each + m] = cells.draft_memory[place * memory_each + m]
+
+    @wp.func
+    def end_list(
+        world: World, neighbours: Neighbours, flags: wp.array(dtype=int), w: int, g: int, length: int,
+        moves: bool,
+    ):  # fmt: skip
+        """Notes the length of a new list."""
+        if length > world.most_listed:
+            wp.atomic_or(flags, w, NEIGHBOUR_OVERFLOW)
+        neighbours.count[g] = wp.min(length, world.most_listed)
+        if moves:
+            neighbours.travel[g] = real(0.0)
+
+    @wp.func
+    def found_of(world: World, cells: Cells, flags: wp.array(dtype=int), w: int, i: int) -> int:
+        """Count of the partners that were found of a sphere, whose bucket is empty for the next time."""
+        # every sphere of the bucket writes the same
+        cells.bucket_size[cells.bucket[i]] = 0
+        if cells.found_count[i] > world.most_found:
+            wp.atomic_or(flags, w, NEIGHBOUR_OVERFLOW)
+        return wp.min(cells.found_count[i], world.most_found)
 
     @wp.kernel(module=module)
     def merge_lists(
@@ -176,23 +149,16 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
         moves = stale[w] == ALL or neighbours.near.moves[g] != 0
         changes = bool(moves)
         for i in range(g * spheres_each, g * spheres_each + model.shape_sphere_count[model.shape[g]]):
-            changes = changes or cells.found_count[i] > 0
-            # empty for the next time; every sphere of the bucket writes the same
-            cells.bucket_size[cells.bucket[i]] = 0
+            changes = found_of(world, cells, flags, w, i) > 0 or changes
         if not changes:
             return
-        grain_total = model.shape.shape[0]
         first = g * neighbours.capacity
-        # a row of the second list, which a single thread has no other use for
-        draft = (grain_total + w * model.grain_count) * neighbours.capacity
         old = int(first)
         old_end = first + neighbours.count[g]
         place = int(0)
         for s in range(model.shape_sphere_count[model.shape[g]]):
             i = g * spheres_each + s
             own = wp.min(cells.found_count[i], world.most_found)
-            if cells.found_count[i] > world.most_found:
-                wp.atomic_or(flags, w, NEIGHBOUR_OVERFLOW)
             found = i * cells.found_capacity
             sort(cells.found, found, own)
             end = found + own
@@ -210,18 +176,95 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
                 if entry != NO_ENTRY:
                     if entry == fresh or (not moves and stays(model, world, grains, neighbours, w, g, entry)):
                         if place < world.most_listed:
-                            put(neighbours, draft + place, entry, wp.where(entry == listed, old, -1))
+                            draft(neighbours, cells, place, entry, wp.where(entry == listed, old, -1))
                         place += 1
                     old += wp.where(entry == listed, 1, 0)
                     found += wp.where(entry == fresh, 1, 0)
-        if place > world.most_listed:
-            wp.atomic_or(flags, w, NEIGHBOUR_OVERFLOW)
-        count = wp.min(place, world.most_listed)
-        for k in range(count):
-            put(neighbours, first + k, neighbours.entry[draft + k], draft + k)
-        neighbours.count[g] = count
-        if moves:
-            neighbours.travel[g] = real(0.0)
+        end_list(world, neighbours, flags, w, g, place, moves)
+        for k in range(neighbours.count[g]):
+            settle(neighbours, cells, first + k, k)
+
+    @wp.func
+    def count_found(world: World, cells: Cells, g: int, entry: int) -> int:
+        """Count of the partners found of a grain's spheres whose entries are less than one."""
+        s = entry >> bits
+        less = int(0)
+        for i in range(g * spheres_each, g * spheres_each + s):
+            less += wp.min(cells.found_count[i], world.most_found)
+        i = g * spheres_each + s
+        own = wp.min(cells.found_count[i], world.most_found)
+        return less + rank_of(cells.found, i * cells.found_capacity, own, entry & mask)
+
+    @wp.func
+    def count_kept(
+        model: Model, world: World, grains: Grains, neighbours: Neighbours, w: int, g: int, end: int
+    ) -> int:
+        """Count of the entries that stay before a slot of a grain's old list."""
+        kept = int(0)
+        for k in range(g * neighbours.capacity, end):
+            kept += wp.where(stays(model, world, grains, neighbours, w, g, neighbours.entry[k]), 1, 0)
+        return kept
+
+    @wp.kernel(module=module, grid_stride=False)
+    def write_lists(
+        model: Model, grains: Grains, stale: wp.array(dtype=int), cells: Cells, neighbours: Neighbours,
+        flags: wp.array(dtype=int),
+    ):  # fmt: skip
+        """The same lists by a warp a grain: an entry's place is found by counting, as they are few."""
+        thread = wp.tid()
+        g = thread // WARP
+        lane = thread - g * WARP
+        w = g // model.grain_count
+        if stale[w] == 0 or cells.rank[g * spheres_each] < 0:
+            return
+        world = model.world[w]
+        moves = stale[w] == ALL or neighbours.near.moves[g] != 0
+        own = int(0)
+        for s in range(lane, model.shape_sphere_count[model.shape[g]], WARP):
+            own += found_of(world, cells, flags, w, g * spheres_each + s)
+        found = from_lane(running_sum(own), WARP - 1)
+        if not moves and found == 0:
+            return
+        first = g * neighbours.capacity
+        old_count = neighbours.count[g]
+        kept = int(0)
+        if not moves:
+            for k in range(lane, old_count + lane, WARP):
+                entry = int(0)
+                is_kept = bool(False)
+                if k < old_count:
+                    entry = neighbours.entry[first + k]
+                    is_kept = stays(model, world, grains, neighbours, w, g, entry)
+                kept_lanes = lanes_with(is_kept)
+                place = kept + bit_count(kept_lanes & ((1 << lane) - 1))
+                if is_kept:
+                    place += count_found(world, cells, g, entry)
+                    if place < world.most_listed:
+                        draft(neighbours, cells, first + place, entry, first + k)
+                kept += bit_count(kept_lanes)
+        for k in range(lane, found, WARP):
+            i = g * spheres_each
+            rest = int(k)
+            while rest >= wp.min(cells.found_count[i], world.most_found):
+                rest -= wp.min(cells.found_count[i], world.most_found)
+                i += 1
+            entry = ((i - g * spheres_each) << bits) | cells.found[i * cells.found_capacity + rest]
+            place = count_found(world, cells, g, entry)
+            old = place_of(neighbours.entry, first, old_count, entry, place)
+            if not moves:
+                place += count_kept(model, world, grains, neighbours, w, g, first + old)
+            slot = int(-1)
+            if old < old_count:
+                if neighbours.entry[first + old] == entry:
+                    slot = first + old
+            if place < world.most_listed:
+                draft(neighbours, cells, first + place, entry, slot)
+        sync_warp()
+        length = kept + found
+        for k in range(lane, wp.min(length, world.most_listed), WARP):
+            settle(neighbours, cells, first + k, first + k)
+        if lane == 0:
+            end_list(world, neighbours, flags, w, g, length, moves)
 
     @wp.kernel(module=module)
     def finish(
@@ -230,8 +273,6 @@ def neighbour_kernels(build: Build) -> SimpleNamespace:
     ):  # fmt: skip
         w = wp.tid()
         if stale[w] != 0:
-            if wp.static(build.cooperative):
-                neighbours.list[w] = 1 - neighbours.list[w]
             if stale[w] == ALL:
                 neighbours.rebuilt[w] = grains.step[w]
             stale[w] = 0

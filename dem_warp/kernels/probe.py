@@ -76,16 +76,14 @@ def probe_kernels(build: Build) -> SimpleNamespace:
             return
         world = model.world[w]
         step = grains.step[w]
-        row = neighbours.list[w] * model.shape.shape[0] + g
         is_free = step >= model.release_step[g]
-        for k in range(neighbours.count[row]):
-            slot = row * neighbours.capacity + k
+        for k in range(neighbours.count[g]):
+            slot = g * neighbours.capacity + k
             entry = neighbours.entry[slot]
-            item = g * neighbours.capacity + k
-            neighbours.near.item[item] = wp.vec2i(entry, slot)
-            if is_free or contacts.is_free(model, neighbours, w, item, step):
+            neighbours.near.item[slot] = wp.vec2i(entry, slot)
+            if is_free or contacts.is_free(model, neighbours, w, slot, step):
                 force, _torque, _rolling = contacts.contact(
-                    model, world, grains, neighbours, w, g, item, step
+                    model, world, grains, neighbours, w, g, slot, step
                 )
                 if wp.length_sq(force) > real(0.0):
                     point, normal = meeting_point(model, world, grains, w, g, entry, step)

@@ -1,9 +1,9 @@
-"""Values of a world's `stale` flag, which is 0 while its neighbour lists hold."""
+"""Values of a world's `stale` flag, which is 0 while its neighbour lists hold; the greatest wins."""
 
 import warp as wp
 
-ALL = wp.constant(1)
-"""All its lists are made anew."""
+SOME = wp.constant(1)
+"""The entries of grains that have moved are made anew, and the others stay."""
 
-SOME = wp.constant(2)
-"""On a CPU: the entries of grains that have moved are, and the others stay."""
+ALL = wp.constant(2)
+"""All its lists are made anew."""

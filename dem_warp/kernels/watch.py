@@ -41,9 +41,12 @@ KEPT = 0.9
 LEAST_PATH = 0.025
 """Part of the skin that is allowed for at the least: grains at rest may be set in motion."""
 
-JOINED, JOINED_ALONE = 0.25, 0.4
-"""Part of the skin, up to one half, from which on a world joins a rebuild that another one calls for; and, on
-a CPU, a grain one that another grain of its world calls for."""
+JOINED = 0.25
+"""Part of the skin, up to one half, from which on a world joins a rebuild that another one calls for."""
+
+MOVED, MOVED_SERIAL = 0.1, 0.4
+"""Part of the skin, up to one half, from which on a grain is searched anew when another one of its world must
+be: on a GPU, where all are looked at anyway, and on a CPU."""
 
 CLEARANCE = 2.0
 """Skins between a grain that waits and all that move freely, from which on it is left out of the lists: each
@@ -66,7 +69,7 @@ def watch_kernels(build: Build) -> SimpleNamespace:
     mask = wp.constant(max_partners(build.sphere_count) - 1)
     walls_each = wp.constant(build.wall_count)
     lanes = wp.constant(WARP if build.cooperative else 1)
-    rebuilt = wp.constant(int(ALL if build.cooperative else SOME))
+    moved = wp.constant(MOVED if build.cooperative else MOVED_SERIAL)
     module = wp.get_module(f"dem_warp_watch_{build.name}")
     wp.set_module_options({"enable_backward": False}, module)
 
@@ -149,7 +152,7 @@ def watch_kernels(build: Build) -> SimpleNamespace:
                 neighbours.near.wall_speed[w] = wp.max(neighbours.near.wall_speed[w], speed)
                 whole = wall_path(model, world, grains, w, i, grains.step[w] + ahead - neighbours.rebuilt[w])
                 if real(2.0) * whole > world.skin:
-                    stale[w] = ALL
+                    wp.atomic_max(stale, w, ALL)
                     any_stale[0] = 1
         neighbours.near.speed[g] = wp.max(speed_of(model, grains, g), float(KEPT) * neighbours.near.speed[g])
         own = float(HEADROOM) * neighbours.near.speed[g]
@@ -158,12 +161,11 @@ def watch_kernels(build: Build) -> SimpleNamespace:
         neighbours.near.afar[g] = wp.where(afar, 1, 0)
         if afar:
             neighbours.travel[g] = world.skin  # it is searched as soon as it needs a list
-        if wp.static(not build.cooperative):
-            moves = uses_up(model, world, grains, neighbours, g, ahead, real(JOINED_ALONE))
-            neighbours.near.moves[g] = wp.where(moves, 1, 0)
+        moves = uses_up(model, world, grains, neighbours, g, ahead, real(moved))
+        neighbours.near.moves[g] = wp.where(moves, 1, 0)
         if alive[g] > 0 and uses_up(model, world, grains, neighbours, g, ahead, real(0.5)):
             if stale[w] == 0:
-                stale[w] = rebuilt
+                wp.atomic_max(stale, w, SOME)
             any_stale[0] = 1
 
     @wp.kernel(module=module)
@@ -184,7 +186,7 @@ def watch_kernels(build: Build) -> SimpleNamespace:
         w = g // model.grain_count
         if idle[w] == 0 and alive[g] > 0 and stale[w] == 0:
             if uses_up(model, model.world[w], grains, neighbours, g, ahead, real(JOINED)):
-                stale[w] = rebuilt
+                stale[w] = SOME
 
     @wp.kernel(module=module, grid_stride=False)
     def heed_neighbours(
@@ -212,10 +214,9 @@ def watch_kernels(build: Build) -> SimpleNamespace:
             if lane == 0:
                 neighbours.near.pace[g] = wp.max(neighbours.near.pace[g], pace)
             return
-        row = neighbours.list[w] * model.shape.shape[0] + g
         striker = float(0.0)
-        for k in range(lane, neighbours.count[row], lanes):
-            partner = neighbours.entry[row * neighbours.capacity + k] & mask
+        for k in range(lane, neighbours.count[g], lanes):
+            partner = neighbours.entry[g * neighbours.capacity + k] & mask
             speed = neighbours.near.wall_speed[w]
             if partner < model.grain_count * spheres_each:
                 j = w * model.grain_count + partner // spheres_each
@@ -252,8 +253,7 @@ def watch_kernels(build: Build) -> SimpleNamespace:
         world = model.world[w]
         own = farthest(world, neighbours.near.pace[g], ahead)
         step = grains.step[w]
-        row = neighbours.list[w] * model.shape.shape[0] + g
-        count = neighbours.count[row]
+        count = neighbours.count[g]
         if alive[g] <= 0 or neighbours.near.afar[g] != 0:
             count = 0
         first = g * neighbours.capacity
@@ -264,7 +264,7 @@ def watch_kernels(build: Build) -> SimpleNamespace:
             neighbours.near.first[g] = first
         found = int(first)
         for k in range(lane, count + lane, lanes):
-            slot = row * neighbours.capacity + k
+            slot = g * neighbours.capacity + k
             entry = int(0)
             is_near = bool(False)
             if k < count:

@@ -13,6 +13,7 @@ from dem_warp.checkpoint import Checkpoints
 from dem_warp.device import resolve_device
 from dem_warp.model import WorldSetup
 from dem_warp.solver import Solver
+from dem_warp.types import Care
 from dem_warp.walls import Mesh, Motion, Plane
 
 resolve_device(None)  # starts Warp, quietly, before it is asked for devices
@@ -30,6 +31,18 @@ def run(*setups: WorldSetup, chunks: int = 60) -> Solver:
     return solver
 
 
+def turning_drum() -> WorldSetup:
+    """Grains that fall between a drum of triangles, which turns, and a plate that shakes."""
+    setup = pile(1)
+    return replace(setup, walls=((Mesh.tube(0.012, 0.1, 24), 1), (Plane(), 1)))
+
+
+def set_in_motion(solver: Solver, world: int) -> None:
+    """Turn a world's drum and shake its plate."""
+    solver.move_wall(world, 0, Motion(spin=(0.0, 0.0, 20.0)))
+    solver.move_wall(world, 1, Motion(amplitude=(0.0, 0.0, 2e-4), frequency=60.0))
+
+
 def test_the_number_of_lanes_does_not_change_the_bits(monkeypatch):
     runs = []
     for lanes in (4, 8, 16, 32):
@@ -43,6 +56,20 @@ def test_the_batch_does_not_change_the_bits():
     alone = state(run(pile(1)))
     together = run(pile(2), pile(3, count=31), pile(1), pile(4, count=5))
     assert_same_bits(state(together, 2), alone)
+
+
+def test_lists_made_anew_where_grains_have_moved_or_all_before_every_step_give_the_same_bits():
+    runs, rebuilds = [], []
+    for care in (Care.USUAL, Care.EVERY_STEP):
+        solver = solve(turning_drum(), precision="mixed", device="cuda")
+        set_in_motion(solver, 0)
+        solver.care = care
+        solver.advance(30)
+        assert not solver.flags.numpy().any()
+        runs.append(state(solver))
+        rebuilds.append(solver.rebuilds.numpy()[0])
+    assert_same_bits(*runs)
+    assert 1 < rebuilds[0] < 0.5 * rebuilds[1]
 
 
 def test_an_interruption_and_another_batch_do_not_change_the_bits(tmp_path):
@@ -62,18 +89,6 @@ def test_an_interruption_and_another_batch_do_not_change_the_bits(tmp_path):
     resumed = Batch([cases[2], cases[7]], device, Checkpoints(tmp_path))
     assert min(resumed.steps) > 0
     assert_same_result(finish(resumed)[1], alone)
-
-
-def turning_drum() -> WorldSetup:
-    """Grains that fall between a drum of triangles, which turns, and a plate that shakes."""
-    setup = pile(1)
-    return replace(setup, walls=((Mesh.tube(0.012, 0.1, 24), 1), (Plane(), 1)))
-
-
-def set_in_motion(solver: Solver, world: int) -> None:
-    """Turn a world's drum and shake its plate."""
-    solver.move_wall(world, 0, Motion(spin=(0.0, 0.0, 20.0)))
-    solver.move_wall(world, 1, Motion(amplitude=(0.0, 0.0, 2e-4), frequency=60.0))
 
 
 def test_meshes_and_motions_leave_the_bits_to_the_world(monkeypatch):

@@ -23,6 +23,7 @@ from worlds import (
 )
 
 from dem_warp.entries import max_partners, partner_bits
+from dem_warp.kernels.stale import ALL
 from dem_warp.solver import CHUNK, Solver
 from dem_warp.types import WorldFlag
 from dem_warp.walls import Plane
@@ -36,9 +37,8 @@ SPHERES = PYRAMID.sphere_count
 def listed(solver: Solver) -> list[tuple[int, int]]:
     """Pairs (own sphere, partner) of a world's present list, in its order."""
     n, neighbours = solver.layout.grain_count, solver.neighbours
-    row = neighbours.list.numpy()[0] * n
-    counts = neighbours.count.numpy()[row : row + n]
-    entries = neighbours.entry.numpy().reshape(-1, neighbours.capacity)[row : row + n]
+    counts = neighbours.count.numpy()[:n]
+    entries = neighbours.entry.numpy().reshape(-1, neighbours.capacity)[:n]
     return [
         (g * SPHERES + (entry >> partner_bits(SPHERES)), entry % max_partners(SPHERES))
         for g in range(n)
@@ -107,7 +107,7 @@ def test_a_moved_pile_has_the_lists_of_its_new_place():
     solver = solve(pile(skin=6e-4), precision="mixed")
     solver.advance(6)
     before = solver.rebuilds.numpy()[0]
-    solver.stale.fill_(1)
+    solver.stale.fill_(ALL)
     solver.any_stale.fill_(1)
     solver._rebuild(0)
     assert solver.rebuilds.numpy()[0] == before + 1
