@@ -162,7 +162,7 @@ def _entries(spheres: _Spheres, skin: float) -> float:
 
 
 def device_bytes(case: Case[Any]) -> int:
-    """Bytes that the world of a case takes on a device, its copy to step back to included.
+    """Bytes that the world of a case takes on a GPU, its copy to step back to included; a CPU needs less.
 
     They follow from the longest neighbour lists that it may have; what compiled kernels and graphs take is
     not among them.
@@ -172,9 +172,10 @@ def device_bytes(case: Case[Any]) -> int:
     real = 8 if case.numerics.precision == "double" else 4
     grains, spheres = setup.grains.count, setup.grains.count * case.grains.sphere_count
     remembered = memory_size(setup.mechanisms, setup.forms)
-    entry = 2 * (4 + 4 * real + remembered * real)
+    entry = 4 + 4 * real + remembered * real
     state = 2 * (24 + 32 + 12 * real) + 60 + 4 * real
     buckets = 4 * spheres
     lists = grains * listed * entry
     moving = grains * state + spheres * 8 * real + lists
-    return int(2 * moving + grains * listed * 8 + spheres * (4 * found + 16 + 4 * real) + 8 * buckets)
+    drafts = lists
+    return int(2 * moving + drafts + grains * listed * 8 + spheres * (4 * found + 16 + 4 * real) + 8 * buckets)

@@ -88,7 +88,7 @@ def test_the_memory_of_a_world_is_predicted(write_study: Write, precision: str) 
     path = write_study(("modulus_scale = 400.0", f'modulus_scale = 400.0\nprecision = "{precision}"'))
     case = load_study(path).case({}, 1)
     batch = Batch([case], "cpu")
-    kept = sum(array.capacity for array in Rollback(batch.solver)._kept.values())
+    kept = sum(array.capacity for array in Rollback(batch.solver)._kept)
     taken = memory_bytes(batch.solver) + kept
     assert 0.8 < device_bytes(case) / taken < 1.5, (device_bytes(case), taken)
 
