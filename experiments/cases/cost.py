@@ -178,4 +178,6 @@ def device_bytes(case: Case[Any]) -> int:
     lists = grains * listed * entry
     moving = grains * state + spheres * 8 * real + lists
     drafts = lists
-    return int(2 * moving + drafts + grains * listed * 8 + spheres * (4 * found + 16 + 4 * real) + 8 * buckets)
+    return int(
+        2 * moving + drafts + grains * listed * 8 + spheres * (4 * found + 16 + 4 * real) + 8 * buckets
+    )
