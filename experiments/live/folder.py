@@ -44,6 +44,22 @@ def inside(folder: Path, name: str) -> Path:
     return path
 
 
+def matching(folder: Path, pattern: str) -> list[Path]:
+    """List what matches a pattern in a folder, the newest first; nothing where it goes meanwhile."""
+    try:
+        return sorted(folder.glob(pattern), key=changed, reverse=True)
+    except OSError:
+        return []
+
+
+def changed(path: Path) -> float:
+    """Time of the last change [s]; 0 of what has gone."""
+    try:
+        return path.stat().st_mtime
+    except OSError:
+        return 0.0
+
+
 def read_json(folder: Path, name: str) -> dict[str, Any]:
     """Read a JSON object; empty where there is none, or it is damaged."""
     try:

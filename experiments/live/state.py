@@ -10,7 +10,7 @@ from typing import Any
 
 from experiments.cases.folder import CASES as STORE
 from experiments.cases.folder import JOURNAL
-from experiments.live.folder import inside, read_json, read_lines, read_table
+from experiments.live.folder import changed, inside, matching, read_json, read_lines, read_table
 from experiments.live.notes import (
     DecisionNote,
     LogNote,
@@ -71,7 +71,7 @@ class RunState:
     @property
     def outputs(self) -> list[str]:
         """Files that the run has made, by their paths in the folder."""
-        tables = sorted(path.name for path in self.folder.glob("tables/*.csv"))
+        tables = sorted(path.name for path in matching(self.folder, "tables/*.csv"))
         return [name for name in (*OUTPUTS, *(f"tables/{name}" for name in tables)) if _is_file(self, name)]
 
 
@@ -100,7 +100,7 @@ def _progress(folder: Path, found: ProgressNote | None) -> ProgressNote:
     if found is None:
         return _ending_of_files(folder)
     if found.state == "running":
-        age = time.time() - max(_changed(folder / JOURNAL / name) for name in (BEAT, PROGRESS))
+        age = time.time() - max(changed(folder / JOURNAL / name) for name in (BEAT, PROGRESS))
         if age > STALE:
             message = f"No sign of life for {duration(age)}: the run was killed, or its machine sleeps."
             return ProgressNote(state="interrupted", message=message)
@@ -115,13 +115,6 @@ def _ending_of_files(folder: Path) -> ProgressNote:
         told = "The run keeps no journal: only its finished heaps can be shown."
         return ProgressNote(state="interrupted", message=told)
     return ProgressNote(state="waiting", message="No run has begun in this folder yet.")
-
-
-def _changed(path: Path) -> float:
-    try:
-        return path.stat().st_mtime
-    except OSError:
-        return 0.0
 
 
 def _cases(folder: Path) -> dict[str, dict[str, Value]]:
@@ -159,7 +152,7 @@ def _heaps(folder: Path, cases: Mapping[str, Mapping[str, Value]]) -> list[dict[
 def _forming(folder: Path, cases: Mapping[str, Mapping[str, Value]]) -> list[dict[str, Value]]:
     """Heaps that form now, the newest first."""
     by_name = {case["name"]: case for case in cases.values() if "name" in case}
-    files = sorted((folder / JOURNAL / GLIMPSES).glob("*.npz"), key=_changed, reverse=True)
+    files = matching(folder / JOURNAL / GLIMPSES, "*.npz")
     return [
         {"id": f"glimpse/{path.stem}", "title": title_of(by_name.get(path.stem, {})), "at_rest": False}
         for path in files[:HEAPS_SHOWN]
@@ -172,8 +165,7 @@ def _at_rest(folder: Path, cases: Mapping[str, Mapping[str, Value]]) -> list[dic
         (key, case) for key, case in cases.items() if "status" in case
     ]
     if not ended:
-        files = sorted((folder / STORE).glob("*.npz"), key=_changed)
-        ended = [(path.stem, {}) for path in files]
+        ended = [(path.stem, {}) for path in reversed(matching(folder / STORE, "*.npz"))]
     found: list[dict[str, Value]] = [
         {"id": f"case/{key}", "title": title_of(case), "at_rest": True, "angle": case.get("angle"),
          "reason": case.get("reason", "")}

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from experiments.errors import InputError
+from experiments.live.folder import matching
 from experiments.live.state import RunState
 from experiments.live.ui.workshop import command_line
 
@@ -108,10 +109,9 @@ class Runs:
 
     def names(self) -> list[str]:
         """Folders of all runs, those that were started here first."""
-        found = sorted(self.folder.glob("out/*/"), key=lambda path: path.stat().st_mtime, reverse=True)
         lying = [
             path.relative_to(self.folder).as_posix()
-            for path in found
+            for path in matching(self.folder, "out/*/")
             if _is_run(path) and not path.is_symlink()
         ]
         return list(dict.fromkeys([*reversed(self._started), *lying]))

@@ -18,6 +18,7 @@ import trimesh
 from commandline import dem_warp
 from starlette.testclient import TestClient
 
+from experiments.live.state import RunState
 from experiments.live.ui import started, workshop
 from experiments.live.ui.start import ui_app
 from experiments.live.ui.workshop import plain_value
@@ -296,6 +297,22 @@ def test_a_run_that_is_unknown_is_not_watched(client: TestClient, folder: Path) 
     (folder.parent / "elsewhere").mkdir()
     for name in ("none", "..%2felsewhere", "%2e%2e/elsewhere"):
         assert client.get(f"/{TOKEN}/run/{name}/-/state.json").status_code in (403, 404, 422)
+
+
+def test_folders_that_go_while_they_are_read_are_no_error(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A run's end takes its glimpses away, whoever looks at them."""
+    (folder / "out" / "heap" / ".live").mkdir(parents=True)
+    runs = started.Runs(folder)
+    assert [run["folder"] for run in runs.listed()] == ["out/heap"]
+
+    def gone(path: Path, pattern: str) -> list[Path]:
+        raise FileNotFoundError(2, "No such file or directory", str(path))
+
+    monkeypatch.setattr(Path, "glob", gone)
+    assert RunState.read(folder / "out" / "heap").heaps == []
+    assert runs.listed() == []
 
 
 def test_a_heap_is_started_watched_and_shown(
