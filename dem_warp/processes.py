@@ -51,7 +51,7 @@ _CONTEXT = _Context()
 
 
 class _Stand(ctypes.Structure):
-    """What a process is at, which its parent reads at any time.
+    """State of a process, which its parent reads at any time.
 
     No lock guards it: a process that is killed would keep it. So what is read may be half of it old.
     """
@@ -68,7 +68,7 @@ class _Stand(ctypes.Structure):
 
 
 _own: list[_Stand] = []
-"""Where this process tells what it is at."""
+"""State of this process, which it tells its parent."""
 
 
 def _start(stands: Any, started: Any) -> None:
