@@ -16,10 +16,10 @@ import typer
 from typer.main import get_command
 
 from dem_warp import SCENES
-from experiments.benchmarks.cluster import plan
 from experiments.cli import app
 from experiments.discover.library import FILES
-from experiments.measurement.observables import OBSERVABLES, OUTLINE
+from experiments.evidence.robustness.cluster import plan
+from experiments.studyfile.observables import OBSERVABLES, OUTLINE
 from experiments.studyfile.reference import study_reference
 
 

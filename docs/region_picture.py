@@ -12,8 +12,8 @@ import pandas as pd
 
 from doe import Sample
 from doe.plots import contour_plot
+from experiments.io.toml_files import read_toml
 from experiments.studyfile.card_surface import card_surfaces
-from experiments.toml_files import read_toml
 
 WORDS = {"static_friction": "friction", "rolling_friction": "rolling friction", "restitution": "restitution"}
 

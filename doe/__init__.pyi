@@ -1,32 +1,36 @@
 """The public names: each is loaded with its module when it is first used."""
 
-from .agreement import Agreement, Estimate, agreement
-from .analysis.canonical import CanonicalAnalysis, canonical, ridge_path
-from .analysis.desirability import BestSetting, Wish, maximize, minimize, most_desirable
-from .analysis.diagnostics import BoxCox, RobustTable, box_cox, influence, robust_coefficients
-from .analysis.effects import TwoLevelEffects, two_level_effects
-from .analysis.formula import LinearFit, fit_formula, fit_mixture
-from .analysis.optimum_region import stationary_region
-from .anova import ErrorTerm, pure_error
-from .compare import Comparison, compare_means
-from .curve_fit import CurveFit, Forecast, MeasuredCurve, fit_curves
-from .curves import CurveEmulator
-from .design import Design
-from .designs.aliases import AliasStructure, alias_structure
-from .designs.augment import add_axial, add_center, foldover, join
-from .designs.box_behnken import box_behnken
-from .designs.central_composite import central_composite
-from .designs.definitive import definitive_screening
-from .designs.factorial import fractional_factorial, full_factorial
-from .designs.mixture import Mixture, simplex_centroid, simplex_lattice
-from .designs.optimal import optimal_design
-from .designs.plackett_burman import plackett_burman
-from .designs.quality import DesignQuality, design_quality, power_table
-from .designs.space_filling import latin_hypercube, sobol
+from .curves.curve_fit import CurveFit, Forecast, MeasuredCurve, fit_curves
+from .curves.curves import CurveEmulator
+from .curves.profiles import Mode, ProfileSample, scatter_of_views
+from .design.anova import ErrorTerm, pure_error
+from .design.design import Design
+from .design.factors import Category, Factor
+from .design.families.aliases import AliasStructure, alias_structure
+from .design.families.augment import add_axial, add_center, foldover, join
+from .design.families.box_behnken import box_behnken
+from .design.families.central_composite import central_composite
+from .design.families.definitive import definitive_screening
+from .design.families.factorial import fractional_factorial, full_factorial
+from .design.families.mixture import Mixture, simplex_centroid, simplex_lattice
+from .design.families.optimal import optimal_design
+from .design.families.plackett_burman import plackett_burman
+from .design.families.quality import DesignQuality, design_quality, power_table
+from .design.families.space_filling import latin_hypercube, sobol
 from .errors import DesignError, TargetError
-from .factors import Category, Factor
-from .joint import Goal, JointFit, joint_fit
-from .noise import (
+from .response.analysis.canonical import CanonicalAnalysis, canonical, ridge_path
+from .response.analysis.desirability import BestSetting, Wish, maximize, minimize, most_desirable
+from .response.analysis.diagnostics import BoxCox, RobustTable, box_cox, influence, robust_coefficients
+from .response.analysis.formula import LinearFit, fit_formula, fit_mixture
+from .response.analysis.optimum_region import stationary_region
+from .response.joint import Goal, JointFit, joint_fit
+from .response.optimum import StationaryPoint
+from .response.region import Region
+from .response.surface import Surface, fit_surface
+from .response.transfer import Transfer, transfer, transfer_points
+from .samples.agreement import Agreement, Estimate, agreement
+from .samples.compare import Comparison, compare_means
+from .samples.noise import (
     NoiseFloor,
     VarianceRatio,
     curvature_test,
@@ -35,14 +39,10 @@ from .noise import (
     noise_floor,
     variance_ratio,
 )
-from .optimum import StationaryPoint
-from .profiles import Mode, ProfileSample, scatter_of_views
-from .region import Region
-from .sample import Sample
-from .screening import ScreenResult, aliases, screen
-from .steepest import ClimbPath, climb_table, steepest_path
-from .surface import Surface, fit_surface
-from .transfer import Transfer, transfer, transfer_points
+from .samples.sample import Sample
+from .screen.screening import ScreenResult, aliases, screen
+from .screen.steepest import ClimbPath, climb_table, steepest_path
+from .screen.two_level_effects import TwoLevelEffects, two_level_effects
 
 __all__ = [
     "Agreement",

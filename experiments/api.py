@@ -7,17 +7,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from experiments.bridge.corrected_card import write_crossing
 from experiments.bridge.crossing import check_order, cross
 from experiments.bridge.result import Crossing
 from experiments.bridge.source import read_source
 from experiments.calibrate import Campaign
 from experiments.calibrate.campaign import StageHook
 from experiments.cases import open_workers, with_engine
-from experiments.cases.folder import locked
-from experiments.errors import InputError
-from experiments.live.trail.journal import Journal
+from experiments.cases.store.folder import locked
+from experiments.io.errors import InputError
+from experiments.journal.journal import Journal
 from experiments.report.companion import Replay
+from experiments.report.corrected_card import write_crossing
 from experiments.report.material_card import CARD
 from experiments.runs.campaign import (
     Desk,

@@ -44,9 +44,9 @@ from experiments.commands.options import (
 )
 from experiments.commands.plans import show_calibration, show_search
 from experiments.commands.results import print_study, show_stage
+from experiments.commands.ui import UI_EXAMPLE, ui
 from experiments.commands.watch import WATCH_EXAMPLE, watch
 from experiments.live.server import live_page
-from experiments.live.ui.command import UI_EXAMPLE, ui
 
 if TYPE_CHECKING:
     from experiments.api import Calibration
@@ -65,7 +65,7 @@ app = typer.Typer(
 def _show_version(wanted: bool) -> None:
     if wanted:
         from dem_warp.version import source_commit
-        from experiments.version import program_version
+        from experiments.io.version import program_version
 
         commit = source_commit()
         typer.echo(f"dem-warp {program_version()}" + (f" ({commit})" if commit else ""))

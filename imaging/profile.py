@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from imaging.elevation import level_outline
 from imaging.errors import PictureError
 from imaging.geometry import FloatArray
 from imaging.outline import Outline
+from imaging.photo.elevation import level_outline
 
 SPACING = 0.2
 """Distance of neighbouring places, over the square root of the outline's area."""

@@ -10,16 +10,16 @@ from typing import Protocol
 import numpy as np
 from scipy import special
 
-from imaging.doubts import doubts_of
 from imaging.errors import PictureError
-from imaging.finding import find_outline
 from imaging.fits import FitSettings
 from imaging.flanks import FlankLine, fit_flanks
 from imaging.geometry import Picture
 from imaging.outline import Outline
+from imaging.photo.doubts import doubts_of
+from imaging.photo.finding import find_outline
+from imaging.photo.view import View, level_angle, level_error
 from imaging.pictures import focal_length, read_picture
 from imaging.reasons import Doubt
-from imaging.view import View, level_angle, level_error
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from imaging.elevation import level_outline
 from imaging.flanks import apex_column
 from imaging.geometry import FloatArray
 from imaging.outline import Outline
+from imaging.photo.elevation import level_outline
 
 
 @dataclass(frozen=True)

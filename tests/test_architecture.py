@@ -217,11 +217,11 @@ def test_every_library_is_declared() -> None:
         ("dem_warp.simulation", {"pandas", "scipy", "pyvista", "cv2", "trimesh", "pydantic", "typer"}),
         ("dem_warp.scenes.library", {"warp", "scipy"}),
         ("doe", {"numpy", "pandas", "scipy"}),
-        ("doe.surface", {"warp", "pyvista", "cv2", "plotly", "matplotlib.pyplot"}),
+        ("doe.response.surface", {"warp", "pyvista", "cv2", "plotly", "matplotlib.pyplot"}),
         ("doe.discrepancy", {"numpy", "pandas", "scipy"}),
         ("doe.discrepancy.analysis", {"warp", "pyvista", "cv2", "plotly", "matplotlib.pyplot", "sklearn"}),
         ("imaging", {"cv2", "numpy", "scipy"}),
-        ("imaging.heap", {"warp", "pyvista", "vtkmodules", "pandas"}),
+        ("imaging.drawing.heap", {"warp", "pyvista", "vtkmodules", "pandas"}),
         ("experiments.cli", {"warp", "pyvista", "pandas", "cv2", "statsmodels", "plotly"}),
     ],
 )
@@ -236,7 +236,11 @@ def test_an_import_loads_no_more_than_it_needs(module: str, unwanted: set[str]) 
 
 def test_no_generic_room_knows_a_study() -> None:
     named = re.compile(r"studies\.(buckwheat|cellulose|trial|wheat_drums)")
-    evidence = ("experiments/studies/", "experiments/verification/", "experiments/benchmarks/")
+    evidence = (
+        "experiments/studies/",
+        "experiments/evidence/verification/",
+        "experiments/evidence/performance/",
+    )
     rooms = [s for s in sources("experiments") if not s.name.startswith(evidence)]
     assert [s.name for s in rooms if named.search(s.path.read_text(encoding="utf-8"))] == []
 

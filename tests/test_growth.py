@@ -26,7 +26,7 @@ MAGNETS = Exporter("Magnets", "none", "in all", lambda material: (), lambda cont
 
 FORMAT = """
 import numpy as np
-from experiments.sphere_files.sphere_file import Format, SphereFile
+from experiments.grains.spheres.sphere_file import Format, SphereFile
 
 SPHERES = np.array([[0.0, 0.0, 0.0, 2.0]])
 BALL = Format("ball", lambda head: head == "ball", lambda path: SphereFile("a ball", SPHERES))
@@ -79,7 +79,7 @@ from experiments.calibrate.screening import screening_design
 from experiments.cli import app
 from experiments.discover.library import library_for
 from experiments.export import EXPORTERS
-from experiments.sphere_files import read_clump
+from experiments.grains.spheres import read_clump
 from experiments.studyfile import load_study
 trial = pathlib.Path("experiments/studies/trial/study.toml")
 magnets, corners = {"magnetism": {"magnetic_force": "0.5 mN"}}, {"screening": {"design": "corners"}}

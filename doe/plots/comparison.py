@@ -8,12 +8,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
-from doe.agreement import Agreement
 from doe.checks import checked_kind, checked_list, checked_number
 from doe.errors import DesignError
 from doe.palette import BLUE, GREEN, MUTED, ORANGE, VERMILION
 from doe.plots.style import canvas, plain
-from doe.steepest import ClimbPath, climb_table
+from doe.samples.agreement import Agreement
+from doe.screen.steepest import ClimbPath, climb_table
 
 
 def climb_plot(

@@ -7,14 +7,14 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from doe.analysis.desirability import Wish, checked_surfaces
 from doe.checks import checked_kind, checked_list, checked_map
-from doe.design import Design, checked_setting, observations
+from doe.design.design import Design, checked_setting, observations
+from doe.design.factors import Category, Factor
 from doe.errors import DesignError
-from doe.factors import Category, Factor
 from doe.palette import BLUE, MUTED, ORANGE, VERMILION
 from doe.plots.style import WIDTH, canvas, plain
-from doe.surface import Surface
+from doe.response.analysis.desirability import Wish, checked_surfaces
+from doe.response.surface import Surface
 
 DASHES = ("-", "--", ":", "-.")
 GAP = 0.6

@@ -8,14 +8,14 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from doe.analysis.desirability import checked_surfaces
 from doe.checks import checked_map, checked_number
-from doe.design import checked_setting
+from doe.design.design import checked_setting
 from doe.errors import DesignError
 from doe.palette import BLUE, GREEN, MUTED, ORANGE, VERMILION
-from doe.plot_data import surface_grid
+from doe.plots.plot_data import surface_grid
 from doe.plots.style import canvas, key
-from doe.surface import Surface
+from doe.response.analysis.desirability import checked_surfaces
+from doe.response.surface import Surface
 
 COLORS = (BLUE, VERMILION, GREEN, ORANGE, MUTED)
 
@@ -39,7 +39,7 @@ def overlay_plot(
     limits : mapping of (low, high) by response
         None where a side is free.
     x, y, at, extent
-        As in ``doe.plot_data.surface_grid``.
+        As in ``doe.plots.plot_data.surface_grid``.
     point : mapping of natural values by factor, optional
         A setting to mark; factors off the axes are held there unless ``at`` says otherwise.
     """

@@ -7,13 +7,13 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from doe.analysis.effects import TwoLevelEffects
 from doe.checks import checked_kind, checked_list
 from doe.errors import DesignError
 from doe.palette import BLUE, MUTED, ORANGE
-from doe.plot_data import half_normal_points, pareto_points
+from doe.plots.plot_data import half_normal_points, pareto_points
 from doe.plots.style import canvas, key, plain
-from doe.screening import ScreenResult
+from doe.screen.screening import ScreenResult
+from doe.screen.two_level_effects import TwoLevelEffects
 
 
 def pareto_chart(

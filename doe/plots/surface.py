@@ -12,12 +12,12 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from doe.checks import checked_kind, checked_number
-from doe.design import checked_setting
+from doe.design.design import checked_setting
 from doe.palette import BLUE, MUTED, VERMILION
-from doe.plot_data import normal_points, surface_grid
+from doe.plots.plot_data import normal_points, surface_grid
 from doe.plots.style import WIDTH, canvas, key, plain
-from doe.region import Region
-from doe.surface import Surface
+from doe.response.region import Region
+from doe.response.surface import Surface
 
 
 def residual_plots(surface: Surface, axes: tuple[Axes, Axes] | None = None) -> Figure:
@@ -59,7 +59,7 @@ def contour_plot(
 
     With the target's curve, a chosen point (natural values by factor), a compatible region (in more than two
     factors: its shadow on the plane of the axes) and the design's runs. ``x``, ``y``, ``at``, ``extent`` as
-    in ``doe.plot_data.surface_grid``; factors off the axes are held at the point when there is one.
+    in ``doe.plots.plot_data.surface_grid``; factors off the axes are held at the point when there is one.
     """
     checked_kind("surface", surface, Surface)
     if point is not None:

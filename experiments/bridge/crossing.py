@@ -17,7 +17,7 @@ from doe import DesignError, TargetError, Transfer, compare_means, transfer, tra
 from experiments.bridge.result import BridgeOutcome, Crossing
 from experiments.bridge.source import Source
 from experiments.calibrate.values import interval_text, listed, quantity
-from experiments.errors import InputError
+from experiments.io.errors import InputError
 
 LEAST_RUNS = 6
 """Fewest runs of a bridge: one round around the point is five, and shift, scale and noise are three."""

@@ -7,14 +7,14 @@ from pathlib import Path
 from typing import Any
 
 from doe import DesignError, Sample, Surface
-from experiments.errors import StudyError
+from experiments.io.errors import StudyError
+from experiments.io.toml_files import read_toml
+from experiments.io.units import Quantity
 from experiments.studyfile import Study, load_card
 from experiments.studyfile.card import BRIDGE
 from experiments.studyfile.card_surface import SURFACE, card_surfaces
 from experiments.studyfile.places import drop
 from experiments.studyfile.solver_section import CORRECTED_FOR
-from experiments.studyfile.units import Quantity
-from experiments.toml_files import read_toml
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from experiments.calibrate.results import STAGES, Outcome, failed
-from experiments.errors import shortened
+from experiments.io.errors import shortened
 from experiments.studyfile.campaign import TARGET_SCENE, Response, scenes_of
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from experiments.calibrate.values import UNLIMITED, reach_limits
-from experiments.errors import InputError, StudyError
+from experiments.io.errors import InputError, StudyError
 from experiments.studyfile import Study
 
 

@@ -1,11 +1,11 @@
 """The public names: each is loaded with its module when it is first used."""
 
-from .engine import Engine
-from .engines import ENGINES, engine_of, with_engine
+from .engines.engine import Engine
+from .engines.engines import ENGINES, engine_of, with_engine
 from .execute import run_cases
-from .folder import open_folder, require_unused
-from .heap import Heap, heap_snapshot, simulate_heap, write_heap
-from .store import Store
+from .show.heap import Heap, heap_snapshot, simulate_heap, write_heap
+from .store.folder import open_folder, require_unused
+from .store.store import Store
 from .workers.opening import open_workers
 from .workers.own import OwnWorkers
 from .workers.resources import Resources

@@ -15,16 +15,16 @@ import pandas as pd
 
 from dem_warp import Case, CaseResult, Progress
 from dem_warp.checkpoint import case_name
-from experiments.cases.engine import NO_ANSWER
+from experiments.cases.engines.engine import NO_ANSWER
 from experiments.cases.measuring import measuring_processes
-from experiments.cases.store import Store
+from experiments.cases.store.store import Store
 from experiments.cases.workers.own import THIS_MACHINE
 from experiments.cases.workers.workers import Workers
-from experiments.errors import StudyError
-from experiments.measurement.observables import ANGLE
+from experiments.io.errors import StudyError
 from experiments.measurement.states import Observed, observe
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import TARGET_SCENE
+from experiments.studyfile.observables import ANGLE
 from experiments.studyfile.study import MeasurementSection
 
 RESULT_COLUMNS = ("status", "reason", ANGLE, "angle_se", "case_key")
@@ -37,7 +37,7 @@ _log = logging.getLogger(__name__)
 
 
 class CaseNotes(Protocol):
-    """Takes notes of cases while they run; `experiments.live.trail.journal` has one."""
+    """Takes notes of cases while they run; `experiments.journal.journal` has one."""
 
     def planned(self, table: pd.DataFrame, names: Sequence[str]) -> None:
         """Note the cases of a table, each with its ``case_key`` and its name while it runs."""

@@ -71,7 +71,7 @@ def angle(
     pip install 'dem-warp\\[heic]', or to be saved as JPEG. Heaps of spheres are seen from eight sides.
     """
     with clear_errors():
-        from experiments.commands import photographs
+        from experiments.measurement import photographs
         from experiments.measurement.heap_files import heap_settings
 
         photographs.require_one_form({"--target": as_target, "--csv": as_csv, "--json": as_json})

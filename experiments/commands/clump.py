@@ -13,7 +13,7 @@ from experiments.commands.options import AsJson, quantity, share
 from experiments.commands.results import print_clump, print_trial
 
 if TYPE_CHECKING:
-    from experiments.commands.shapes import Clump
+    from experiments.grains.clumps.shapes import Clump
 
 CLUMP_EXAMPLE = "Example: [bold]dem-warp clump tri-pyramid:5.90x3.93 --spheres 9 --out clump.txt[/]"
 
@@ -60,7 +60,7 @@ def clump(
 ) -> None:
     """Make a grain of spheres from a mesh or measured dimensions: volume, mass, inertia, spheres."""
     with clear_errors():
-        from experiments.commands.shapes import ClumpRequest, make_clump, write_clump
+        from experiments.grains.clumps.shapes import ClumpRequest, make_clump, write_clump
 
         _require_new(out, picture)
         request = ClumpRequest(
@@ -83,8 +83,8 @@ def clump(
 
 def _require_new(out: Path | None, picture: Path | None) -> None:
     """Refuse what cannot be written before anything is fitted."""
-    from experiments.commands.clump_picture import require_picture
-    from experiments.files import require_new_file
+    from experiments.grains.clumps.clump_picture import require_picture
+    from experiments.io.files import require_new_file
 
     if out:
         require_new_file(out, "a clump")

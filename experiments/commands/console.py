@@ -23,7 +23,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn
 from rich.text import Text
 
-from experiments.live.trail.progress import duration, time_left
+from experiments.journal.progress import duration, time_left
 
 if TYPE_CHECKING:
     from dem_warp import Progress as BatchProgress
@@ -36,7 +36,7 @@ ENDED_OUTSIDE = "a process was ended from outside, perhaps for lack of memory: f
 QUIET_START = 2.0
 """Least duration that shows progress [s]."""
 MANIFEST = "study.json"
-"""File of a folder that a run can go on in; `experiments.cases.manifest` writes it."""
+"""File of a folder that a run can go on in; `experiments.cases.store.manifest` writes it."""
 
 LINE_EVERY = 10.0
 """Time between two lines of progress where there is no terminal [s]."""
@@ -174,7 +174,7 @@ def _ended_by_sigterm() -> Iterator[None]:
 
 def _is_input(error: ValueError) -> bool:
     """Tell that an error is of the input: those of libraries that were never loaded cannot be."""
-    kinds = [("experiments.errors", "InputError"), ("imaging", "PictureError"), ("doe", "DesignError")]
+    kinds = [("experiments.io.errors", "InputError"), ("imaging", "PictureError"), ("doe", "DesignError")]
     loaded = (getattr(sys.modules.get(module), name, ()) for module, name in kinds)
     return isinstance(error, tuple(kind for kind in loaded if kind))
 

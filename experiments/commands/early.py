@@ -72,8 +72,8 @@ def _readable(path: Path | None, scale: str | None, engine: str | None) -> Study
     """Read a study file; None where none is named and the study that ships is meant."""
     if path is None and engine is None:
         return None
-    from experiments.errors import InputError, StudyError
-    from experiments.toml_files import read_toml
+    from experiments.io.errors import InputError, StudyError
+    from experiments.io.toml_files import read_toml
 
     scales = read_toml(path)[1].get("scale", {}) if path is not None else {}
     if path is not None and scale is not None and isinstance(scales, dict) and scale not in scales:

@@ -49,7 +49,7 @@ def export(
         from experiments.cases import require_unused
         from experiments.commands.leaving import exported_test, study_of, told_of_bridge
         from experiments.export import export_input, write_export
-        from experiments.files import require_folder
+        from experiments.io.files import require_folder
         from experiments.runs.choices import default_folder
         from experiments.studyfile.campaign import TARGET_SCENE
 

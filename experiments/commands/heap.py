@@ -78,11 +78,11 @@ def heap(
     with clear_errors():
         check_heap_file(study, scale, engine, scene)
         from experiments.cases import open_workers, require_unused, simulate_heap, with_engine, write_heap
-        from experiments.cases.heap import filmed_by
-        from experiments.cases.movie import MOVIES, require_movie
+        from experiments.cases.show.heap import filmed_by
+        from experiments.cases.show.movie import MOVIES, require_movie
         from experiments.cases.workers.own import watched_by
-        from experiments.files import require_folder
-        from experiments.live.trail.journal import Journal
+        from experiments.io.files import require_folder
+        from experiments.journal.journal import Journal
         from experiments.runs.campaign import watching
         from experiments.runs.choices import chosen_resources, chosen_study, default_folder, resources_for
         from experiments.studyfile.campaign import TARGET_SCENE

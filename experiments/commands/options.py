@@ -85,7 +85,7 @@ def present_device(name: str | None) -> str | None:
 
 def assignments(texts: list[str]) -> dict[str, str]:
     """Split ``NAME=VALUE`` options."""
-    from experiments.errors import InputError
+    from experiments.io.errors import InputError
 
     pairs = [text.partition("=") for text in texts]
     for text, (name, equals, value) in zip(texts, pairs, strict=True):
@@ -96,8 +96,8 @@ def assignments(texts: list[str]) -> dict[str, str]:
 
 def quantity(text: str, dimension: str, option: str) -> float:
     """Read an option's quantity in SI."""
-    from experiments.errors import InputError
-    from experiments.studyfile.units import Quantity
+    from experiments.io.errors import InputError
+    from experiments.io.units import Quantity
 
     try:
         return Quantity.parse(text).to_base(dimension)
@@ -107,7 +107,7 @@ def quantity(text: str, dimension: str, option: str) -> float:
 
 def share(text: str, option: str) -> float:
     """Read a share between 0 and 1, as ``5%`` or ``0.05``."""
-    from experiments.errors import InputError
+    from experiments.io.errors import InputError
 
     words = text.strip()
     try:

@@ -15,7 +15,7 @@ from experiments.commands.console import messages, plain
 if TYPE_CHECKING:
     from experiments.calibrate.results import StageResult
     from experiments.cases import Heap, Resources
-    from experiments.commands.clump_search import Trial
+    from experiments.grains.clumps.clump_search import Trial
     from experiments.studyfile import Study
 
 

@@ -32,7 +32,7 @@ def watch(
     then open the address that it told in a browser here.
     """
     with clear_errors("The run itself goes on, if it was running."):
-        from experiments.errors import InputError
+        from experiments.io.errors import InputError
         from experiments.live.server import Place, open_browser, require_libraries, serve, watch_app
 
         require_libraries()

@@ -10,14 +10,14 @@ import numpy as np
 from dem_warp import Case, CaseResult, Progress
 from doe.discrepancy import Outcomes, Point
 from experiments.cases import Engine, Workers, engine_of
-from experiments.cases.key import case_key
+from experiments.cases.engines.key import case_key
+from experiments.cases.store.outcome_table import OutcomeTable
 from experiments.cases.workers.own import THIS_MACHINE
 from experiments.discover.library import Mechanism, with_mechanisms
-from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.wave import WaveRunner
-from experiments.errors import StudyError
-from experiments.measurement.observables import BY_NAME, VERSION
+from experiments.io.errors import StudyError
 from experiments.studyfile import Study
+from experiments.studyfile.observables import BY_NAME, VERSION
 
 
 class EngineSimulator:

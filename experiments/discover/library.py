@@ -20,14 +20,14 @@ from dem_warp import Case, effective_moduli
 from dem_warp.laws.conventions import Rolling
 from dem_warp.registry import Registry
 from dem_warp.scenes.poured_scene import GRAVITY
+from experiments.io.toml_files import read_toml
+from experiments.io.units import Quantity
 from experiments.studyfile import Study, StudyError
 from experiments.studyfile.factor_section import Parameters, merge
 from experiments.studyfile.places import Places, drop, nested, value_at
 from experiments.studyfile.schema import Section, field_at, validated
 from experiments.studyfile.sections import Physics
 from experiments.studyfile.setters import setter_at
-from experiments.studyfile.units import Quantity
-from experiments.toml_files import read_toml
 
 FORMER_NAMES = {"contact_cohesion": "contact_adhesion"}
 """Names by which older studies and banks know mechanisms."""

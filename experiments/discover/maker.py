@@ -9,7 +9,7 @@ from datetime import date
 
 from dem_warp.provenance import engine_fingerprint
 from experiments.cases import Engine
-from experiments.cases.key import engine_identity
+from experiments.cases.engines.key import engine_identity
 
 
 def fingerprint_of(engine: Engine | None) -> str:

@@ -26,14 +26,14 @@ from doe.discrepancy import (
     settings_of,
 )
 from experiments.cases import engine_of
-from experiments.cases.key import engine_identity
-from experiments.cases.manifest import describe
+from experiments.cases.engines.key import engine_identity
+from experiments.cases.store.manifest import describe
 from experiments.discover.library import FORMER_NAMES, Mechanism, library_for, with_maximum
 from experiments.discover.maker import notes_on
 from experiments.discover.mirror import odd_observables
-from experiments.errors import InputError, StudyError
+from experiments.io.errors import InputError, StudyError
+from experiments.io.texts import nearest_name
 from experiments.studyfile import Study
-from experiments.texts import nearest_name
 
 WITHOUT_EFFECT = (
     "name", "note", "companion", "target", "response", "campaign", "discover", "factor", "engine",

@@ -10,12 +10,12 @@ from pathlib import Path
 
 from dem_warp import Case, CaseResult, Progress
 from experiments.cases import Engine, Workers
-from experiments.cases.engine import NO_ANSWER
+from experiments.cases.engines.engine import NO_ANSWER
 from experiments.cases.measuring import measuring_processes
+from experiments.cases.store.outcome_table import Outcome, OutcomeTable
 from experiments.cases.workers.own import THIS_MACHINE
-from experiments.discover.outcome_table import Outcome, OutcomeTable
-from experiments.measurement.observables import NAMES
 from experiments.measurement.states import measure
+from experiments.studyfile.observables import NAMES
 from experiments.studyfile.study import MeasurementSection
 
 SAVE_EVERY = 5.0

@@ -7,10 +7,10 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from dem_warp import Case, Material
-from experiments.errors import InputError
 from experiments.export.contact import Contact, Term
 from experiments.export.laws import LawsOfCode
 from experiments.export.translated import Translated
+from experiments.io.errors import InputError
 
 
 @dataclass(frozen=True)

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from experiments.errors import InputError, Problem
 from experiments.export.exporter import ExportedTest, Translation
 from experiments.export.facts import grain_rows, laws_row
 from experiments.export.library import EXPORTERS
-from experiments.files import write_text
-from experiments.version import program_version
+from experiments.io.errors import InputError, Problem
+from experiments.io.files import write_text
+from experiments.io.version import program_version
 
 README = "README.md"
 """File that says what was translated how."""

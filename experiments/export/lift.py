@@ -11,9 +11,9 @@ import numpy as np
 from dem_warp import Case, ClumpShape, LiftedCylinder
 from dem_warp.scenes.lifted_cylinder import LiftController
 from dem_warp.scenes.poured_controller import CALM, HEAPED
-from experiments.errors import InputError
 from experiments.export.exporter import ExportedTest
 from experiments.export.sizes import classes_of
+from experiments.io.errors import InputError
 
 FIRST_SEED = 10_000
 """LIGGGHTS wants primes above it."""

@@ -12,12 +12,12 @@ import numpy as np
 
 from doe.palette import BLUE, SERIES, VERMILION
 from experiments.calibrate.results import STAGES
-from experiments.errors import InputError
+from experiments.io.errors import InputError
 from experiments.live.folder import inside
 from experiments.live.notes import ResponseNote, SampleNote
 from experiments.live.state import RunState
-from experiments.measurement.observables import ANGLE, OBSERVABLES
 from experiments.report.kit.chart import Chart, add_bars, add_line, add_points, add_target, new_figure
+from experiments.studyfile.observables import ANGLE, OBSERVABLES
 
 MOST_FACTORS = 4
 """Factors whose values the response is drawn over."""

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.cases.folder import CASES, JOURNAL
-from experiments.errors import InputError
+from experiments.cases.store.folder import CASES, JOURNAL
+from experiments.io.errors import InputError
+from experiments.journal.glimpses import read_glimpse, spheres_of
+from experiments.journal.journal import GLIMPSES
 from experiments.live.folder import inside
-from experiments.live.trail.glimpses import read_glimpse, spheres_of
-from experiments.live.trail.journal import GLIMPSES
 
 MOST_SPHERES = 60_000
 """Spheres of a heap that are drawn; of more, whole grains are left out evenly."""
@@ -55,7 +55,7 @@ def heap_spheres(folder: Path, name: str) -> tuple[np.ndarray, str, float]:
 
 def _heap_file(path: Path) -> np.ndarray:
     """Read the spheres of a heap's file."""
-    from experiments.sphere_files import read_spheres
+    from experiments.grains.spheres import read_spheres
 
     read = read_spheres(path)
     bodies = np.zeros(len(read.spheres)) if read.bodies is None else read.bodies

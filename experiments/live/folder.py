@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from experiments.errors import InputError
+from experiments.io.errors import InputError
 
 LARGEST = 50_000_000
 """Bytes of the largest file that is read whole."""

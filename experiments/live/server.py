@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from experiments.errors import InputError
+from experiments.io.errors import InputError
 from experiments.live.guard import Guard, new_token
 
 if TYPE_CHECKING:

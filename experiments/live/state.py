@@ -8,8 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from experiments.cases.folder import CASES as STORE
-from experiments.cases.folder import JOURNAL
+from experiments.cases.store.folder import CASES as STORE
+from experiments.cases.store.folder import JOURNAL
+from experiments.journal.journal import BEAT, CASES, GLIMPSES, LOG, PROGRESS, RUN, STAGES
+from experiments.journal.progress import duration
 from experiments.live.folder import changed, inside, matching, read_json, read_lines, read_table
 from experiments.live.notes import (
     DecisionNote,
@@ -22,8 +24,6 @@ from experiments.live.notes import (
     noted,
     values_of,
 )
-from experiments.live.trail.journal import BEAT, CASES, GLIMPSES, LOG, PROGRESS, RUN, STAGES
-from experiments.live.trail.progress import duration
 
 STALE = 15.0
 """Time without a sign of life after which a run counts as killed [s]."""

@@ -14,11 +14,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from doe.discrepancy import Calibration
-from experiments.errors import InputError
-from experiments.measurement.observables import DIMENSIONS, Instrument, Observable
-from experiments.rows import Row
-from experiments.studyfile.units import Quantity
-from experiments.texts import nearest_name
+from experiments.io.errors import InputError
+from experiments.io.rows import Row
+from experiments.io.texts import nearest_name
+from experiments.io.units import Quantity
+from experiments.studyfile.observables import DIMENSIONS, Instrument, Observable
 
 CALIBRATION = "calibration"
 """Stands for a condition in rows that state an error of calibration."""

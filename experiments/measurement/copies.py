@@ -7,7 +7,7 @@ from collections.abc import Hashable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from experiments.errors import InputError
+from experiments.io.errors import InputError
 
 REPEATS = "repeats are of separate heaps, never copies of one another"
 """Rule of whatever is measured several times."""

@@ -2,7 +2,7 @@
 
 Grains stop falling when the drum is as full as a look at its surface tells, and a level bed is struck off at
 the height that the stated filling has: the bed ends lower at its sides, or higher by the grains that were
-still falling (`experiments/benchmarks/fillings.py` has the size of both).
+still falling (`experiments/evidence/performance/fillings.py` has the size of both).
 """
 
 from __future__ import annotations

@@ -10,14 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from experiments.errors import InputError
-from experiments.sphere_files import format_of, length_unit, read_spheres
+from experiments.grains.spheres import format_of, length_unit, read_spheres
+from experiments.io.errors import InputError
+from experiments.io.units import Quantity
 from experiments.studyfile.study import MeasurementSection
-from experiments.studyfile.units import Quantity
 from imaging import Doubt, HeapAngle, heap_angle, overlay, snapshot
-from imaging.doubts import GREATEST_ANGLE, LEAST_ANGLE, ROUGH_EDGE
+from imaging.drawing.ground import find_ground
 from imaging.geometry import Picture, Spheres
-from imaging.ground import find_ground
+from imaging.photo.doubts import GREATEST_ANGLE, LEAST_ANGLE, ROUGH_EDGE
 
 DEFAULT_UNIT = "m"
 """Unit of a heap's file that names none; angles do not depend on it."""

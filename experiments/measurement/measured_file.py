@@ -25,16 +25,16 @@ from pathlib import Path
 import numpy as np
 
 from doe.discrepancy import Measured
-from experiments.errors import InputError, Problem
+from experiments.io.errors import InputError, Problem
+from experiments.io.rows import Row, read_rows
+from experiments.io.texts import nearest_name
 from experiments.measurement.calibration import CALIBRATION, stated_calibration
 from experiments.measurement.copies import Repeats
 from experiments.measurement.notes import data_notes
-from experiments.measurement.observables import Observable
 from experiments.measurement.plausible import SizeOfTest, inversions, size_of_test
 from experiments.measurement.readings import CLOGGED, CLOGGED_ROW, Outlines, Reading, readings_of
-from experiments.rows import Row, read_rows
 from experiments.studyfile import Condition, Study
-from experiments.texts import nearest_name
+from experiments.studyfile.observables import Observable
 from imaging import PictureError
 
 COLUMNS = ("condition", "replicate", "observable", "value", "unit", "picture", "pixel", "fit", "profile")

@@ -10,7 +10,7 @@ from glob import glob
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from experiments.errors import InputError, Problem
+from experiments.io.errors import InputError, Problem
 from imaging import FITS, FitSettings, PictureError
 
 if TYPE_CHECKING:

@@ -10,10 +10,10 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from dem_warp import Drum, LiftedCylinder
-from experiments.errors import InputError
-from experiments.measurement.observables import BY_NAME, OBSERVABLES, Observable
+from experiments.io.errors import InputError
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import TARGET_SCENE
+from experiments.studyfile.observables import BY_NAME, OBSERVABLES, Observable
 
 PATIENCE = 10.0
 """Time that a heap is given after the tube is gone [s]."""

@@ -14,11 +14,11 @@ from typing import NamedTuple
 import numpy as np
 
 from dem_warp.scenes.drum_surface import STATIONS
-from experiments.errors import InputError
+from experiments.io.errors import InputError
+from experiments.io.rows import Row, read_rows
+from experiments.io.units import Quantity
 from experiments.measurement.copies import Repeats
 from experiments.measurement.plausible import SizeOfTest
-from experiments.rows import Row, read_rows
-from experiments.studyfile.units import Quantity
 from imaging import PictureError
 
 COLUMNS = ("replicate", "view", "x", "z", "picture", "pixel")

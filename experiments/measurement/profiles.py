@@ -6,14 +6,14 @@ from typing import Any
 
 from dem_warp import Drum
 from doe import ProfileSample, scatter_of_views
+from doe.curves.profiles import LEAST_PROFILES
 from doe.errors import RuleError
-from doe.profiles import LEAST_PROFILES
-from experiments.errors import InputError
-from experiments.measurement.observables import OUTLINE_PROFILE, PROFILES, SURFACE_PROFILE
+from experiments.io.errors import InputError
 from experiments.measurement.plausible import size_of_test
 from experiments.measurement.profile_files import Profiles, read_drum_profiles, read_heap_profiles
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import TARGET_SCENE
+from experiments.studyfile.observables import OUTLINE_PROFILE, PROFILES, SURFACE_PROFILE
 
 OWN = ("note", "twin")
 """Keys of ``[target]`` that no ``[[response]]`` has."""

@@ -10,8 +10,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from experiments.errors import InputError, Problem
-from experiments.measurement.observables import (
+from experiments.io.errors import InputError, Problem
+from experiments.io.rows import Row
+from experiments.io.texts import nearest_name
+from experiments.io.units import Quantity
+from experiments.measurement.pictures import require_same_fit
+from experiments.measurement.plausible import SizeOfTest
+from experiments.measurement.profile_files import read_drum_profiles, read_heap_profiles
+from experiments.studyfile.observables import (
     DIMENSIONS,
     OUTLINE_PROFILE,
     PROFILES,
@@ -19,12 +25,6 @@ from experiments.measurement.observables import (
     Observable,
     View,
 )
-from experiments.measurement.pictures import require_same_fit
-from experiments.measurement.plausible import SizeOfTest
-from experiments.measurement.profile_files import read_drum_profiles, read_heap_profiles
-from experiments.rows import Row
-from experiments.studyfile.units import Quantity
-from experiments.texts import nearest_name
 
 if TYPE_CHECKING:
     from imaging import Outline, PictureError

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from dem_warp import CaseResult
-from experiments.measurement.observables import BY_NAME, NAMES, OBSERVABLES, OUTLINE, View
+from experiments.studyfile.observables import BY_NAME, NAMES, OBSERVABLES, OUTLINE, View
 from experiments.studyfile.study import MeasurementSection
 from imaging import HeapAngle, PictureError, heap_angle
 

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 
 from doe import Sample
-from experiments.errors import InputError
+from experiments.io.errors import InputError
 from experiments.measurement.copies import require_separate
 from experiments.measurement.measured_file import read_measured
-from experiments.measurement.observables import ANGLE, BY_NAME
 from experiments.measurement.pictures import find_pictures, measure_pictures, require_same_fit
 from experiments.measurement.profiles import counted_twice, with_profiles
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import TARGET_SCENE
+from experiments.studyfile.observables import ANGLE, BY_NAME
 
 
 @dataclass(frozen=True)

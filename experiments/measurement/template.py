@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from experiments.files import require_new_file, write_text
+from experiments.io.files import require_new_file, write_text
 from experiments.measurement.measured_file import COLUMNS
 from experiments.measurement.readings import CLOGGED_ROW
 from experiments.studyfile import Condition, Study

@@ -10,7 +10,7 @@ import plotly.graph_objects as go
 
 from doe import ScreenResult
 from doe.palette import BLUE, GREEN, INK, MUTED, ORANGE, VERMILION
-from doe.plot_data import half_normal_points, pareto_points
+from doe.plots.plot_data import half_normal_points, pareto_points
 from experiments.calibrate.cases import measured
 from experiments.calibrate.results import ClimbResult, NoiseFloorResult, TargetResult, VerificationResult
 from experiments.report.kit.chart import Chart, add_bars, add_line, add_points, add_target, new_figure

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from experiments.files import copy_file, existing
+from experiments.io.files import copy_file, existing
 from experiments.studyfile.card import files_of
 
 

@@ -16,11 +16,11 @@ import pandas as pd
 
 from dem_warp import CaseResult
 from experiments.calibrate.results import Campaign
-from experiments.errors import StudyError
+from experiments.io.errors import StudyError
+from experiments.io.texts import nearest_name
 from experiments.report.kit.html import Chapter
 from experiments.report.published import Published
 from experiments.studyfile import Study
-from experiments.texts import nearest_name
 
 if TYPE_CHECKING:
     from doe.discrepancy import Discovery

@@ -10,6 +10,7 @@ import pandas as pd
 
 from dem_warp import EDEM
 from experiments.calibrate.results import Campaign
+from experiments.io.version import program_version
 from experiments.report.kit.latex import latex_table, latex_text
 from experiments.report.kit.markdown import markdown_table
 from experiments.report.kit.numbers import enumeration, fixed, p_clause, quantity, significant
@@ -17,7 +18,6 @@ from experiments.report.kit.table import Layout, Table, columns, make_table
 from experiments.report.study_facts import study_facts
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import Response
-from experiments.version import program_version
 
 
 @dataclass(frozen=True)

@@ -13,15 +13,15 @@ import pandas as pd
 
 from experiments.calibrate.export import jsonable
 from experiments.calibrate.results import Campaign
-from experiments.cases.manifest import study_hash
-from experiments.files import write_text
+from experiments.cases.store.manifest import study_hash
+from experiments.io.files import write_text
+from experiments.io.version import program_version
 from experiments.report.campaign_page import render_page
 from experiments.report.companion import Replay
 from experiments.report.material_card import write_material_card
 from experiments.report.pictures import HeapPicture
 from experiments.report.solid import SolidHeap
 from experiments.studyfile import Study
-from experiments.version import program_version
 
 LIBRARIES = ("warp-lang", "numpy", "scipy", "pandas", "statsmodels", "scikit-learn", "opencv-python-headless")
 """Packages whose version may change a number."""

@@ -21,13 +21,13 @@ from experiments.calibrate.checks import check_calibration
 from experiments.calibrate.export import jsonable
 from experiments.calibrate.results import StageResult
 from experiments.cases import Store, Workers, open_folder, run_cases
-from experiments.cases.key import engine_identity
-from experiments.cases.manifest import MANIFEST, write_manifest
-from experiments.cases.outputs import publishing
+from experiments.cases.engines.key import engine_identity
+from experiments.cases.store.manifest import MANIFEST, write_manifest
+from experiments.cases.store.outputs import publishing
 from experiments.cases.workers.own import THIS_MACHINE, watched_by
-from experiments.errors import StudyError
-from experiments.files import write_text
-from experiments.live.trail.journal import Journal
+from experiments.io.errors import StudyError
+from experiments.io.files import write_text
+from experiments.journal.journal import Journal
 from experiments.measurement.target import with_measurements
 from experiments.report import heap_pictures, verified_heap, write_report
 from experiments.report.companion import Replay, companion_of

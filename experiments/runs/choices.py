@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from experiments.cases import Resources
-from experiments.errors import InputError
+from experiments.io.errors import InputError
 from experiments.studyfile import Study, StudyError, load_study, study_scales
 from experiments.studyfile.cluster_section import read_profile
 

@@ -19,8 +19,8 @@ from experiments.cases import Resources
 from experiments.cases.workers.opening import EXTRA, missing_libraries
 from experiments.cases.workers.speed import Speed, few_spheres, stored_speed
 from experiments.cases.workers.submissions import submit_command
-from experiments.version import program_version
-from imaging.opengl import opengl_works
+from experiments.io.version import program_version
+from imaging.drawing.opengl import opengl_works
 
 
 @dataclass(frozen=True)

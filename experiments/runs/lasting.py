@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from doe.errors import RuleError
-from experiments.cases.outputs import is_listed
-from experiments.errors import InputError
+from experiments.cases.store.outputs import is_listed
+from experiments.io.errors import InputError
 from experiments.studyfile import Study
 
 OUTCOMES, BANK = "outcomes.sqlite", "bank.npz"

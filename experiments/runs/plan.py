@@ -16,13 +16,13 @@ from doe.discrepancy import bank_points
 from experiments.calibrate.campaign import plan_opening
 from experiments.calibrate.screening import screening_design
 from experiments.cases import Resources, open_workers
-from experiments.cases.cost import Cost, cost_of, device_bytes
+from experiments.cases.forecast.cost import Cost, cost_of, device_bytes
+from experiments.cases.store.outcome_table import OutcomeTable
 from experiments.cases.workers.batches import rounds_of
 from experiments.cases.workers.speed import Speed, measure_speed, store_speed, stored_speed, wave_seconds
 from experiments.discover.engine import EngineSimulator
-from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.search import Search
-from experiments.errors import InputError, StudyError
+from experiments.io.errors import InputError, StudyError
 from experiments.report.companion import companion_of
 from experiments.studyfile import Study
 from experiments.studyfile.campaign import TARGET_SCENE, scenes_of

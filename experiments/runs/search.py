@@ -14,18 +14,17 @@ from dem_warp import Progress
 from dem_warp.version import source_commit
 from doe.discrepancy import Bank, Discovery, Fit, Measured, Outcomes, Point, drive
 from experiments.cases import Workers, engine_of, open_folder, require_unused
-from experiments.cases.folder import locked
-from experiments.cases.outputs import publishing, sha256_of
+from experiments.cases.store.folder import locked
+from experiments.cases.store.outcome_table import OutcomeTable
+from experiments.cases.store.outputs import publishing, sha256_of
 from experiments.cases.workers.own import THIS_MACHINE, watched_by
 from experiments.discover.engine import EngineSimulator
 from experiments.discover.maker import fingerprint_of, maker_of_today
-from experiments.discover.outcome_table import OutcomeTable
 from experiments.discover.search import Search
-from experiments.errors import InputError
-from experiments.files import replacing
-from experiments.live.trail.journal import Journal
+from experiments.io.errors import InputError
+from experiments.io.files import replacing
+from experiments.journal.journal import Journal
 from experiments.measurement.measured_file import read_measured
-from experiments.measurement.observables import Instrument
 from experiments.report import HeapPicture, SolidHeap
 from experiments.report.companion import Companion, companion_of
 from experiments.report.discovery import Terms, write_discovery
@@ -33,6 +32,7 @@ from experiments.report.discovery.pictures import photograph, simulated_heaps, t
 from experiments.runs.campaign import Watch, watching
 from experiments.runs.lasting import BANK, OUTCOMES, lasting_files
 from experiments.studyfile import Study
+from experiments.studyfile.observables import Instrument
 
 SETTINGS = "settings.json"
 """File of the rules of a search, beside its report."""

@@ -12,11 +12,11 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from experiments.errors import StudyError
+from experiments.io.errors import StudyError
+from experiments.io.toml_files import read_toml
 from experiments.studyfile.factor_section import merge
 from experiments.studyfile.places import drop
 from experiments.studyfile.solver_section import CARD_LAWS, CORRECTED_FOR, LAWS, laws_of
-from experiments.toml_files import read_toml
 
 MATERIAL = "material"
 """Key of a study that names a card, and table of a card that holds the sections."""

@@ -10,7 +10,7 @@ from typing import Any
 import pandas as pd
 
 from doe import Design, DesignError, Factor, Surface, fit_surface
-from experiments.errors import StudyError
+from experiments.io.errors import StudyError
 
 SURFACE = "surface"
 """Table of a card that holds the surface of each fitted response, by its name."""

@@ -8,9 +8,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field, field_validator
 
+from experiments.io.toml_files import read_toml
 from experiments.studyfile.places import Places
 from experiments.studyfile.schema import Section, Time, validated
-from experiments.toml_files import read_toml
 
 _MEMORY = re.compile(r"\d+(\.\d+)? ?[kMGT]i?B")
 _LINE = re.compile(r"[^\n\r\0]*")

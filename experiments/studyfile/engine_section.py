@@ -7,7 +7,7 @@ from typing import Self
 
 from pydantic import Field, field_validator, model_validator
 
-from experiments.measurement.observables import BY_NAME
+from experiments.studyfile.observables import BY_NAME
 from experiments.studyfile.schema import Section, Time
 
 

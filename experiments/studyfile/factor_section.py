@@ -9,12 +9,12 @@ from typing import Annotated, Any
 from pydantic import Field, PlainValidator, ValidationInfo, field_validator, model_validator
 
 from doe import Factor
-from experiments.errors import StudyError
+from experiments.io.errors import StudyError
+from experiments.io.texts import nearest_name
+from experiments.io.units import Quantity
 from experiments.studyfile.places import Places, nested, value_at
 from experiments.studyfile.schema import Dimension, RawQuantity, Section
 from experiments.studyfile.setters import Setter, setter_at
-from experiments.studyfile.units import Quantity
-from experiments.texts import nearest_name
 
 
 def _read_parameters(value: object) -> tuple[str, ...]:

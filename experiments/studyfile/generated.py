@@ -17,8 +17,8 @@ from pydantic import AfterValidator, Field, create_model, model_validator
 
 from dem_warp import Parameter
 from dem_warp.parameters import parameters_of
+from experiments.io.units import dimension_of_unit
 from experiments.studyfile.schema import Dimension, Section
-from experiments.studyfile.units import dimension_of_unit
 
 
 class EngineSection(Section):

@@ -18,9 +18,9 @@ from annotated_types import Ge, Gt, Le, Lt
 from pydantic import AfterValidator, BaseModel
 from pydantic.fields import FieldInfo
 
+from experiments.io.units import UNITS, Quantity
 from experiments.studyfile.schema import Generated, dimension_of, fields_of, marks_of, section_of
 from experiments.studyfile.study import Study
-from experiments.studyfile.units import UNITS, Quantity
 
 _KINDS = {
     Any: "any value",

@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterable, Iterator, Sequence
 
-from doe.factors import RESERVED_NAMES
-from experiments.errors import Problem, StudyError
-from experiments.measurement.observables import observables_of
+from doe.design.factors import RESERVED_NAMES
+from experiments.io.errors import Problem, StudyError
+from experiments.studyfile.observables import observables_of
 from experiments.studyfile.places import Places
 from experiments.studyfile.scene_sections import SceneSection
 

@@ -19,10 +19,10 @@ from pydantic import (
 from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
-from experiments.errors import Problem, StudyError
+from experiments.io.errors import Problem, StudyError
+from experiments.io.texts import nearest_name
+from experiments.io.units import Quantity, unit_size
 from experiments.studyfile.places import KeyPath, Places, value_at
-from experiments.studyfile.units import Quantity, unit_size
-from experiments.texts import nearest_name
 
 SectionT = TypeVar("SectionT", bound=BaseModel)
 

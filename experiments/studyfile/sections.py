@@ -69,7 +69,7 @@ class ShapeSection(Section):
     @field_validator("clump_unit")
     @classmethod
     def _is_a_length(cls, unit: str | None) -> str | None:
-        from experiments.sphere_files import length_unit
+        from experiments.grains.spheres import length_unit
 
         if unit is not None:
             length_unit(unit)
@@ -171,7 +171,7 @@ class GrainSection(MaterialSection, ShapeSection):
 @lru_cache(maxsize=32)
 def _read_clump(path: Path, unit: str | None, modified: int) -> ClumpShape:
     # The readers of files know the units of this package.
-    from experiments.sphere_files import read_clump
+    from experiments.grains.spheres import read_clump
 
     return read_clump(path, unit).shape
 

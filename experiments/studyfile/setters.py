@@ -8,11 +8,11 @@ from typing import Annotated, Any
 
 from pydantic import TypeAdapter, ValidationError
 
+from experiments.io.units import Quantity
 from experiments.studyfile.mechanisms import mechanisms_section
 from experiments.studyfile.scene_sections import scene_section
 from experiments.studyfile.schema import Dimension, Section, bounds, dimension_of, message, steps
 from experiments.studyfile.sections import Physics
-from experiments.studyfile.units import Quantity
 
 
 @dataclass(frozen=True)

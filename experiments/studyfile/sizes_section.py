@@ -12,11 +12,11 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from dem_warp import ClumpShape, GrainPopulation, Material, SizeClasses
-from experiments.grain_sizes.classes import Classes, cut_classes
-from experiments.grain_sizes.diameters import DIAMETERS
-from experiments.grain_sizes.distribution import Continuous, Distribution
+from experiments.grains.sizes.classes import Classes, cut_classes
+from experiments.grains.sizes.diameters import DIAMETERS
+from experiments.grains.sizes.distribution import Continuous, Distribution
+from experiments.io.units import unit_size
 from experiments.studyfile.schema import Length, Number, Section
-from experiments.studyfile.units import unit_size
 
 SOURCES = ("sieves", "counts", "distribution")
 """Keys of which a section has one."""
@@ -151,7 +151,7 @@ def _distribution(section: SizesSection) -> tuple[Distribution, float]:
     # the units of this package.
     from scipy import stats
 
-    from experiments.grain_sizes.tables import read_counts, read_sieves
+    from experiments.grains.sizes.tables import read_counts, read_sieves
 
     if section.sieves is not None:
         return read_sieves(section.sieves, section.unit)

@@ -9,10 +9,10 @@ from typing import Annotated, Any, Self
 from pydantic import Field, ValidationError, ValidationInfo, model_validator
 
 from dem_warp import EDEM, PRESETS, ContactLaws
-from experiments.errors import StudyError
+from experiments.io.errors import StudyError
+from experiments.io.texts import nearest_name
 from experiments.studyfile.generated import EngineSection, section_for
 from experiments.studyfile.schema import Generated, Section, nested_error
-from experiments.texts import nearest_name
 
 BASE = "base"
 """Key of ``[solver.laws]`` that names the set of which its other keys change something."""

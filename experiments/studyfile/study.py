@@ -17,8 +17,9 @@ from pydantic import Field, PrivateAttr, field_validator
 
 from dem_warp import Case
 from doe import Factor
-from experiments.errors import StudyError
-from experiments.measurement.observables import Observable, measurable
+from experiments.io.errors import StudyError
+from experiments.io.texts import nearest_name
+from experiments.io.toml_files import read_toml
 from experiments.studyfile.campaign import TARGET_SCENE, CampaignSettings, Target
 from experiments.studyfile.card import card_document, with_material
 from experiments.studyfile.cluster_section import ClusterSection
@@ -32,6 +33,7 @@ from experiments.studyfile.factor_section import (
     natural_value,
     with_factor_values,
 )
+from experiments.studyfile.observables import Observable, measurable
 from experiments.studyfile.places import KeyPath, Places
 from experiments.studyfile.reserved_names import check_factor_names
 from experiments.studyfile.scene_sections import SceneSection
@@ -39,8 +41,6 @@ from experiments.studyfile.schema import RawQuantity, Section, validated
 from experiments.studyfile.sections import Physics, Scene, TooManyGrains
 from experiments.studyfile.setters import changed
 from experiments.studyfile.target_section import ResponseSection, TargetSection, build_target
-from experiments.texts import nearest_name
-from experiments.toml_files import read_toml
 from imaging import FITS
 
 BUCKWHEAT = Path(__file__).parents[1] / "studies" / "buckwheat" / "study.toml"

@@ -8,13 +8,13 @@ from dataclasses import replace
 from pydantic import Field
 
 from doe import Sample
-from experiments.errors import StudyError
-from experiments.measurement.observables import ANGLE, DIMENSIONS, PROFILES, Observable, observables_of
+from experiments.io.errors import StudyError
+from experiments.io.texts import nearest_name
 from experiments.studyfile.campaign import MOST, TARGET_SCENE, FactorValues, Response, Target, Twin
+from experiments.studyfile.observables import ANGLE, DIMENSIONS, PROFILES, Observable, observables_of
 from experiments.studyfile.places import KeyPath, Places
 from experiments.studyfile.scene_sections import SceneSection
 from experiments.studyfile.schema import RawQuantity, Section
-from experiments.texts import nearest_name
 
 MEASUREMENTS = ("mean", "sd", "n")
 """Keys that tell of the physical test."""

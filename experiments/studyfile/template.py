@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from experiments.errors import InputError
-from experiments.files import is_device_name, require_new_file, write_text
+from experiments.io.errors import InputError
+from experiments.io.files import is_device_name, require_new_file, write_text
 
 TEMPLATE = Path(__file__).parents[1] / "studies" / "template.toml"
 

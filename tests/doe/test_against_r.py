@@ -30,8 +30,8 @@ from doe import (
     screen,
     two_level_effects,
 )
-from doe.analysis.coefficients import coefficient_table
-from doe.designs.mixture import Mixture
+from doe.design.coefficients import coefficient_table
+from doe.design.families.mixture import Mixture
 
 FOLDER = Path(__file__).parent / "data" / "published"
 REFERENCE = json.loads((FOLDER / "reference.json").read_text())

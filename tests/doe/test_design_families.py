@@ -33,9 +33,9 @@ from doe import (
     simplex_lattice,
     sobol,
 )
-from doe.designs.factorial import CATALOGUE
-from doe.designs.hadamard import conference_matrix
-from doe.designs.mixture import Mixture
+from doe.design.families.factorial import CATALOGUE
+from doe.design.families.hadamard import conference_matrix
+from doe.design.families.mixture import Mixture
 
 # Word lengths of the catalogue's first designs (Chen, Sun and Wu 1993): resolution by runs and factors.
 RESOLUTIONS = {

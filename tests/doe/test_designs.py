@@ -7,8 +7,8 @@ import pandas as pd
 import pytest
 
 from doe import Design, DesignError, Factor, central_composite, fit_surface, plackett_burman
-from doe.designs.central_composite import two_level_part
-from doe.designs.hadamard import hadamard_candidates, screening_matrix, worst_alias
+from doe.design.families.central_composite import two_level_part
+from doe.design.families.hadamard import hadamard_candidates, screening_matrix, worst_alias
 
 CONSTRUCTIBLE = [n for n in range(4, 129, 4) if n not in (92, 116)]
 

@@ -31,7 +31,7 @@ from doe import (
     steepest_path,
     variance_ratio,
 )
-from doe.joint_plots import joint_plot
+from doe.plots.joint_plots import joint_plot
 
 FACTORS = [Factor("A", 2.0, 5.0), Factor("B", -0.3, 0.9)]
 DESIGN = central_composite(FACTORS)

@@ -55,7 +55,7 @@ from doe import (
     transfer_points,
     two_level_effects,
 )
-from doe.joint_plots import joint_plot
+from doe.plots.joint_plots import joint_plot
 
 FACTORS = [Factor("A", 0.0, 1.0), Factor("B", 2.0, 5.0), Factor("C", -1.0, 1.0)]
 MORE = [*FACTORS, Factor("D", 0.0, 1.0)]

@@ -7,8 +7,8 @@ import pytest
 from scipy import stats
 
 from doe import Design, DesignError, Factor, Goal, Sample, central_composite, joint_fit
-from doe.quadratic import QuadraticForm
-from doe.region import compatible_region
+from doe.response.quadratic import QuadraticForm
+from doe.response.region import compatible_region
 
 FACTORS = (Factor("E", 0.3, 0.5), Factor("F", 0.2, 0.6))
 DESIGN = central_composite(FACTORS, "rotatable", 5)

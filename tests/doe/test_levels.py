@@ -1,6 +1,6 @@
 """Stated levels, small and seeded: after a selection, of a climb, a screening, an agreement.
 
-The long simulations are the record in experiments/benchmarks/statistics.
+The long simulations are the record in experiments/evidence/accuracy/statistics.
 """
 
 import numpy as np

@@ -16,7 +16,7 @@ from doe import (
     noise_floor,
     variance_ratio,
 )
-from doe.factors import Factor
+from doe.design.factors import Factor
 
 
 def test_noise_floor_of_five_by_tables():

@@ -19,7 +19,7 @@ from doe import (
     steepest_path,
     two_level_effects,
 )
-from doe.plot_data import half_normal_points, normal_points, pareto_points, surface_grid
+from doe.plots.plot_data import half_normal_points, normal_points, pareto_points, surface_grid
 
 TARGET = 30.148
 

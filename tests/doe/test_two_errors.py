@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from doe.two_errors import MOST, STRAY, TwoErrors, false_alarms
+from doe.samples.two_errors import MOST, STRAY, TwoErrors, false_alarms
 
 PAIRS = [(1.0, 1.0), (1.0, 11.0), (7.0, 1.0), (7.0, 2.0), (3.0, 11.0), (7.0, 4.0), (30.0, 3.0)]
 

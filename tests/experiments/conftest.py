@@ -15,8 +15,8 @@ import pytest
 from dem_warp import CaseResult, LiftedCylinder
 from dem_warp.clump_fitting import fit_clump
 from dem_warp.device import resolve_device
-from experiments.benchmarks import columns as scene
-from experiments.benchmarks.columns import Columns
+from experiments.evidence.performance import columns as scene
+from experiments.evidence.performance.columns import Columns
 from experiments.report import solid
 from experiments.studyfile import Study, load_study
 
@@ -53,7 +53,9 @@ def _small_pictures() -> Iterator[None]:
 def _coarse_clumps(monkeypatch: pytest.MonkeyPatch) -> None:
     """Fit clumps with half the samples along a side, an eighth in all, where more would show no more."""
     for module in ("shapes", "clump_search"):
-        monkeypatch.setattr(f"experiments.commands.{module}.fit_clump", partial(fit_clump, resolution=20))
+        monkeypatch.setattr(
+            f"experiments.grains.clumps.{module}.fit_clump", partial(fit_clump, resolution=20)
+        )
 
 
 SMALL_STUDY = Path(__file__).with_name("small.toml").read_text(encoding="utf-8")

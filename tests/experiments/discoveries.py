@@ -24,9 +24,9 @@ from doe.discrepancy import (
     Question,
     Verdict,
 )
-from experiments.measurement.observables import BY_NAME
 from experiments.report.discovery import Terms
 from experiments.studyfile import Study
+from experiments.studyfile.observables import BY_NAME
 
 CONDITIONS = ("base", "fast", "wide", "rough", "fast-wide")
 HELD_OUT = (False, False, False, False, True)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from imaging import measure
-from imaging.doubts import LARGEST_CLIFF, LARGEST_ERROR, ROUGH_EDGE, doubts_of, highest_cliff
 from imaging.outline import Outline
+from imaging.photo.doubts import LARGEST_CLIFF, LARGEST_ERROR, ROUGH_EDGE, doubts_of, highest_cliff
 from imaging.plate import PlateLine
 
 

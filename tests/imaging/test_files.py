@@ -11,8 +11,8 @@ import pytest
 from PIL import Image
 
 from imaging import PictureError, measure_photograph, read_picture, save_picture
+from imaging.drawing.synthetic import Camera, DrawnHeap, draw
 from imaging.pictures import FILM_DIAGONAL, MAXIMUM_PIXELS, focal_length
-from imaging.synthetic import Camera, DrawnHeap, draw
 
 
 def png_of(path: Path, columns: int, rows: int) -> Path:

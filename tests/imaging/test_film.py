@@ -8,7 +8,7 @@ import pytest
 from PIL import Image, ImageSequence
 
 from imaging import PictureError
-from imaging.film import Scenery, save_film
+from imaging.drawing.film import Scenery, save_film
 
 SCENERY = Scenery(half_width=0.05, height=0.06, pixels=400)
 METERS_PER_PIXEL = 0.1 / 400

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from imaging import Outline, heap_profile, heap_shape, profile_heights
-from imaging.elevation import level_outline
+from imaging.photo.elevation import level_outline
 from imaging.plate import PlateLine
 
 RADIUS = 100.0

@@ -14,7 +14,7 @@ from imaging import (
     read_picture,
     save_picture,
 )
-from imaging.synthetic import Camera, DrawnHeap, draw
+from imaging.drawing.synthetic import Camera, DrawnHeap, draw
 
 SCENE = Camera(
     heap=(60, 95, 135),

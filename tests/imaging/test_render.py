@@ -14,14 +14,14 @@ from imaging import (
     heap_angle,
     measure,
     measure_photograph,
-    opengl,
     overlay,
     save_picture,
     silhouette,
     snapshot,
 )
+from imaging.drawing import opengl
+from imaging.drawing.synthetic import Camera, DrawnHeap, draw
 from imaging.geometry import Frame, Spheres
-from imaging.synthetic import Camera, DrawnHeap, draw
 
 
 @pytest.mark.parametrize("backend", ["raster", "pyvista"])

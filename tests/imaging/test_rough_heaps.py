@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 from imaging import compare, heap_angle, measure
-from imaging.synthetic import Camera, DrawnHeap, cone_of_spheres, draw
+from imaging.drawing.synthetic import Camera, DrawnHeap, cone_of_spheres, draw
 
 HEAPS = 120
 LEVEL = 0.95

@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 
 from imaging import measure
-from imaging.background import contrast_with_background
-from imaging.shade import MOST_SHADED, shaded_edge
-from imaging.sighting import sight
-from imaging.synthetic import Camera, DrawnHeap, draw
-from imaging.view import View
+from imaging.drawing.synthetic import Camera, DrawnHeap, draw
+from imaging.photo.background import contrast_with_background
+from imaging.photo.shade import MOST_SHADED, shaded_edge
+from imaging.photo.sighting import sight
+from imaging.photo.view import View
 
 WALL, PLATE, STRAW, COAL = (235, 235, 230), (120, 110, 100), (45, 70, 95), (60, 62, 64)
 ANGLE, WIDTH = 30.0, 400.0

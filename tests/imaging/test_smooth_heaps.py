@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from imaging import FitSettings, heap_shape, measure
-from imaging.synthetic import Camera, DrawnHeap, draw
+from imaging.drawing.synthetic import Camera, DrawnHeap, draw
 
 FLANKS = [(5, 5), (5, 8), (10, 10), (12, 20), (20, 20), (25, 35), (30, 30), (40, 30), (45, 45)]
 CAMERAS = {

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from imaging import PictureError, View, find_outline, measure, overlay
-from imaging.synthetic import Camera, DrawnHeap, draw
-from imaging.view import level_angle, level_error, seen_angle
+from imaging.drawing.synthetic import Camera, DrawnHeap, draw
+from imaging.photo.view import level_angle, level_error, seen_angle
 
 WALL, PLATE, GRAIN = (235, 235, 230), (120, 110, 100), (45, 70, 95)
 BLUE = (170, 110, 60)

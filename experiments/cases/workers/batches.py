@@ -9,13 +9,13 @@ import numpy as np
 
 from dem_warp import Case
 from dem_warp.simulation import batches
-from experiments.cases.cost import cost_of, device_bytes
+from experiments.cases.forecast.cost import cost_of, device_bytes
 
 WORLDS = 1024
 """Worlds that one launch on a GPU holds at the most: few enough that a killed run loses little."""
 
 FULL_GRAINS = 330_000
-"""Grains with which a large GPU reaches 95 % of its speed (`experiments/benchmarks/README.md`, cost)."""
+"""Grains with which a large GPU reaches 95 % of its speed (`experiments/evidence/performance/README.md`, cost)."""
 
 GPU_WORKERS = 2
 """Workers of a GPU, each with a launch of its own in a process of its own, where workers are processes that

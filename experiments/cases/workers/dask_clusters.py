@@ -19,7 +19,7 @@ from experiments.cases.workers.submissions import (
     submit_command,
 )
 from experiments.cases.workers.workers import WorkersLostError
-from experiments.errors import InputError
+from experiments.io.errors import InputError
 from experiments.studyfile.cluster_section import ClusterSection
 
 if TYPE_CHECKING:

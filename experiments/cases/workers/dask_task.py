@@ -18,10 +18,10 @@ from filelock import FileLock, Timeout
 from dem_warp import Case, CaseResult, Progress
 from dem_warp.device import resolve_device
 from dem_warp.provenance import engine_fingerprint
-from experiments.cases.engine import Engine
+from experiments.cases.engines.engine import Engine
 from experiments.cases.workers.outbox import Outbox
 from experiments.cases.workers.own import OwnWorkers
-from experiments.errors import InputError
+from experiments.io.errors import InputError
 
 PATIENCE = 120.0
 """Time that a worker waits for the client's word before it takes it for gone [s]."""

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from dem_warp import Case, CaseResult
 from dem_warp.result import OnProgress, OnResult
-from experiments.cases.engine import Engine
+from experiments.cases.engines.engine import Engine
 from experiments.cases.workers.batches import plan_batches
 from experiments.cases.workers.dask_task import (
     Message,
@@ -28,7 +28,7 @@ from experiments.cases.workers.speed import expected_seconds
 from experiments.cases.workers.submissions import Submissions
 from experiments.cases.workers.wave import Wave
 from experiments.cases.workers.workers import WorkersLostError
-from experiments.errors import InputError
+from experiments.io.errors import InputError
 
 if TYPE_CHECKING:
     from distributed import Client, Future

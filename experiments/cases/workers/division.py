@@ -7,10 +7,10 @@ import logging
 from collections.abc import Callable
 from concurrent.futures import BrokenExecutor
 
-from experiments.cases.engine import NO_ANSWER
-from experiments.cases.program import empty_result
+from experiments.cases.engines.engine import NO_ANSWER
+from experiments.cases.engines.program import empty_result
 from experiments.cases.workers.wave import Wave
-from experiments.errors import InputError
+from experiments.io.errors import InputError
 
 FULL = ("failed to allocate", "out of memory")
 """Words of Warp and of CUDA when the memory of a device is used up."""

@@ -14,7 +14,7 @@ from dem_warp import Processes
 from experiments.cases.workers.own import OwnWorkers
 from experiments.cases.workers.resources import Resources
 from experiments.cases.workers.workers import Workers
-from experiments.errors import InputError
+from experiments.io.errors import InputError
 from experiments.studyfile.cluster_section import ClusterSection
 
 if TYPE_CHECKING:

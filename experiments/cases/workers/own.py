@@ -16,7 +16,7 @@ from dem_warp.batch import Onlooker
 from dem_warp.checkpoint import CHECKPOINT_EVERY
 from dem_warp.device import resolve_device
 from dem_warp.result import OnProgress, OnResult
-from experiments.cases.engine import Engine
+from experiments.cases.engines.engine import Engine
 from experiments.cases.workers.batches import plan_batches
 from experiments.cases.workers.division import run_divided
 from experiments.cases.workers.speed import cpu_name, expected_seconds
@@ -25,7 +25,7 @@ from experiments.cases.workers.workers import Workers
 
 CHEAP_WORLDS = 30
 """Worlds of 2,500 clumps whose checkpoints take 2 % of a minute where the disk is slow
-(`experiments/benchmarks/README.md`, cost of checkpoints)."""
+(`experiments/evidence/performance/README.md`, cost of checkpoints)."""
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import warp as wp
 from dem_warp.device import resolve_device
 from experiments.cases.workers.batches import GPU_WORKERS
 from experiments.cases.workers.speed import cpu_name
-from experiments.errors import InputError
+from experiments.io.errors import InputError
 from experiments.studyfile.cluster_section import ClusterSection
 
 _ADDRESS = re.compile(r"((tcp|tls|wss?|ucxx?)://)?([\w.-]+|\[[\da-fA-F:.]+(%[\w.-]+)?\]):(?P<port>\d{1,5})")

@@ -26,11 +26,11 @@ from dem_warp import (
     Material,
     Numerics,
 )
-from experiments.cases.cost import Cost, cost_of
-from experiments.cases.engine import Engine
+from experiments.cases.engines.engine import Engine
+from experiments.cases.forecast.cost import Cost, cost_of
 from experiments.cases.workers.batches import rounds_of
 from experiments.cases.workers.workers import Workers
-from experiments.files import read_file, write_text
+from experiments.io.files import read_file, write_text
 
 Clock = Callable[[], float]
 """Tells a time [s]."""
@@ -100,7 +100,7 @@ class Speed:
         A step of a launch waits for its kernels, one after another, however little they do; beside that its
         grains take time only as far as they fill the device. The longer of the two hides the other, but for
         the corner, which the root of the sum of squares rounds off. The host's looks hide nothing. This form
-        was chosen on the first twelve waves of `experiments.benchmarks.cluster.waves`, run on an H100.
+        was chosen on the first twelve waves of `experiments.evidence.robustness.cluster.waves`, run on an H100.
 
         Launches that share a GPU take turns on it, each while the host looks after the worlds of the others:
         a step of theirs takes as long as one alone, or as their kernels one after another.

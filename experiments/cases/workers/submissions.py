@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from experiments.errors import InputError
+from experiments.io.errors import InputError
 from experiments.studyfile.cluster_section import ClusterSection
 
 SYSTEMS = {

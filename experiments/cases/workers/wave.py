@@ -11,7 +11,7 @@ import numpy as np
 
 from dem_warp import Case, CaseResult, Progress
 from dem_warp.result import OnProgress, OnResult
-from experiments.cases.cost import relative_costs
+from experiments.cases.forecast.cost import relative_costs
 
 
 @dataclass(frozen=True)

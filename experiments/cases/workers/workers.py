@@ -9,7 +9,7 @@ from typing import Any, Protocol
 
 from dem_warp import Case, CaseResult
 from dem_warp.result import OnProgress, OnResult
-from experiments.cases.engine import Engine
+from experiments.cases.engines.engine import Engine
 
 
 class WorkersLostError(BrokenExecutor):

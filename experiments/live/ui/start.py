@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from experiments.errors import InputError
+from experiments.io.errors import InputError
 from experiments.live.server import guarded
 from experiments.live.ui.started import Runs
 from experiments.live.ui.workshop import LARGEST_UPLOAD, Workshop, command_line, problems_of

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
 
-from experiments.errors import InputError
+from experiments.io.errors import InputError
 from experiments.live.folder import matching
 from experiments.live.state import RunState
 from experiments.live.ui.workshop import command_line

@@ -16,18 +16,18 @@ import numpy as np
 
 from dem_warp import SCENES
 from experiments.commands.options import quantity, share
-from experiments.commands.photographs import mean_angle, measure_pictures
-from experiments.commands.shapes import ClumpRequest, make_clump, write_clump
-from experiments.errors import InputError, Problem
-from experiments.files import replacing, write_text
+from experiments.grains.clumps.shapes import ClumpRequest, make_clump, write_clump
+from experiments.io.errors import InputError, Problem
+from experiments.io.files import replacing, write_text
+from experiments.io.toml_files import read_toml, toml_text
 from experiments.live.folder import inside
+from experiments.measurement.photographs import mean_angle, measure_pictures
 from experiments.measurement.pictures import find_pictures
 from experiments.studyfile import Study, load_study, study_scales
 from experiments.studyfile.factor_section import merge
 from experiments.studyfile.places import nested
 from experiments.studyfile.reference import study_reference
 from experiments.studyfile.template import TEMPLATE, new_study_path
-from experiments.toml_files import read_toml, toml_text
 
 LARGEST_UPLOAD = 100_000_000
 """Bytes of the largest file that is taken."""

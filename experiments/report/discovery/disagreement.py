@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from doe.discrepancy import CalibrationUse, Discovery, Fit, Question, Slip, Verdict
-from experiments.measurement.observables import Instrument
 from experiments.report.discovery.terms import Terms, spaced
 from experiments.report.kit.numbers import enumeration, trimmed
+from experiments.studyfile.observables import Instrument
 
 CLEAR = 0.05
 """Adjusted p value below which a residual is told."""

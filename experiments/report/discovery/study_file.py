@@ -11,15 +11,15 @@ import numpy as np
 
 from doe import Sample
 from doe.discrepancy import Candidate, Data, Discovery, Fit, Interval, Verdict
-from experiments.cases.manifest import study_hash
+from experiments.cases.store.manifest import study_hash
 from experiments.discover.library import Mechanism, with_mechanisms
-from experiments.files import write_text
+from experiments.io.files import write_text
+from experiments.io.toml_files import toml_text
 from experiments.measurement.target import Replicated, target_tables
 from experiments.report.clump_files import gather_clumps
 from experiments.report.discovery.terms import Terms
 from experiments.report.discovery.verdict import tied
 from experiments.studyfile import Study
-from experiments.toml_files import toml_text
 
 HEAD = """\
 # Written by dem-warp discover: {name}, with {title} added as a factor that ranges over its 90 % interval.

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 from doe.discrepancy import Interval
 from experiments.discover.library import Mechanism
-from experiments.measurement.observables import Observable
 from experiments.report.kit.numbers import MISSING, enumeration, fixed, trimmed
 from experiments.studyfile.factor_section import FactorSection
+from experiments.studyfile.observables import Observable
 
 SHOWN_UNITS = {"m": (1e3, "mm"), "deg": (1.0, "°"), "1": (1.0, "")}
 """Units that a reader likes better: the factor, and the unit."""

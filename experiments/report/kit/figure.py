@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from doe.palette import GRID
-from experiments.files import replacing
+from experiments.io.files import replacing
 
 
 def new_axes(width: float = 7.2, height: float = 4.2, grid: str | None = "both") -> tuple[Figure, Axes]:

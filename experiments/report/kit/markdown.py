@@ -8,7 +8,7 @@ from typing import Any
 
 import pandas as pd
 
-from experiments.files import write_text
+from experiments.io.files import write_text
 from experiments.report.kit.numbers import fixed, plain
 from experiments.report.kit.table import Column, Row, Table, make_table, plain_table
 

@@ -22,7 +22,7 @@ from experiments.cases import engine_of
 from experiments.cli import app
 from experiments.studyfile import load_card, load_study
 
-CONES = Path(__file__).parents[1] / "engines" / "cone_program.py"
+CONES = Path(__file__).parents[1] / "cases" / "engines" / "cone_program.py"
 COMMAND = f"'{sys.executable}' '{CONES}'"
 OTHER = """
 name = "other"

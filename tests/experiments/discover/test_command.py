@@ -11,10 +11,10 @@ from typer.testing import CliRunner
 
 from experiments.cases import OwnWorkers
 from experiments.cli import app
-from experiments.measurement.observables import PHOTOGRAPHED
 from experiments.runs.campaign import check_runs
 from experiments.runs.search import OUTCOMES, Job, run_search
 from experiments.studyfile import load_study
+from experiments.studyfile.observables import PHOTOGRAPHED
 
 TRIAL = Path(__file__).parents[3] / "experiments" / "studies" / "trial"
 STUDY = TRIAL / "study.toml"

@@ -11,10 +11,10 @@ import pytest
 from dem_warp.scenes.drum_surface import STATIONS
 from doe.discrepancy import Outcomes, Point, Verdict, drive, load_bank
 from experiments.discover.search import Search
-from experiments.errors import InputError
+from experiments.io.errors import InputError
 from experiments.measurement.measured_file import read_measured
-from experiments.measurement.observables import SURFACE
 from experiments.studyfile import Study, load_study
+from experiments.studyfile.observables import SURFACE
 
 TUBE = '[scene.lifted-cylinder]\ndiameter = "28 mm"\nheight = "28 mm"\ngrain_count = 30\n'
 ANGLE = '[target]\nmean = "30 deg"\nsd = "0.5 deg"\nn = 5\n'

@@ -11,15 +11,15 @@ import pytest
 from dem_warp import Case, CaseResult, Progress, simulate
 from doe.discrepancy import Point
 from experiments.cases import OwnWorkers
+from experiments.cases.store.outcome_table import OutcomeTable
 from experiments.cases.workers import own
 from experiments.discover import wave
 from experiments.discover.engine import EngineSimulator
 from experiments.discover.library import library_for
-from experiments.discover.outcome_table import OutcomeTable
-from experiments.errors import StoreError
-from experiments.measurement.observables import NAMES
+from experiments.io.errors import StoreError
 from experiments.measurement.states import measure
 from experiments.studyfile import Study, load_study
+from experiments.studyfile.observables import NAMES
 
 CONDITIONS = """
 [condition.base]

@@ -37,11 +37,11 @@ from doe.discrepancy.fitting.size_interval import coded_size_interval
 from doe.discrepancy.verdict.conclusion import Conclusion, withdrawn
 from doe.discrepancy.verdict.records import calibration_uses
 from experiments.discover.search import Search
+from experiments.evidence.trials.emulated_simulator import EmulatedSimulator, emulated_heaps
 from experiments.measurement.calibration import usual_calibration
 from experiments.measurement.measured_file import read_measured
-from experiments.measurement.observables import BY_NAME
 from experiments.studyfile import load_study
-from experiments.trials.emulated_simulator import EmulatedSimulator, emulated_heaps
+from experiments.studyfile.observables import BY_NAME
 
 TRIAL = Path(__file__).parents[3] / "experiments" / "studies" / "trial" / "study.toml"
 SYSTEMATIC = 0.2

@@ -10,7 +10,7 @@ import pytest
 
 from experiments.discover import library
 from experiments.discover.library import FILES, library_for, with_mechanisms
-from experiments.errors import StudyError
+from experiments.io.errors import StudyError
 from experiments.studyfile import Study, load_study
 
 TRIAL = Path(library.__file__).parents[1] / "studies" / "trial" / "study.toml"

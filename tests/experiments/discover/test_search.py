@@ -15,10 +15,10 @@ from experiments.discover.fresh_cases import cases_for
 from experiments.discover.library import FORMER_NAMES
 from experiments.discover.maker import maker_of_today
 from experiments.discover.search import Search
-from experiments.errors import InputError, StudyError
-from experiments.measurement.observables import NAMES, OBSERVABLES, OUTLINE
+from experiments.io.errors import InputError, StudyError
 from experiments.report.discovery import Terms, verdict_line, write_discovery
 from experiments.studyfile import Study, load_study
+from experiments.studyfile.observables import NAMES, OBSERVABLES, OUTLINE
 
 TRIAL = Path(__file__).parents[3] / "experiments" / "studies" / "trial" / "study.toml"
 

@@ -11,10 +11,10 @@ import pytest
 from doe.discrepancy import Measured, Verdict, drive, fit_emulator
 from doe.discrepancy.contest.slips import find_slips
 from experiments.discover.search import Search
+from experiments.evidence.trials.emulated_simulator import EmulatedSimulator, emulated_heaps
 from experiments.measurement.measured_file import read_measured
-from experiments.measurement.observables import OBSERVABLES
 from experiments.studyfile import load_study
-from experiments.trials.emulated_simulator import EmulatedSimulator, emulated_heaps
+from experiments.studyfile.observables import OBSERVABLES
 
 TRIAL = Path(__file__).parents[3] / "experiments" / "studies" / "trial" / "study.toml"
 STUDY = load_study(TRIAL, "bench")

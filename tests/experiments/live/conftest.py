@@ -11,9 +11,9 @@ import pytest
 from dem_warp import CaseResult
 from experiments.calibrate.cases import plan_cases
 from experiments.cases import Store
-from experiments.files import write_text
+from experiments.io.files import write_text
+from experiments.journal.journal import Journal
 from experiments.live.server import Place, serving, watch_app
-from experiments.live.trail.journal import Journal
 from experiments.studyfile import Study
 
 sys.path.insert(0, str(Path(__file__).parent))

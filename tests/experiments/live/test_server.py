@@ -18,7 +18,7 @@ from starlette.testclient import TestClient
 
 from dem_warp import CaseResult
 from experiments import api, cases
-from experiments.errors import InputError
+from experiments.io.errors import InputError
 from experiments.live import server
 from experiments.live.server import Place, watch_app
 from experiments.studyfile import Study

@@ -18,12 +18,12 @@ import trimesh
 from commandline import dem_warp
 from starlette.testclient import TestClient
 
+from experiments.io.toml_files import read_toml
 from experiments.live.state import RunState
 from experiments.live.ui import started, workshop
 from experiments.live.ui.start import ui_app
 from experiments.live.ui.workshop import plain_value
 from experiments.studyfile import load_study
-from experiments.toml_files import read_toml
 
 TOKEN = "a-secret-token"
 

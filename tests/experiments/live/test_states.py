@@ -14,12 +14,12 @@ import pytest
 from conftest import KEY, NAME, begin
 
 from dem_warp import CaseResult, Progress
-from experiments.benchmarks.fuzz.mutations import mutated
 from experiments.cases import Store, open_folder
-from experiments.cases.folder import JOURNAL, is_used
+from experiments.cases.store.folder import JOURNAL, is_used
+from experiments.evidence.robustness.fuzz.mutations import mutated
+from experiments.journal.journal import BEAT, CASES, PROGRESS, Journal
 from experiments.live.charts import charts_of
 from experiments.live.state import RunState
-from experiments.live.trail.journal import BEAT, CASES, PROGRESS, Journal
 from experiments.live.watched import state_text
 from experiments.studyfile import Study
 
@@ -74,7 +74,7 @@ def test_a_killed_run_is_interrupted(run_folder: Path, small_study: Study, cone:
 def test_a_run_gives_signs_of_life(
     run_folder: Path, small_study: Study, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("experiments.live.trail.journal.BEAT_EVERY", 0.01)
+    monkeypatch.setattr("experiments.journal.journal.BEAT_EVERY", 0.01)
     with Journal(run_folder, "calibrate", small_study):
         ended = time.monotonic() + 20.0
         while not (run_folder / JOURNAL / BEAT).exists():

@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 
 from doe.discrepancy import Calibration, Measured
-from experiments.errors import InputError
+from experiments.io.errors import InputError
 from experiments.measurement.calibration import usual_calibration
 from experiments.measurement.measured_file import read_measured
-from experiments.measurement.observables import BY_NAME
 from experiments.studyfile import load_study
+from experiments.studyfile.observables import BY_NAME
 
 TRIAL = Path(__file__).parents[3] / "experiments" / "studies" / "trial" / "study.toml"
 

@@ -10,18 +10,18 @@ import numpy as np
 import pytest
 
 from dem_warp import CaseResult
-from experiments.errors import InputError, StudyError
+from experiments.io.errors import InputError, StudyError
 from experiments.measurement.measured_file import read_measured
-from experiments.measurement.observables import OUTLINE, OUTLINE_STATIONS
 from experiments.measurement.plausible import SizeOfTest
 from experiments.measurement.profile_files import read_heap_profiles
 from experiments.measurement.profiles import with_profiles
 from experiments.measurement.states import measure, observe
 from experiments.studyfile import load_study
+from experiments.studyfile.observables import OUTLINE, OUTLINE_STATIONS
 from experiments.studyfile.study import MeasurementSection
 from imaging import save_picture, silhouette
+from imaging.drawing.synthetic import Camera, DrawnHeap, draw
 from imaging.profile import SPACING, STATIONS, profile_heights
-from imaging.synthetic import Camera, DrawnHeap, draw
 
 SIZE = SizeOfTest(grain=1e-4, length=0.14, time=np.inf)
 SETTINGS = MeasurementSection(azimuths=4, pixels=400, outline=True)

@@ -13,14 +13,14 @@ from typer.testing import CliRunner
 import imaging
 from doe.discrepancy import Measured
 from experiments.cli import app
-from experiments.errors import InputError
+from experiments.io.errors import InputError
 from experiments.measurement.measured_file import read_measured
 from experiments.measurement.notes import SUSPICION
-from experiments.measurement.observables import NAMES
 from experiments.measurement.readings import CLOGGED
 from experiments.studyfile import Study, load_study
+from experiments.studyfile.observables import NAMES
 from imaging import save_picture
-from imaging.synthetic import Camera, DrawnHeap, draw
+from imaging.drawing.synthetic import Camera, DrawnHeap, draw
 
 CONDITIONS = """
 [condition.base]

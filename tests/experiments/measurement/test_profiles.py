@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.errors import InputError, StudyError
+from experiments.io.errors import InputError, StudyError
 from experiments.measurement.profile_files import read_drum_profiles
 from experiments.measurement.profiles import with_profiles
 from experiments.measurement.target import with_measurements

@@ -10,12 +10,12 @@ import pytest
 
 from doe import Sample
 from experiments.commands.early import check_calibration_file
-from experiments.errors import InputError
+from experiments.io.errors import InputError
 from experiments.measurement.target import with_measurements
 from experiments.runs.campaign import check_runs
 from experiments.studyfile import Study, load_study
 from imaging import measure_photograph, save_picture
-from imaging.synthetic import Camera, DrawnHeap, draw
+from imaging.drawing.synthetic import Camera, DrawnHeap, draw
 
 WriteStudy = Callable[..., Path]
 

@@ -12,11 +12,11 @@ import pytest
 
 from doe import Sample
 from experiments.calibrate import Campaign
-from experiments.errors import StudyError
+from experiments.io.errors import StudyError
+from experiments.io.toml_files import toml_text
 from experiments.report.clump_files import gather_clumps
 from experiments.report.material_card import CARD, material_card, write_material_card
 from experiments.studyfile import Study, load_study
-from experiments.toml_files import toml_text
 
 TEST = """
 name = "Another test of the same material"

@@ -11,14 +11,15 @@ import pandas as pd
 import pytest
 
 from experiments.calibrate import Campaign
-from experiments.errors import InputError
+from experiments.evidence.studies.buckwheat.bases.grid import bases, grid
+from experiments.evidence.studies.buckwheat.records import paper_record
+from experiments.evidence.studies.buckwheat.sensitivity.variants import variants
+from experiments.io.errors import InputError
 from experiments.report import render_page
 from experiments.report.kit.markdown import markdown_table
 from experiments.report.kit.table import Column, make_table
 from experiments.report.material_card import CARD, write_material_card
-from experiments.studies.buckwheat.bases.grid import bases, grid
 from experiments.studies.buckwheat.companion import COMPANION
-from experiments.studies.buckwheat.records import paper_record
 from experiments.studies.buckwheat.records.paper_page import (
     PAGE,
     RUNS,
@@ -30,7 +31,6 @@ from experiments.studies.buckwheat.records.paper_page import (
 from experiments.studies.buckwheat.replay.replay import Replay
 from experiments.studies.buckwheat.replay.replay_tables import ranking_sentence, replay_tables
 from experiments.studies.buckwheat.replay.runs import planned_cases
-from experiments.studies.buckwheat.sensitivity.variants import variants
 from experiments.studyfile import Study, load_study
 from experiments.studyfile.card import read_card, with_material
 

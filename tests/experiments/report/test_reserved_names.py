@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from experiments.calibrate import Campaign
-from experiments.errors import StudyError
+from experiments.io.errors import StudyError
 from experiments.studyfile import Study, load_study
 from experiments.studyfile.reserved_names import RESERVED
 

@@ -11,10 +11,10 @@ import pandas as pd
 import pytest
 
 from experiments.calibrate import Campaign, calibrate
+from experiments.io.units import Quantity
 from experiments.report import render_page
 from experiments.report.material_card import write_material_card
 from experiments.studyfile import Study, load_study
-from experiments.studyfile.units import Quantity
 
 POINT = Path(__file__).parents[3] / "experiments" / "studies" / "buckwheat" / "curve_to_point.toml"
 

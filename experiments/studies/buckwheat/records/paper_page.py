@@ -15,19 +15,19 @@ from doe import Agreement, agreement
 from doe.plots import agreement_plot
 from experiments.calibrate.export import jsonable
 from experiments.calibrate.results import Campaign
-from experiments.files import replacing, write_text
+from experiments.evidence.studies.buckwheat.bases.choice import BaseChoice
+from experiments.evidence.studies.buckwheat.bases.choice_tables import choice_tables
+from experiments.evidence.studies.buckwheat.sensitivity.sensitivities import Sensitivities
+from experiments.evidence.studies.buckwheat.sensitivity.sensitivity_tables import sensitivity_tables
+from experiments.io.files import replacing, write_text
 from experiments.report.kit.figure import save_figure
 from experiments.report.kit.markdown import facts_list, markdown_page, markdown_table, wall_times_table
 from experiments.report.kit.table import Column, Layout, Table, columns, make_table
 from experiments.report.material_card import CARD
 from experiments.report.pictures import heap_row
-from experiments.studies.buckwheat.bases.choice import BaseChoice
-from experiments.studies.buckwheat.bases.choice_tables import choice_tables
 from experiments.studies.buckwheat.replay.replay import RUN, Replay
 from experiments.studies.buckwheat.replay.replay_tables import ranking_sentence, replay_tables
 from experiments.studies.buckwheat.replay.runs import DESIGNS, TABLES
-from experiments.studies.buckwheat.sensitivity.sensitivities import Sensitivities
-from experiments.studies.buckwheat.sensitivity.sensitivity_tables import sensitivity_tables
 from experiments.studyfile import Study
 from imaging import save_picture
 
@@ -149,7 +149,7 @@ def record_page(record: Record) -> str:
         "# The paper's runs, simulated again",
         "Every run of Tables 3, 5 and 6 of the paper and its verification, beside the published angles. This "
         "page is made from the files beside it: "
-        "`python -m experiments.studies.buckwheat.records.paper_record --help`.",
+        "`python -m experiments.evidence.studies.buckwheat.records.paper_record --help`.",
         facts_list(record.provenance),
         wall_times_table(record.provenance, "heaps"),
         "## Agreement",

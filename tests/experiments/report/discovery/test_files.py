@@ -17,11 +17,11 @@ from experiments.calibrate.checks import check_study
 from experiments.calibrate.export import jsonable
 from experiments.calibrate.noise_floor import plan_noise_floor
 from experiments.discover.library import library_for
-from experiments.measurement.observables import BY_NAME, OBSERVABLES
 from experiments.report.discovery import Terms, write_discovery
 from experiments.runs.campaign import check_runs
 from experiments.studyfile import Study, load_study
 from experiments.studyfile.campaign import TARGET_SCENE
+from experiments.studyfile.observables import BY_NAME, OBSERVABLES
 
 Discovered = Callable[[Verdict], Discovery]
 

@@ -1,0 +1,1 @@
+"""Responses that are curves: emulators, fits and profiles."""

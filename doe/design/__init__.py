@@ -1,0 +1,1 @@
+"""Designs of experiments: factors, points, terms, and the families of designs."""

@@ -1,0 +1,324 @@
+"""Design: the settings of every run, coded and natural, with the order in which to run them."""
+
+from collections.abc import Hashable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
+
+from doe.checks import (
+    checked_flag,
+    checked_kind,
+    checked_list,
+    checked_map,
+    checked_number,
+    checked_seed,
+    real_array,
+)
+from doe.design.factors import Category, Factor, checked_factors
+from doe.design.labels import aligned
+from doe.design.points import coded_points, natural_points
+from doe.errors import DesignError
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """Runs in standard order.
+
+    Parameters
+    ----------
+    factors : tuple of Factor
+    coded : DataFrame, one row a run
+        Coded settings: a column for each factor and each dummy, by name. The index holds the runs' labels.
+    seed : int, optional
+        Seed of ``run_order``; None keeps the standard order.
+    dummies : names
+        Columns of a screening design that stand for no factor and hold -1 and +1: what they estimate is error
+        and interactions. A column is a dummy because it is named here, never by its values.
+    blocks : Series, optional
+        Label of each run's block (day, batch, oven), by run. Blocks are a term of every model of the design.
+    notes : sentences
+        What whoever uses the design should know: what it mixes up, which design does better.
+    """
+
+    factors: tuple[Factor, ...]
+    coded: pd.DataFrame
+    seed: int | None = None
+    dummies: tuple[str, ...] = ()
+    blocks: pd.Series | None = None
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        factors = checked_factors(self.factors)
+        checked_seed(self.seed)
+        checked_kind("coded, the table of a design,", self.coded, pd.DataFrame)
+        names, dummies = [factor.name for factor in factors], tuple(checked_list("dummies", self.dummies))
+        coded = _checked_table(self.coded, names, dummies)
+        for name in dummies:
+            center = (coded[names] == 0.0).all(axis=1) & (coded[name] == 0.0)
+            odd = coded.index[~(coded[name].isin([-1.0, 1.0]) | center)]
+            if len(odd):
+                raise DesignError(
+                    f"a dummy holds only -1 and +1 (0 at the center): column {name!r} holds "
+                    f"{coded.loc[odd[0], name]} "
+                    f"in run {odd[0]}"
+                )
+        object.__setattr__(self, "factors", factors)
+        object.__setattr__(self, "coded", coded)
+        object.__setattr__(self, "dummies", dummies)
+        if self.blocks is not None:
+            object.__setattr__(self, "blocks", checked_blocks(self.blocks, coded))
+
+    def __repr__(self) -> str:
+        factors = ", ".join(f"{f.name} {f.levels_text}" for f in self.factors)
+        extras = [f"{len(self.dummies)} dummies"] if self.dummies else []
+        if self.blocks is not None:
+            extras.append(f"{self.blocks.nunique()} blocks")
+        replicated = len(self.coded) - len(self.coded[self.names].drop_duplicates())
+        extras += [f"{replicated} repeated settings"] if replicated else []
+        return (
+            f"{type(self).__name__} of {len(self.coded)} runs in {factors}{''.join(f'; {e}' for e in extras)}"
+        )
+
+    @classmethod
+    def from_table(
+        cls,
+        table: pd.DataFrame,
+        factors: Iterable[Factor],
+        coded: bool | None = None,
+        *,
+        dummies: Iterable[str] = (),
+        block: str | None = None,
+    ) -> "Design":
+        """Return the design that a table holds.
+
+        Parameters
+        ----------
+        table : DataFrame, one row a run
+            A column for each factor, each dummy and the blocks; no other.
+        factors : iterable of Factor
+        coded : bool, optional
+            Whether the factors' columns are coded (else in natural units). By default they are taken as coded
+            where that is plain: each factor's column holds -1 and +1.
+        dummies : names
+            Columns in -1 and +1 that stand for no factor.
+        block : name, optional
+            Column that holds the blocks' labels.
+
+        Raises
+        ------
+        DesignError
+            A factor without column, a column that is nothing of the three, a value that is not finite, a run
+            label that comes twice, a dummy with other values than -1 and +1, or a table of which it is not
+            plain whether it is coded.
+        """
+        factors, dummies = checked_factors(factors), tuple(checked_list("dummies", dummies))
+        if coded is not None:
+            checked_flag("coded, unless it is None,", coded)
+        if not isinstance(table, pd.DataFrame):
+            raise DesignError(f"a design is made from a DataFrame, received {type(table).__name__}")
+        blocks = None
+        if block is not None:
+            if not isinstance(block, str) or block not in table.columns:
+                raise DesignError(f"no column for the block {block!r}; the table has {list(table.columns)}")
+            blocks, table = table[block], table.drop(columns=block)
+        if coded is not None and not coded:
+            table = table.assign(**coded_points(factors, _checked_natural(table, factors)))
+        design = cls(factors, table, dummies=dummies, blocks=blocks)
+        if coded is None:
+            _check_coded(design)
+        return design
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the factors."""
+        return [factor.name for factor in self.factors]
+
+    @property
+    def points(self) -> pd.DataFrame:
+        """Coded settings without the dummy columns."""
+        return self.coded[self.names]
+
+    @cached_property
+    def natural(self) -> pd.DataFrame:
+        """Natural settings, one column a factor."""
+        return natural_points(self.factors, self.coded)
+
+    @cached_property
+    def run_order(self) -> pd.Index:
+        """Run labels in the order of execution: ``design.natural.loc[design.run_order]``."""
+        if self.seed is None:
+            return self.coded.index
+        order = np.random.default_rng(int(self.seed)).permutation(len(self.coded))
+        return self.coded.index[order]
+
+    def factor(self, name: str) -> Factor:
+        """Return the factor of this name."""
+        if not isinstance(name, str):
+            raise DesignError(f"a factor is named by text, received {name!r}")
+        for factor in self.factors:
+            if factor.name == name:
+                return factor
+        raise DesignError(f"no factor is named {name!r}; the design has {', '.join(self.names)}")
+
+    def select(self, runs: Sequence) -> "Design":
+        """Return a design of these runs, renumbered from 1; a label that comes again is a replicate.
+
+        So a table of finished cases, some replicated and some missing, becomes a design again:
+        ``design.select(table["run"])``.
+        """
+        runs = checked_list("runs", runs)
+        unknown = [run for run in runs if not isinstance(run, Hashable) or run not in self.coded.index]
+        if unknown:
+            raise DesignError(f"the design has no run {unknown[0]!r}; its runs are {list(self.coded.index)}")
+        table = numbered(self.coded.loc[runs])
+        blocks = None if self.blocks is None else self.blocks.loc[runs].set_axis(table.index)
+        return Design(self.factors, table, dummies=self.dummies, blocks=blocks)
+
+    def with_blocks(self, labels: Sequence) -> "Design":
+        """Return the design with these blocks: a label for each run, in the order of the runs."""
+        labels = checked_list("blocks", labels)
+        if len(labels) != len(self.coded):
+            raise DesignError(f"blocks: one label for each of {len(self.coded)} runs, received {len(labels)}")
+        blocks = pd.Series(labels, index=self.coded.index)
+        return replace(self, blocks=blocks)
+
+
+def numbered(table: pd.DataFrame) -> pd.DataFrame:
+    """Return the table with runs numbered from 1."""
+    return table.set_axis(pd.RangeIndex(1, len(table) + 1, name="run"))
+
+
+def observations(design: Design, response: ArrayLike) -> tuple[pd.DataFrame, pd.Series]:
+    """Return coded settings and response with one row an observation.
+
+    Parameters
+    ----------
+    design : Design
+    response : array-like, shape (runs,) or (runs, replicates)
+        A Series or DataFrame is read by its labels, which are the design's runs in any order; an array by its
+        position, in the design's row order. Columns of a DataFrame are replicates and are numbered.
+
+    Raises
+    ------
+    DesignError
+        Other labels, another shape, or a value that is not finite (with its run and replicate).
+    """
+    checked_kind("design", design, Design)
+    values = aligned("a response", response, design.coded.index)
+    runs = len(design.coded)
+    if values.ndim not in (1, 2) or values.shape[0] != runs or values.size == 0:
+        raise DesignError(f"a response has shape ({runs},) or ({runs}, replicates), received {values.shape}")
+    values = values.reshape(runs, -1)
+    bad = np.argwhere(~np.isfinite(values))
+    if len(bad):
+        run, replicate = bad[0]
+        raise DesignError(
+            f"a response must be finite: {values[run, replicate]} in run {design.coded.index[run]}, "
+            f"replicate {replicate + 1}"
+        )
+    rows = np.repeat(np.arange(runs), values.shape[1])
+    coded = design.coded.iloc[rows]
+    return coded, pd.Series(values.ravel(), index=coded.index, name="response")
+
+
+def checked_setting(name: str, point: Any, design: Design) -> dict[str, Any]:
+    """Return the natural settings of a design's factors; raise DesignError when one is missing or wrong."""
+    given = checked_map(name, point)
+    missing = [factor.name for factor in design.factors if factor.name not in given]
+    if missing:
+        raise DesignError(f"no value for factor {missing[0]!r} in {name}: {given}")
+    for factor in design.factors:
+        if isinstance(factor, Category):
+            factor.to_coded(given[factor.name])
+        else:
+            checked_number(f"the value of {factor.name!r} in {name}", given[factor.name])
+    return {factor.name: given[factor.name] for factor in design.factors}
+
+
+def checked_blocks(blocks: pd.Series, coded: pd.DataFrame) -> pd.Series:
+    """Return the runs' blocks in the order of the runs; raise DesignError unless each run has one."""
+    if (
+        not isinstance(blocks, pd.Series)
+        or not blocks.index.is_unique
+        or set(blocks.index) != set(coded.index)
+    ):
+        raise DesignError("blocks: a Series with a label for each run of the design, by the runs' labels")
+    blocks = blocks.loc[coded.index].rename("block")
+    if blocks.isna().any():
+        raise DesignError(f"blocks: run {blocks.index[blocks.isna()][0]} has none")
+    names = {f"block {label}" for label in blocks.unique()} & set(coded.columns)
+    if names:
+        raise DesignError(f"{min(names)!r} names a block's column in the model: give the factor another name")
+    return blocks
+
+
+def _check_coded(design: Design) -> None:
+    """Raise DesignError unless it is plain that a table's factors are coded."""
+    for factor in design.factors:
+        values = design.coded[factor.name].to_numpy()
+        if isinstance(factor, Category):
+            continue  # the names of levels are no numbers
+        coded, natural = (
+            all(np.isclose(values, end, rtol=1e-9, atol=1e-9 * factor.half_range).any() for end in ends)
+            for ends in ((-1.0, 1.0), (factor.low, factor.high))
+        )
+        if not coded or (natural and (factor.low, factor.high) != (-1.0, 1.0)):
+            raise DesignError(
+                f"it is not plain whether the table is coded or in natural units: factor {factor.name!r} has "
+                f"the levels {factor.low:g} and {factor.high:g}, its column runs from {values.min():g} to "
+                f"{values.max():g}; say coded=False (natural units) or coded=True"
+            )
+
+
+def _checked_natural(table: pd.DataFrame, factors: tuple[Factor, ...]) -> pd.DataFrame:
+    """Return the factors' columns, numbers as floats; raise DesignError when one is missing."""
+    columns = {}
+    for factor in factors:
+        if factor.name not in table.columns:
+            raise DesignError(f"no column for factor {factor.name!r}; the table has {list(table.columns)}")
+        column = table[factor.name]
+        if not isinstance(factor, Category):
+            column = real_array(f"every column of a design holds numbers: {factor.name!r}", column)
+        columns[factor.name] = column
+    return pd.DataFrame(columns, index=table.index)
+
+
+def _checked_table(table: pd.DataFrame, names: list[str], dummies: tuple[str, ...]) -> pd.DataFrame:
+    """Return a float copy with the factors' columns first; raise DesignError when it is no table of runs."""
+    for what, wanted in (("factor", names), ("dummy", dummies)):
+        missing = [name for name in wanted if name not in table.columns]
+        if missing:
+            raise DesignError(f"no column for {what} {missing[0]!r}; the table has {list(table.columns)}")
+    for what, labels in (("run label", table.index), ("column", table.columns)):
+        if labels.has_duplicates:
+            raise DesignError(f"each {what} comes once, received again: {labels[labels.duplicated()][0]}")
+    if table.empty:
+        raise DesignError("a design has at least one run, received an empty table")
+    strangers = [name for name in table.columns if name not in (*names, *dummies)]
+    if strangers:
+        raise DesignError(
+            f"column {strangers[0]!r} is no factor: name it among the dummies (dummies=[...]), as the block "
+            f"(block={strangers[0]!r}), or drop it"
+        )
+    if set(names) & set(dummies):
+        raise DesignError(
+            f"a column is a factor or a dummy: {min(set(names) & set(dummies))!r} is named as both"
+        )
+    columns = {
+        name: real_array(f"every column of a design holds numbers: {name!r}", table[name])
+        for name in (*names, *dummies)
+    }
+    table = pd.DataFrame(columns, index=table.index)
+    values = table.to_numpy()
+    bad = np.argwhere(~np.isfinite(values))
+    if len(bad):
+        row, column = bad[0]
+        raise DesignError(
+            f"settings must be finite: {values[row, column]} in run {table.index[row]}, "
+            f"column {table.columns[column]!r}"
+        )
+    return table

@@ -1,0 +1,1 @@
+"""Response surfaces: fits, contours, regions and optima."""

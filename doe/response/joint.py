@@ -1,0 +1,383 @@
+"""Several responses together: the setting that they agree on best, where they agree, what stays open."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy import optimize
+
+from doe.checks import checked_count, checked_level, checked_map, checked_number
+from doe.design.factors import Factor
+from doe.errors import DesignError
+from doe.response.fitted import FittedSurface, unselected
+from doe.response.region import Region, box_cells, misfit
+from doe.response.surface import Surface
+from doe.samples.sample import Sample
+from doe.samples.simultaneous import Simultaneous
+from doe.samples.two_errors import TwoErrors
+
+Misfit = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], TwoErrors]
+
+NODES = 5
+"""Cells at which the level of several responses is found."""
+
+PULL = 1e-3
+"""Weight of the squared distance to the centre beside chi2: it chooses among settings that are as good."""
+
+STARTS = 3
+"""Cells from which the smallest chi2 is refined: the best ones of as many orthants."""
+
+
+@dataclass(frozen=True)
+class Goal:
+    """One response: its fitted surface, and what was measured."""
+
+    surface: FittedSurface
+    target: Sample
+
+    def __post_init__(self) -> None:
+        for place, wanted in (("design", "a fitted surface"), ("evaluate", "a fitted surface")):
+            if not hasattr(self.surface, place):
+                raise DesignError(f"a goal's surface is {wanted}, received {self.surface!r}")
+        if not isinstance(self.target, Sample):
+            raise DesignError(f"a goal's target is a Sample (mean, sd, n), received {self.target!r}")
+        if not self.target.sd > 0.0:
+            raise DesignError(f"a response is weighed by its target's spread, received {self.target}")
+
+    @property
+    def fit(self) -> FittedSurface:
+        """The surface before the data chose its terms: its errors hold (``doe.Surface.unselected``)."""
+        return unselected(self.surface)
+
+    def misfit(self, coded: NDArray[np.float64]) -> Misfit:
+        """Return fit less target at coded points, its standard error and the shares of the two errors."""
+        return misfit(self.surface, coded, self.target.mean, self.target.se, float(self.target.df))
+
+
+@dataclass(frozen=True, eq=False)
+class JointFit:
+    """Responses fitted over the same factors, against their targets; made by ``joint_fit``.
+
+    The region explored is the coded box -extent..+extent as far as the farthest run. There a setting is
+    compatible with several responses when none of them differs from its target significantly, at the level of
+    each at which all together hold alpha (``level``; ``doe.response.region.compatible_region`` has the rule for one).
+    That level lies above alpha over their number where the errors of the fits hang together, as those of
+    responses of the same runs do, whose residuals tell it. The targets are measured one independently of the
+    other. So the true setting is compatible with probability 1 - alpha, where the models hold: .94 to .96 for
+    .95 with 3 measurements of each target or more (.943 to .964 with 6 responses and 3 measurements); with 2
+    at least .94, up to .995. Surfaces whose terms the
+    data chose count as they were before the choice.
+    """
+
+    goals: Mapping[str, Goal]
+    """Responses by name."""
+    alpha: float
+    extent: float
+    radius: float
+    """Coded distance of the farthest run from the centre."""
+    cells: NDArray[np.float64]
+    """Centers of the box's cells, coded, shape (cells, factors)."""
+    resolution: int
+
+    @property
+    def factors(self) -> tuple[Factor, ...]:
+        """Factors that all surfaces are fitted over."""
+        return next(iter(self.goals.values())).surface.design.factors
+
+    @cached_property
+    def explored(self) -> NDArray[np.bool_]:
+        """Cells as near to the centre as the farthest run."""
+        return np.linalg.norm(self.cells, axis=1) <= self.radius
+
+    @cached_property
+    def misfits(self) -> dict[str, Misfit]:
+        """By response, how far fit and target differ at every cell."""
+        return {name: goal.misfit(self.cells) for name, goal in self.goals.items()}
+
+    def region(self, *names: str) -> Region:
+        """Return where some responses agree with their targets; without names, all of them."""
+        return self._region(self._mask(names or tuple(self.goals)))
+
+    def band(self, name: str) -> Region:
+        """Return where one response agrees at the level that all share; all bands meet in ``region()``."""
+        self._check_names((name,))
+        place = list(self.goals).index(name)
+        return self._region(self.explored & self._accepted(tuple(self.goals), self.misfits)[:, place])
+
+    def share(self, *names: str) -> float:
+        """Return which part of the region explored is compatible with some responses (default: all)."""
+        mask = self._mask(names or tuple(self.goals))
+        return float(np.count_nonzero(mask) / np.count_nonzero(self.explored))
+
+    def level(self, point: Mapping[str, float] | None = None) -> float:
+        """Return the level of each response's test at which all of them together hold alpha, at a point.
+
+        Found by drawing (``doe.samples.simultaneous``), with the errors as they are estimated there.
+        """
+        first = self._first(tuple(self.goals), self._misfits_at(self._coded(point)))
+        return float(self._together(tuple(self.goals)).levels(first)[0])
+
+    @cached_property
+    def coded_point(self) -> NDArray[np.float64]:
+        """The setting with the smallest chi2; among several as good, the one nearest to the centre."""
+        objective = sum(self._chi2(found) for found in self.misfits.values())
+        objective = objective + PULL * np.sum(self.cells**2, axis=1)
+        order = np.argsort(np.where(self.explored, objective, np.inf), kind="stable")
+        orthant = (self.cells[order] > 0.0) @ 2 ** np.arange(len(self.factors))
+        _, best = np.unique(orthant, return_index=True)
+        found = [self._refined(self.cells[start]) for start in order[np.sort(best)[:STARTS]]]
+        return min(found, key=self._objective)
+
+    @property
+    def point(self) -> dict[str, float]:
+        """The same setting in natural units."""
+        return {f.name: float(f.to_natural(x)) for f, x in zip(self.factors, self.coded_point, strict=True)}
+
+    def tests(self, point: Mapping[str, float] | None = None) -> pd.DataFrame:
+        """Compare every response with its target at a point.
+
+        Parameters
+        ----------
+        point : mapping of natural values by factor, optional
+            Default: the setting with the smallest chi2.
+
+        Returns
+        -------
+        DataFrame, index ``response``
+            fitted (mean), fitted_se, target, target_se, t (of the difference), df (Welch and
+            Satterthwaite's), p (the level from which on the difference is significant), agrees (p is not
+            below ``level``).
+        """
+        coded = self._coded(point)
+        every = self._misfits_at(coded)
+        agreed = self._accepted(tuple(self.goals), every)[0]
+        rows = {}
+        for (name, goal), agrees in zip(self.goals.items(), agreed, strict=True):
+            found = every[name]
+            difference, error, share = (float(values[0]) for values in found[:3])
+            mean, se = (float(values[0]) for values in goal.fit.evaluate(coded[None]))
+            rows[name] = {
+                "fitted": mean,
+                "fitted_se": se,
+                "target": goal.target.mean,
+                "target_se": goal.target.se,
+                "t": difference / error,
+                "df": float(found[3].df(share)),
+                "p": found[3].p(difference / error, share),
+                "agrees": bool(agrees),
+            }
+        return pd.DataFrame.from_dict(rows, orient="index").rename_axis("response")
+
+    def agrees(self, point: Mapping[str, float] | None = None) -> bool:
+        """Tell if all responses agree with their targets at a point (default: that of the smallest chi2)."""
+        return bool(self._accepted(tuple(self.goals), self._misfits_at(self._coded(point))).all())
+
+    @cached_property
+    def shrinkage(self) -> pd.DataFrame:
+        """Shares of the compatible region left by each response: the first, then what shrinks it most.
+
+        A response that tells nothing new makes it a little larger, as each is then held to a stricter level.
+
+        Returns
+        -------
+        DataFrame, index ``response`` in the order of adding
+            share (of the region explored that is compatible with this and those before), ratio (to the share
+            before), alone (share with this response alone), with_first (share with the first and this).
+        """
+        rows = {}
+        for added in self._order():
+            share, before = self.share(*added), self.share(*added[:-1]) if len(added) > 1 else 1.0
+            name, first = added[-1], added[0]
+            rows[name] = {
+                "share": share,
+                "ratio": share / before if before > 0.0 else np.nan,
+                "alone": self.share(name),
+                "with_first": self.share(*dict.fromkeys((first, name))),
+            }
+        return pd.DataFrame.from_dict(rows, orient="index").rename_axis("response")
+
+    @cached_property
+    def directions(self) -> pd.DataFrame:
+        """Directions of the factors by how well the responses together pin them down, the best first.
+
+        They are the eigenvectors of the Fisher information at the point of the smallest chi2,
+        sum of g g' / s^2 over the responses with the gradient g of the fitted mean and the error s of its
+        difference from the target, all in coded units.
+
+        Returns
+        -------
+        DataFrame, index ``direction`` from 1
+            A column for each factor (the unit vector, its largest component positive), half_width (coded;
+            infinite where no response changes), span (of the compatible region along it, over that of the
+            region explored; 0 where nothing is compatible).
+
+            The true setting lies within half_width of the point along the direction with probability
+            1 - alpha (with 2 measurements of a target at least so), where the surfaces are straight that far
+            (``doe.samples.simultaneous``).
+        """
+        names, every = tuple(self.goals), self._misfits_at(self.coded_point)
+        gradients = [goal.fit.quadratic_form.gradient(self.coded_point) for goal in self.goals.values()]
+        slopes = np.array(gradients) / np.array([[float(found[1][0])] for found in every.values()])
+        information = slopes.T @ slopes
+        values, vectors = np.linalg.eigh(information)
+        values, vectors = values[::-1], vectors[:, ::-1]
+        # Rounding leaves eigenvalues of either sign where there is no information at all.
+        values = np.where(values > 1e-12 * max(values[0], np.finfo(float).tiny), values, 0.0)
+        largest = np.abs(vectors).argmax(axis=0)
+        vectors = vectors * np.sign(vectors[largest, range(len(values))])
+        together, first = self._together(names), self._first(names, every)[0]
+        half_width = [
+            together.half_width(np.array(gradients), vector, first) if value > 0.0 else np.inf
+            for vector, value in zip(vectors.T, values, strict=True)
+        ]
+        index, mask = pd.RangeIndex(1, len(values) + 1, name="direction"), self._mask(names)
+        table = pd.DataFrame(vectors.T, columns=[factor.name for factor in self.factors], index=index)
+        return table.assign(half_width=half_width, span=[self._span(vector, mask) for vector in vectors.T])
+
+    def _mask(self, names: tuple[str, ...]) -> NDArray[np.bool_]:
+        """Return the cells where some responses agree, by the level of these."""
+        self._check_names(names)
+        return self.explored & self._accepted(names, self.misfits).all(axis=1)
+
+    def _accepted(self, names: tuple[str, ...], every: Mapping[str, Misfit]) -> NDArray[np.bool_]:
+        """Return which of some responses agree where the misfits were found, shape (points, responses)."""
+        difference = np.column_stack([every[name][0] for name in names])
+        return self._together(names).accepted(difference, self._first(names, every))
+
+    def _together(self, names: tuple[str, ...]) -> Simultaneous:
+        """Return the joint test of some responses, its level found at fits that err little, more, most."""
+        if names not in self._tests:
+            places = [list(self.goals).index(name) for name in names]
+            first = self._first(names, self.misfits)[self.explored]
+            order = np.argsort(first.sum(axis=1), kind="stable")
+            self._tests[names] = Simultaneous(
+                [self.misfits[name][3] for name in names],
+                np.array([self.goals[name].target.se ** 2 for name in names]),
+                self._correlation[np.ix_(places, places)],
+                first[order[np.linspace(0, len(order) - 1, NODES).astype(int)]],
+                self.alpha,
+            )
+        return self._tests[names]
+
+    @cached_property
+    def _tests(self) -> dict[tuple[str, ...], Simultaneous]:
+        return {}
+
+    @cached_property
+    def _correlation(self) -> NDArray[np.float64]:
+        """Correlation of the residuals of responses that were fitted to the same runs, else 0."""
+        fits = [goal.fit for goal in self.goals.values()]
+        matrix = np.eye(len(fits))
+        for (i, one), (j, other) in combinations(enumerate(fits), 2):
+            if isinstance(one, Surface) and isinstance(other, Surface) and one.points.equals(other.points):
+                matrix[i, j] = matrix[j, i] = np.corrcoef(one.residuals, other.residuals)[0, 1]
+        return matrix
+
+    def _first(self, names: tuple[str, ...], every: Mapping[str, Misfit]) -> NDArray[np.float64]:
+        """Return the variances of the fitted means behind misfits, shape (points, responses)."""
+        return np.column_stack([every[name][1] ** 2 * (1.0 - every[name][2]) for name in names])
+
+    def _misfits_at(self, coded: NDArray[np.float64]) -> dict[str, Misfit]:
+        return {name: goal.misfit(coded[None]) for name, goal in self.goals.items()}
+
+    def _check_names(self, names: tuple[str, ...]) -> None:
+        unknown = [name for name in names if name not in self.goals]
+        if unknown:
+            raise DesignError(f"no response is named {unknown[0]!r}; the fit has {', '.join(self.goals)}")
+
+    def _region(self, mask: NDArray[np.bool_]) -> Region:
+        table = pd.DataFrame(self.cells, columns=[factor.name for factor in self.factors])
+        return Region(self.factors, table, mask, self.resolution, self.extent, self.explored)
+
+    def _span(self, direction: NDArray[np.float64], mask: NDArray[np.bool_]) -> float:
+        """Return the shadow of a region's cells on a direction, over that of the region explored."""
+        shadow = self.cells @ direction
+        belonging = shadow[mask]
+        return float(np.ptp(belonging) / np.ptp(shadow[self.explored])) if belonging.size else 0.0
+
+    def _order(self) -> Iterator[tuple[str, ...]]:
+        """Return the responses so far, from the first on, each time with the one that shrinks most."""
+        added, *left = self.goals
+        chosen: tuple[str, ...] = (added,)
+        yield chosen
+        while left:
+            best = min(left, key=lambda name: self.share(*chosen, name))
+            left.remove(best)
+            chosen = (*chosen, best)
+            yield chosen
+
+    def _coded(self, point: Mapping[str, float] | None) -> NDArray[np.float64]:
+        """Return a point in coded units: that of the smallest chi2 unless one is given."""
+        if point is None:
+            return self.coded_point
+        point = checked_map("point", point)
+        missing = [factor.name for factor in self.factors if factor.name not in point]
+        if missing:
+            raise DesignError(f"no value for factor {missing[0]!r} in the point {point}")
+        values = {f: checked_number(f"the point's value of {f.name!r}", point[f.name]) for f in self.factors}
+        return np.array([float(factor.to_coded(value)) for factor, value in values.items()])
+
+    def _chi2(self, found: Misfit) -> NDArray[np.float64]:
+        return (found[0] / found[1]) ** 2
+
+    def _objective(self, coded: NDArray[np.float64]) -> float:
+        chi2 = sum(float(self._chi2(goal.misfit(coded[None]))[0]) for goal in self.goals.values())
+        return chi2 + PULL * float(coded @ coded)
+
+    def _refined(self, start: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the smallest chi2 of the region explored, searched from a cell; the cell if none is less."""
+        inside = {"type": "ineq", "fun": lambda x: self.radius**2 - x @ x, "jac": lambda x: -2.0 * x}
+        bounds = [(-self.extent, self.extent)] * len(start)
+        options = {"ftol": 1e-12, "maxiter": 200}
+        result = optimize.minimize(
+            self._objective, start, method="SLSQP", bounds=bounds, constraints=inside, options=options
+        )
+        better = result.success and self._objective(result.x) <= self._objective(start)
+        return result.x if better else start
+
+
+def joint_fit(goals: Mapping[str, Goal], alpha: float = 0.05, resolution: int | None = None) -> JointFit:
+    """Fit several responses together: chi2 = sum of ((fit - target) / error)^2 over the responses.
+
+    The error of a response is that of its fit and that of its target together.
+
+    Parameters
+    ----------
+    goals : mapping of Goal by name
+        Surfaces over the same factors in the same coding, the first response first.
+    alpha : float
+        1 - alpha is the level of the compatible region.
+    resolution : int, optional
+        Cells along each factor.
+
+    Raises
+    ------
+    DesignError
+        No response, surfaces over other factors, or a target without a spread.
+    """
+    if not isinstance(goals, Mapping) or not goals:
+        received = "none" if isinstance(goals, Mapping) else repr(goals)
+        raise DesignError(f"a joint fit needs at least one response by its name, received {received}")
+    for name, goal in goals.items():
+        if not isinstance(goal, Goal):
+            raise DesignError(f"response {name!r} of a joint fit is a Goal, received {goal!r}")
+    checked_level(alpha)
+    if resolution is not None:
+        checked_count("resolution", resolution)
+    designs = {name: goal.surface.design for name, goal in goals.items()}
+    first, design = next(iter(designs.items()))
+    for name, other in designs.items():
+        if other.factors != design.factors:
+            raise DesignError(
+                f"responses are fitted together over the same factors: {first!r} has {design.factors}, "
+                f"{name!r} has {other.factors}"
+            )
+    runs = np.vstack([other.points.to_numpy(dtype=np.float64) for other in designs.values()])
+    extent = float(np.abs(runs).max())
+    radius = float(np.linalg.norm(runs, axis=1).max()) * (1.0 + 1e-9)  # the farthest run itself is inside
+    cells, count = box_cells(len(design.factors), extent, resolution)
+    return JointFit(dict(goals), alpha, extent, radius, cells, count)

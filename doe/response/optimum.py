@@ -1,0 +1,141 @@
+"""Single points of a surface: the one nearest to the center on the target contour, and the stationary one."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy import optimize
+
+from doe.checks import checked_map, checked_number
+from doe.design.points import natural_points
+from doe.errors import DesignError, TargetError
+from doe.response.contour import contour_points
+from doe.response.fitted import FittedSurface
+from doe.response.quadratic import QuadraticForm
+from doe.response.region import box_cells
+
+NEAREST_STARTS = 8
+"""Points of the contour from which the nearest one is refined."""
+
+FLAT_RATIO = 1e-9
+"""Curvature relative to the largest coefficient below which a direction counts as straight."""
+
+
+@dataclass(frozen=True, eq=False)
+class StationaryPoint:
+    """Point at which the gradient of a quadratic surface vanishes."""
+
+    coded: pd.Series
+    natural: pd.Series
+    mean: float
+    """Fitted response there."""
+    kind: str
+    """``"minimum"``, ``"maximum"`` or ``"saddle"``."""
+    curvatures: NDArray[np.float64]
+    """Eigenvalues of the quadratic form in coded units, ascending."""
+
+    @property
+    def inside(self) -> bool:
+        """It lies in the coded box -1..+1."""
+        return bool((self.coded.abs() <= 1.0).all())
+
+
+def nearest(
+    surface: FittedSurface, target: float, to: Mapping[str, float] | None = None, extent: float = 1.0
+) -> pd.Series:
+    """Return the point of the target contour with the smallest coded distance to a point.
+
+    Parameters
+    ----------
+    surface : FittedSurface
+    target : float
+    to : mapping of natural values by factor, optional
+        Default: the design's center.
+    extent : float
+        Coded half width of the box that the point must lie in.
+
+    Returns
+    -------
+    Series
+        Natural value by factor.
+
+    Raises
+    ------
+    TargetError
+        The fitted surface does not reach the target in the box.
+    DesignError
+        A target, an extent or a point that is no finite number.
+    """
+    checked_number("target", target)
+    checked_number("extent, the coded half width of the box,", extent, above=0.0)
+    factors = surface.design.factors
+    origin = np.zeros(len(factors))
+    if to is not None:
+        to = checked_map("the point to be near to", to)
+        missing = [name for name in surface.design.names if name not in to]
+        if missing:
+            raise DesignError(f"no value for factor {missing[0]!r} in the point to be near to: {dict(to)}")
+        values = [checked_number(f"the value of {f.name!r} to be near to", to[f.name]) for f in factors]
+        origin = np.array([factor.to_coded(value) for factor, value in zip(factors, values, strict=True)])
+    starts = contour_points(surface, target, extent, None).to_numpy()
+    if not len(starts):
+        mean, _ = surface.evaluate(box_cells(len(factors), extent)[0])
+        raise TargetError(
+            f"the fitted surface does not reach the target {target:g}: it runs from {mean.min():.4g} to "
+            f"{mean.max():.4g} inside the coded box -{extent:g}..+{extent:g}"
+        )
+    order = np.argsort(np.linalg.norm(starts - origin, axis=1), kind="stable")[:NEAREST_STARTS]
+    candidates = [_refined(surface.quadratic_form, target, starts[i], origin, extent) for i in order]
+    best = min(candidates, key=lambda point: float(np.linalg.norm(point - origin)))
+    return pd.Series({f.name: float(f.to_natural(x)) for f, x in zip(factors, best, strict=True)})
+
+
+def stationary_point(surface: FittedSurface) -> StationaryPoint:
+    """Return the point where the gradient vanishes (canonical analysis, Box and Wilson 1951).
+
+    Raises
+    ------
+    DesignError
+        The surface is straight along some direction, so that there is no single such point.
+    """
+    form = surface.quadratic_form
+    curvatures, directions = np.linalg.eigh(form.matrix)
+    scale = max(np.abs(curvatures).max(), np.abs(form.slopes).max())
+    if np.abs(curvatures).min() <= FLAT_RATIO * scale:
+        direction = directions[:, np.abs(curvatures).argmin()].round(3)
+        raise DesignError(
+            "a stationary point needs curvature in every direction; the fitted surface is straight along "
+            f"{dict(zip(surface.design.names, direction.tolist(), strict=True))} (coded)"
+        )
+    point = np.linalg.solve(form.matrix, -0.5 * form.slopes)
+    kind = "minimum" if curvatures.min() > 0.0 else "maximum" if curvatures.max() < 0.0 else "saddle"
+    coded = pd.DataFrame([point], columns=surface.design.names)
+    natural = natural_points(surface.design.factors, coded)
+    return StationaryPoint(coded.iloc[0], natural.iloc[0], float(form.value(point)), kind, curvatures)
+
+
+def _refined(
+    form: QuadraticForm,
+    target: float,
+    start: NDArray[np.float64],
+    origin: NDArray[np.float64],
+    extent: float,
+) -> NDArray[np.float64]:
+    """Return the contour's point nearest to the origin, searched from a point of the contour."""
+
+    def squared_distance(x: NDArray[np.float64]) -> float:
+        return float((x - origin) @ (x - origin))
+
+    settings: dict[str, Any] = {
+        "jac": lambda x: 2.0 * (x - origin),
+        "bounds": [(-extent, extent)] * len(start),
+        "constraints": {"type": "eq", "fun": lambda x: form.value(x) - target, "jac": form.gradient},
+        "method": "SLSQP",
+        "options": {"ftol": 1e-15, "maxiter": 200},
+    }
+    result = optimize.minimize(squared_distance, start, **settings)
+    solved = result.success and abs(form.value(result.x) - target) <= 1e-9 * max(1.0, abs(target))
+    return result.x if solved else start

@@ -1,0 +1,332 @@
+"""A surface carried over to another process: shifted and scaled by what a few runs there show.
+
+Two simulators of one test, or a simulator and a laboratory, seldom agree, but their responses to the factors
+are of one shape: y = t + shift + scale (s(x) - t), with s the surface of the first and t a level to count
+from, such as the target. Shift and scale are estimated by generalized least squares. Their errors come from
+both sides: the noise of the runs, estimated from them by restricted likelihood, and that of the surface,
+which moves its values together. That the scale is 1 within a quarter is taken as known beforehand (mixed
+estimation; Theil and Goldberger 1961), so that noise alone cannot make it next to nothing. What the runs tell
+of the surface beyond shift and scale moves it within its own errors (best linear unbiased prediction;
+Harville 1977, Kennedy and O'Hagan 2001 with a constant scale).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+from scipy import optimize, stats
+from scipy.linalg import block_diag
+from statsmodels.regression.linear_model import GLS
+
+from doe.checks import (
+    MOST,
+    checked_count,
+    checked_df,
+    checked_kind,
+    checked_level,
+    checked_map,
+    checked_number,
+    checked_points,
+    real_array,
+)
+from doe.design.design import Design
+from doe.design.points import coded_points, natural_points
+from doe.design.terms import INTERCEPT, model_matrix
+from doe.errors import DesignError
+from doe.response import optimum, region
+from doe.response.quadratic import QuadraticForm
+from doe.response.surface import Surface
+from doe.samples.sample import Sample
+
+SCALE_SD = 0.25
+"""Standard deviation of the scale about 1 before any run: solvers of one test are alike so far."""
+
+FARTHEST = 1e4
+"""Distance of the level from the responses over their range from which on shift and scale are one."""
+
+LEAST_RUNS = 4
+"""Fewest runs that leave a spread beside shift and scale."""
+
+ROUNDS = 20
+"""Rounds of estimating the scale, which weighs the surface's own error, at the most."""
+
+SETTLED = 1e-3
+"""Change of the scale from one round to the next that weighs nothing."""
+
+LOWEST_NOISE = 1e-3
+"""Least standard deviation of a run that is looked for, as a part of the responses' spread."""
+
+
+@dataclass(frozen=True, eq=False)
+class Transfer:
+    """A surface as it is in another process; made by ``transfer``. It has contours, optima and regions."""
+
+    source: Surface
+    level: float
+    """Response that shift and scale count from."""
+    points: NDArray[np.float64]
+    """Coded settings of the runs of the other process, (runs, factors)."""
+    response: NDArray[np.float64]
+    """Their responses, (runs,)."""
+    noise: float
+    """Standard deviation of one of them."""
+    weight: float
+    """Scale with which the surface's own error is weighed."""
+    scale_sd: float = SCALE_SD
+    """Standard deviation of the scale about 1 that was taken as known beforehand; infinite: nothing was."""
+
+    @property
+    def design(self) -> Design:
+        """Design of the source, whose factors and coding hold."""
+        return self.source.design
+
+    @cached_property
+    def _fit(self):  # type: ignore[no-untyped-def]  # statsmodels has no types
+        return GLS(*_with_prior(self), sigma=_with_prior_variance(self, self._covariance)).fit()
+
+    @property
+    def shift(self) -> float:
+        """Response of the other process where the surface has the level, less the level."""
+        return float(self._fit.params[0])
+
+    @property
+    def scale(self) -> float:
+        """Change of the other process's response where the surface's changes by one."""
+        return float(self._fit.params[1])
+
+    @property
+    def residual_df(self) -> float:
+        """Degrees of freedom of the noise."""
+        return float(len(self.response) - 2)
+
+    def intervals(self, alpha: float = 0.05) -> dict[str, tuple[float, float]]:
+        """Return the intervals of ``shift`` and ``scale`` that hold with probability 1 - alpha each."""
+        reach = stats.t.isf(0.5 * checked_level(alpha), self.residual_df) * self._fit.bse
+        return {
+            name: (float(value - width), float(value + width))
+            for name, value, width in zip(("shift", "scale"), self._fit.params, reach, strict=True)
+        }
+
+    def evaluate(self, coded: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return mean in the other process and its standard error at coded points, (points, factors)."""
+        points = checked_points(coded, len(self.design.names))
+        own, common = self._columns(points), self._common(points)
+        weighed = np.linalg.solve(self._covariance, np.column_stack([self._leftover, common.T]))
+        mean = self.level + own @ self._fit.params + common @ weighed[:, 0]
+        gap = own - common @ np.linalg.solve(self._covariance, self._columns(self.points))
+        prior = self.weight**2 * _quadratic(self._rows(points), self._surface_covariance)
+        variance = prior - np.einsum("ij,ji->i", common, weighed[:, 1:])
+        variance += _quadratic(gap, self._fit.normalized_cov_params)
+        return mean, np.sqrt(np.maximum(self._fit.scale * variance, 0.0))
+
+    @cached_property
+    def quadratic_form(self) -> QuadraticForm:
+        """Mean in the other process as a polynomial in coded units."""
+        whole = self.source.unselected
+        terms = (INTERCEPT, *whole.terms)
+        own = dict(zip((INTERCEPT, *self.source.terms), self.source.coded_coefficients, strict=True))
+        moved = self.weight * self._surface_covariance @ self._rows(self.points).T
+        moved = self.weight * moved @ np.linalg.solve(self._covariance, self._leftover)
+        values = [self.scale * own.get(term, 0.0) + more for term, more in zip(terms, moved, strict=True)]
+        values[0] += self.level + self.shift - self.scale * self.level
+        return QuadraticForm.of(self.design.names, terms[1:], values)
+
+    def nearest(self, target: float, to: dict[str, float] | None = None, extent: float = 1.0) -> pd.Series:
+        """Return the target contour's point nearest to a point, natural (see ``doe.response.optimum.nearest``)."""
+        return optimum.nearest(self, target, to, extent)
+
+    def compatible_region(
+        self, target: float | Sample, alpha: float = 0.05, extent: float = 1.0
+    ) -> region.Region:
+        """Return the settings that the target does not contradict (see ``doe.response.region.compatible_region``)."""
+        return region.compatible_region(self, target, alpha=alpha, extent=extent)
+
+    # ---- parts of the model --------------------------------------------------------------------------------
+
+    def _columns(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Columns of shift and scale, the level taken off by the response: (points, 2)."""
+        table = pd.DataFrame(points, columns=self.design.names)
+        values = model_matrix(table, self.source.terms).to_numpy() @ self.source.coded_coefficients.to_numpy()
+        return np.column_stack([np.ones(len(points)), values - self.level])
+
+    def _rows(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Terms of the model whose errors are the surface's, (points, terms)."""
+        table = pd.DataFrame(points, columns=self.design.names)
+        return model_matrix(table, self.source.unselected.terms).to_numpy()
+
+    @cached_property
+    def _surface_covariance(self) -> NDArray[np.float64]:
+        whole = self.source.unselected
+        count = len(whole.terms) + 1
+        return whole.fit.cov_params().to_numpy()[:count, :count]
+
+    def _common(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Covariance of the surface's error at points with that at the runs, (points, runs)."""
+        return self.weight**2 * self._rows(points) @ self._surface_covariance @ self._rows(self.points).T
+
+    @cached_property
+    def _covariance(self) -> NDArray[np.float64]:
+        """Covariance of the runs' responses about shift and scale."""
+        return self.noise**2 * np.eye(len(self.response)) + self._common(self.points)
+
+    @cached_property
+    def _leftover(self) -> NDArray[np.float64]:
+        return self.response - self.level - self._columns(self.points) @ self._fit.params
+
+
+def _with_prior(found: Transfer) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return responses and columns of shift and scale, with what is known of the scale as one more run."""
+    below, columns = found.response - found.level, found._columns(found.points)
+    if not np.isfinite(found.scale_sd):
+        return below, columns
+    return np.append(below, 1.0), np.vstack([columns, [0.0, 1.0]])
+
+
+def _with_prior_variance(found: Transfer, covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the covariance of those responses."""
+    if not np.isfinite(found.scale_sd):
+        return covariance
+    return block_diag(covariance, found.scale_sd**2)
+
+
+def _quadratic(rows: NDArray[np.float64], matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return r'Mr of every row r."""
+    return np.asarray(np.einsum("ij,jk,ik->i", rows, matrix, rows))
+
+
+def transfer(
+    source: Surface, runs: pd.DataFrame, response: ArrayLike, level: float, scale_sd: float = SCALE_SD
+) -> Transfer:
+    """Carry a surface over to another process by a few runs there.
+
+    Parameters
+    ----------
+    source : Surface
+    runs : DataFrame, one row a run
+        A column for each factor, natural units.
+    response : array-like, shape (runs,)
+    level : float
+        Response that shift and scale count from: the target. They are then nearly uncorrelated.
+    scale_sd : float
+        Standard deviation of the scale about 1 before any run; infinite: nothing is known of it.
+
+    Raises
+    ------
+    DesignError
+        Fewer than four runs, a value that is not finite, or runs that cannot tell shift from scale: on all of
+        them the surface is the same.
+    """
+    checked_kind("source", source, Surface)
+    checked_kind("runs", runs, pd.DataFrame)
+    values = real_array("a response", response)
+    missing = [name for name in source.design.names if name not in runs.columns]
+    if missing:
+        raise DesignError(f"no column for factor {missing[0]!r}; the runs have {list(runs.columns)}")
+    natural = {name: real_array(f"the runs' {name!r}", runs[name]) for name in source.design.names}
+    table = coded_points(source.design.factors, pd.DataFrame(natural))
+    points = pd.DataFrame(table)[source.design.names].to_numpy(dtype=np.float64)
+    if values.shape != (len(points),):
+        raise DesignError(f"{len(points)} runs need one response each, received the shape {values.shape}")
+    if len(points) < LEAST_RUNS:
+        raise DesignError(f"a surface is carried over by {LEAST_RUNS} runs or more, received {len(points)}")
+    if not (np.isfinite(values).all() and np.isfinite(points).all()):
+        raise DesignError("runs and responses must be finite, received others")
+    distance = np.abs(checked_number("the level", level) - values).max()
+    if distance > FARTHEST * max(float(np.ptp(values)), float(np.ptp(source.fitted))):
+        raise DesignError(f"the level lies among the responses or near them, received {level:g}")
+    checked_df("scale_sd, the standard deviation of the scale,", scale_sd)
+    found = Transfer(source, float(level), points, values, 1.0, 1.0, scale_sd)
+    if np.ptp(found._columns(points)[:, 1]) <= 1e-9 * max(1.0, float(np.ptp(source.fitted))):
+        raise DesignError(
+            "runs must lie where the surface differs, to tell shift from scale; all have one value"
+        )
+    for _ in range(ROUNDS):
+        before = found.weight
+        found = _with_noise(found)
+        found = replace(found, weight=found.scale)
+        if abs(found.weight - before) < SETTLED:
+            break
+    return found
+
+
+def _with_noise(found: Transfer) -> Transfer:
+    """Return it with the noise of the highest restricted likelihood at its weight."""
+    spread = float(np.std(found.response, ddof=1))
+    if not spread > 0.0:
+        raise DesignError("no noise can be told from responses that are all the same")
+    below, columns = _with_prior(found)
+    common = found._common(found.points)
+
+    def lack(log_noise: float) -> float:
+        covariance = _with_prior_variance(found, np.exp(2.0 * log_noise) * np.eye(len(common)) + common)
+        inverse = np.linalg.inv(covariance)
+        normal = columns.T @ inverse @ columns
+        left = below - columns @ np.linalg.solve(normal, columns.T @ inverse @ below)
+        logs = np.linalg.slogdet(covariance)[1] + np.linalg.slogdet(normal)[1]
+        return float(logs + left @ inverse @ left)
+
+    ends = (np.log(LOWEST_NOISE * spread), np.log(3.0 * spread))
+    best = optimize.minimize_scalar(lack, bounds=ends, method="bounded", options={"xatol": 1e-6})
+    return replace(found, noise=float(np.exp(best.x)))
+
+
+def transfer_points(
+    source: Surface, at: dict[str, float], count: int, step: float = 0.7, extent: float = 1.0, turn: int = 0
+) -> pd.DataFrame:
+    """Place runs around a point of a surface: there, across its contour, and along it.
+
+    Across tells the scale, there and across together the shift; along shows if the factors trade off there as
+    here. The order is there, up, down, and to both sides, again and again, so that any count is balanced as
+    far as it goes.
+
+    Parameters
+    ----------
+    source : Surface
+    at : mapping of natural values by factor
+    count : int
+    step : float
+        Coded distance of the outer runs.
+    extent : float
+        Coded half width of the box that all lie in, as far as the point itself does.
+    turn : int
+        Number of the direction along the contour, of those that more than two factors have.
+
+    Returns
+    -------
+    DataFrame
+        Natural units, a column a factor, one row a run.
+    """
+    checked_kind("source", source, Surface)
+    names, at = source.design.names, checked_map("at", at)
+    missing = [name for name in names if name not in at]
+    if missing:
+        raise DesignError(f"no value for factor {missing[0]!r} in the point {at}")
+    count, turn = checked_count("count", count, most=MOST), checked_count("turn", turn, least=0)
+    step, extent = checked_number("step", step, above=0.0), checked_number("extent", extent, above=0.0)
+    values = [checked_number(f"the point's value of {name!r}", at[name]) for name in names]
+    origin = np.array([float(f.to_coded(x)) for f, x in zip(source.design.factors, values, strict=True)])
+    slope = source.quadratic_form.gradient(origin)
+    if not np.linalg.norm(slope) > 0.0:
+        raise DesignError(f"a surface is carried over at a point where it rises or falls, not at {at}")
+    across = slope / np.linalg.norm(slope)
+    directions = [np.zeros(len(names)), across, -across]
+    if len(names) > 1:
+        others = np.linalg.svd(across[None])[2][1:]
+        along = others[turn % len(others)]
+        directions += [along, -along]
+    box = max(extent, float(np.abs(origin).max()))
+    rows = [_inside(origin, directions[i % len(directions)], step, box) for i in range(count)]
+    return natural_points(source.design.factors, pd.DataFrame(rows, columns=names)).reset_index(drop=True)
+
+
+def _inside(
+    origin: NDArray[np.float64], direction: NDArray[np.float64], step: float, box: float
+) -> NDArray[np.float64]:
+    """Return the point a step away, or as far as the box lets it."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        room = np.where(direction != 0.0, (box - origin * np.sign(direction)) / np.abs(direction), np.inf)
+    return origin + min(step, float(room.min())) * direction

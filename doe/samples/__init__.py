@@ -1,0 +1,1 @@
+"""Comparison of samples: noise floor, means, agreement."""

@@ -1,0 +1,228 @@
+"""Several differences at once, each of two errors (``doe.samples.two_errors``): the level of each, linear estimates.
+
+The smallest p value of k differences lies below alpha / k with probability alpha at most (Bonferroni), less
+where the errors hang together, as those of responses of the same runs do, and less where the rule of a single
+difference keeps its level with some to spare. Here the level of each is the one at which all together hold
+theirs. It is found by drawing what would be found again if the estimated variances and correlations were the
+true ones (a bootstrap of the smallest p value; Beran, J. Amer. Statist. Assoc. 83, 1988, p. 687). The draws
+are the same each time, so that the same data give the same level.
+"""
+
+import bisect
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache, cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special, stats
+from scipy.stats import qmc
+
+from doe.samples.two_errors import TwoErrors, located
+
+FloatArray = NDArray[np.float64]
+
+DRAWS, SEED = 4096, 1
+"""Of the bootstrap: a level of .05 is known to .002."""
+
+LEVELS = 7
+"""Levels that the draws are looked at with, from `LOWEST` of the shared one to `HIGHEST` of the whole one."""
+
+LOWEST, HIGHEST = 0.6, 1.2
+
+LEVEL_TAILS, INTERVAL_TAILS = (0.5, 0.4), (0.35, 0.12)
+"""Probabilities of a smaller estimate for the true variances behind an interval: estimates that weigh as well
+as measure must be doubted more than those that only measure."""
+
+MANY = 1e6
+"""More degrees of freedom than these are as good as a known variance."""
+
+
+@dataclass(frozen=True, eq=False)
+class Simultaneous:
+    """Differences that are tested together: each has a first error, here or there another, and a second one.
+
+    Parameters
+    ----------
+    errors : sequence of TwoErrors
+        Degrees of freedom of both errors of each difference.
+    second : array, shape (differences,)
+        Estimated variances of the second errors, which are independent.
+    correlation : array, shape (differences, differences)
+        Estimated correlation of the first errors, which is also that of what their variances come from.
+    reference : array, shape (nodes, differences)
+        Estimated variances of the first errors where the level is found, small ones first; between them it is
+        interpolated.
+    alpha : float
+        Level of all tests together.
+    """
+
+    errors: Sequence[TwoErrors]
+    second: FloatArray
+    correlation: FloatArray
+    reference: FloatArray
+    alpha: float
+
+    def levels(self, first: FloatArray) -> FloatArray:
+        """Return the level of each test, for estimated variances of the first errors, shape (..., tests)."""
+        if len(self.errors) == 1:
+            return np.full(first.shape[:-1], self.alpha)
+        size, level = self._curve
+        return np.asarray(np.exp(np.interp(_size(first), size, level)))
+
+    def accepted(self, difference: FloatArray, first: FloatArray) -> NDArray[np.bool_]:
+        """Return which differences are not significant, each at the level at which all hold theirs.
+
+        Parameters
+        ----------
+        difference, first : array, shape (points, differences)
+        """
+        return np.asarray(np.abs(difference) <= self.reach(first))
+
+    def reach(self, first: FloatArray) -> FloatArray:
+        """Return the size from which on each difference is significant, shape (points, differences).
+
+        Parameters
+        ----------
+        first : array, shape (points, differences)
+            Estimated variances of the first errors.
+        """
+        total = first + self.second
+        grid, level = self._grid, self.levels(first)
+        place = np.clip(np.searchsorted(grid, level) - 1, 0, len(grid) - 2)
+        weight = np.log(level / grid[place]) / np.log(grid[place + 1] / grid[place])
+        rows = np.arange(len(level))
+        reach = np.empty(first.shape)
+        for column, rule in enumerate(self.errors):
+            share = self.second[column] / total[:, column]
+            table = np.array([rule.critical(share, one) for one in grid])
+            critical = table[place, rows] ** (1.0 - weight) * table[place + 1, rows] ** weight
+            reach[:, column] = critical * np.sqrt(total[:, column])
+        return reach
+
+    def half_width(self, slopes: FloatArray, direction: FloatArray, first: FloatArray) -> float:
+        """Return the half width of the interval of a linear combination of unknowns.
+
+        The differences are slopes @ x plus their errors; x is estimated by least squares, each difference
+        weighed by its estimated variance. The interval holds direction @ x with probability 1 - alpha.
+
+        Parameters
+        ----------
+        slopes : array, shape (differences, unknowns)
+        direction : array, shape (unknowns,)
+            In the span of the rows of the slopes.
+        first : array, shape (differences,)
+        """
+        # In coordinates of the slopes' span the normal equations have a solution, whatever the weights.
+        _, values, basis = np.linalg.svd(slopes, full_matrices=False)
+        basis = basis[values > 1e-9 * values[0]]
+        inner, wanted = slopes @ basis.T, basis @ direction
+        difference, own, other = self._drawn(first, *INTERVAL_TAILS)
+        row = _weights(inner, wanted, np.einsum("bii->bi", own) + other)
+        error = (row * difference).sum(axis=1)
+        reach = np.quantile(np.abs(error) / np.sqrt(_variance(row, own, other)), 1.0 - self.alpha)
+        found = np.sqrt(np.outer(first, first)) * self.correlation
+        row = _weights(inner, wanted, (first + self.second)[None])
+        return float(reach * np.sqrt(_variance(row, found[None], self.second[None])[0]))
+
+    @property
+    def _grid(self) -> FloatArray:
+        """Levels of one test at which the draws are looked at."""
+        return np.geomspace(LOWEST * self.alpha / len(self.errors), HIGHEST * self.alpha, LEVELS)
+
+    @cached_property
+    def _curve(self) -> tuple[FloatArray, FloatArray]:
+        """Size of the first errors' variances at the reference, and the logarithm of the level there."""
+        size, place = np.unique(_size(self.reference), return_index=True)
+        return size, np.array([self._log_level(first) for first in self.reference[place]])
+
+    def _log_level(self, first: FloatArray) -> float:
+        difference, own, other = self._drawn(first, *LEVEL_TAILS)
+        total = np.einsum("bii->bi", own) + other
+        size = np.abs(difference) / np.sqrt(total)
+        lower, way = located(other / total)
+
+        def alarms(level: float) -> float:
+            found = np.zeros(len(size), dtype=bool)
+            for column, rule in enumerate(self.errors):
+                table, place = rule.table(level), lower[:, column]
+                found |= size[:, column] > table[place] + way[:, column] * np.diff(table)[place]
+            return float(found.mean())
+
+        # The share of alarms grows with the level: the two of the grid around alpha are enough.
+        grid = self._grid
+        place = min(max(bisect.bisect_left(grid, self.alpha, key=alarms), 1), len(grid) - 1)
+        around = [np.log(max(alarms(level), 1e-12)) for level in grid[place - 1 : place + 1]]
+        found = float(np.interp(np.log(self.alpha), around, np.log(grid[place - 1 : place + 1])))
+        if any(rule.second_df < 2.0 for rule in self.errors):
+            # Two measurements tell too little of their spread to say what the rule has to spare.
+            found = min(found, float(np.log(self.alpha / len(self.errors))))
+        return found
+
+    def _drawn(self, first: FloatArray, own_tail: float, other_tail: float) -> tuple[FloatArray, ...]:
+        """Return drawn differences, the covariances of their first errors and the variances of the second.
+
+        Both as they would be estimated, shapes (draws, differences), (draws, differences, differences) and
+        (draws, differences). The true variances are those of which such an estimate as was found is smaller
+        with the probability of the tails.
+        """
+        dfs = np.array(self._dfs)
+        normal, spread, other, ratio = self._standard
+        own = np.sqrt(first * dfs[0] / stats.chi2.ppf(own_tail, dfs[0]))
+        its = self.second * dfs[1] / stats.chi2.ppf(other_tail, dfs[1])
+        return own * normal + np.sqrt(its) * other, np.outer(own, own) * spread, its * ratio
+
+    @cached_property
+    def _standard(self) -> tuple[FloatArray, ...]:
+        """Draws of unit variance: first errors and their covariance, correlated; second errors and theirs."""
+        normal, root, other, ratio = _draws(*self._dfs)
+        factor = np.linalg.cholesky(self.correlation + 1e-9 * np.eye(len(self.errors)))
+        mixed = (factor @ root) / np.sqrt(self._dfs[0])[:, None]
+        return normal @ factor.T, mixed @ mixed.transpose(0, 2, 1), other, ratio
+
+    @property
+    def _dfs(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        first = tuple(float(min(rule.first_df, MANY)) for rule in self.errors)
+        return first, tuple(float(min(rule.second_df, MANY)) for rule in self.errors)
+
+
+def _size(first: FloatArray) -> FloatArray:
+    """Return the mean logarithm of variances, which tells apart where the level is found."""
+    return np.log(np.maximum(first, np.finfo(float).tiny)).mean(axis=-1)
+
+
+def _weights(slopes: FloatArray, direction: FloatArray, variance: FloatArray) -> FloatArray:
+    """Return the weights of differences in direction @ x, by least squares with each row of variances."""
+    weighted = slopes / variance[:, :, None]
+    information = np.einsum("bij,ik->bjk", weighted, slopes)
+    solved = np.linalg.solve(information, np.tile(direction[:, None], (len(variance), 1, 1)))[..., 0]
+    return np.asarray(np.einsum("bij,bj->bi", weighted, solved))
+
+
+def _variance(row: FloatArray, own: FloatArray, other: FloatArray) -> FloatArray:
+    """Return the variance of weighted differences from the covariance of their first and second errors."""
+    return np.asarray(np.einsum("bi,bij,bj->b", row, own, row) + (row**2 * other).sum(axis=1))
+
+
+@cache
+def _draws(first_df: tuple[float, ...], second_df: tuple[float, ...]) -> tuple[FloatArray, ...]:
+    """Return standard draws: first errors, the root of their Wishart matrix, second errors, chi-square / df.
+
+    The root is Bartlett's: lower triangular, the roots of chi-squares of falling degrees of freedom on the
+    diagonal and normals below it; with fewer degrees of freedom than differences its last columns are empty.
+    The points are Sobol's, which know a level better than as many random ones.
+    """
+    count = len(first_df)
+    points = qmc.Sobol(3 * count + count * (count + 1) // 2, seed=SEED).random(DRAWS)
+    normal, other, ratio, rest = np.split(points, [count, 2 * count, 3 * count], axis=1)
+    ratio = np.column_stack(
+        [stats.chi2.ppf(part, df) / df for part, df in zip(ratio.T, second_df, strict=True)]
+    )
+    root = np.zeros((DRAWS, count, count))
+    below = np.tril_indices(count, -1)
+    root[:, below[0], below[1]] = special.ndtri(rest[:, count:])
+    for place, df in enumerate(first_df):
+        left = df - place
+        root[:, place, place] = np.sqrt(stats.chi2.ppf(rest[:, place], left)) if left > 0.0 else 0.0
+        root[:, place, int(np.ceil(df)) :] = 0.0
+    return special.ndtri(normal), root, special.ndtri(other), ratio

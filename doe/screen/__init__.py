@@ -1,0 +1,1 @@
+"""Screening designs' analysis and the path of steepest ascent."""

@@ -1,0 +1,1 @@
+"""Engines that simulate cases: dem-warp and other programs."""

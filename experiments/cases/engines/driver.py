@@ -1,0 +1,82 @@
+"""Drivers: codes that a case can be exported to, as engines. They run the exported input in its folder."""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import experiments.export
+from dem_warp import Case, CaseResult
+from dem_warp.provenance import source_meaning
+from experiments.cases.engines.contract import heap_result, read_heap
+from experiments.export import EXPORTERS, ExportedTest, Translation, export_input
+from experiments.io.errors import InputError
+from experiments.io.files import write_text
+
+APPROXIMATE = "[engine] approximate = true (bridge: --approximate)"
+"""Words that ask for the nearest of what a code lacks."""
+
+
+@dataclass(frozen=True)
+class Driver:
+    """A code that runs what its exporter writes."""
+
+    name: str
+    """Name of its exporter."""
+    approximate: bool = False
+    """Take the nearest for what the code lacks, as the exporter does when it is told to."""
+    observables: tuple[str, ...] = ()
+
+    def answers(self, case: Case) -> tuple[str, ...]:
+        """Name the file of the heap."""
+        return (self._translation(case).heap,)
+
+    @property
+    def identity(self) -> dict[str, Any]:
+        """Name of the code, and what its exporter's source means."""
+        return {"driver": self.name, "approximate": self.approximate, "exporters": _exporters()}
+
+    def check(self, case: Case) -> None:
+        """Raise ValueError where the code has no input of a case, lacks something of it, or is not there."""
+        self._located(self._translation(case))
+
+    def write(self, case: Case, folder: Path) -> Sequence[str]:
+        """Write the exported input, and return the command that runs it."""
+        translation = self._translation(case)
+        for name, text in translation.files.items():
+            write_text(folder / name, text)
+        return [self._located(translation), *translation.command[1:]]
+
+    def read(self, case: Case, folder: Path) -> CaseResult:
+        """Read the spheres of the heap."""
+        [heap] = self.answers(case)
+        return heap_result(*read_heap(folder / heap), {}, {"program": EXPORTERS[self.name].code})
+
+    def _translation(self, case: Case) -> Translation:
+        test = ExportedTest(self.name, case, "the case")
+        translation = export_input(test, self.name, self.approximate, APPROXIMATE)
+        if not (translation.command and translation.heap):
+            raise InputError("must be a code whose input can be run here", self.name, "engine")
+        return translation
+
+    def _located(self, translation: Translation) -> str:
+        program = translation.command[0]
+        if path := shutil.which(program):
+            return path
+        rule = f"{EXPORTERS[self.name].code} must be installed, its program on the PATH"
+        raise InputError(rule, program, "engine")
+
+
+@cache
+def _exporters() -> str:
+    """Hash of what the exporters' sources mean."""
+    folder, digest = Path(experiments.export.__path__[0]), hashlib.sha256()
+    for path in sorted(folder.rglob("*.py")):
+        text = source_meaning(path.read_text(encoding="utf-8"))
+        digest.update(f"{path.relative_to(folder).as_posix()}\n{text}\n".encode())
+    return digest.hexdigest()

@@ -1,0 +1,111 @@
+"""Engines by name, those that ship and those of packages from outside, and the engine of a study."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from dem_warp.registry import Registry
+from experiments.cases.engines.contract import command_program
+from experiments.cases.engines.driver import Driver
+from experiments.cases.engines.engine import Engine
+from experiments.cases.engines.program import ProgramEngine
+from experiments.io.errors import InputError, Problem, StudyError
+from experiments.studyfile import Study
+from experiments.studyfile.engine_section import EngineSection, quoted
+from experiments.studyfile.solver_section import CARD_SOLVER, OWN_SOLVER
+
+
+def _check(name: str, engine: object, known: object) -> None:
+    if not callable(engine):
+        raise TypeError(f"must be a function of cases, got {engine!r}")
+
+
+_DRIVERS = {name: ProgramEngine(Driver(name)) for name in ("liggghts", "lammps", "yade")}
+
+ENGINES: Registry[Engine] = Registry("dem_warp.engines", _DRIVERS, _check)
+"""Engines by name: drivers of other codes, and those of installed packages."""
+
+
+def with_engine(study: Study, name: str | None = None, command: str | None = None, **limits: Any) -> Study:
+    """Return a study whose cases another engine simulates, by its name or its command; None: its own.
+
+    Further keys of the section, such as ``time_limit``, are laid over the study's; None leaves one as it is.
+    A command's files are looked for in the current folder.
+
+    Raises
+    ------
+    InputError
+        When there is none of this name, the command is no command, or both are given.
+    """
+    if name is None and command is None:
+        return study
+    if name is not None and command is not None:
+        raise InputError("an engine is given by its name or by its command", f"{name}; {command}", "engine")
+    if name is not None and name not in ENGINES:
+        raise InputError(f"must be one of {', '.join(ENGINES) or 'none'}", name, "engine")
+    document = study.document
+    kept = {key: value for key, value in document.get("engine", {}).items() if key not in ("name", "command")}
+    if command is not None:
+        words = command_program(command, Path.cwd(), "--command").words
+        chosen = {"command": " ".join(map(quoted, words))}
+    else:
+        chosen = {"name": str(name)}
+    given = {key: value for key, value in limits.items() if value is not None}
+    return study.with_document(document | {"engine": kept | chosen | given})
+
+
+def engine_of(study: Study) -> Engine | None:
+    """Engine that a study names; None is that of dem-warp.
+
+    Raises
+    ------
+    StudyError
+        When there is none of its name, its program is not there, it cannot simulate the study's cases, a rule
+        for programs is given to what is none, or the study's card was corrected for another solver.
+    """
+    section, place = study.engine, f"{study.file}: engine"
+    solver, solver_place = study.solver, f"{study.file}: solver.{CARD_SOLVER}"
+    if section is None:
+        solver.check_solver(OWN_SOLVER, solver_place)
+        return None
+    if section.command is not None:
+        more = (section.version, section.observables)
+        command = command_program(section.command, study.file.parent, f"{place}.command", *more)
+        solver.check_solver(command.name, solver_place)
+        return ProgramEngine(command, section.workers, section.time_limit)
+    engine = _engine_named(section, place)
+    solver.check_solver(str(section.name), solver_place)
+    check = getattr(engine, "check", None)
+    if check is not None:
+        try:
+            check(study.case({}, seed=0))
+        except InputError as error:
+            # each on its own line: a code may lack more than one message holds
+            found = (Problem(problem.rule, problem.value, place) for problem in error.problems)
+            raise StudyError.of(found) from None
+        except ValueError as error:
+            raise StudyError(f"{section.name} cannot run this study: {error}", section.name, place) from None
+    return engine
+
+
+def _engine_named(section: EngineSection, place: str) -> Engine:
+    """Engine of a section's name, with the section's limits."""
+    if section.name is None or section.name not in ENGINES:
+        rule = f"must be one of {', '.join(ENGINES) or 'none'}"
+        raise StudyError(rule, section.name, f"{place}.name")
+    engine = ENGINES[section.name]
+    if section.version or section.observables:
+        rule = "version and observables belong to a command; an engine of a name knows its own"
+        raise StudyError(rule, section.version or list(section.observables), place)
+    driver = engine.program if isinstance(engine, ProgramEngine) else None
+    if section.approximate and not isinstance(driver, Driver):
+        raise StudyError("belongs to the codes that a case is exported to", True, f"{place}.approximate")
+    if isinstance(driver, Driver):
+        return ProgramEngine(Driver(driver.name, section.approximate), section.workers, section.time_limit)
+    if isinstance(engine, ProgramEngine):
+        return replace(engine, workers=section.workers, time_limit=section.time_limit)
+    if section.time_limit is not None:
+        raise StudyError("this engine runs no program that a limit could end", section.time_limit, place)
+    return engine

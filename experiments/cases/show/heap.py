@@ -1,0 +1,189 @@
+"""One case: simulated, measured, and written as spheres, as a picture of its heap, and as its numbers."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from dem_warp import CaseResult, Film, Progress, simulate_frames
+from experiments.cases.engines.engines import engine_of
+from experiments.cases.show.frames import write_frames
+from experiments.cases.show.movie import NO_MOVIE, write_movie
+from experiments.cases.show.polydata import poly, save
+from experiments.cases.store.manifest import study_hash
+from experiments.cases.workers.own import THIS_MACHINE, OwnWorkers
+from experiments.cases.workers.workers import Workers
+from experiments.io.errors import InputError
+from experiments.io.files import replacing, write_text
+from experiments.io.version import with_version
+from experiments.measurement.filling import filling_reached
+from experiments.measurement.states import Observed, observe
+from experiments.studyfile import Study
+from experiments.studyfile.campaign import TARGET_SCENE
+from experiments.studyfile.observables import observables_of
+from imaging import HeapAngle, PictureError, Snapshot, overlay, save_picture, snapshot
+
+
+@dataclass(frozen=True)
+class Heap:
+    """A simulated case and the repose angle of its heap, if the test leaves one."""
+
+    study: Study
+    """Study that it was made from."""
+    settings: dict[str, float]
+    """Value of every factor in its natural unit."""
+    seed: int
+    """Seed of everything random in it."""
+    result: CaseResult
+    """Result of the case."""
+    observed: Observed
+    """Measurements of it."""
+    scene: str = TARGET_SCENE
+    """Name of its scene."""
+    film: Film | None = None
+    """Frames of its course, where they were asked for and it could begin."""
+
+    @property
+    def angle(self) -> HeapAngle | None:
+        """Its angle; None when the case failed, there is no measurable heap, or the test leaves none."""
+        return self.observed.angle
+
+    @property
+    def reason(self) -> str:
+        """Reason that the case or the measurement failed; empty when neither did."""
+        return self.observed.reason
+
+    @property
+    def filling(self) -> float | None:
+        """Part of the drum that its bed took; None of another test, or where it was not filled."""
+        scene = self.study.case(self.settings, self.seed, self.scene).scene
+        return filling_reached(scene, self.result.observables)
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Unit of every observable that it gave."""
+        scene = self.study.scenes[self.scene]
+        known = observables_of(scene.observables, scene.leaves_a_heap)
+        return {name: known[name].unit for name in self.observed.observables if name in known}
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything but the grains as JSON-able data: angles in degrees, observables in SI."""
+        angle = self.angle
+        return {
+            "study": self.study.name,
+            "scale": self.study.scale,
+            "scene": self.scene,
+            "settings": self.settings,
+            "units": {factor.name: factor.unit for factor in self.study.factors},
+            "seed": self.seed,
+            "status": self.result.status,
+            "reason": self.reason,
+            "fit": self.study.measurement.fit,
+            "angle": {"mean": angle.mean, "se": angle.se} if angle else None,
+            "views": [
+                {"azimuth": math.degrees(azimuth), "left": view.left, "right": view.right}
+                for azimuth, view in (zip(angle.azimuths, angle.views, strict=True) if angle else ())
+            ],
+            "observables": self.observed.observables,
+            "observable_units": self.units,
+            "filling": self.filling,
+            "provenance": {**with_version(self.result.provenance), "study": study_hash(self.study)},
+        }
+
+
+def simulate_heap(
+    study: Study,
+    settings: Mapping[str, float],
+    seed: int,
+    workers: Workers = THIS_MACHINE,
+    progress: Callable[[Progress], None] | None = None,
+    scene: str = TARGET_SCENE,
+    frames: int | None = None,
+) -> Heap:
+    """Simulate one case with the study's engine, and measure its heap.
+
+    Settings, seed and scene are those of `Study.case`. With a number of `frames` its course is kept, and the
+    result is the same to the bit.
+
+    Raises
+    ------
+    StudyError
+        When there is no such factor or scene, or a value leaves what is physical.
+    InputError
+        When frames are asked of another engine than dem-warp's own.
+    """
+    case, film = study.case(settings, seed, scene), None
+    if frames is None:
+        [result] = workers.simulate([case], engine_of(study), on_progress=progress)
+    else:
+        result, film = simulate_frames(case, frames, filmed_by(study, workers).name, progress)
+    values = {factor.name: settings.get(factor.name, factor.center) for factor in study.factors}
+    observed = observe(study.measurement, result, study.scenes[scene].leaves_a_heap)
+    return Heap(study, values, seed, result, observed, scene, film)
+
+
+def filmed_by(study: Study, workers: Workers) -> OwnWorkers:
+    """Return the workers, which must be of this machine and have dem-warp's own engine to keep frames.
+
+    Raises
+    ------
+    InputError
+        When they do not.
+    """
+    if engine_of(study) is not None:
+        other = study.engine and (study.engine.name or study.engine.command)
+        raise InputError("must run on dem-warp's own engine", other, "--frames")
+    if not isinstance(workers, OwnWorkers):
+        raise InputError("must run on this machine", workers.machine, "--frames")
+    return workers
+
+
+def heap_snapshot(study: Study, result: CaseResult, angle: HeapAngle | None, view: int = 0) -> Snapshot:
+    """Draw a heap as one of the views of its angle saw it."""
+    return snapshot(
+        result.sphere_centers,
+        result.sphere_radii,
+        azimuth=angle.azimuths[view] if angle else 0.0,
+        pixels=study.measurement.pixels,
+        grains=result.sphere_grain,
+    )
+
+
+def write_heap(heap: Heap, folder: Path, movie: str = "gif") -> None:
+    """Write ``heap.vtp``, pictures and ``angle.json`` into a folder, made when it is missing.
+
+    ``snapshot.png`` has the fitted flanks drawn on it; ``snapshot-clean.png``, the same picture without them,
+    can be measured again. Frames, if there are any, come into the folder ``frames``, and as a film, of one of
+    `experiments.cases.show.movie.MOVIES`, beside it. Where no grain is left, as may be in a hopper, or a program's
+    answer cannot be drawn, there is no picture.
+    """
+    if len(heap.result.positions):
+        with replacing(folder / "heap.vtp") as temporary:
+            write_spheres(temporary, heap.result)
+        with suppress(PictureError):  # the heap's reason says as much
+            _write_pictures(heap, folder)
+    if heap.film:
+        write_frames(heap.film, folder / "frames")
+        if movie != NO_MOVIE:
+            write_movie(heap.film, folder / f"heap.{movie}")
+    write_text(folder / "angle.json", json.dumps(heap.to_dict(), indent=1, allow_nan=False) + "\n")
+
+
+def _write_pictures(heap: Heap, folder: Path) -> None:
+    clean = heap_snapshot(heap.study, heap.result, heap.angle)
+    annotated = overlay(clean, heap.angle.views[0]) if heap.angle else clean.image
+    for name, picture in (("snapshot-clean.png", clean.image), ("snapshot.png", annotated)):
+        with replacing(folder / name) as temporary:
+            save_picture(temporary, picture)
+
+
+def write_spheres(path: Path, result: CaseResult) -> None:
+    """Write a heap's spheres as points [m] with ``radius`` [m], ``grain`` and ``shape``."""
+    grains = result.sphere_grain
+    arrays = {"radius": result.sphere_radii, "grain": grains, "shape": result.shapes[grains]}
+    save(poly(result.sphere_centers, arrays), path)

@@ -1,0 +1,75 @@
+"""The study of a folder of results: ``study.json``, its hash, and the differences from another."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from experiments.io.errors import StoreError
+from experiments.io.files import read_file, write_text
+from experiments.studyfile import Study
+from experiments.studyfile.places import KeyPath, dotted
+
+MANIFEST = "study.json"
+"""File that says which study the folder belongs to."""
+
+
+LARGEST = 10_000_000
+"""Bytes of the largest file of this kind that is read."""
+
+
+def describe(study: Study) -> dict[str, Any]:
+    """Everything that a study says of its results, its clumps included, as JSON-able data.
+
+    Where its cases are simulated changes none of them.
+    """
+    digests = [hashlib.sha256(clump.read_bytes()).hexdigest() for clump in study.grain.files]
+    document = {key: value for key, value in study.document.items() if key != "cluster"}
+    return {"study": document, "scale": study.scale, "clump_sha256": digests}
+
+
+def study_hash(study: Study) -> str:
+    """SHA-256 of everything that a study says, which its outputs carry."""
+    text = json.dumps(describe(study), sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def write_manifest(folder: Path, study: Study) -> None:
+    """Write the file that says which study the folder belongs to."""
+    write_text(folder / MANIFEST, json.dumps(describe(study), indent=1, allow_nan=False))
+
+
+def differences(old: object, new: object, path: KeyPath = ()) -> Iterator[str]:
+    """Name every key whose value differs, as ``key: old -> new``."""
+    if isinstance(old, Mapping) and isinstance(new, Mapping):
+        for key in [*old, *(key for key in new if key not in old)]:
+            yield from differences(old.get(key), new.get(key), (*path, key))
+    elif isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
+        for index, (before, after) in enumerate(zip(old, new, strict=True)):
+            yield from differences(before, after, (*path, index))
+    elif old != new:
+        yield f"{dotted(path)}: {_shown(old)} -> {_shown(new)}"
+
+
+def _shown(value: object) -> str:
+    return "not given" if value is None else json.dumps(value)
+
+
+def read_manifest(folder: Path) -> dict[str, Any]:
+    """Read what `write_manifest` wrote.
+
+    Raises
+    ------
+    StoreError
+        When the folder has no such file, or it cannot be read.
+    """
+    path = folder / MANIFEST
+    try:
+        manifest: dict[str, Any] = json.loads(read_file(path, LARGEST))
+        return manifest
+    except (OSError, ValueError, RecursionError):
+        rule = f"a folder to resume must hold the {MANIFEST} of the run that made it"
+        raise StoreError(rule, "none that can be read", str(path)) from None

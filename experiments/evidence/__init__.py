@@ -1,0 +1,1 @@
+"""Evidence: verification, performance, robustness, accuracy, trials and records of studies."""

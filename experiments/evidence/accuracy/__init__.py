@@ -1,0 +1,1 @@
+"""Accuracy of photographs, outlines, statistics and cards on other codes."""

@@ -1,0 +1,1 @@
+"""Robustness: kills, full disks, mutated files and clusters."""

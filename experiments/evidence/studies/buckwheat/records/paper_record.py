@@ -1,0 +1,109 @@
+"""The record of the paper's runs: gathered from the folders that made it, its page written anew.
+
+    dem-warp calibrate --scale paper --follow-paper --out out/paper
+    python -m experiments.evidence.studies.buckwheat.sensitivity --modulus-scale 10 --out out/sensitivities
+    dem-warp calibrate --scale bench --only-paper --out out/bench
+    python -m experiments.evidence.studies.buckwheat.bases simulate --modulus-scale 100 --out out/bases
+    python -m experiments.evidence.studies.buckwheat.bases measure --out out/bases
+    python -m experiments.evidence.studies.buckwheat.records.paper_record --paper out/paper \\
+        --smaller bench=out/bench --sensitivities out/sensitivities --bases out/bases
+
+Without a folder it writes the page again from the tables of the record. The record lies in
+``experiments/evidence/studies/buckwheat/record``.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from experiments.evidence.studies.buckwheat.bases.grid import bases
+from experiments.evidence.studies.buckwheat.bases.simulation import Folder
+from experiments.evidence.studies.buckwheat.sensitivity.folder import SETTINGS
+from experiments.evidence.studies.buckwheat.sensitivity.variants import variants
+from experiments.io.files import copy_file, write_text
+from experiments.report.material_card import CARD
+from experiments.runs.campaign import RECORD
+from experiments.studies.buckwheat import paper
+from experiments.studies.buckwheat.records.paper_page import (
+    BASES,
+    CAMPAIGN,
+    HEAPS,
+    PROVENANCE,
+    RUNS,
+    SENSITIVITIES,
+    write_record_page,
+)
+
+FOLDER = Path(paper.__file__).with_name(RECORD)
+
+
+def gather_paper(source: Path, record: Path, commit: str | None = None) -> None:
+    """Take over the runs of ``dem-warp calibrate --follow-paper`` or ``--only-paper`` from its folder.
+
+    Where the machine that made them had no repository, the commit is given.
+    """
+    for name in (RUNS, PROVENANCE):
+        copy_file(source / RECORD / name, record / name)
+    for name in (CAMPAIGN, HEAPS):
+        if (source / RECORD / name).is_file():
+            copy_file(source / RECORD / name, record / name)
+    # The card of the campaign beside, with its clumps.
+    for path in source.glob(f"{Path(CARD).stem}*"):
+        copy_file(path, record / path.name)
+    if commit:
+        made_by = json.loads((record / PROVENANCE).read_text(encoding="utf-8"))
+        write_text(record / PROVENANCE, json.dumps(made_by | {"commit": commit}, indent=1) + "\n")
+
+
+def gather_scale(name: str, source: Path, record: Path) -> None:
+    """Take over the paper's runs at a smaller scale."""
+    copy_file(source / RECORD / RUNS, record / f"runs-{name}.csv")
+
+
+def gather_sensitivities(source: Path, record: Path) -> None:
+    """Take over the angles of every variant that was simulated."""
+    copy_file(source / SETTINGS, record / SENSITIVITIES / SETTINGS)
+    for name in variants():
+        if (source / f"{name}.csv").is_file():
+            copy_file(source / f"{name}.csv", record / SENSITIVITIES / f"{name}.csv")
+
+
+def gather_bases(source: Path, record: Path) -> None:
+    """Take over the angles of every base that was simulated and read."""
+    copy_file(source / SETTINGS, record / BASES / SETTINGS)
+    for path in (Folder(source).table(base) for base in bases().values()):
+        if path.is_file():
+            copy_file(path, record / BASES / path.name)
+
+
+def main(
+    paper_folder: Annotated[
+        Path | None, typer.Option("--paper", help="Folder of a calibration with the paper's runs.")
+    ] = None,
+    smaller: Annotated[
+        list[str] | None, typer.Option(metavar="NAME=FOLDER", help="The same at a smaller scale.")
+    ] = None,
+    sensitivities: Annotated[Path | None, typer.Option(help="Folder of the variants.")] = None,
+    tried: Annotated[Path | None, typer.Option("--bases", help="Folder of the bases.")] = None,
+    commit: Annotated[str | None, typer.Option(help="Commit that made the paper's runs.")] = None,
+    out: Annotated[Path, typer.Option(help="Folder of the record.")] = FOLDER,
+) -> None:
+    """Gather the record and write its page."""
+    if paper_folder:
+        gather_paper(paper_folder, out, commit)
+    for text in smaller or []:
+        name, _, source = text.partition("=")
+        gather_scale(name, Path(source), out)
+    if sensitivities:
+        gather_sensitivities(sensitivities, out)
+    if tried:
+        gather_bases(tried, out)
+    print(write_record_page(out))
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -1,0 +1,152 @@
+"""The files of the benchmark of model criticism, and their loader.
+
+`README.md` beside them says what they hold. The answers are a file of their own, so that nobody opens them
+by chance.
+"""
+
+from __future__ import annotations
+
+import json
+import zlib
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from doe.discrepancy import Bank, Emulator, Measured, Settings, fit_emulator, load_bank
+from experiments.evidence.trials.baselines.protocol import Problem
+from experiments.evidence.trials.drawing import Declared
+from experiments.evidence.trials.truth import Label, read_labels, write_labels
+from experiments.io.errors import InputError
+from experiments.io.files import replacing, write_text
+
+FOLDER = Path(__file__).parent / "benchmark"
+"""The released benchmark."""
+TRIALS, RULES, ANSWERS = "trials.npz", "rules.json", "answers.json"
+LARGEST = 50_000_000
+"""Bytes of the largest file of trials that is read."""
+
+
+@dataclass(frozen=True, eq=False)
+class Posed:
+    """A trial without its answer."""
+
+    name: str
+    bank: int
+    """Number of the bank that belongs to it."""
+    withheld: tuple[str, ...]
+    """Mechanisms of the bank that are not in the library of this trial."""
+    measured: Measured
+    """Its heaps."""
+
+
+@dataclass(frozen=True, eq=False)
+class Benchmark:
+    """Banks, the search's rules for each, and trials."""
+
+    banks: tuple[Bank, ...]
+    rules: tuple[Settings, ...]
+    """By bank: the settings of the search, with what it may name."""
+    libraries: tuple[tuple[Declared, ...], ...]
+    """By bank: its mechanisms with their detectable sizes."""
+    trials: tuple[Posed, ...]
+
+    def __post_init__(self) -> None:
+        if not len(self.banks) == len(self.rules) == len(self.libraries) or not self.banks:
+            counts = (len(self.banks), len(self.rules), len(self.libraries))
+            raise InputError("needs rules and a library for each of at least one bank", counts, "Benchmark")
+        if any(not 0 <= trial.bank < len(self.banks) for trial in self.trials):
+            numbers = sorted({trial.bank for trial in self.trials})
+            raise InputError(f"numbers of banks are 0 to {len(self.banks) - 1}", numbers, "Benchmark.trials")
+
+    @cached_property
+    def emulators(self) -> tuple[Emulator, ...]:
+        """Emulators fitted to the banks."""
+        return tuple(fit_emulator(bank) for bank in self.banks)
+
+    def problem(self, trial: Posed) -> Problem:
+        """A trial as a method sees it."""
+        known = self.emulators[trial.bank].without(*trial.withheld)
+        seed = zlib.crc32(trial.name.encode())
+        return Problem(trial.name, known, trial.measured, self.rules[trial.bank], seed)
+
+
+def write_benchmark(folder: Path, benchmark: Benchmark, labels: Sequence[Label]) -> None:
+    """Write banks, trials and rules, and the answers apart."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for number, bank in enumerate(benchmark.banks):
+        bank.save(folder / f"bank-{number}.npz")
+    trials = benchmark.trials
+    conditions = trials[0].measured.conditions
+    with replacing(folder / TRIALS) as temporary:
+        np.savez_compressed(
+            temporary,
+            trial=np.array([one.name for one in trials]),
+            bank=np.array([one.bank for one in trials], dtype=np.int16),
+            withheld=np.array([" ".join(one.withheld) for one in trials]),
+            conditions=np.array(conditions),
+            observables=np.array(trials[0].measured.observables),
+            values=np.array(
+                [[one.measured.values[c] for c in conditions] for one in trials], dtype=np.float32
+            ),
+        )
+    rules = [
+        {"settings": asdict(settings), "library": [_record(effect) for effect in library]}
+        for settings, library in zip(benchmark.rules, benchmark.libraries, strict=True)
+    ]
+    write_text(folder / RULES, json.dumps(rules, indent=1, allow_nan=False) + "\n")
+    write_labels(folder / ANSWERS, labels)
+
+
+def _record(effect: Declared) -> dict[str, object]:
+    """Fields of a declared mechanism; JSON has no infinity, so a size that no data show is null."""
+    detectable = effect.detectable if np.isfinite(effect.detectable) else None
+    return asdict(effect) | {"detectable": detectable}
+
+
+def load_benchmark(folder: Path = FOLDER) -> Benchmark:
+    """Read the banks, the rules and the trials, without the answers.
+
+    Raises
+    ------
+    InputError
+        When the files are none of a benchmark.
+    """
+    path = folder / TRIALS
+    if not path.is_file() or path.stat().st_size > LARGEST:
+        raise InputError(f"must be a file of at most {LARGEST:,} bytes", "none, or a larger one", str(path))
+    with np.load(path, allow_pickle=False) as file:
+        table = {name: file[name] for name in file.files}
+    if lacking := {"trial", "bank", "withheld", "conditions", "observables", "values"} - set(table):
+        raise InputError("needs the arrays of a benchmark", f"no {', '.join(sorted(lacking))}", str(path))
+    conditions, observables = (tuple(map(str, table[name])) for name in ("conditions", "observables"))
+    trials = []
+    for name, bank, withheld, rows in zip(
+        table["trial"], table["bank"], table["withheld"], table["values"].astype(float), strict=True
+    ):
+        measured = Measured(conditions, observables, dict(zip(conditions, rows, strict=True)))
+        trials.append(Posed(str(name), int(bank), tuple(str(withheld).split()), measured))
+    document = json.loads((folder / RULES).read_text(encoding="utf-8"))
+    banks = tuple(load_bank(folder / f"bank-{number}.npz") for number in range(len(document)))
+    rules = tuple(_settings(one["settings"]) for one in document)
+    libraries = tuple(tuple(_effect(effect) for effect in one["library"]) for one in document)
+    return Benchmark(banks, rules, libraries, tuple(trials))
+
+
+def load_answers(folder: Path = FOLDER) -> Mapping[str, Label]:
+    """Read the truths of the trials, by trial."""
+    return {label.trial: label for label in read_labels(folder / ANSWERS)}
+
+
+def _settings(document: dict[str, object]) -> Settings:
+    named = document.pop("resolvable")
+    settings = Settings(**document)  # type: ignore[arg-type]
+    return replace(settings, resolvable=None if named is None else tuple(named))  # type: ignore[arg-type]
+
+
+def _effect(document: dict[str, object]) -> Declared:
+    found, kin = document.pop("detectable"), document.pop("kin")
+    detectable = float("inf") if found is None else found
+    return Declared(**document, detectable=detectable, kin=tuple(kin))  # type: ignore[arg-type]

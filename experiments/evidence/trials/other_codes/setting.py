@@ -1,0 +1,100 @@
+"""Settings of the other workshop: what it does in its own way, drawn once for a trial."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from dem_warp import PRESETS, Case, ContactLaws, Interaction
+from dem_warp.laws.conventions import Rolling
+from experiments.discover.library import LONG_LEVER
+from experiments.evidence.trials.other_codes.odd_lift import odd
+from experiments.export.lift import FIRST_SEED
+
+DIRECTIONS = 4096
+"""Directions that a grain is touched from, for the mean of its levers."""
+
+_STREAM = 2
+"""Stream of random numbers of a trial's seed; 1 is that of its camera."""
+
+LAWS: Mapping[str, ContactLaws] = {
+    "lammps": replace(PRESETS["lammps"], restitution="closed_form", tangential_damping="tsuji"),
+    "liggghts": PRESETS["liggghts"],
+}
+"""Laws of each code, but for rolling. LAMMPS is told the damping that the restitution means here: what it
+itself makes of the number is another grain, whose heap is flatter by a standard deviation."""
+
+ROLLING: Mapping[str, tuple[Rolling, ...]] = {
+    "lammps": ("sds",),
+    "liggghts": ("cdt", "epsd2"),
+}
+"""Resistances to rolling of each code."""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """Way in which a trial's tests are run."""
+
+    step_share: float
+    """Time step over that of the study."""
+    rain_rate: float
+    """Grains a second at the most."""
+    tube_sides: int
+    """Sides of the prism that stands for the tube, where it is a mesh."""
+    look_time: float
+    """Time between two looks of the film [s]."""
+    rolling: Rolling
+    """Resistance to rolling, where there is one."""
+
+    @classmethod
+    def drawn(cls, code: str, seed: int) -> Setting:
+        """Draw the setting of a trial from its seed."""
+        rng = np.random.default_rng([seed, _STREAM])
+        return cls(
+            step_share=float(rng.uniform(0.6, 1.0)),
+            rain_rate=float(rng.uniform(500.0, 1000.0)),
+            tube_sides=int(rng.integers(40, 97)),
+            look_time=float(rng.uniform(2.5e-3, 5e-3)),
+            rolling=ROLLING[code][rng.integers(len(ROLLING[code]))],
+        )
+
+    def of(self, case: Case[Any], code: str) -> Case[Any]:
+        """Take a case to the other workshop, which has a code."""
+        scene = odd(
+            replace(case.scene, rain_rate=min(self.rain_rate, case.scene.rain_rate)),
+            tube_sides=self.tube_sides,
+            look_time=self.look_time,
+        )
+        fraction = self.step_share * case.numerics.time_step_fraction
+        among, wall = rolling_levers(case)
+        return replace(
+            case,
+            scene=scene,
+            grain_grain=_with_lever(case.grain_grain, among),
+            grain_wall=_with_lever(case.grain_wall, wall),
+            numerics=replace(case.numerics, time_step_fraction=fraction),
+            laws=replace(LAWS[code], rolling=self.rolling),
+        )
+
+
+def rolling_levers(case: Case[Any]) -> tuple[float, float]:
+    """Levers of a case's rolling resistance over R*, that of the other codes: among grains, and on walls.
+
+    Some have the distance to the grain's centre, here the mean of it, others R* themselves.
+    """
+    if case.laws.rolling not in LONG_LEVER:
+        return 1.0, 1.0
+    shape = case.grains.mixture.shapes[0]
+    directions = np.random.default_rng(FIRST_SEED).normal(size=(DIRECTIONS, 3))
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    touched = np.argmax(directions @ shape.centers.T + shape.radii, axis=1)
+    points = shape.centers[touched] + directions * shape.radii[touched, None]
+    lever = float(np.mean(np.linalg.norm(points, axis=1) / shape.radii[touched]))
+    return 2.0 * lever, lever
+
+
+def _with_lever(pair: Interaction, lever: float) -> Interaction:
+    return replace(pair, rolling_friction=lever * pair.rolling_friction)

@@ -1,0 +1,304 @@
+"""The score of the analysis: findings against the revealed truths, and both against what was aimed at."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Hashable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from scipy.stats import binomtest
+
+from doe.discrepancy import Verdict
+from experiments.discover.library import FORMER_NAMES
+from experiments.evidence.trials.drawing import STRONG, Declared
+from experiments.evidence.trials.findings import CRASH
+from experiments.evidence.trials.roc import area_text
+from experiments.evidence.trials.truth import Kind, Label, Sealed
+
+_JUDGED = ("kind", "truth", "true_size", "multiple", "right", "tied", "wrong")
+
+OTHERS = ("weak single", *map(str, Kind), "two names", *map(str, Verdict), CRASH)
+"""Labels of a confusion that name no mechanism."""
+
+POWER_EDGES = (0.0, 0.5, 1.0, 1.5, 2.0, 3.0, math.inf)
+"""Ends of the classes of size, in detectable ones."""
+
+
+@dataclass(frozen=True)
+class Share:
+    """A count out of a number of trials."""
+
+    count: int
+    trials: int
+
+    @property
+    def value(self) -> float:
+        """The share; NaN without trials."""
+        return self.count / self.trials if self.trials else math.nan
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Its 95 % interval (Clopper and Pearson 1934); everything without trials."""
+        if not self.trials:
+            return 0.0, 1.0
+        ends = binomtest(self.count, self.trials).proportion_ci(0.95, method="exact")
+        return float(ends.low), float(ends.high)
+
+    def __str__(self) -> str:
+        if not self.trials:
+            return "no trials"
+        low, high = self.interval
+        return f"{self.count} of {self.trials}, {100 * low:.0f} to {100 * high:.0f} %"
+
+
+@dataclass(frozen=True)
+class Aim:
+    """One thing that the trials must show."""
+
+    question: str
+    wanted: str
+    """In words, as it was fixed beforehand."""
+    found: str
+    """With its interval."""
+    passed: bool | None
+    """None where too few trials ran to say."""
+
+
+def scored(findings: pd.DataFrame, labels: Mapping[str, Label], sealed: Sequence[Sealed]) -> pd.DataFrame:
+    """Set every finding against the truth.
+
+    The findings get the columns ``part``, ``kind``, ``truth`` (names parted by blanks), ``true_size`` and
+    ``multiple`` (of a pair the smaller), and the judgement: ``right`` (that name, or both, and no other),
+    ``tied`` (a tie with the truth in it), ``wrong`` (a name that is not in the truth).
+    """
+    parts = {trial.trial: trial.part for trial in sealed}
+    rows = [_judged(row, labels[row["trial"]]) for row in findings.to_dict("records")]
+    judged = pd.DataFrame(rows, index=findings.index, columns=list(_JUDGED)).astype(
+        {"right": bool, "tied": bool, "wrong": bool}
+    )
+    return pd.concat([findings, judged], axis=1).assign(part=findings["trial"].map(parts))
+
+
+def _judged(finding: dict[Hashable, Any], label: Label) -> dict[str, object]:
+    truth, named = set(label.mechanisms), set(str(finding["named"]).split())
+    naming = finding["verdict"] == Verdict.NAMED
+    known = label.kind in (Kind.SINGLE, Kind.UNRESOLVED, Kind.PAIR)
+    return {
+        "kind": str(label.kind),
+        "truth": " ".join(label.mechanisms),
+        "true_size": label.sizes[0][1] if label.sizes else math.nan,
+        "multiple": min(label.multiples, default=0.0),
+        "right": bool(known and finding["verdict"] == Verdict.NAMED and named == truth),
+        "tied": bool(known and finding["verdict"] == Verdict.TIE and truth <= named),
+        "wrong": bool(naming and not (known and named <= truth)),
+    }
+
+
+def strong_singles(table: pd.DataFrame) -> pd.DataFrame:
+    """Trials of one mechanism that was to be named."""
+    return table[(table["kind"] == Kind.SINGLE) & (table["multiple"] > STRONG)]
+
+
+def share(column: pd.Series) -> Share:
+    """Count the true of a boolean column."""
+    return Share(int(column.sum()), len(column))
+
+
+def confusion(table: pd.DataFrame) -> pd.DataFrame:
+    """Count answers (columns) by truth (rows).
+
+    A mechanism's row has its trials above 1.5 detectable sizes; the weaker ones of all are one row. Two names
+    are one column, as are the verdicts without a name.
+    """
+    strong = (table["kind"] == Kind.SINGLE) & (table["multiple"] > STRONG)
+    weak = (table["kind"] == Kind.SINGLE) & ~strong
+    truth = table["truth"].where(strong, table["kind"].mask(weak, "weak single"))
+    names, naming = table["named"].str.split(), table["verdict"] == Verdict.NAMED
+    answer = table["verdict"].mask(naming, table["named"]).mask(naming & (names.str.len() > 1), "two names")
+    counts = pd.crosstab(truth, answer, rownames=["truth"], colnames=["answer"])
+    return counts.reindex(index=_names_first(counts.index), columns=_names_first(counts.columns))
+
+
+def _names_first(labels: Iterable[str]) -> list[str]:
+    """Sort labels: mechanisms by name, then kinds of trials or verdicts."""
+    return sorted(labels, key=lambda label: (OTHERS.index(label) if label in OTHERS else -1, label))
+
+
+def power_curve(table: pd.DataFrame) -> pd.DataFrame:
+    """Shares of alarms and of right names by effect, over all trials of one resolvable mechanism.
+
+    A row is a class of size: its ends ``least`` and ``most`` (in detectable ones), ``trials``, and for
+    ``alarm`` and ``right`` the share with the ends of its interval.
+    """
+    singles = table[(table["kind"] == Kind.SINGLE) & (table["multiple"] > 0)]
+    rows = []
+    classes = pd.cut(singles["multiple"], POWER_EDGES, labels=False)
+    for number, members in singles.groupby(classes):
+        least, most = POWER_EDGES[int(number) : int(number) + 2]  # type: ignore[call-overload]
+        row = {"least": least, "most": most, "trials": len(members)}
+        for name in ("alarm", "right"):
+            counted = share(members[name])
+            row |= zip((name, f"{name}_low", f"{name}_high"), (counted.value, *counted.interval), strict=True)
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def by_mechanism(table: pd.DataFrame) -> pd.DataFrame:
+    """For each mechanism of the library: its strong trials and how they ended, each in one column."""
+    strong = strong_singles(table)
+    verdicts, tied = strong["verdict"], strong["tied"]
+    ends = {
+        "trials": verdicts.notna(),
+        "right": strong["right"],
+        "tied": tied,
+        "tie of others": (verdicts == Verdict.TIE) & ~tied,
+        "wrong": strong["wrong"],
+        "unknown": verdicts == Verdict.UNKNOWN,
+        "unseen": verdicts == Verdict.NONE,
+        "crash": verdicts == CRASH,
+    }
+    return pd.DataFrame(ends).groupby(strong["truth"]).sum().rename_axis("mechanism")
+
+
+def by_outsider(table: pd.DataFrame) -> pd.DataFrame:
+    """For each effect that may not be named: its trials and how they ended."""
+    outside = table[table["kind"].isin([Kind.UNRESOLVED, Kind.WITHHELD, Kind.STRANGER])]
+    hidden = outside["truth"] + " (" + outside["kind"] + ")"
+    return pd.crosstab(hidden, outside["verdict"], rownames=["effect"], colnames=[None])
+
+
+def removed(table: pd.DataFrame) -> np.ndarray:
+    """Share of the held-out excess that is gone, of every right name whose held-out gap was there before.
+
+    The excess is Q less its degrees of freedom, 0 at the least; without one, there is nothing to remove.
+    """
+    right = table[table["right"]]
+    before = np.maximum(right["held_out_before"] - right["held_out_degrees"], 0.0)
+    after = np.maximum(right["held_out_after"] - right["held_out_degrees"], 0.0)
+    there = before > 0
+    return np.asarray(1.0 - after[there] / before[there], dtype=np.float64)
+
+
+def covered(table: pd.DataFrame) -> pd.Series:
+    """True where the stated 90 % interval holds the true size, of each right name of a single mechanism."""
+    right = table[table["right"] & (table["kind"] == Kind.SINGLE)]
+    return right["true_size"].between(right["size_low"], right["size_high"])
+
+
+def aims(table: pd.DataFrame, unresolvable: Sequence[str]) -> tuple[Aim, ...]:
+    """Hold one view's trials, rows of `scored`, against what was aimed at.
+
+    `unresolvable` are the mechanisms that were declared not resolvable beforehand.
+    """
+    kind, verdict = table["kind"], table["verdict"]
+    nulls, pairs, strong = table[kind == Kind.NULL], table[kind == Kind.PAIR], strong_singles(table)
+    unknown = verdict[kind.isin([Kind.WITHHELD, Kind.STRANGER])] == Verdict.UNKNOWN
+    names = table.loc[verdict == Verdict.NAMED, "named"].str.split()
+    forbidden = names.map(lambda these: bool(set(these) & set(unresolvable))).astype(bool)
+    above, outside, two = "one mechanism above 1.5 gamma80", "outside the library", "two mechanisms"
+    enough, each = _mechanism_aims(above, by_mechanism(strong))
+    return (
+        _limit("nothing hidden: alarms", "at most 5 in 100", nulls["alarm"], most=0.05),
+        _limit("nothing hidden: wrong names", "at most 1 in 100", nulls["wrong"], most=0.01),
+        enough,
+        _limit(f"{above}: the right name", "at least 80 %", strong["right"], least=0.80),
+        each,
+        _limit(f"{above}: right or in a tie", "at least 90 %", strong["right"] | strong["tied"], least=0.90),
+        _limit(f"{above}: a wrong name", "at most 3 %", strong["wrong"], most=0.03),
+        _limit(f"{outside}: unknown", "at least 90 % of 60", unknown, least=0.90),
+        _none("names that were declared not resolvable", forbidden),
+        _removed_aim(removed(table)),
+        _limit("named: size within its 90 % interval", "82 to 96 %", covered(table), least=0.82, most=0.96),
+        _limit(f"{two}: both named", "at least half", pairs["right"], least=0.50),
+        _limit(f"{two}: no wrong name", "at least 95 %", ~pairs["wrong"].astype(bool), least=0.95),
+        _none("analyses that crashed", verdict == CRASH),
+    )
+
+
+def foreign_aims(table: pd.DataFrame) -> tuple[Aim, ...]:
+    """Hold one view's trials against what was aimed at where another code makes the heaps."""
+    kind, verdict = table["kind"], table["verdict"]
+    nulls, pairs, strong = table[kind == Kind.NULL], table[kind == Kind.PAIR], strong_singles(table)
+    unknown = verdict[kind.isin([Kind.WITHHELD, Kind.STRANGER])] == Verdict.UNKNOWN
+    above, outside, two = "one mechanism above 1.5 gamma80", "outside the library", "two mechanisms"
+    return (
+        _limit("nothing hidden: alarms", "at most 2 in 40", nulls["alarm"], most=0.05),
+        _none("nothing hidden: wrong names", nulls["wrong"]),
+        _limit(f"{above}: the right name", "at least 80 %", strong["right"], least=0.80),
+        _limit(f"{above}: right or in a tie", "at least 90 %", strong["right"] | strong["tied"], least=0.90),
+        _limit(f"{above}: a wrong name", "at most 2 %", strong["wrong"], most=0.02),
+        _limit(f"{outside}: unknown", "at least 90 %", unknown, least=0.90),
+        _limit("named: size within its 90 % interval", "82 to 96 %", covered(table), least=0.82, most=0.96),
+        _limit(f"{two}: a wrong name", "at most 2 %", pairs["wrong"], most=0.02),
+        _limit("any trial: a wrong name", "at most 2 %", table["wrong"], most=0.02),
+        _none("analyses that crashed", verdict == CRASH),
+    )
+
+
+def unknown_area(table: pd.DataFrame) -> str:
+    """Area under the curve of *unknown*, by the misfit of the closest model, of one view's trials, as text.
+
+    What the library lacks against one or two strong mechanisms of it. A trial without an alarm has the least
+    score: nothing was said to be missing. Empty where no finding has a score, as in older records.
+    """
+    if not table["misfit"].notna().any():
+        return ""
+    strong = pd.concat([strong_singles(table), table[table["kind"] == Kind.PAIR]])
+    foreign = table[table["kind"].isin([Kind.WITHHELD, Kind.STRANGER])]
+    scores = (rows["misfit"].astype(float).fillna(-np.inf).to_numpy() for rows in (foreign, strong))
+    return area_text(*scores)
+
+
+MUST_RESOLVE = (
+    "contact_adhesion", "liquid_bridges", "size_spread", "plate_tilt", "vibration", "rolling_torque",
+)  # fmt: skip
+"""Mechanisms that must be resolvable at half of their range; that of rolling is missing from the base."""
+
+
+def declared_aim(library: Sequence[Declared]) -> Aim:
+    """Hold what was declared beforehand against the mechanisms that must be resolvable."""
+    # Sealed records keep the names that they were sealed with.
+    sealed = {FORMER_NAMES.get(effect.name, effect.name): effect.name for effect in library}
+    wanted = [sealed.get(name, name) for name in MUST_RESOLVE]
+    seen = {effect.name for effect in library if effect.resolvable and effect.strongest >= 2.0}
+    missing = [name for name in wanted if name not in seen]
+    found = f"not {', '.join(missing)}" if missing else "every one"
+    question = f"resolvable at half of their range: {', '.join(wanted)}"
+    return Aim(question, "every one", found, not missing)
+
+
+def _mechanism_aims(above: str, counts: pd.DataFrame) -> tuple[Aim, Aim]:
+    """Aims of strong trials, as `by_mechanism` counts them: that there are enough, and of each mechanism."""
+    some = len(counts) > 0
+    enough = len(counts) >= 8 and bool((counts["trials"] >= 15).all())
+    least = f"{len(counts)} mechanisms, {counts['trials'].min()} trials at least" if some else "none"
+    each = [f"{name} {row.right} of {row.trials}" for name, row in counts.iterrows()]
+    right = bool((counts["right"] >= 11 / 15 * counts["trials"]).all()) if some else None
+    question = f"{above}: the right name, each mechanism"
+    return (
+        Aim("mechanisms with strong trials", "8 mechanisms, 15 trials each", least, enough),
+        Aim(question, "at least 11 of 15", ", ".join(each) or "no trials", right),
+    )
+
+
+def _removed_aim(gone: np.ndarray) -> Aim:
+    question, wanted = "named: held-out excess removed, median", "at least 80 %"
+    if not len(gone):
+        return Aim(question, wanted, "no trials", None)
+    median = float(np.median(gone))
+    return Aim(question, wanted, f"{100 * median:.0f} %, {len(gone)} trials", median >= 0.80)
+
+
+def _none(question: str, column: pd.Series) -> Aim:
+    counted = share(column)
+    return Aim(question, "none", str(counted), counted.count == 0 if counted.trials else None)
+
+
+def _limit(question: str, wanted: str, column: pd.Series, least: float = 0.0, most: float = 1.0) -> Aim:
+    found = share(column)
+    passed = least <= found.value <= most if found.trials else None
+    value = f"{100 * found.value:.0f} % ({found})" if found.trials else str(found)
+    return Aim(question, wanted, value, passed)

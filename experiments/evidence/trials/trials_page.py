@@ -1,0 +1,214 @@
+"""The record of the trials: tables, pictures and one page, written from its own files."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from doe.palette import BLUE, MUTED, VERMILION
+from experiments.evidence.trials.declaration import Declaration
+from experiments.evidence.trials.drawing import STRONG
+from experiments.evidence.trials.findings import EVERYTHING, OUTLINED, PHOTOGRAPHS
+from experiments.evidence.trials.folder import NOTES, PAGE, RUNS
+from experiments.evidence.trials.kept import Record, read_record
+from experiments.evidence.trials.score import (
+    OTHERS,
+    Aim,
+    by_mechanism,
+    by_outsider,
+    confusion,
+    declared_aim,
+    power_curve,
+    unknown_area,
+)
+from experiments.report.kit.figure import new_axes, save_figure
+from experiments.report.kit.markdown import markdown_table, write_page
+
+TITLES = {
+    EVERYTHING: "With every observable",
+    OUTLINED: "With every observable, and the outlines of the photographs",
+    PHOTOGRAPHS: "With photographs only",
+}
+
+_UNAIMED = {
+    PHOTOGRAPHS: "No aims were set for photographs, which show less; gamma80 is that of every observable."
+}
+"""Views that have figures only, and why."""
+
+_VERDICTS = {True: "pass", False: "**FAIL**", None: "too few"}
+
+_OURS = """# Blind trials of the search for a missing mechanism
+
+Heaps of the real engine with a hidden effect: drawn and simulated by a generator that runs apart from the
+analysis, with seeds, time step and camera of its own."""
+
+_FOREIGN = """# A second reality: blind trials whose heaps {code} makes
+
+Heaps of {code} with a hidden effect: laws, filling, walls, time step, seeds and camera are its own, drawn by
+a generator that runs apart from the analysis."""
+
+_SEALED = """The truths were sealed by salted hashes (`sealed.csv`)
+before anything was simulated, and revealed (`labels.json`) when the verdicts below were in. What was
+declared beforehand, the settings of the analysis by their hash and the smallest effect that it should see of
+each mechanism (gamma80), stands in `declared.json`. An effect is the distance of a size from the mechanism's
+null, counted in gamma80; *strong* is above 1.5. A verdict is right that names the hidden mechanism (or both)
+and nothing else; it is wrong as soon as it names one that is not there. Intervals of shares are 95 %
+(Clopper and Pearson).
+"""
+
+
+def write_trials_page(folder: Path) -> Path:
+    """Write the page and the pictures of a record from its files, its notes after the introduction.
+
+    Raises
+    ------
+    InputError
+        When a label does not fit its seal.
+    """
+    record, notes = read_record(folder), folder / NOTES
+    heaps = _FOREIGN.format(code=record.code) if record.reality else _OURS
+    parts = [f"{heaps} {_SEALED}", *([notes.read_text(encoding="utf-8")] if notes.is_file() else [])]
+    parts += [_runs(folder / RUNS), _declared(record.declaration)]
+    if record.reality:
+        parts.append(_made(record.reality))
+    for view, title in TITLES.items():
+        if done := len(record.in_view(view)):
+            some = f" of {record.sealed}" if done < record.sealed else ""
+            parts += _view(record, view, f"## {title}\n\n{done}{some} trials.", folder)
+    return write_page(folder / PAGE, *parts)
+
+
+def _made(reality: dict[str, Any]) -> str:
+    """Say how another code makes each effect."""
+    rows = [{"effect": name, "made by": text} for name, text in reality["library"].items()]
+    strange = [
+        {"outside the library": name, "what it is": text} for name, text in reality["strangers"].items()
+    ]
+    text = f"## How {reality['name']} makes it\n\n{reality['laws']}.\n\n{markdown_table(pd.DataFrame(rows))}"
+    return f"{text}\n{markdown_table(pd.DataFrame(strange))}"
+
+
+def _runs(path: Path) -> str:
+    runs = pd.read_csv(path)
+    cases, hours = int(runs["cases"].sum()), runs["seconds"].sum() / 3600
+    text = f"{cases} cases in {hours:.2f} h of wall time with the statistics (`{path.name}`)."
+    totals = runs.groupby(["what", "machine", "date"], sort=False)[["cases", "seconds"]].sum().reset_index()
+    return f"## Runs\n\n{text}\n\n{markdown_table(totals)}"
+
+
+def _declared(declared: Declaration) -> str:
+    table = pd.DataFrame(
+        {
+            "mechanism": effect.name,
+            "null": effect.null,
+            "maximum": effect.maximum,
+            "gamma80, from the null": effect.detectable,
+            "of the range": effect.detectable / abs(effect.maximum - effect.null),
+            "told apart": "yes" if effect.told_apart else "no",
+            "resolvable": "yes" if effect.resolvable else "no",
+            "looks like": ", ".join(effect.kin),
+        }
+        for effect in declared.library
+    ).replace(np.inf, np.nan)
+    scale = f", scale {declared.scale}" if declared.scale else ""
+    stated = (
+        f"{declared.study}{scale}, {declared.plan.replicates} heaps a condition; declared and sealed on "
+        f"{declared.drawn_on}; settings of the analysis {declared.settings.sha256}. A mechanism is "
+        f"resolvable that is told from every other, and whose range holds more than {STRONG:g} gamma80; no "
+        "other may be named."
+    )
+    aim = _aims([declared_aim(declared.library)])
+    return f"## Declared beforehand\n\n{stated}\n\n{markdown_table(table)}\n{aim}"
+
+
+def _view(record: Record, view: str, heading: str, folder: Path) -> list[str]:
+    rows, found = record.in_view(view), record.aims(view)
+    _draw_power(power_curve(rows), folder / f"power-{view}.png")
+    _draw_confusion(confusion(rows), folder / f"confusion-{view}.png")
+    verdict = "verdict" if len(rows) == record.sealed else "verdict so far"
+    parts = [
+        f"{heading} {_UNAIMED.get(view, '')}",
+        _figures(found) if view in _UNAIMED else _aims(found, verdict),
+        f"![shares of alarms and names by effect](power-{view}.png)",
+        f"![answers by truth](confusion-{view}.png)",
+        "Strong effects have a row each. In brackets: trials.",
+        "### Strong effects, by mechanism",
+        markdown_table(by_mechanism(rows).reset_index()),
+    ]
+    if len(outside := by_outsider(rows)):
+        parts += ["### Effects that may not be named", markdown_table(outside.reset_index())]
+    if area := unknown_area(rows):
+        parts.append(
+            "By the misfit of the closest model what the library lacks is told from one or two strong effects"
+            f" of it with an area under the curve of {area}."
+        )
+    return parts
+
+
+def _aims(found: Sequence[Aim], verdict: str = "verdict") -> str:
+    rows = [
+        {"question": aim.question, "wanted": aim.wanted, "found": aim.found, verdict: _VERDICTS[aim.passed]}
+        for aim in found
+    ]
+    return markdown_table(pd.DataFrame(rows))
+
+
+def _figures(found: Sequence[Aim]) -> str:
+    return markdown_table(pd.DataFrame([{"question": aim.question, "found": aim.found} for aim in found]))
+
+
+def _draw_power(curve: pd.DataFrame, path: Path) -> None:
+    figure, axes = new_axes(7.2, 3.8, "y")
+    places = np.arange(len(curve))
+    series = (("alarm", "gap found", BLUE, -0.08), ("right", "named right", VERMILION, 0.08))
+    for name, label, colour, aside in series if len(curve) else ():
+        value = curve[name].to_numpy()
+        spread = np.abs(curve[[f"{name}_low", f"{name}_high"]].to_numpy().T - value)
+        axes.errorbar(places + aside, value, spread, fmt="o", color=colour, capsize=3, label=label)
+    if len(curve):
+        axes.set_xticks(places, [_class_label(row) for row in curve.itertuples()])
+        strong = int((curve["most"] <= STRONG).sum())
+        axes.axvline(strong - 0.5, color=MUTED, linestyle=":", linewidth=1.0)
+        figure.legend(frameon=False, loc="outside upper right", ncols=len(series))
+    axes.set(xlabel="effect [gamma80], and trials", ylabel="share of trials", ylim=(-0.03, 1.03))
+    save_figure(figure, path)
+
+
+def _class_label(row: Any) -> str:
+    ends = f"{row.least:g} to {row.most:g}" if np.isfinite(row.most) else f"above {row.least:g}"
+    return f"{ends}\n({row.trials})"
+
+
+def _draw_confusion(counts: pd.DataFrame, path: Path) -> None:
+    trials = counts.sum(axis=1)
+    shares = counts.div(trials, axis=0).to_numpy()
+    width, height = 2.8 + 0.42 * counts.shape[1], 2.0 + 0.27 * counts.shape[0]
+    figure, axes = new_axes(width, height, grid=None)
+    axes.imshow(shares, cmap="Blues", vmin=0.0, vmax=1.2, aspect="auto")
+    for (row, column), count in np.ndenumerate(counts.to_numpy()):
+        if count:
+            ink = "white" if shares[row, column] > 0.6 else "black"
+            axes.text(column, row, str(count), ha="center", va="center", fontsize=8, color=ink)
+    columns, rows = (
+        [str(name).replace("_", " ") for name in names] for names in (counts.columns, counts.index)
+    )
+    labels = [f"{name} ({count})" for name, count in zip(rows, trials, strict=True)]
+    axes.set_xticks(range(len(columns)), columns, rotation=45, ha="right", rotation_mode="anchor", fontsize=8)
+    axes.set_yticks(range(len(labels)), labels, fontsize=8)
+    axes.set_xticks(np.arange(1, len(columns)) - 0.5, minor=True)
+    axes.set_yticks(np.arange(1, len(labels)) - 0.5, minor=True)
+    axes.grid(which="minor", color="white", linewidth=1.0)
+    axes.tick_params(which="both", length=0)
+    axes.axhline(_mechanisms(counts.index) - 0.5, color=MUTED, linewidth=1.0)
+    axes.axvline(_mechanisms(counts.columns) - 0.5, color=MUTED, linewidth=1.0)
+    axes.set(xlabel="verdict", ylabel="truth")
+    save_figure(figure, path)
+
+
+def _mechanisms(names: Iterable[str]) -> int:
+    """Count the labels of a confusion that name a mechanism; they come first."""
+    return sum(name not in OTHERS for name in names)

@@ -1,0 +1,148 @@
+"""Spheres that run out of a flat-bottomed hopper, against Beverloo's law."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from dem_warp import Case, CaseResult, ClumpShape, GrainPopulation, Hopper, Interaction, Material
+from experiments.evidence.verification.problems.setups import GRAVITY, STEEL
+from experiments.evidence.verification.problems.stored import finished_cases
+from experiments.evidence.verification.result import Curve, Plot, Result, Row, absolute_row, detection_row
+
+K, K_SPREAD = 1.4, 0.2
+"""Correction of the outlet, in sphere diameters, fixed before any run."""
+
+EXPONENT = 2.5
+LEAST_CONSTANT, LARGEST_CONSTANT = 0.55, 0.65
+
+DIAMETER = 3e-3
+"""Mean of the spheres [m]."""
+
+GLASS = Material(density=2500.0, shear_modulus=1e6, poisson_ratio=0.25)
+"""As heavy as glass, but so soft that a second takes 18,000 steps."""
+
+OUTLETS = (6, 7, 8, 9, 10)
+"""Diameters of the outlet, in sphere diameters."""
+
+FRICTIONS = {0.092: "spheres of glass", 0.25: "spheres of acetate", 0.5: "rough spheres"}
+"""The first two as measured (Foerster et al., 1994); the bounds of C hold for the first."""
+
+ROLLING_FRICTION = 0.01
+WIDTH, DEPTH = 2.2, 3.0
+"""Of the bin and of its filling, in diameters of the outlet."""
+
+RAIN_SPEED, RAIN_FRACTION = 0.5, 0.07
+"""Speed of the rain [m/s], and the part of its volume that is spheres."""
+
+PROBLEM = "Spheres out of a flat-bottomed hopper"
+SEEDS = {"cpu": 1, "cuda": 4}
+
+TEXT = f"""Spheres of {1e3 * DIAMETER:g} mm (standard deviation 5 %) fill a round bin with a flat bottom,
+and run out of a round hole in it, {OUTLETS[0]} to {OUTLETS[-1]} sphere diameters wide. Bins are {WIDTH:g}
+outlets wide, and filled to {DEPTH:g}. The rate is the slope of the mass fallen over time while 20 to 70 %
+of it fall.
+
+Beverloo's law is W = C rho sqrt(g) (D - k d)^2.5, with rho the density of the bed as poured (W. A.
+Beverloo, H. A. Leniger and J. van de Velde, Chemical Engineering Science 15 (1961) 260-269). k = {K:g} was
+fixed before any run, as were the bounds: exponent 2.5 within 0.15, C from {LEAST_CONSTANT:g} to
+{LARGEST_CONSTANT:g} at a realistic friction. What k = {K - K_SPREAD:g} and {K + K_SPREAD:g} would give is
+stated.
+
+Spheres of glass have a friction of 0.092, and spheres of acetate one of 0.25, as S. F. Foerster, M. Y.
+Louge, H. Chang and K. Allia measured (Physics of Fluids 6 (1994) 1108-1115). The bounds of C hold for the
+first, whose density the spheres have; with more friction C falls."""
+
+
+def hopper_case(outlet: float, friction: float, seed: int) -> Case:
+    """Bin whose outlet is so many sphere diameters wide; all bins have the same proportions."""
+    width = WIDTH * outlet * DIAMETER
+    hopper = Hopper(
+        diameter=width,
+        fill_depth=DEPTH * outlet * DIAMETER,
+        outlet=outlet * DIAMETER,
+        wall_material=STEEL,
+        rain_speed=RAIN_SPEED,
+        rain_rate=RAIN_FRACTION * RAIN_SPEED * 1.5 * width**2 / DIAMETER**3,
+    )
+    surfaces = Interaction(restitution=0.5, static_friction=friction, rolling_friction=ROLLING_FRICTION)
+    grains = GrainPopulation(ClumpShape.sphere(DIAMETER / 2.0), GLASS)
+    return Case(hopper, grains, surfaces, surfaces, seed=seed)
+
+
+@dataclass(frozen=True)
+class Flow:
+    """Steady flow out of one hopper."""
+
+    outlet: float
+    """Opening, in sphere diameters."""
+    rate: float
+    """Mass over bulk density, root of gravity and diameter of the spheres to the power of 2.5."""
+
+    @classmethod
+    def of(cls, outlet: float, result: CaseResult) -> "Flow":
+        """Flow of a case that has a rate."""
+        seen = result.observables
+        bulk_density = GLASS.density * seen["solid_fraction"]
+        return cls(outlet, seen["flow_rate"] / (bulk_density * np.sqrt(GRAVITY) * DIAMETER**EXPONENT))
+
+
+def exponent(flows: Sequence[Flow], k: float) -> float:
+    """Power of the outlet less `k` sphere diameters that the rates follow, by least squares."""
+    openings = np.log([flow.outlet - k for flow in flows])
+    return float(np.polyfit(openings, np.log([flow.rate for flow in flows]), 1)[0])
+
+
+def rate_constant(flows: Sequence[Flow], k: float) -> float:
+    """Beverloo's C, geometric mean over the outlets."""
+    return float(np.exp(np.mean([np.log(flow.rate / (flow.outlet - k) ** EXPONENT) for flow in flows])))
+
+
+def _rows(flows: Mapping[float, Sequence[Flow]]) -> list[Row]:
+    law = "Beverloo et al. (1961)"
+    middle = 0.5 * (LEAST_CONSTANT + LARGEST_CONSTANT)
+    realistic, *_ = FRICTIONS
+    rows, constants = [], []
+    for friction, each in flows.items():
+        case = f"{FRICTIONS[friction]}, friction {friction:g}"
+        for k in (K, K - K_SPREAD, K + K_SPREAD):
+            power, constant = exponent(each, k), rate_constant(each, k)
+            bounds = (0.15, LARGEST_CONSTANT - middle if friction == realistic else None)
+            power_bound, constant_bound = bounds if k == K else (None, None)
+            labels = (PROBLEM, case, f"exponent, k = {k:.1f}", law)
+            rows.append(absolute_row(labels, EXPONENT, power, power_bound))
+            labels = (PROBLEM, case, f"C, k = {k:.1f}", law)
+            rows.append(absolute_row(labels, middle, constant, constant_bound))
+        constants.append(rate_constant(each, K))
+    for (friction, name), fall in zip(list(FRICTIONS.items())[1:], -np.diff(constants), strict=True):
+        rows.append(detection_row(PROBLEM, f"{name}, friction {friction:g}", "fall of C to it", 0.01, fall))
+    return rows
+
+
+def _plot(flows: Mapping[float, Sequence[Flow]]) -> Plot:
+    outlets = np.linspace(OUTLETS[0] - 0.5, OUTLETS[-1] + 0.5, 60)
+    curves = []
+    for colour, (friction, each) in enumerate(flows.items()):
+        constant = rate_constant(each, K)
+        law = constant * (outlets - K) ** EXPONENT
+        openings, rates = np.array([(flow.outlet, flow.rate) for flow in each]).T
+        curves += [
+            Curve(f"friction {friction:g}", openings, rates, "points", colour),
+            Curve(f"{constant:.3f} (D/d - {K:g})^2.5", outlets, law, "line", colour),
+        ]
+    return Plot("beverloo", "Flow out of a hopper", "outlet D / d", "W / (rho sqrt(g) d^2.5)", tuple(curves))
+
+
+def beverloo(device: str) -> Result:
+    """Rates of flow through five outlets at three frictions."""
+    seeds = range(1, 1 + SEEDS["cpu" if device == "cpu" else "cuda"])
+    settings = [(friction, outlet, seed) for friction in FRICTIONS for outlet in OUTLETS for seed in seeds]
+    cases = [hopper_case(outlet, friction, seed) for friction, outlet, seed in settings]
+    flows: dict[float, list[Flow]] = {friction: [] for friction in FRICTIONS}
+    for (friction, outlet, _), result in zip(settings, finished_cases(cases, device), strict=True):
+        if "flow_rate" in result.observables:
+            flows[friction].append(Flow.of(outlet, result))
+    labels = (PROBLEM, f"all {len(cases)} hoppers", "hoppers without a rate", "none clogs")
+    lost = len(cases) - sum(len(each) for each in flows.values())
+    rows = (absolute_row(labels, 0.0, lost, 0.0), *_rows(flows))
+    return Result("Beverloo", TEXT, rows, (_plot(flows),))

@@ -1,0 +1,1 @@
+"""Grains: sizes, clumps and files of spheres."""

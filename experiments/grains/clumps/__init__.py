@@ -1,0 +1,1 @@
+"""Clumps that stand for a grain's shape."""

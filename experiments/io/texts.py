@@ -1,0 +1,88 @@
+"""Text files as people's programs write them: byte-order marks, other encodings, decimal commas."""
+
+from __future__ import annotations
+
+import codecs
+import difflib
+import re
+from pathlib import Path
+
+from experiments.io.errors import InputError
+from experiments.io.files import read_file
+
+LARGEST = 10_000_000
+"""Bytes of the largest text file that is read."""
+
+_MARKS = {
+    codecs.BOM_UTF32_LE: "UTF-32", codecs.BOM_UTF32_BE: "UTF-32",
+    codecs.BOM_UTF16_LE: "UTF-16", codecs.BOM_UTF16_BE: "UTF-16",
+}  # fmt: skip
+_NUMBER = re.compile(
+    r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf|infinity)", re.IGNORECASE
+)
+_COMMA_NUMBER = re.compile(r"[+-]?\d+,\d+(?:[eE][+-]?\d+)?")
+
+DELIMITERS = (";", "\t", None, ",")
+"""Delimiters of a table, in the order in which they are tried; None: blanks."""
+
+
+def read_text(path: Path, largest: int = LARGEST) -> str:
+    """Read a text file in UTF-8 of at most so many bytes; a byte-order mark is left out.
+
+    Raises
+    ------
+    InputError
+        When there is no such file, it is too large, or it is not text in UTF-8; UTF-16 is named.
+    """
+    try:
+        data = read_file(path, largest)
+    except OSError as error:
+        raise InputError("must be a readable file", error.strerror or str(error), str(path)) from None
+    return decoded(data, str(path))
+
+
+def decoded(data: bytes, place: str) -> str:
+    """Decode text in UTF-8 as `read_text` does; ``place`` names it in errors."""
+    named = next((name for mark, name in _MARKS.items() if data.startswith(mark)), "")
+    if not named and data.count(0, 0, 4096) > 0:
+        zeros = sorted(half.count(0) / max(len(half), 1) for half in (data[:4096:2], data[1:4096:2]))
+        named = "UTF-16" if zeros[0] < 0.05 and zeros[1] > 0.5 else "binary data"
+    if named:
+        advice = ": save it as UTF-8" if named.startswith("UTF") else ""
+        raise InputError("must be text in UTF-8", f"{named}{advice}", place)
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        received = f"the byte 0x{data[error.start]:02x}, as of Windows-1252 or Latin-1: save it as UTF-8"
+        raise InputError("must be text in UTF-8", received, f"{place}, line {line}") from None
+
+
+def split(line: str, delimiter: str | None) -> list[str]:
+    """Cut a line into its cells, quotes and blanks around them removed."""
+    return [cell.strip().strip('"').strip() for cell in line.split(delimiter)]
+
+
+def is_number(text: str, delimiter: str | None = None) -> bool:
+    """Tell that a cell is a number; a decimal comma may stand in it unless commas separate the cells."""
+    return bool(_NUMBER.fullmatch(text) or (delimiter != "," and _COMMA_NUMBER.fullmatch(text)))
+
+
+def number(text: str) -> float:
+    """Convert a cell for which `is_number` holds."""
+    return float(text.replace(",", "."))
+
+
+def delimiter_of(line: str) -> str | None:
+    """Find the delimiter of a line of numbers: the first one by which every cell is a number."""
+    for delimiter in DELIMITERS:
+        cells = split(line, delimiter)
+        if len(cells) > 1 and all(is_number(cell, delimiter) for cell in cells):
+            return delimiter
+    return None
+
+
+def nearest_name(name: str, known: list[str]) -> str:
+    """Suggest what a misspelt name may have meant, as the end of a sentence."""
+    near = difflib.get_close_matches(name, known, n=1)
+    return f"did you mean {near[0]!r}?" if near else f"known: {', '.join(known) or 'none'}"

@@ -1,0 +1,115 @@
+"""TOML files: read with the place of what is wrong, and written."""
+
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from experiments.io.errors import InputError, StudyError
+from experiments.io.texts import read_text
+
+DEEPEST = 20
+"""Levels of tables and lists in each other that a file may have."""
+
+MOST_DOTS = 100
+"""Dots in a row of a line's parts: the time that keys of many levels take grows with the square of these."""
+
+LONGEST_SHOWN = 200
+"""Characters of a wrong line that are shown."""
+
+
+def read_toml(path: Path, what: str = "the study") -> tuple[str, dict[str, Any]]:
+    """Read a TOML file, of a kind named for the error message: its text, and what it says.
+
+    Raises
+    ------
+    StudyError
+        When it cannot be read, or is no TOML.
+    """
+    try:
+        text = read_text(path).replace("\r\n", "\n")
+        _check_keys(text)
+        document = tomllib.loads(text)
+        _check(document)
+        return text, document
+    except tomllib.TOMLDecodeError as error:
+        found = re.search(r"at line (\d+)", str(error))
+        number = int(found[1]) if found else len(text.splitlines())
+        # another rule for what ends a line may know fewer of them
+        shown = "".join(text.split("\n")[number - 1 : number]).strip()[:LONGEST_SHOWN]
+        raise StudyError(f"must be valid TOML: {error}", shown, f"{path}:{number}") from None
+    except RecursionError:
+        raise StudyError("must be TOML of a few levels", "a table far deeper", str(path)) from None
+    except InputError as error:
+        raise StudyError(f"{what} {error.rule}", error.value, error.place) from None
+    except ValueError as error:
+        # an integer of thousands of digits, for one
+        raise StudyError("must be valid TOML", str(error), str(path)) from None
+
+
+def _check_keys(text: str) -> None:
+    """Refuse keys of very many levels before they are read."""
+    if any(part.count(".") > MOST_DOTS for part in re.split(r"[\n,=\[\]{}]", text)):
+        raise RecursionError
+
+
+def _check(document: Mapping[str, Any]) -> None:
+    """Refuse, without recursion, what is nested too deep, and integers that TOML does not have."""
+    level: list[Any] = [document]
+    for _ in range(DEEPEST):
+        inner = [value for each in level for value in (each.values() if isinstance(each, Mapping) else each)]
+        if large := [value for value in inner if isinstance(value, int) and not -(2**63) <= value < 2**63]:
+            raise ValueError(f"integers have 64 bits, not {str(large[0])[:40]} ...")
+        level = [value for value in inner if isinstance(value, Mapping | list)]
+    if level:
+        raise RecursionError
+
+
+def toml_text(document: Mapping[str, Any], path: tuple[str, ...] = (), array: bool = False) -> str:
+    """Write nested tables of text, numbers, truth values, lists of them and lists of tables as TOML.
+
+    None is left out; `path` is where the document stands in the file, in an `array` of tables or alone.
+    """
+    arrays = {key: value for key, value in document.items() if _holds_tables(value)}
+    tables = {key: value for key, value in document.items() if isinstance(value, Mapping)}
+    values = {key: value for key, value in document.items() if key not in arrays and key not in tables}
+    lines = [f"{_key(key)} = {_value(value)}" for key, value in values.items() if value is not None]
+    if path and (lines or array or not document):
+        head = f"[{'.'.join(map(_key, path))}]"
+        lines.insert(0, f"[{head}]" if array else head)
+    parts = ["\n".join(lines)] if lines else []
+    parts += [toml_text(table, (*path, key)).rstrip() for key, table in tables.items()]
+    for key, items in arrays.items():
+        parts += [toml_text(item, (*path, key), array=True).rstrip() for item in items]
+    return "\n\n".join(parts) + "\n"
+
+
+def _holds_tables(value: Any) -> bool:
+    return isinstance(value, list | tuple) and bool(value) and isinstance(value[0], Mapping)
+
+
+def _key(key: str) -> str:
+    return key if re.fullmatch(r"[\w-]+", key, re.ASCII) else _text(key)
+
+
+def _text(text: str) -> str:
+    # TOML takes all that JSON takes, save the one control character that JSON does not escape
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def _value(value: Any) -> str:
+    match value:
+        case bool():
+            return "true" if value else "false"
+        case str():
+            return _text(value)
+        case int() | float():
+            return repr(value)
+        case list() | tuple():
+            return f"[{', '.join(map(_value, value))}]"
+        case _:
+            raise TypeError(f"a {type(value).__name__} has no form in TOML")

@@ -1,0 +1,132 @@
+"""Pictures of a heap of spheres: plain silhouettes to measure, shaded snapshots to look at."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from imaging.drawing import opengl, raster
+from imaging.errors import PictureError
+from imaging.geometry import FloatArray, Frame, Picture, Spheres
+
+GRAIN_COLOR = (62.0, 94.0, 138.0)
+"""Buckwheat brown, blue-green-red."""
+SHADE_SPREAD = 0.10
+"""Standard deviation of the relative lightness of grains."""
+PLATE_COLOR = (206, 202, 198)
+PLATE_EDGE_COLOR = (120, 116, 112)
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """A picture of a heap, with its scale."""
+
+    image: Picture
+    """Grey or blue-green-red."""
+    meters_per_pixel: float
+    """Scale."""
+    ground_row: float
+    """Row of the plate's surface; whole numbers are the middles of pixels."""
+    azimuth: float
+    """Direction of the camera [rad]: at 0 the picture's right is +x and the camera looks along +y."""
+
+
+def silhouette(
+    centers: ArrayLike,
+    radii: ArrayLike,
+    azimuth: float = 0.0,
+    pixels: int = 800,
+    backend: str = "raster",
+    frame: Frame | None = None,
+) -> Snapshot:
+    """Draw the black silhouette of a heap on white, without the plate, for measuring.
+
+    Parameters
+    ----------
+    centers, radii : (n, 3) and (n,) arrays
+        Spheres [m], z up, on the plate z = 0.
+    azimuth : float
+        Direction of the camera [rad].
+    pixels : int
+        Width of the heap in the picture; strays beside it make the picture wider.
+    backend : {"raster", "pyvista", "auto"}
+        `raster` needs numpy alone; `pyvista` needs OpenGL; `auto` takes pyvista where OpenGL works.
+    frame : Frame, optional
+        What the picture shows, where several share it; `pixels` is then unused.
+    """
+    spheres = Spheres.of(centers, radii)
+    frame = frame or Frame.around(spheres, pixels)
+    shown, _ = frame.select(spheres)
+    image = 255 - _renderer(backend).coverage(shown, frame, azimuth)
+    return Snapshot(image, frame.meters_per_pixel, frame.ground_row, azimuth)
+
+
+def snapshot(
+    centers: ArrayLike,
+    radii: ArrayLike,
+    azimuth: float = 0.0,
+    pixels: int = 800,
+    backend: str = "auto",
+    frame: Frame | None = None,
+    grains: ArrayLike | None = None,
+) -> Snapshot:
+    """Draw a shaded picture of a heap on its plate, to look at.
+
+    Its frame is that of `silhouette`, so that lines measured on one can be drawn on the other. The
+    parameters are those of `silhouette`, and
+
+    grains : (n,) array, optional
+        Grain of each sphere; grains then differ a little in shade.
+    """
+    spheres = Spheres.of(centers, radii)
+    frame = frame or Frame.around(spheres, pixels)
+    shown, indices = frame.select(spheres)
+    colors = _sphere_colors(grains, len(spheres.radii))[indices]
+    layer = _renderer(backend).shaded(shown, colors, frame, azimuth)
+    opacity = layer[:, :, 3:].astype(np.float64) / 255.0
+    image = np.rint(opacity * layer[:, :, :3] + (1.0 - opacity) * empty_plate(frame)).astype(np.uint8)
+    return Snapshot(image, frame.meters_per_pixel, frame.ground_row, azimuth)
+
+
+class Renderer(Protocol):
+    """Drawer of spheres; both pictures are seen by a horizontal orthographic camera."""
+
+    def coverage(self, spheres: Spheres, frame: Frame, azimuth: float) -> Picture:
+        """Share of each pixel that the spheres cover, 0 to 255."""
+        ...
+
+    def shaded(self, spheres: Spheres, colors: FloatArray, frame: Frame, azimuth: float) -> Picture:
+        """Lit spheres of the given colours (n, 3), blue-green-red and opacity."""
+        ...
+
+
+def _renderer(backend: str) -> Renderer:
+    if backend == "auto":
+        return opengl if opengl.opengl_works() else raster
+    renderers: dict[str, Renderer] = {"raster": raster, "pyvista": opengl}
+    if backend not in renderers:
+        raise PictureError("the backend is raster, pyvista or auto", repr(backend), "backend")
+    return renderers[backend]
+
+
+def _sphere_colors(grains: ArrayLike | None, sphere_count: int) -> FloatArray:
+    """Colour of every sphere (n, 3): that of its grain, always the same for the same number of grains."""
+    if grains is None:
+        return np.tile(GRAIN_COLOR, (sphere_count, 1))
+    owner = np.asarray(grains)
+    if owner.shape != (sphere_count,):
+        raise PictureError("there is one grain number for each sphere", owner.shape, "grains")
+    _, rank = np.unique(owner, return_inverse=True)
+    lightness = 1.0 + SHADE_SPREAD * np.random.default_rng(0).standard_normal(rank.max() + 1)
+    return np.clip(np.outer(lightness[rank], GRAIN_COLOR), 0.0, 255.0)
+
+
+def empty_plate(frame: Frame) -> Picture:
+    """Draw the plate of a frame alone, blue-green-red."""
+    image = np.full((*frame.shape, 3), 255, dtype=np.uint8)
+    image[frame.ground_rows :] = PLATE_COLOR
+    image[frame.ground_rows : frame.ground_rows + 1] = PLATE_EDGE_COLOR
+    return image

@@ -1,0 +1,1 @@
+"""Heaps found on photographs."""

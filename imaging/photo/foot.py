@@ -1,0 +1,230 @@
+"""The heap's foot on a plate whose top is seen: below the plate's far edge, down to the front of its base.
+
+A camera that looks down on the plate sees the heap before the plate's far edge. The base of a heap is round,
+so that its front is half an ellipse, whose half axes give the camera's height.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from imaging.geometry import FloatArray, Layer
+from imaging.photo.background import unevenness, unshaded
+from imaging.plate import PlateLine
+
+SIDE_SHARE = 0.05
+"""Part of the plate's width, at either end, that shows the plate's own colours."""
+LIKENESS = 4.0
+"""Heap and plate are told apart where they differ by this many times the plate's noise."""
+LEAST_DIFFERENCE = 12.0
+"""Difference [of 255] below which two colours are alike: compression and light differ by as much."""
+TEXTURE_SHARE = 0.015
+"""Grains and the gaps between them, as a share of the heap's width: closed before the foot is outlined."""
+ARC_ROUNDS = 12
+"""Rounds of reweighting of the arc, which leave single grains aside."""
+CORE = 0.95
+"""Part of the half width over which the arc is fitted: at its ends it is upright."""
+ROW_SHARE = 0.8
+"""Part of a body's width over which its heap rises where the body ends with it: but for a grain or two."""
+ROW_DEPTH = 0.065
+"""Depth of the lowest row of grains, in the heap's widths: that of a heap of some sixteen grains across."""
+ROW_UNEVENNESS = 0.5
+"""Unevenness of the lowest row over that of the grains above it: a board is even."""
+LEAST_RISE = 4.0
+"""A heap rises where it is this high over the line [pixels]: a blurred edge and a lens make less."""
+LEAST_ARC = 3.0
+"""A foot is seen where it is this many of its standard errors deep, and as many pixels."""
+
+
+@dataclass(frozen=True)
+class PlateTop:
+    """View below the plate's line."""
+
+    level: Layer
+    """Difference from the plate's own colours over that at which the heap is cut out; 0 above the line,
+    shape (rows, columns)."""
+    alike: bool
+    """Heap and plate are too alike to tell where the heap ends."""
+
+
+def below_plate(
+    colors: Layer, heap: NDArray[np.bool_], body: NDArray[np.bool_], plate: PlateLine
+) -> PlateTop:
+    """Compare what lies below the plate's line with the plate.
+
+    Each line along the plate, levelled, goes from the colour at its left end to that at its right: so a
+    plate's top, its front and the light on them drop out, and what remains is the heap, or its shadow.
+
+    Parameters
+    ----------
+    colors : (rows, columns, channels) array
+    heap : (rows, columns) bool array
+        The part of the heap above the plate's line.
+    body : (rows, columns) bool array
+        All that stands out of the wall, with the plate.
+    plate : PlateLine
+    """
+    rows, columns = heap.shape
+    nothing = np.zeros((rows, columns), dtype=np.float32)
+    upright = np.array([[1.0, 0.0, 0.0], [-plate.slope, 1.0, 0.0]])
+    turned = cv2.warpAffine(colors, upright, (columns, rows), borderMode=cv2.BORDER_REPLICATE)
+    flat = np.asarray(turned, dtype=np.float32).reshape(colors.shape)
+    first = int(np.ceil(plate.row)) + 1
+    if first >= rows - 2:
+        return PlateTop(nothing, alike=False)
+    ends = np.flatnonzero(body.any(axis=0))[[0, -1]]
+    size = max(2, round(SIDE_SHARE * (ends[1] - ends[0])))
+    sides = [flat[first:, ends[0] : ends[0] + size], flat[first:, ends[1] - size + 1 : ends[1] + 1]]
+    middles = [np.median(side, axis=1) for side in sides]
+    noise = max(
+        float(np.median(np.abs(side - middle[:, None]))) for side, middle in zip(sides, middles, strict=True)
+    )
+    share = np.clip((np.arange(columns) - ends[0]) / max(ends[1] - ends[0], 1), 0.0, 1.0).astype(np.float32)
+    own = middles[0][:, None] + share[None, :, None] * (middles[1] - middles[0])[:, None]
+    least = max(LIKENESS * noise, LEAST_DIFFERENCE)
+    difference, typical = _told_apart(flat[first:], own, colors, heap, least)
+    upper = nothing.copy()
+    upper[first:] = difference / max(0.5 * typical, least)
+    back = np.array([[1.0, 0.0, 0.0], [plate.slope, 1.0, 0.0]])
+    level = np.asarray(cv2.warpAffine(upper, back, (columns, rows)), dtype=np.float32)
+    return PlateTop(level, alike=typical < least)
+
+
+def _told_apart(
+    below: Layer, own: Layer, colors: Layer, heap: NDArray[np.bool_], least: float
+) -> tuple[Layer, float]:
+    """Difference below the line from the plate's own colours, and that of the heap above the line from them.
+
+    A shadow's share is left out, unless the heap then differs no more: grey powder on a grey plate.
+    """
+    covered = heap.any(axis=0)
+    reach = max(1, round(0.5 * TEXTURE_SHARE * int(covered.sum())))
+    near = np.median(own[: max(2, len(own) // 20), covered], axis=(0, 1)).astype(np.float32)
+    around = np.broadcast_to(near, colors.shape)
+    typical = float(np.median(unshaded(colors, around, reach)[heap]))
+    if typical >= least:
+        return unshaded(below, own, reach), typical
+    typical = float(np.median(np.linalg.norm(colors[heap] - near, axis=1)))
+    return np.linalg.norm(below - own, axis=2), typical
+
+
+def is_lowest_row(
+    colors: Layer, heap: NDArray[np.bool_], body: NDArray[np.bool_], plate: PlateLine, least: float
+) -> bool:
+    """Tell if what was taken for a plate is the heap's lowest row of grains, whose tops lie on a line too.
+
+    It is no wider than the heap, a grain deep, of the heap's colours but for their shade, and as uneven.
+
+    Parameters
+    ----------
+    colors, heap, body, plate
+        As for `below_plate`.
+    least : float
+        Difference of colours [of 255] from which on two are not alike.
+    """
+    covered = np.flatnonzero(body.any(axis=0))
+    width = float(np.ptp(covered))
+    below = np.arange(len(body))[:, None] - plate.rows_at(np.arange(body.shape[1]))
+    rising = np.flatnonzero((heap & (below < -LEAST_RISE)).any(axis=0))
+    if len(rising) == 0 or np.ptp(rising) < ROW_SHARE * width:
+        return False
+    lowest = np.where(body, below, -np.inf).max(axis=0)[covered]
+    # Half of the columns, not all: a grain may lie before the others.
+    if float(np.median(lowest)) > ROW_DEPTH * width:
+        return False
+    row, above = body & (below > 0.0), heap & (below > -ROW_DEPTH * width)
+    if not row.any() or not above.any():
+        return False
+    own = np.broadcast_to(np.median(colors[above], axis=0), colors[row][None].shape).astype(np.float32)
+    if float(np.median(unshaded(colors[row][None], own, 0))) > least:
+        return False
+    uneven = unevenness(colors, max(2, round(0.25 * float(np.median(lowest)))))
+    return float(np.median(uneven[row])) >= ROW_UNEVENNESS * float(np.median(uneven[above]))
+
+
+def joined_foot(heap: NDArray[np.bool_], level: Layer, plate: PlateLine) -> NDArray[np.bool_]:
+    """The heap above the plate's line with the foot that goes on below it."""
+    rows, columns = heap.shape
+    width = int(np.ptp(np.flatnonzero(heap.any(axis=0)))) + 1
+    size = 2 * max(1, round(0.5 * TEXTURE_SHARE * width)) + 1
+    cut = (level > 1.0).astype(np.uint8)
+    cut = np.asarray(cv2.morphologyEx(cut, cv2.MORPH_CLOSE, np.ones((size, size), np.uint8)), dtype=np.uint8)
+    lower = np.greater(cv2.morphologyEx(cut, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)), 0)
+    line = plate.rows_at(np.arange(columns))
+    row = np.arange(rows)[:, None]
+    # The plate's edge itself, blurred, belongs to neither: the heap goes on through it where it does below.
+    seam = (row >= line - 1.5) & (row <= line + 3.0) & heap.any(axis=0)
+    whole = heap | (lower & (row > line)) | seam
+    _, labels = cv2.connectedComponents(whole.astype(np.uint8), connectivity=4)
+    kept = np.unique(labels[heap])
+    joined = np.isin(labels, kept[kept > 0]) & (heap | (lower & (row > line)))
+    return np.asarray(joined)
+
+
+@dataclass(frozen=True)
+class Base:
+    """The front of a heap's base: row = `row` + `slope` * column + `depth` * half ellipse between `ends`."""
+
+    row: float
+    slope: float
+    depth: float
+    depth_se: float
+    ends: tuple[float, float]
+
+    @property
+    def seen(self) -> bool:
+        """The base is a curve, and no line."""
+        return self.depth > LEAST_ARC * max(self.depth_se, 1.0)
+
+    @property
+    def half_width(self) -> float:
+        """Half of the base's width [pixels]."""
+        return 0.5 * (self.ends[1] - self.ends[0])
+
+    @property
+    def elevation(self) -> float:
+        """Angle at which the camera looks down on the plate [degrees]."""
+        return float(np.degrees(np.arcsin(min(self.depth / self.half_width, 1.0))))
+
+    @property
+    def elevation_se(self) -> float:
+        """Standard error of the elevation [degrees]."""
+        cosine = max(np.cos(np.radians(self.elevation)), 0.1)
+        return float(np.degrees(self.depth_se / self.half_width / cosine))
+
+
+def front_of_base(bottom: FloatArray, slope: float | None) -> Base:
+    """Fit the front of the base to the lower edge of a heap, the sum of distances being least.
+
+    Parameters
+    ----------
+    bottom : (columns,) array
+        Rows of the lower edge; NaN outside the heap.
+    slope : float, optional
+        Of the plate; left out, it is fitted.
+    """
+    columns = np.flatnonzero(np.isfinite(bottom)).astype(np.float64)
+    ends = (float(columns[0]) - 0.5, float(columns[-1]) + 0.5)
+    middle, half = 0.5 * (ends[0] + ends[1]), 0.5 * (ends[1] - ends[0])
+    core = columns[np.abs(columns - middle) <= CORE * half]
+    curve = np.sqrt(1.0 - ((core - middle) / half) ** 2)
+    values = bottom[core.astype(np.intp)]
+    terms = np.column_stack([np.ones_like(core), curve])
+    if slope is None:
+        terms = np.column_stack([terms, core - middle])
+    else:
+        values = values - slope * (core - middle)
+    weight = np.ones(len(core))
+    for _ in range(ARC_ROUNDS):
+        root = np.sqrt(weight)
+        fitted = np.linalg.lstsq(terms * root[:, None], values * root, rcond=None)[0]
+        residual = values - terms @ fitted
+        scale = max(float(np.median(np.abs(residual))), 0.25)
+        weight = 1.0 / np.maximum(np.abs(residual), scale)
+    tilt = float(fitted[2]) if slope is None else slope
+    spread = 1.5 * scale / np.sqrt(max(len(core) / 10.0, 1.0)) / max(float(curve.std()), 1e-6)
+    return Base(float(fitted[0]) - tilt * middle, tilt, float(fitted[1]), spread, ends)

@@ -1,0 +1,397 @@
+"""The command line, run as a person runs it: exit codes, messages, and what is (not) written."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import pyvista
+from commandline import dem_warp
+
+from experiments import api
+from experiments.cases.store.manifest import study_hash
+from experiments.commands.console import CaseProgress, describe_progress, duration
+from experiments.runs import campaign as run
+from experiments.studyfile import load_study
+from imaging import save_picture
+
+WriteStudy = Callable[..., Path]
+
+COMMANDS = ("calibrate", "heap", "angle", "clump", "new", "discover")
+
+
+def last_line_of(program: str) -> str:
+    """Run a program in a fresh interpreter; return the last line that it prints."""
+    command, home = [sys.executable, "-c", program], Path(run.__file__).parents[3]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=home)
+    return done.stdout.splitlines()[-1]
+
+
+def triangle(slope: float = 0.5) -> np.ndarray:
+    """Draw a dark heap on white: a triangle of a given slope."""
+    rows, columns = np.mgrid[0:300, 0:800]
+    inside = (240 - rows) < slope * (300 - np.abs(columns - 400))
+    return np.where(inside & (rows < 240), 40, 255).astype(np.uint8)
+
+
+@pytest.fixture(autouse=True)
+def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "work").mkdir()
+    monkeypatch.chdir(tmp_path / "work")
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_explains_itself_with_an_example(command: str) -> None:
+    code, out, _ = dem_warp(command, "--help")
+    assert code == 0
+    assert f"Example: dem-warp {command}" in " ".join(out.split())
+
+
+def test_help_imports_nothing_heavy() -> None:
+    program = (
+        "import sys; from experiments.cli import app; app(['--help'], standalone_mode=False); "
+        "print(sorted({'warp', 'numpy', 'cv2', 'pandas', 'statsmodels', 'pyvista'} & set(sys.modules)))"
+    )
+    assert last_line_of(program) == "[]"
+
+
+@pytest.mark.parametrize("command", ["calibrate", "discover", "heap"])
+@pytest.mark.parametrize("content", [None, "name = ", "[scale.other]\n"])
+def test_a_file_that_is_no_study_is_answered_before_any_library_is_imported(
+    tmp_path: Path, command: str, content: str | None
+) -> None:
+    path = tmp_path / "wrong.toml"
+    if content is not None:
+        path.write_text(content, encoding="utf-8")
+    words = [command, str(path), "--scale", "bench"]
+    program = (
+        f"import sys; from experiments.cli import app; code = app({words!r}, standalone_mode=False); "
+        "print(code, sorted({'warp', 'numpy', 'cv2', 'pandas', 'scipy'} & set(sys.modules)))"
+    )
+    assert last_line_of(program) == "2 []"
+
+
+def test_a_calibration_does_not_need_pyvista() -> None:
+    program = "import sys; import experiments.runs.campaign; print('pyvista' in sys.modules)"
+    assert last_line_of(program) == "False"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('sphere = "2 mm"', "sphere = 2", "unit of length"),
+        ('sphere = "2 mm"', 'sphere = "-2 mm"', "greater than 0"),
+        ("low = 0.2", "low = 0.8", "low must be below high"),
+        ("n = 5", "n = 5\nm = 6", "unknown key"),
+    ],
+)
+@pytest.mark.parametrize("command", ["calibrate", "heap"])
+def test_a_wrong_study_ends_with_2_and_writes_nothing(
+    write_study: WriteStudy, command: str, old: str, new: str, message: str
+) -> None:
+    path = write_study((old, new))
+    code, out, err = dem_warp(command, path, "--device", "cpu", "--out", "results")
+    assert (code, out) == (2, "")
+    assert message in err
+    assert f"{path}:" in err
+    assert list(Path().iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["absent.toml"], "readable file"),
+        (["--scale", "bnch"], "did you mean 'bench'"),
+        (["--device", "tpu"], "--device"),
+        (["--scale", "bench", "--set", "E"], "NAME=VALUE"),
+        (["--scale", "bench", "--set", "Z=1"], "must name a factor"),
+        (["--scale", "bench", "--set", "B=34"], "unit of pressure"),
+        (["--scale", "bench", "--set", "E=-1"], "greater than or equal to 0"),
+    ],
+)
+def test_wrong_options_end_with_2_and_write_nothing(arguments: list[str], message: str) -> None:
+    code, out, err = dem_warp("heap", *arguments)
+    assert (code, out) == (2, "")
+    assert message in err
+    assert list(Path().iterdir()) == []
+
+
+def test_decisions_that_do_not_fit_the_factors_end_with_2(write_study: WriteStudy) -> None:
+    path = write_study(add="[campaign.surface]\ncenter = { E = -0.5 }\n")
+    code, _, err = dem_warp("calibrate", path, "--device", "cpu", "--out", "results")
+    assert code == 2
+    assert "campaign.surface.center" in err
+    assert not Path("results").exists()
+
+
+def test_a_study_without_a_target_cannot_be_calibrated(write_study: WriteStudy) -> None:
+    path = write_study(('[target]\nmean = "30 deg"\nsd = "0.5 deg"\nn = 5\n', ""))
+    code, _, err = dem_warp("calibrate", path, "--device", "cpu", "--out", "results")
+    assert (code, Path("results").exists()) == (2, False)
+    assert "[target]" in err
+
+
+HOPPER = """[scene.hopper]
+diameter = "28 mm"
+fill_depth = "16 mm"
+outlet = "20 mm"
+"""
+
+
+def of_a_hopper(write_study: WriteStudy) -> Path:
+    """Write a study of a hopper, whose target is no angle."""
+    angle = '[target]\nmean = "30 deg"\nsd = "0.5 deg"\nn = 5\n'
+    tube = '[scene.lifted-cylinder]\ndiameter = "28 mm"\nheight = "28 mm"\ngrain_count = 30\n'
+    return write_study((tube, HOPPER), (angle, ""))
+
+
+def test_another_test_than_a_heap_gives_what_it_measures(write_study: WriteStudy) -> None:
+    code, out, err = dem_warp("heap", of_a_hopper(write_study), "--device", "cpu", "--out", "results")
+    assert (code, err.splitlines()[-1]) == (0, "Files: results")
+    printed = dict(line.split(": ") for line in out.splitlines())
+    kept = json.loads(Path("results/angle.json").read_text(encoding="utf-8"))
+    assert kept["angle"] is None
+    fallen = kept["observables"]["fallen_mass"]
+    assert printed["fallen mass"] == f"{fallen:.5g} kg"
+    assert kept["observable_units"]["fallen_mass"] == "kg"
+    assert Path("results/snapshot.png").is_file()
+
+
+@pytest.mark.parametrize("option", ["--follow-paper", "--only-paper"])
+def test_only_the_papers_study_follows_the_paper(write_study: WriteStudy, option: str) -> None:
+    code, _, err = dem_warp("calibrate", write_study(), option, "--device", "cpu", "--out", "results")
+    assert (code, Path("results").exists()) == (2, False)
+    assert "only a study whose companion has published runs" in " ".join(err.split())
+
+
+def test_an_angle_that_no_heap_has_cannot_be_calibrated(write_study: WriteStudy) -> None:
+    path = of_a_hopper(write_study)
+    path.write_text(path.read_text("utf-8") + '[target]\nmean = "30 deg"\nsd = "0.5 deg"\nn = 5\n', "utf-8")
+    code, _, err = dem_warp("calibrate", path, "--device", "cpu", "--out", "results")
+    assert (code, Path("results").exists()) == (2, False)
+    assert "which this test does not leave: name an observable of the test" in " ".join(err.split())
+
+
+def test_a_used_folder_is_refused(write_study: WriteStudy) -> None:
+    Path("results").mkdir()
+    Path("results/mine.txt").write_text("mine", encoding="utf-8")
+    for command in ("calibrate", "heap"):
+        code, _, err = dem_warp(command, write_study(), "--device", "cpu", "--out", "results")
+        assert code == 2
+        assert "new or empty" in err
+    assert [path.name for path in Path("results").iterdir()] == ["mine.txt"]
+
+
+def test_an_interruption_says_how_to_go_on(write_study: WriteStudy, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupt(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(api, "run_campaign", interrupt)
+    path = write_study()
+    command = (
+        "calibrate",
+        path,
+        "--out",
+        "my results",
+        "--scale",
+        "stiff",
+        "--device",
+        "cpu",
+        "--workers",
+        2,
+    )
+    code, _, err = dem_warp(*command, "--json")
+    assert code == 130
+    written = f"dem-warp calibrate {path} --out 'my results' --scale stiff --device cpu --workers 2 --json"
+    assert f"Interrupted. Resume with: {written} --resume" in err
+
+
+def test_a_small_real_heap_is_simulated_and_written(write_study: WriteStudy) -> None:
+    path = write_study()
+    command = ("heap", path, "--set", "E=0.5", "--seed", 3, "--device", "cpu", "--json")
+    code, out, _ = dem_warp(*command, "--out", "one")
+    assert code == 0
+    heap = json.loads(out)
+    assert heap == json.loads(Path("one/angle.json").read_text(encoding="utf-8"))
+    assert (heap["settings"], heap["seed"], heap["status"]) == ({"E": 0.5}, 3, "finished")
+    assert heap["provenance"]["study"] == study_hash(load_study(path))
+    assert heap["observables"]["grain_count"] == 30
+    views = [0.5 * (view["left"] + view["right"]) for view in heap["views"]]
+    assert heap["angle"]["mean"] == pytest.approx(np.mean(views), rel=1e-12)
+    spheres = pyvista.read("one/heap.vtp")
+    assert spheres.n_points == 30
+    # Every sphere rests on the plate or on others: Hertz overlaps are far below a tenth of a radius.
+    assert (spheres.points[:, 2] > 0.9 * spheres["radius"]).all()
+    assert Path("one/snapshot.png").stat().st_size > 1000
+    # The same case gives the same bits.
+    assert json.loads(dem_warp(*command, "--out", "two")[1])["views"] == heap["views"]
+
+
+def test_a_heap_of_two_shapes_is_simulated_and_written(write_study: WriteStudy) -> None:
+    shapes = (
+        '[grain.shapes.large]\nsphere = "2 mm"\n[grain.shapes.small]\nsphere = "1.5 mm"\nfraction = 0.4\n\n'
+    )
+    path = write_study(('sphere = "2 mm"\n', ""), ("[wall]", f"{shapes}[wall]"))
+    code, out, _ = dem_warp("heap", path, "--device", "cpu", "--json", "--out", "one")
+    assert (code, json.loads(out)["status"]) == (0, "finished")
+    spheres = pyvista.read("one/heap.vtp")
+    assert spheres.n_points == 30
+    counts = np.bincount(spheres["shape"])
+    # Binomial: four standard deviations about 12 of 30.
+    assert counts[1] == pytest.approx(12, abs=4.0 * np.sqrt(30 * 0.4 * 0.6))
+    for shape, radius in enumerate((2e-3, 1.5e-3)):
+        # Sizes lie within three standard deviations of 5 %.
+        np.testing.assert_allclose(spheres["radius"][spheres["shape"] == shape], radius, rtol=0.15)
+    assert Path("one/snapshot.png").stat().st_size > 1000
+
+
+def test_photographs_become_angles_and_overlays() -> None:
+    save_picture("a.png", triangle(0.5))
+    save_picture("b.png", triangle(0.3))
+    code, out, _ = dem_warp("angle", "a.png", "b.png", "--json", "--overlay", "drawn")
+    assert code == 0
+    angles = [row["mean"] for row in json.loads(out)["pictures"]]
+    # The smooth-heap tolerance of `imaging` at this width.
+    assert angles == pytest.approx(np.degrees(np.arctan([0.5, 0.3])), abs=0.3)
+    assert sorted(path.name for path in Path("drawn").iterdir()) == ["a-angle.png", "b-angle.png"]
+    code, out, _ = dem_warp("angle", "a.png")
+    assert code == 0
+    assert f"{angles[0]:.2f}" in out
+
+
+def test_a_photograph_without_a_heap_ends_with_2() -> None:
+    save_picture("empty.png", np.full((300, 800), 255, dtype=np.uint8))
+    code, out, err = dem_warp("angle", "empty.png", "--overlay", "drawn")
+    assert (code, out) == (2, "")
+    assert "empty.png" in err
+    assert not Path("drawn").exists()
+
+
+def test_one_bad_photograph_does_not_hide_the_others() -> None:
+    save_picture("a.png", triangle())
+    code, out, err = dem_warp("angle", "a.png", "absent.png", "--json")
+    assert code == 2
+    assert [row["mean"] is None for row in json.loads(out)["pictures"]] == [False, True]
+    assert "absent.png" in err
+
+
+def test_photographs_become_a_target() -> None:
+    for name, slope in (("a", 0.5), ("b", 0.52), ("c", 0.54)):
+        save_picture(f"{name}.png", triangle(slope))
+    code, out, _ = dem_warp("angle", "a.png", "b.png", "c.png", "--target")
+    assert code == 0
+    section = tomllib.loads(out)["target"]
+    truth = np.degrees(np.arctan([0.5, 0.52, 0.54]))
+    # Three angles, each within the smooth-heap tolerance.
+    assert float(section["mean"].split()[0]) == pytest.approx(truth.mean(), abs=0.3)
+    assert float(section["sd"].split()[0]) == pytest.approx(truth.std(ddof=1), abs=0.3)
+    assert section["n"] == 3
+    code, _, err = dem_warp("angle", "a.png", "--target")
+    assert code == 2
+    assert "two measured heaps" in err
+    code, out, _ = dem_warp("angle", "a.png", "b.png", "--csv")
+    assert (code, len(out.splitlines())) == (0, 3)
+
+
+def test_a_photograph_given_twice_has_its_rows_and_is_no_target() -> None:
+    Path("views").mkdir()
+    for name in ("a.png", "views/a.png", "views/b.png"):
+        save_picture(name, triangle(0.5))
+    save_picture("c.png", triangle(0.54))
+    code, out, _ = dem_warp("angle", "a.png", "views/a.png", "--csv")
+    assert (code, len(out.splitlines())) == (0, 3)
+    code, out, err = dem_warp("angle", "a.png", "c.png", "views/a.png", "--target")
+    assert (code, out) == (2, "")
+    assert "a.png (--target: picture 1)" in err
+    assert "--target: picture 3" in err
+    # Views of one heap are no repeats.
+    code, _, _ = dem_warp("angle", "c.png", "views/a.png", "views/b.png", "--by", "folder", "--target")
+    assert code == 0
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--crop", "1,2,3"), "--crop"),
+        (("--crop", "10,10,5,20"), "left < right"),
+        (("--plate", "a,b,c,d"), "--plate"),
+        (("--heap", "0"), "counted from 1"),
+        (("--elevation", "70"), "elevation"),
+        (("--by", "name"), "--by"),
+        (("--overlay", "a.png"), "--overlay"),
+    ],
+)
+def test_wrong_words_about_a_photograph_end_with_2(options: tuple[str, str], words: str) -> None:
+    save_picture("a.png", triangle())
+    code, out, err = dem_warp("angle", "a.png", *options)
+    assert (code, out) == (2, "")
+    assert words in err
+
+
+def test_an_unknown_fit_ends_with_2() -> None:
+    save_picture("a.png", triangle())
+    code, _, err = dem_warp("angle", "a.png", "--fit", "wide")
+    assert code == 2
+    assert "flank, middle" in err
+
+
+def test_a_new_study_is_written_once_and_loads() -> None:
+    assert dem_warp("new", "rye")[0] == 0
+    code, _, err = dem_warp("new", "rye")
+    assert code == 2
+    assert "never overwrites" in err
+    assert dem_warp("new", "../rye")[0] == 2
+    assert [path.name for path in Path().iterdir()] == ["rye.toml"]
+
+
+def test_a_clump_is_made_written_and_described() -> None:
+    solid = ("clump", "ellipsoid:6x3x3", "--spheres", 3, "--density", "1000 kg/m^3", "--json")
+    code, out, _ = dem_warp(*solid, "--out", "grain.txt")
+    assert code == 0
+    fitted = json.loads(out)
+    assert len(fitted["spheres_mm"]) == 3
+    # Water: a milligram a cubic millimetre.
+    assert fitted["mass_mg"] == pytest.approx(fitted["volume_mm3"], rel=1e-12)
+    assert 0.5 < fitted["coverage"] < 1.0
+    code, out, _ = dem_warp("clump", "grain.txt", "--json")
+    # The file holds nine decimals of a millimetre.
+    assert json.loads(out)["volume_mm3"] == pytest.approx(fitted["volume_mm3"], rel=1e-7)
+    assert dem_warp(*solid, "--out", "grain.txt")[0] == 2
+
+
+@pytest.mark.parametrize(
+    "arguments", [["sphere:2"], ["cube:2", "--spheres", "3"], ["grain.stl", "--spheres", "3"], ["grain.txt"]]
+)
+def test_a_wrong_shape_ends_with_2(arguments: list[str]) -> None:
+    code, out, err = dem_warp("clump", *arguments)
+    assert (code, out) == (2, "")
+    assert "received" in err
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"), [(0.4, "0 s"), (59.4, "59 s"), (80.0, "1 min 20 s"), (7500.0, "2 h 5 min")]
+)
+def test_times_read_well(seconds: float, text: str) -> None:
+    assert duration(seconds) == text
+
+
+def test_progress_tells_the_time_left(capsys: pytest.CaptureFixture[str]) -> None:
+    from dem_warp import Progress
+
+    halfway = Progress(done=3, total=12, fraction=0.25, phase_counts={"lift": 2, "waiting": 7}, seconds=20.0)
+    assert describe_progress(halfway) == "1 min 0 s left, 3 of 12 cases, 2 lift"
+    # An earlier run had done a fifth: this one did a twentieth in its 20 s.
+    taken_up = Progress(done=0, total=12, fraction=0.2, phase_counts={}, seconds=0.0)
+    assert describe_progress(halfway, taken_up).startswith("5 min 0 s left")
+    with CaseProgress("climb") as show:
+        show(start := Progress(0, 12, 0.01, {}, 1.0))
+        show(halfway)
+        show(Progress(3, 12, 0.26, {}, 21.0))
+    # Without a terminal: nothing in the first two seconds, then a line every ten.
+    assert capsys.readouterr().err.split() == f"climb: 25 %, {describe_progress(halfway, start)}".split()

@@ -1,0 +1,109 @@
+"""Answers before the libraries load: to a wrong study, to ``--help``, to ``new``."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from experiments.commands.early import check_calibration_file, check_heap_file
+from experiments.evidence.performance.answers import WRONG, wrong_study
+from experiments.io.errors import StudyError
+
+ROOT = Path(__file__).resolve().parents[3]
+
+HEAVY = {
+    "warp", "pandas", "scipy", "statsmodels", "sklearn", "cv2", "pyvista", "vtkmodules", "plotly",
+    "matplotlib", "trimesh", "jinja2",
+}  # fmt: skip
+"""Libraries that take from a tenth of a second to seconds to load."""
+
+PROGRAM = """
+import sys
+from experiments.cli import app
+try:
+    app(sys.argv[1:])
+finally:
+    print("LOADED", *sys.modules)
+"""
+
+
+def run(*words: str, folder: Path) -> tuple[int, str, set[str]]:
+    """Run a command; return its exit code, what it says of an error, and the modules that it loaded."""
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM, *words],
+        cwd=folder,
+        env={"PYTHONPATH": str(ROOT), "PATH": ""},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    loaded = set(done.stdout.partition("LOADED")[2].split())
+    assert "experiments.cli" in loaded
+    return done.returncode, done.stderr, loaded
+
+
+@pytest.mark.parametrize("kind", WRONG)
+def test_a_wrong_study_is_answered_without_simulator_statistics_or_pictures(
+    kind: str, tmp_path: Path
+) -> None:
+    study = wrong_study(tmp_path, kind)
+    code, said, loaded = run("calibrate", study.name, "--out", "out", folder=tmp_path)
+    assert code == 2
+    assert said.startswith("Error:")
+    assert HEAVY & loaded == set()
+    assert not (tmp_path / "out").exists()
+
+
+def test_other_commands_check_a_study_as_early(tmp_path: Path) -> None:
+    study = wrong_study(tmp_path, "a wrong unit")
+    for words in (("heap", study.name), ("discover", study.name, "measured.csv")):
+        code, said, loaded = run(*words, folder=tmp_path)
+        assert (code, HEAVY & loaded) == (2, set())
+        assert "needs a unit of density" in said
+
+
+@pytest.mark.parametrize(
+    "kind",
+    [
+        "more grains than a case can have",
+        "a tube that too many grains fill",
+        "a tube narrower than two grains",
+    ],
+)
+def test_a_heap_that_cannot_be_is_refused_as_early(kind: str, tmp_path: Path) -> None:
+    study = wrong_study(tmp_path, kind)
+    code, said, loaded = run("heap", study.name, "--seed", "2", folder=tmp_path)
+    assert (code, HEAVY & loaded) == (2, set())
+    assert "grains" in said
+    assert "scene" in said
+
+
+def test_settings_may_make_a_heap_of_fewer_grains(tmp_path: Path) -> None:
+    path = wrong_study(tmp_path, "a tube that too many grains fill")
+    text = path.read_text(encoding="utf-8").replace('height = "10000 m"\n', "")
+    factor = """
+[[factor]]
+name = "h"
+label = "height"
+parameter = "scene.lifted-cylinder.height"
+low = "40 mm"
+high = "20000 m"
+"""
+    path.write_text(text + factor, encoding="utf-8")
+    check_heap_file(path)
+    with pytest.raises(StudyError, match="at most"):
+        check_calibration_file(path)
+
+
+def test_an_engine_that_is_none_is_answered_as_early(tmp_path: Path) -> None:
+    code, said, loaded = run("calibrate", "--engine", "nobody", folder=tmp_path)
+    assert (code, HEAVY & loaded) == (2, set())
+    assert "liggghts, lammps, yade" in said
+
+
+@pytest.mark.parametrize("words", [("--help",), ("calibrate", "--help"), ("new", "mygrain")])
+def test_help_and_a_new_study_read_no_study(words: tuple[str, ...], tmp_path: Path) -> None:
+    code, _, loaded = run(*words, folder=tmp_path)
+    assert code == 0
+    assert (HEAVY | {"numpy"}) & loaded == set()

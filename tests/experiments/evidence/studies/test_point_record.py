@@ -1,0 +1,106 @@
+"""The record of what further responses buy: gathered, and its page written anew from the cases."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from experiments.calibrate import Campaign, calibrate
+from experiments.evidence.studies.buckwheat.records.point_record import (
+    CASES,
+    STUDY,
+    KeptCases,
+    gather,
+    kept_campaign,
+    write_record_page,
+)
+from experiments.io.errors import InputError
+from experiments.studyfile import Study, load_study
+
+
+def planes(study: Study, table: pd.DataFrame) -> pd.DataFrame:
+    """Heaps and hoppers whose responses are planes of two frictions, with noise from the seed."""
+
+    def case(row: Mapping) -> dict:
+        e, f = (float(factor.to_coded(row[factor.name])) for factor in study.factors[:2])
+        noise = np.random.default_rng(row["seed"]).standard_normal(2)
+        if row["scene"] == "target":
+            density = 0.55 - 0.02 * e + 0.002 * noise[1]
+            return {"angle": 24.0 + 2.0 * e + 5.0 * f + 0.5 * noise[0], "solid_fraction": density}
+        return {"angle": np.nan, "flow_rate": 0.05 - 0.006 * e + 0.001 * noise[0]}
+
+    rows = pd.DataFrame([case(row) for row in table.to_dict("records")], index=table.index)
+    facts = {"status": "finished", "reason": "", "grain_count": 400.0, "simulated_time": 2.0}
+    return pd.concat([table, rows], axis=1).assign(**facts)
+
+
+@pytest.fixture(scope="module")
+def study() -> Study:
+    return load_study(STUDY, "bench")
+
+
+@pytest.fixture(scope="module")
+def campaign(study: Study) -> Campaign:
+    return calibrate(study, lambda table: planes(study, table))
+
+
+@pytest.fixture
+def folder(campaign: Campaign, tmp_path: Path) -> Path:
+    """Lay out what a campaign's folder has of it."""
+    (tmp_path / "out" / "tables").mkdir(parents=True)
+    campaign.tables()["cases"].to_csv(tmp_path / "out" / "tables" / CASES, index=False)
+    (tmp_path / "out" / "results.json").write_text(json.dumps({"provenance": {"device": "cpu"}}))
+    (tmp_path / "out" / "wall_times.csv").write_text("stage,simulated,seconds\nsurface,28,61.0\n")
+    return tmp_path / "out"
+
+
+def test_kept_cases_repeat_the_campaigns_findings_to_the_bit(
+    campaign: Campaign, study: Study, folder: Path, tmp_path: Path
+) -> None:
+    gather("bench", folder, tmp_path / "record")
+    again = kept_campaign(study, tmp_path / "record" / "bench")
+    for stage in ("target", "screening", "selection", "surface", "optimum", "verification"):
+        found, before = again.to_dict()[stage], campaign.to_dict()[stage]
+        assert json.dumps(found) == json.dumps(before), stage
+    assert again.reason == campaign.reason
+
+
+def test_the_page_is_the_same_whenever_it_is_written(folder: Path, tmp_path: Path) -> None:
+    record = tmp_path / "record"
+    gather("bench", folder, record)
+    first = write_record_page(record).read_text(encoding="utf-8")
+    assert write_record_page(record).read_text(encoding="utf-8") == first
+    assert "In all 28 cases in 61 s." in first
+    assert "| density |" in first
+    assert (record / "bench" / "joint.png").stat().st_size > 10_000
+
+
+def test_cases_of_another_campaign_are_refused(campaign: Campaign) -> None:
+    cases = campaign.cases
+    heaps = cases[cases["stage"] == "climb"].drop(columns=["status", "reason", "angle"])
+    kept = KeptCases(cases, "cases.csv")
+    assert len(kept(heaps[["stage", "scene", "run", "replicate", "E", "F", "G", "H", "seed"]])) == len(heaps)
+    plan = heaps[["stage", "scene", "run", "replicate", "E", "F", "G", "H", "seed"]]
+    with pytest.raises(InputError, match="asks for; gather them anew"):
+        kept(plan.assign(seed=1))
+    with pytest.raises(InputError, match="the study's settings"):
+        kept(plan.assign(E=0.5))
+
+
+def test_settings_may_end_in_other_digits_on_another_machine(campaign: Campaign) -> None:
+    heaps = campaign.cases.query("stage == 'climb'")
+    plan = heaps[["stage", "scene", "run", "replicate", "E", "F", "G", "H", "seed"]]
+    kept = KeptCases(campaign.cases, "cases.csv")
+    assert (kept(plan.assign(E=plan["E"] * (1 + 1e-10)))["E"] == heaps["E"].to_numpy()).all()
+    with pytest.raises(InputError, match="the study's settings"):
+        kept(plan.assign(E=plan["E"] * (1 + 1e-6)))
+
+
+def test_a_folder_without_a_campaign_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="a folder to gather from must hold"):
+        gather("bench", tmp_path, tmp_path / "record")

@@ -1,0 +1,279 @@
+"""The released benchmark, the command that answers it, and the record of answers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from typer.testing import CliRunner
+
+from experiments.evidence.trials.baselines import benchmark_files, record, run
+from experiments.evidence.trials.baselines.answers_table import add_answer, file_of, read_answers
+from experiments.evidence.trials.baselines.benchmark_files import (
+    Benchmark,
+    Posed,
+    load_answers,
+    load_benchmark,
+    write_benchmark,
+)
+from experiments.evidence.trials.baselines.compare import (
+    Paired,
+    Parts,
+    areas,
+    comparisons,
+    due,
+    held,
+    judged,
+    paired,
+    power,
+    summary,
+)
+from experiments.evidence.trials.baselines.draw import round_of
+from experiments.evidence.trials.baselines.library import ALONE, methods
+from experiments.evidence.trials.baselines.protocol import Answer
+from experiments.evidence.trials.drawing import STRONG, Declared
+from experiments.evidence.trials.roc import auroc
+from experiments.evidence.trials.truth import Kind, Label, write_labels
+from experiments.io.errors import InputError
+from experiments.report.kit.markdown import markdown_table
+
+RECORDS = Path(benchmark_files.FOLDER).parents[1] / "record"
+KEPT = RECORDS / "baselines"
+
+
+@pytest.fixture(scope="module")
+def released() -> Benchmark:
+    return load_benchmark()
+
+
+def test_the_release_is_small_and_every_trial_has_its_answer_apart(released: Benchmark) -> None:
+    files = list(benchmark_files.FOLDER.iterdir())
+    assert sum(file.stat().st_size for file in files) < 5_000_000
+    labels = load_answers()
+    assert [trial.name for trial in released.trials] == list(labels)
+    for trial in released.trials:
+        label, library = labels[trial.name], set(released.banks[trial.bank].space.names)
+        hidden = set(label.mechanisms)
+        assert hidden <= library
+        assert (hidden <= set(trial.withheld)) == (label.kind in (Kind.NULL, Kind.WITHHELD))
+        shape = 8, len(trial.measured.observables)
+        assert {trial.measured.values[name].shape for name in trial.measured.conditions} == {shape}  # noqa: PD011
+
+
+def test_any_first_part_of_the_trials_is_balanced(released: Benchmark) -> None:
+    labels = load_answers()
+    kinds = pd.Series([str(labels[trial.name].kind) for trial in released.trials])
+    whole = kinds.value_counts(normalize=True)
+    # A round of every bank has some 23 trials.
+    part = kinds[:69].value_counts(normalize=True)
+    np.testing.assert_allclose(part[whole.index], whole, atol=0.03)
+
+
+def test_a_benchmark_is_read_as_it_was_written(tmp_path: Path, released: Benchmark) -> None:
+    few = Benchmark(released.banks, released.rules, released.libraries, released.trials[:3])
+    write_benchmark(tmp_path, few, list(load_answers().values())[:3])
+    again = load_benchmark(tmp_path)
+    assert again.rules == released.rules
+    assert again.libraries == released.libraries
+    for one, other in zip(few.trials, again.trials, strict=True):
+        assert (one.name, one.bank, one.withheld) == (other.name, other.bank, other.withheld)
+        for name in one.measured.conditions:
+            np.testing.assert_array_equal(one.measured.values[name], other.measured.values[name])  # noqa: PD011
+    np.testing.assert_array_equal(again.banks[1].values, released.banks[1].values)
+    assert load_answers(tmp_path) == dict(list(load_answers().items())[:3])
+
+
+def test_files_of_no_benchmark_are_refused(tmp_path: Path, released: Benchmark) -> None:
+    with pytest.raises(InputError, match="must be a file"):
+        load_benchmark(tmp_path)
+    np.savez(tmp_path / "trials.npz", trial=np.array(["a"]))
+    with pytest.raises(InputError, match="needs the arrays"):
+        load_benchmark(tmp_path)
+    stray = Posed("t", 7, (), released.trials[0].measured)
+    with pytest.raises(InputError, match="numbers of banks"):
+        Benchmark(released.banks, released.rules, released.libraries, (stray,))
+
+
+def test_a_round_has_every_kind_and_sizes_within_the_ranges() -> None:
+    library = (
+        Declared("a", 0.0, 1.0, 0.3),
+        Declared("b", 0.0, 1.0, 0.5, kin=("c",)),
+        Declared("c", 0.0, 1.0, 0.5),
+    )
+    drawn = [list(round_of(library, number, np.random.default_rng(number))) for number in range(6)]
+    for hidden in drawn:
+        kinds = [kind for kind, _ in hidden]
+        assert [kinds.count(kind) for kind in (Kind.NULL, Kind.SINGLE, Kind.PAIR, Kind.WITHHELD)] == [
+            4,
+            3,
+            1,
+            2,
+        ]
+        for kind, effects in hidden:
+            assert {effect.name for effect, _ in effects} != {"b", "c"}
+            for effect, multiple in effects:
+                assert 0.5 <= multiple <= effect.strongest
+                assert kind is Kind.SINGLE or multiple >= STRONG
+    sizes = {m for hidden in drawn for kind, effects in hidden if kind is Kind.SINGLE for _, m in effects}
+    assert sizes == {0.5, 1.0, 1.5, 2.0, 3.0}
+
+
+def test_the_command_goes_on_where_it_stopped(tmp_path: Path) -> None:
+    command = [str(tmp_path), "--methods", "discrepancy", "--count"]
+    app = run.typer.Typer()
+    app.command()(run.main)
+    for count in ("1", "2"):
+        done = CliRunner().invoke(app, [*command, count])
+        assert done.exit_code == 0, done.output
+    answers = read_answers(file_of(tmp_path, "discrepancy"))
+    assert list(answers["trial"]) == ["trial-001", "trial-002"]
+    refused = CliRunner().invoke(app, [str(tmp_path), "--methods", "guessing"])
+    assert refused.exit_code == 2
+    assert "guessing" in refused.output
+
+
+def _label(trial: str, kind: Kind, *names: str, multiple: float = 2.0) -> Label:
+    return Label(trial, kind, (0.5,), tuple((n, 1.0) for n in names), tuple(multiple for _ in names), 1, "")
+
+
+LABELS = [
+    _label("n", Kind.NULL),
+    _label("s", Kind.SINGLE, "a"),
+    _label("w", Kind.SINGLE, "a", multiple=0.5),
+    _label("p", Kind.PAIR, "a", "b"),
+    _label("o", Kind.WITHHELD, "a"),
+]
+GOOD = {
+    "n": Answer(0.1, False),
+    "s": Answer(5.0, True, ("a",), outside=0.3),
+    "w": Answer(0.2, False),
+    "p": Answer(6.0, True, ("a", "b"), outside=0.2),
+    "o": Answer(4.0, True, unknown=True, outside=7.0),
+}
+POOR = {
+    "n": Answer(3.0, True, ("a",)),
+    "s": Answer(5.0, True, ("a", "b"), tied=True),
+    "w": Answer(0.2, False),
+    "p": Answer(6.0, True, ("a",)),
+    "o": Answer(4.0, True, ("b",)),
+}
+
+
+def _kept(folder: Path) -> None:
+    write_labels(folder / "labels.json", LABELS)
+    for method, answers in ((ALONE, GOOD), ("BIC", POOR)):
+        for trial, answer in answers.items():
+            add_answer(file_of(folder, method), trial, answer, 1.0)
+
+
+def test_answers_are_judged_by_what_is_hidden(tmp_path: Path) -> None:
+    _kept(tmp_path)
+    table = record.read_record(tmp_path)
+    good, poor = (rows.set_index("trial") for _, rows in table.groupby("method", sort=False))
+    assert list(good.index[good["right"]]) == ["n", "s", "p", "o"]
+    assert not good["wrong"].any()
+    assert list(poor.index[poor["right"]]) == []
+    assert list(poor.index[poor["wrong"]]) == ["n", "o"]
+    assert list(poor.index[poor["tied_right"]]) == ["s"]
+    first, second = summary(table).to_dict("records")
+    assert (first["false alarms"], first["named"], first["not in the library: unknown"]) == (
+        "0 of 1", "1 of 1", "1 of 1"
+    )  # fmt: skip
+    assert (second["false alarms"], second["in a tie"], second["a name for it"]) == (
+        "1 of 1",
+        "1 of 1",
+        "1 of 1",
+    )
+    assert power(table, "alarm").loc[0.5, "trials"] == 1
+    [row] = comparisons(table, ALONE).to_dict("records")
+    assert row["no false alarm"].startswith("1 : 0 of 1")
+    assert row["right answer"].startswith("4 : 0 of 4")
+
+
+def test_what_was_declared_not_resolvable_may_be_named_where_it_is_hidden_and_no_answer_is_due() -> None:
+    labels = {name: _label(name, Kind.UNRESOLVED, "a") for name in ("right", "wrong")}
+    rows = [
+        {"trial": "right", "alarm": True, "named": "a", "tied": False, "unknown": False},
+        {"trial": "wrong", "alarm": True, "named": "b", "tied": False, "unknown": False},
+    ]
+    answers = pd.DataFrame(rows).assign(method="m")
+    table = judged(answers, labels)
+    assert list(table["wrong"]) == [False, True]
+    assert not due(table).any()
+    bound = held(answers, ["b"])
+    assert list(bound["named"]) == ["", "b"]
+    assert list(bound["unknown"]) == [True, False]
+
+
+def test_sizes_that_differ_are_classed(tmp_path: Path) -> None:
+    sizes = {"s": 1.6, "t": 1.8, "u": 2.4}
+    labels = {name: _label(name, Kind.SINGLE, "a", multiple=size) for name, size in sizes.items()}
+    rows = [
+        {"trial": name, "alarm": name != "s", "named": "", "tied": False, "unknown": False} for name in sizes
+    ]
+    shares = power(judged(pd.DataFrame(rows).assign(method="m"), labels), "alarm")
+    assert list(shares.index) == [1.7, 2.4]
+    assert list(shares["trials"]) == [2, 1]
+    assert list(shares["m"]) == [0.5, 1.0]
+
+
+def test_records_within_a_record_stand_beside_it(tmp_path: Path) -> None:
+    _kept(tmp_path)
+    _kept(tmp_path / "other")
+    page = record.write_methods_page(tmp_path).read_text(encoding="utf-8")
+    beside = page[page.index("## On other heaps") :]
+    first = "0 of 1 | 1 of 1 | 1 of 1 | 1 of 1 | 0 of 5 | 1.000 | 1.000 |  |"
+    for heaps in ("emulated", "[other](other/README.md)"):
+        assert f"| {ALONE} | {heaps} | {first}" in beside
+    assert (
+        "| BIC | emulated | 1 of 1 | 0 of 1 | 0 of 1 | 0 of 1 | 2 of 5 | 0.750 |  | 4 : 0, p = 0.12 |"
+        in beside
+    )
+
+
+def test_the_page_is_written_from_the_record_alone(tmp_path: Path) -> None:
+    _kept(tmp_path)
+    page = record.write_methods_page(tmp_path).read_text(encoding="utf-8")
+    assert "5 trials that every method has answered" in page
+    assert "| BIC | 1 of 1 |" in page
+    assert {path.name for path in tmp_path.glob("*.png")} == {"roc.png", "power.png"}
+
+
+def test_areas_and_paired_tests_are_those_of_the_textbook() -> None:
+    assert auroc(np.array([3.0, 2.0]), np.array([1.0])) == 1.0
+    assert auroc(np.array([1.0]), np.array([1.0])) == 0.5
+    assert auroc(np.array([1.0, 4.0]), np.array([2.0, 3.0])) == 0.5
+    # Ten trials that differ, one of them for the first: 2 (1 + 10) / 2^10.
+    assert Paired(1, 9, 50).p == pytest.approx(22.0 / 1024.0)
+    assert Paired(0, 0, 5).p == 1.0
+    one, other = pd.Series({"a": True, "b": True, "c": False}), pd.Series({"b": False, "c": True, "d": True})
+    assert paired(one, other) == Paired(1, 1, 2)
+
+
+def test_weak_effects_are_not_among_the_strong() -> None:
+    rows = [
+        {"trial": one.trial, "alarm": False, "named": "", "tied": False, "unknown": False} for one in LABELS
+    ]
+    table = judged(pd.DataFrame(rows).assign(method="m"), {one.trial: one for one in LABELS})
+    parts = Parts(table)
+    assert list(parts.strong["trial"]) == ["s"]
+    assert list(parts.foreign["trial"]) == ["o"]
+
+
+def test_the_kept_record_is_of_the_released_trials_and_its_page_says_what_its_files_say(
+    tmp_path: Path,
+) -> None:
+    for file in KEPT.rglob("*"):
+        if file.is_file() and file.suffix != ".png":
+            (tmp_path / file.relative_to(KEPT)).parent.mkdir(parents=True, exist_ok=True)
+            (tmp_path / file.relative_to(KEPT)).write_bytes(file.read_bytes())
+    table = record.read_record(tmp_path)
+    assert set(table["trial"]) <= set(load_answers())
+    assert list(dict.fromkeys(table["method"])) == ["search", *methods(None)]
+    written = record.write_methods_page(tmp_path).read_text(encoding="utf-8")
+    assert written == (KEPT / "README.md").read_text(encoding="utf-8")
+    released = (benchmark_files.FOLDER / "README.md").read_text(encoding="utf-8")
+    assert markdown_table(summary(table)).strip() in released
+    assert markdown_table(areas(table)).strip() in released

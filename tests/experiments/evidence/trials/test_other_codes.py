@@ -1,0 +1,372 @@
+"""A second reality: inputs say what was hidden, films are read as they were drawn, codes run them."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from dem_warp import Case, ClumpShape, GrainPopulation
+from dem_warp.laws.capillary import CapillaryBridge
+from dem_warp.laws.jkr import JKR
+from dem_warp.scenes.surfaces import bed_level
+from doe.discrepancy import Point
+from experiments.cases import OwnWorkers
+from experiments.cases.engines.program import AnswerError
+from experiments.cases.store.outcome_table import OutcomeTable
+from experiments.evidence.trials.drawing import Plan
+from experiments.evidence.trials.generate import STUDY
+from experiments.evidence.trials.other_codes.effects import DECLARED, STRANGERS
+from experiments.evidence.trials.other_codes.generate import PLAN, in_turn, plan_for, write_reality
+from experiments.evidence.trials.other_codes.liggghts_input import energy_density, liggghts_files, wetting
+from experiments.evidence.trials.other_codes.making import MADE
+from experiments.evidence.trials.other_codes.program import CODES, engine_for
+from experiments.evidence.trials.other_codes.reading import (
+    Frame,
+    Grasp,
+    filmed_observables,
+    read_balance,
+    read_film,
+)
+from experiments.evidence.trials.other_codes.setting import Setting
+from experiments.evidence.trials.other_codes.simulator import OtherCodeSimulator
+from experiments.evidence.trials.other_codes.surfaces import Bench
+from experiments.evidence.trials.truth import Kind, Label
+from experiments.io.errors import InputError
+from experiments.studyfile import load_study
+from experiments.studyfile.observables import NAMES, OUTLINE
+
+THETA = {"mu_gg": 0.6, "mu_gw": 0.5, "e_gg": 0.3}
+COUNT = 24
+SMALL = {"scene": {"lifted-cylinder": {"grain_count": COUNT, "height": "25 mm"}}}
+PROGRAMS = {"lammps": "lmp", "liggghts": "liggghts"}
+SETTING = Setting(1.0, 1000.0, 48, 4e-3, "cdt")
+SETTINGS = {"lammps": replace(SETTING, rolling="sds"), "liggghts": SETTING}
+G = 9.81
+
+with_programs = pytest.mark.parametrize(
+    "code", [pytest.param(code, marks=pytest.mark.program(name)) for code, name in PROGRAMS.items()]
+)
+
+
+def case_of(code: str = "liggghts") -> Case:
+    """A test of few grains, in the setting of a code's workshop."""
+    case = load_study(STUDY, "bench", SMALL).case(THETA, seed=3)
+    return SETTINGS[code].of(case, code)
+
+
+SHAPE = case_of().grains.mixture.shapes[0]
+
+
+def test_rolling_friction_is_told_to_other_codes_with_the_lever_that_the_study_has() -> None:
+    # the lever is R* there: half a sphere's radius among spheres, all of it on a wall
+    sphere = ClumpShape.sphere(1e-3)
+    study = {"contact": {kind: {"rolling_friction": 0.1} for kind in ("grain-grain", "grain-wall")}}
+    told = {}
+    for laws in ("edem", "relative"):
+        case = load_study(STUDY, "bench", study | {"solver": {"laws": laws}}).case(THETA, seed=3)
+        case = replace(case, grains=GrainPopulation(sphere, case.grain_material))
+        theirs = SETTING.of(case, "liggghts")
+        told[laws] = [theirs.grain_grain.rolling_friction, theirs.grain_wall.rolling_friction]
+    assert told["edem"] == pytest.approx([0.2, 0.1], rel=1e-12)
+    assert told["relative"] == [0.1, 0.1]
+
+
+# ---- the film ----------------------------------------------------------------------------------------------
+
+
+def rows_of(positions: np.ndarray, sizes: np.ndarray, seed: int, velocity: np.ndarray) -> np.ndarray:
+    """Rows of a dump of turned grains that move alike, in a strange order."""
+    rng = np.random.default_rng(seed)
+    turns = Rotation.random(len(positions), random_state=seed)
+    rows = []
+    for number, (place, size) in enumerate(zip(positions, sizes, strict=True)):
+        centers = place + turns[number].apply(SHAPE.centers * size)
+        for sphere, (center, radius) in enumerate(zip(centers, SHAPE.radii * size, strict=True)):
+            identity = number * SHAPE.sphere_count + sphere + 1
+            rows.append([identity, number + 1, *center, *velocity, radius])
+    return rng.permutation(np.array(rows))
+
+
+def test_a_grain_is_found_by_its_spheres() -> None:
+    rng = np.random.default_rng(1)
+    places, sizes = rng.uniform(-0.01, 0.01, (7, 3)), rng.uniform(0.9, 1.1, 7)
+    velocity = np.array([0.1, -0.2, 0.3])
+    frame = Grasp(SHAPE).frame(5, rows_of(places, sizes, 2, velocity))
+    # nine digits of metres in, double precision through
+    assert frame.positions == pytest.approx(places, abs=1e-12)
+    assert frame.sizes == pytest.approx(sizes, rel=1e-12)
+    assert frame.velocities == pytest.approx(np.tile(velocity, (7, 1)), abs=1e-12)
+    assert frame.spheres.shape == (7, SHAPE.sphere_count, 4)
+
+
+def test_spheres_that_are_no_grain_are_refused() -> None:
+    rows = rows_of(np.zeros((1, 3)), np.ones(1), 2, np.zeros(3))
+    rows[0, 2] += 1e-4
+    with pytest.raises(AnswerError, match="not where its shape has them"):
+        Grasp(SHAPE).frame(0, rows)
+    with pytest.raises(AnswerError, match="every grain must have 3 spheres"):
+        Grasp(SHAPE).frame(0, rows[:2])
+
+
+def test_spheres_of_a_grain_that_has_left_are_passed_over() -> None:
+    rows = rows_of(np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]]), np.ones(2), 2, np.zeros(3))
+    gone = np.flatnonzero(rows[:, 1] == 2)
+    rows[gone, 1] = -1
+    frame = Grasp(SHAPE).frame(5, np.delete(rows, gone[0], axis=0))
+    assert frame.positions == pytest.approx(np.zeros((1, 3)), abs=1e-12)
+
+
+def test_a_film_that_breaks_off_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "film.dump"
+    with pytest.raises(AnswerError, match=r"wrote no film\.dump"):
+        list(read_film(path, SHAPE))
+    head = "ITEM: TIMESTEP\n{}\nITEM: NUMBER OF ATOMS\n3\nITEM: BOX BOUNDS ff ff ff\n0 1\n0 1\n0 1\n"
+    row = " ".join(["0.0"] * 9)
+    path.write_text(head.format(4) + f"ITEM: ATOMS id mol x y z vx vy vz radius\n{row}\n{row}\n")
+    with pytest.raises(AnswerError, match="step 4 must have 3 rows, got 2"):
+        list(read_film(path, SHAPE))
+    (tmp_path / "balance.txt").write_text("# step force\n# second\n100 -0.5\n150 -0.25\n")
+    assert read_balance(tmp_path / "balance.txt") == {100: -0.5, 150: -0.25}
+
+
+FALL_STEPS, LOOK = 4000, 50
+
+
+def _film(case: Case, places: np.ndarray) -> Iterator[Frame]:
+    """Film of a bed that shrinks to a tenth of its height at one rate, and then lies still."""
+    still = round((case.scene.lift_time + case.scene.rest_time + 0.1) / case.time_step)
+    for step in range(0, FALL_STEPS + still, LOOK):
+        fallen = min(step / FALL_STEPS, 1.0)
+        now = places * np.array([1.0, 1.0, 1.0 - 0.9 * fallen])
+        speed = 0.0 if fallen == 1.0 else 0.9 / (FALL_STEPS * case.time_step)
+        velocity = np.stack([0 * places[:, 2], 0 * places[:, 2], -speed * places[:, 2]], axis=1)
+        numbers, sizes = np.arange(1, len(places) + 1), np.ones(len(places))
+        spheres = now[:, None] + SHAPE.centers[None]
+        radii = np.broadcast_to(SHAPE.radii[None, :, None], (len(places), SHAPE.sphere_count, 1))
+        yield Frame(step, numbers, now, velocity, sizes, np.concatenate([spheres, radii], axis=2))
+
+
+def test_times_and_drag_of_a_drawn_film_are_those_it_was_drawn_with() -> None:
+    case = case_of()
+    rng = np.random.default_rng(4)
+    radius = case.scene.diameter / 2
+    places = np.column_stack([rng.uniform(-0.6, 0.6, (60, 2)) * radius, rng.uniform(0.002, 0.02, 60)])
+    mass = 60 * case.grain_material.density * SHAPE.volume
+    # a quarter of the weight hangs on the tube in every step
+    frames = list(_film(case, places))
+    forces = {frame.step: -0.25 * mass * G for frame in frames[1:]}
+    seen, last, failure = filmed_observables(case, iter(frames), forces)
+    assert failure == ""
+    assert seen["wall_drag"] == pytest.approx(0.25, rel=1e-6)
+    reach = case.grains.grain_reach
+    top = bed_level(places, (radius, radius), reach)
+    assert seen["fill_height"] == pytest.approx(top, rel=1e-12)
+    # the level is half a grain above tops that sink at one rate; between two looks it is straight
+    half = 0.5 * reach
+    for name, part in (("t75", 0.75), ("t55", 0.55)):
+        fallen = (1.0 - (part * top - half) / (top - half)) / 0.9
+        assert seen[name] == pytest.approx(fallen * FALL_STEPS * case.time_step, rel=1e-9)
+    assert seen["centre_height"] == pytest.approx(0.1 * places[:, 2].mean(), rel=1e-6)
+    assert seen["rolled_fraction"] == pytest.approx(0.0, abs=1e-12)
+    assert len(last.numbers) == 60
+
+
+def test_a_film_without_an_end_and_a_look_without_its_force_are_refused() -> None:
+    case = case_of()
+    places = np.column_stack([np.zeros((5, 2)), np.linspace(0.002, 0.02, 5)])
+    frames = list(_film(case, places))
+    forces = {frame.step: 0.0 for frame in frames}
+    with pytest.raises(AnswerError, match="ends before the tube is clear"):
+        filmed_observables(case, iter(frames[:20]), forces)
+    with pytest.raises(AnswerError, match=f"step {LOOK}: the balance has no force"):
+        filmed_observables(case, iter(frames), {})
+    with pytest.raises(AnswerError, match="no frame"):
+        filmed_observables(case, iter([]), {})
+
+
+# ---- effects -----------------------------------------------------------------------------------------------
+
+
+def test_the_energy_density_parts_spheres_as_hard_as_jkr() -> None:
+    work, radius, modulus = 0.02, 1.35e-3, 1.2e5
+    density = energy_density(work, radius, modulus)
+    overlap = np.linspace(0.0, 1e-4, 400_001)
+    reduced = radius / 2
+    force = 4 / 3 * modulus * math.sqrt(reduced) * overlap**1.5 - density * 2 * math.pi * reduced * overlap
+    # the grid is fine enough for six digits at a minimum
+    assert -force.min() == pytest.approx(1.5 * math.pi * work * reduced, rel=1e-6)
+
+
+def test_bridges_pull_alike_where_spheres_touch_and_break_alike() -> None:
+    bridge = CapillaryBridge(surface_tension=0.01, bridge_volume=5e-11)
+    radius = 1.35e-3
+    part, tension = wetting(bridge, radius)
+    # LIGGGHTS takes of each sphere the part of its liquid in the cap that the other one covers
+    cap = 0.5 * (1.0 - math.sqrt(1.0 - 0.25))
+    volume = 2 * cap * part * 4 / 3 * math.pi * radius**3
+    assert volume == pytest.approx(bridge.bridge_volume, rel=1e-12)
+    scaled = math.log(volume / radius**3)
+    force = math.pi * tension * radius * (math.exp(0.48 - 0.0082 * scaled) + 0.078 + 0.0018 * scaled)
+    assert force == pytest.approx(2 * math.pi * radius * bridge.surface_tension, rel=1e-12)
+
+
+def test_each_stranger_changes_the_case_and_keeps_the_mean_mass() -> None:
+    case = case_of()
+    whole = Bench(case).templates
+    for effect in STRANGERS.values():
+        changed = effect.change(case, effect.maximum)
+        assert changed != case
+        templates = Bench(changed).templates
+        assert sum(t.fraction * t.mass for t in templates) == pytest.approx(
+            sum(t.fraction * t.mass for t in whole), rel=1e-6
+        )
+    assert [each.name for each in DECLARED] == list(STRANGERS)
+
+
+def test_the_plate_of_known_friction_is_not_made_slick() -> None:
+    case = case_of()
+    known = replace(case, scene=replace(case.scene, plate_friction=0.8))
+    assert STRANGERS["slick_plate"].change(known, 0.9) == known
+    slick = STRANGERS["slick_plate"].change(case, 0.9)
+    assert slick.scene.plate_friction == pytest.approx(0.1 * case.grain_wall.static_friction)
+
+
+def liggghts_text(case: Case) -> str:
+    return liggghts_files(Bench(case))["lift.in"]
+
+
+def test_liggghts_is_told_what_is_hidden() -> None:
+    case = case_of()
+    assert "cohesion" not in liggghts_text(case)
+    adhesive = replace(case, mechanisms=(JKR(between="grains", work_of_adhesion=0.02),))
+    text = liggghts_text(adhesive)
+    # among grains alone: the walls' laws have no adhesion
+    assert "pair_style gran model hertz tangential history cohesion sjkr" in text
+    assert "wall/gran model hertz tangential history rolling_friction" in text
+    turning = STRANGERS["turning_tube"].change(case, 5.0)
+    unfixed = re.findall(r"unfix (turn|lift)", liggghts_text(turning))
+    assert unfixed == ["turn", "lift"]  # motions that are superposed are taken off in reverse order
+    slippery = liggghts_text(STRANGERS["slippery_class"].change(case, 0.5))
+    friction = np.array(
+        slippery.split("coefficientFriction peratomtypepair 4 ")[1].split("\n")[0].split(), float
+    ).reshape(4, 4)
+    assert friction == pytest.approx(friction.T)
+    assert friction[3, 0] / friction[0, 0] == pytest.approx(friction[3, 1] / friction[0, 1])
+    assert friction[3, 3] < friction[0, 0]
+    shaken = replace(case, scene=replace(case.scene, vibration_amplitude=1e-4))
+    assert "wiggle amplitude 0 0 0.0001 period 0.02" in liggghts_text(shaken)
+
+
+def test_a_conical_tube_is_right_at_half_its_height() -> None:
+    case = STRANGERS["conical_tube"].change(case_of(), 3.0)
+    numbers = re.findall(r"vertex (\S+) (\S+) (\S+)", liggghts_files(Bench(case))["tube.stl"])
+    corners = np.array(numbers, dtype=float)
+    inner = np.hypot(corners[:, 0], corners[:, 1]) * math.cos(math.pi / SETTING.tube_sides)
+    low, high = inner[corners[:, 2] == 0.0], inner[corners[:, 2] > 0.0]
+    assert low.min() + high.min() == pytest.approx(case.scene.diameter, rel=1e-6)
+    slope = (low.min() - high.min()) / case.scene.height
+    assert math.degrees(math.atan(slope)) == pytest.approx(3.0, rel=1e-6)
+
+
+# ---- the generator -----------------------------------------------------------------------------------------
+
+
+def test_a_setting_is_the_trials_own_and_always_the_same() -> None:
+    settings = {Setting.drawn("liggghts", seed) for seed in range(30)}
+    assert len(settings) == 30
+    assert {setting.rolling for setting in settings} == {"cdt", "epsd2"}
+    assert Setting.drawn("liggghts", 7) == Setting.drawn("liggghts", 7)
+    ours, theirs = load_study(STUDY, "bench").case(THETA, 1), Setting.drawn("liggghts", 7)
+    case = theirs.of(ours, "liggghts")
+    assert case.time_step == pytest.approx(theirs.step_share * ours.time_step)
+    assert case.laws.sliding == "spring_free"
+
+
+def test_the_plan_holds_at_least_120_trials_of_what_the_code_can_make() -> None:
+    plan = plan_for("liggghts", PLAN)
+    assert plan.mechanisms == tuple(MADE["liggghts"])
+    singles = plan.strong * len(plan.mechanisms)
+    assert (plan.nulls, singles, plan.pairs) == (40, 48, 12)
+    assert plan.nulls + singles + plan.pairs + plan.strangers * len(STRANGERS) >= 120
+    with pytest.raises(InputError, match="liggghts makes"):
+        plan_for("liggghts", Plan(mechanisms=("air_drag",)))
+    with pytest.raises(InputError, match="must be one of lammps, liggghts"):
+        engine_for("edem")
+
+
+def test_trials_are_measured_evenly_over_their_classes() -> None:
+    rng = np.random.default_rng(3)
+    drawn = [(Kind.NULL, ())] * 20 + [(Kind.PAIR, ("a", "b")), (Kind.PAIR, ("a", "c"))] * 3
+    drawn += [
+        (kind, (name,)) for kind, name in ((Kind.SINGLE, "a"), (Kind.SINGLE, "b"), (Kind.STRANGER, "d"))
+    ] * 4
+    labels = [
+        Label(f"t-{n:02d}", drawn[at][0], (), tuple((name, 1.0) for name in drawn[at][1]), (), n, "")
+        for n, at in enumerate(rng.permutation(len(drawn)))
+    ]
+    order = in_turn(labels)
+    assert {label.trial for label in order} == {label.trial for label in labels}
+    for kind in Kind:
+        seen = np.cumsum([label.kind is kind for label in order])
+        even = seen[-1] * (np.arange(len(order)) + 1) / len(order)
+        # each class is half a trial off its share at most, and no kind here has more than two
+        assert np.abs(seen - even).max() < 2.0
+
+
+@pytest.mark.parametrize("code", CODES)
+def test_the_reality_says_how_each_effect_is_made(code: str, tmp_path: Path) -> None:
+    write_reality(tmp_path / "reality.json", code)
+    text = (tmp_path / "reality.json").read_text()
+    assert all(name in text for name in (*MADE[code], *STRANGERS))
+
+
+# ---- the codes themselves ----------------------------------------------------------------------------------
+
+
+def observed(code: str, folder: Path, *sizes: tuple[tuple[str, float], ...]) -> list[dict[str, float]]:
+    """Observables of small tests that a code runs, each with the sizes of some effects."""
+    study, table = load_study(STUDY, "bench", SMALL), OutcomeTable(folder / "outcomes.sqlite")
+    points = [Point(tuple(THETA.values()), own, "base", 12) for own in sizes]
+    with OtherCodeSimulator(study, code, SETTINGS[code], table, OwnWorkers("cpu", 1)) as simulator:
+        outcomes = simulator(points)
+    assert outcomes.reasons == ("",) * len(points)
+    return [dict(zip(simulator.observables, row, strict=True)) for row in outcomes.values]
+
+
+@with_programs
+def test_a_code_makes_a_heap_that_our_functions_read(code: str, tmp_path: Path) -> None:
+    [seen] = observed(code, tmp_path, ())
+    assert set(seen) == {*NAMES, *(each.name for each in OUTLINE)}
+    assert np.isfinite(list(seen.values())).all()
+    scene = case_of().scene
+    assert 0.0 < seen["t75"] < seen["t55"] < scene.lift_time
+    # grains of 2.3 mm reach, 24 of them in a tube of 14 mm: two or three layers and more
+    assert 0.5e-2 < seen["fill_height"] < scene.height
+    assert 0.0 < seen["wall_drag"] < 1.0
+    # it is kept: no program is asked for again
+    assert len(OutcomeTable(tmp_path / "outcomes.sqlite")) == 1
+    assert observed(code, tmp_path, ()) == [seen]
+
+
+@with_programs
+def test_a_code_makes_every_effect(code: str, tmp_path: Path) -> None:
+    sizes = {name: _largest(name) for name in MADE[code]}
+    sizes |= {name: effect.maximum for name, effect in STRANGERS.items()}
+    without, *with_one = observed(code, tmp_path, (), *(((name, size),) for name, size in sizes.items()))
+    for name, seen in zip(sizes, with_one, strict=True):
+        assert np.isfinite(list(seen.values())).all(), name
+        assert seen != without, name
+
+
+def _largest(effect: str) -> float:
+    from experiments.discover.library import library_for
+
+    [mechanism] = [each for each in library_for(load_study(STUDY, "bench")) if each.name == effect]
+    return mechanism.maximum

@@ -1,0 +1,183 @@
+"""Heaps that LIGGGHTS, LAMMPS and Yade left, measured by the code that measures dem-warp's own.
+
+The files under ``data`` were written by LIGGGHTS-PUBLIC 3.8.0, LAMMPS and Yade 2023.02a of Debian 12 with the
+scripts beside them.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+import pytest
+from commandline import dem_warp
+from scipy.spatial import cKDTree
+
+from experiments.grains.spheres import read_spheres
+from experiments.io.errors import InputError
+from imaging import PictureError, heap_angle
+from imaging.drawing.ground import find_ground
+from imaging.geometry import Spheres
+
+DATA = Path(__file__).parent / "data"
+
+
+def measured(*arguments: object) -> list[dict]:
+    code, out, err = dem_warp("angle", *arguments, "--json")
+    assert code == 0, err
+    return json.loads(out)["pictures"]
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("liggghts_spheres.dump", "liggghts_scaled.dump", "liggghts_20000.vtk"),
+        ("lammps_scaled.dump", "lammps_unwrapped.dump"),
+        ("yade_spheres.txt", "yade_spheres_id.txt", "yade_-spheres-00000000.vtk", "yade-spheres.20000.vtu"),
+    ],
+)
+def test_one_heap_has_the_same_spheres_in_every_format(names: tuple[str, ...]) -> None:
+    first, *others = (read_spheres(DATA / name).spheres for name in names)
+    for other in others:
+        distance, nearest = cKDTree(first).query(other)
+        assert sorted(nearest) == list(range(len(first)))
+        # Six digits of a place in a box of 0.13 m.
+        assert distance.max() < 1e-6
+
+
+def test_the_angle_is_that_of_the_spheres_on_the_plate_of_the_script() -> None:
+    """Read without the package's reader: the last frame, the plate of ``liggghts_spheres.in`` taken off."""
+    last = (DATA / "liggghts_spheres.dump").read_text("utf-8").rpartition("ITEM: ATOMS")[2]
+    table = np.loadtxt(last.splitlines()[1:])
+    plate = np.array([0.0, 0.0, -0.003])
+    truth = heap_angle(table[:, 2:5] - plate, table[:, 5])
+    [given] = measured(DATA / "liggghts_spheres.dump", "--plate-height", "-3 mm")
+    assert (given["mean"], given["se"]) == pytest.approx((truth.mean, truth.se), abs=1e-9)
+    # Found where most spheres rest, a few micrometres deep in the plate: less than a tenth of a pixel.
+    [found] = measured(DATA / "liggghts_spheres.dump")
+    assert found["mean"] == pytest.approx(truth.mean, abs=0.05)
+    assert "plate found at -3.00" in found["source"]
+    assert "frame 2 of 2 (timestep 20000)" in found["source"]
+
+
+def test_the_unit_leaves_the_angle_and_scales_what_is_told(tmp_path: Path) -> None:
+    [metres] = measured(DATA / "yade_clumps.txt", "--overlay", tmp_path / "drawn")
+    assert Path(metres["overlay"]).stat().st_size > 1000
+    [millimetres] = measured(DATA / "yade_clumps.txt", "--unit", "mm")
+    assert millimetres["mean"] == pytest.approx(metres["mean"], abs=1e-6)
+    assert "1.2 to 1.5 mm radius in 208 grains" in metres["source"]
+    assert "0.0012 to 0.0015 mm radius in 208 grains" in millimetres["source"]
+
+
+def test_grains_beside_the_plate_do_not_count() -> None:
+    spheres = read_spheres(DATA / "yade_spheres.txt").spheres
+    fallen = int((spheres[:, 2] < 0.0).sum())
+    assert fallen > 0
+    [row] = measured(DATA / "yade_spheres.txt")
+    assert f"{fallen} below it left out" in row["source"]
+
+
+def test_a_cut_dump_gives_its_last_whole_frame(tmp_path: Path) -> None:
+    text = (DATA / "liggghts_spheres.dump").read_text("utf-8")
+    cut = tmp_path / "cut.dump"
+    cut.write_text(text[: int(0.9 * len(text))], "utf-8")
+    read = read_spheres(cut)
+    assert read.told.endswith("frame 1 of 2 (timestep 10000), the last whole one")
+    assert len(read.spheres) == 280
+    cut.write_text(text[:1000], "utf-8")
+    with pytest.raises(InputError, match="none that is whole"):
+        read_spheres(cut)
+
+
+def test_clumps_of_a_dump_are_its_bodies() -> None:
+    read = read_spheres(DATA / "liggghts_clumps.dump")
+    assert (len(read.spheres), read.body_count) == (447, 149)
+
+
+def test_a_flat_heap_is_doubted(tmp_path: Path) -> None:
+    x, y = (axis.ravel() for axis in np.meshgrid(np.arange(40.0), np.arange(40.0)))
+    z = 1.0 + 0.03 * (28.0 - np.hypot(x - 19.5, y - 19.5))
+    flat = tmp_path / "flat.csv"
+    rows = "".join(f"{a},{b},{c},0.6\n" for a, b, c in zip(x, y, z, strict=True))
+    flat.write_text("x,y,z,r\n" + rows, "utf-8")
+    [row] = measured(flat, "--unit", "mm", "--plate-height", "0 mm")
+    assert row["doubts"][0].startswith("range")
+
+
+def test_few_grains_are_no_heap() -> None:
+    with pytest.raises(PictureError, match="at least 20 grains; received 1"):
+        heap_angle(np.array([[0.0, 0.0, 1e-3]]), np.array([1e-3]))
+
+
+def test_a_plate_is_found_in_any_unit_and_under_grains_that_sink_in() -> None:
+    random = np.random.default_rng(1)
+    radii = random.normal(1.0, 0.05, 60)
+    centers = np.column_stack([random.uniform(-20, 20, (60, 2)), radii - random.uniform(0.0, 0.01, 60)])
+    layers = np.vstack([centers, centers + np.array([0.0, 0.0, 1.6])]) + np.array([0.0, 0.0, 7.0])
+    for unit in (1.0, 1e-3):
+        both = Spheres(unit * layers, unit * np.tile(radii, 2))
+        # The deepest overlap is a hundredth of a radius.
+        assert find_ground(both) == pytest.approx(7.0 * unit, abs=0.01 * unit)
+    with pytest.raises(PictureError, match="give its height"):
+        find_ground(Spheres(centers * [1.0, 1.0, 0.0] + np.arange(60.0)[:, None] * [0.0, 0.0, 1.0], radii))
+
+
+def dump_with(line: str, replacement: str) -> str:
+    text = (DATA / "lammps_scaled.dump").read_text("utf-8")
+    assert text.count(line) == 1
+    return text.replace(line, replacement)
+
+
+@pytest.mark.parametrize(
+    ("text", "rule", "place"),
+    [
+        (
+            dump_with("ITEM: ATOMS id type xs ys zs radius", "ITEM: ATOMS id type xs ys zs"),
+            "columns",
+            "line 9",
+        ),
+        (
+            dump_with("ITEM: BOX BOUNDS ff ff ff", "ITEM: BOX BOUNDS xy xz yz ff ff ff"),
+            "a tilted box are not read",
+            "line 1",
+        ),
+        (
+            dump_with("169 1 0.410705 0.0295139 0.0923283 0.002", "169 1 0.410705 nan 0.0923283 0.002"),
+            "finite",
+            "line 10",
+        ),
+        (
+            dump_with("169 1 0.410705 0.0295139 0.0923283 0.002", "169 1 0.410705 0.0295139 0.0923283 -1"),
+            "r > 0",
+            "line 10",
+        ),
+        ("#format jointedPM\n1 2 3\n", "a format of Yade with spheres", "line 1"),
+        ("x,y,z,weight\n1,2,3,4\n", "columns x, y, z and radius", "line 1"),
+        ("# vtk DataFile Version 3.0\nnonsense\nASCII\n", "VTK file", "heap"),
+    ],
+)
+def test_a_wrong_file_is_refused_with_its_place(tmp_path: Path, text: str, rule: str, place: str) -> None:
+    path = tmp_path / "heap"
+    path.write_text(text, "utf-8")
+    code, out, err = dem_warp("angle", path)
+    assert (code, out) == (2, "")
+    assert rule in err
+    assert f"{path}, {place}" in err if place != "heap" else str(path) in err
+
+
+def test_a_vtk_file_without_radii_is_refused() -> None:
+    code, _, err = dem_warp("angle", DATA / "liggghts_boundingBox_20000.vtk")
+    assert code == 2
+    assert "an array radius" in err
+
+
+def test_blank_lines_take_no_longer_than_reading_them(tmp_path: Path) -> None:
+    # 0.1 s; a search that began anew at each took most of a minute
+    (tmp_path / "heap.txt").write_text("0 0 0 1.5\n" + "\n" * 200_000, encoding="utf-8")
+    started = time.process_time()
+    with suppress(InputError):
+        read_spheres(tmp_path / "heap.txt")
+    assert time.process_time() - started < 2.0

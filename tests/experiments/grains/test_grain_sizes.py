@@ -1,0 +1,348 @@
+"""Sizes as they are measured: tables, distributions and shapes, and what is refused."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from dem_warp import ClumpShape
+from experiments.grains.sizes.classes import cut_classes
+from experiments.grains.sizes.diameters import feret_diameter, sieve_diameter, volume_diameter
+from experiments.grains.sizes.distribution import Continuous, Tabulated
+from experiments.grains.sizes.tables import read_counts, read_sieves
+from experiments.io.errors import InputError, StudyError
+from experiments.report.study_facts import study_facts
+from experiments.studyfile import load_study
+
+LAWS = {
+    "normal": stats.norm(2.0, 0.3),
+    "lognormal": stats.lognorm(np.log(1.4), scale=2.0),
+    "rosin-rammler": stats.weibull_min(3.5, scale=2.0),
+}
+WHOLE = (1e-6, 1.0 - 1e-6)
+
+
+@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("basis", ["number", "volume"])
+def test_classes_keep_numbers_and_mass_of_a_distribution(name: str, basis: str) -> None:
+    """Number and volume of the grains between the cuts, by scipy's quadrature of the density."""
+    law, cut = LAWS[name], (0.02, 0.98)
+    classes = cut_classes(Continuous(law), basis, cut, 7)
+    ends = law.ppf(cut)
+    mean, third = (law.expect(lambda d, p=p: d**p, lb=ends[0], ub=ends[1]) / 0.96 for p in (1, 3))
+    if basis == "number":
+        assert classes.mean_mass_diameter**3 == pytest.approx(third, rel=1e-9)
+        assert classes.fractions == pytest.approx([1 / 7] * 7, rel=1e-9)
+        # A class has one size: its mean is a little above that of the sizes in it.
+        found = np.dot(classes.fractions, classes.diameters)
+        assert mean <= found < 1.01 * mean
+    else:
+        inverse = law.expect(lambda d: d**-3.0, lb=ends[0], ub=ends[1]) / 0.96
+        # by volume, the number of grains of a unit of it is the mean of 1 / d^3
+        assert classes.mean_mass_diameter**-3 == pytest.approx(inverse, rel=1e-9)
+        volumes = np.array(classes.fractions) * np.power(classes.diameters, 3)
+        assert volumes / volumes.sum() == pytest.approx([1 / 7] * 7, rel=1e-9)
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_moments_are_those_of_a_sample(name: str) -> None:
+    law, draws = LAWS[name], 400_000
+    sample = law.rvs(draws, random_state=1)
+    for power in (1, 2, 3):
+        own = sample**power
+        moment = Continuous(law).moment(power, *WHOLE)
+        # Five standard errors of the sample's mean.
+        assert moment == pytest.approx(own.mean(), abs=5.0 * own.std() / np.sqrt(draws))
+
+
+@pytest.mark.parametrize(
+    ("basis", "cut"), [("number", (0.01, 0.99)), ("number", (0.05, 0.9)), ("volume", (0.05, 0.9))]
+)
+def test_the_mass_beyond_the_cuts_is_told(basis: str, cut: tuple[float, float]) -> None:
+    law = LAWS["lognormal"]
+    lost = cut_classes(Continuous(law), basis, cut, 10).mass_lost
+    if basis == "volume":
+        assert lost == pytest.approx(1.0 - (cut[1] - cut[0]), rel=1e-12)
+        return
+    # The mass is a lognormal too, its median larger by exp(3 s^2) (Hatch and Choate 1929).
+    spread = np.log(1.4)
+    mass = stats.lognorm(spread, scale=2.0 * np.exp(3.0 * spread**2))
+    assert lost == pytest.approx(1.0 - np.diff(mass.cdf(law.ppf(cut)))[0], rel=1e-6)
+
+
+def test_numbers_become_volumes_and_back_after_hatch_and_choate() -> None:
+    spread = np.log(1.3)
+    by_number = stats.lognorm(spread, scale=1.0)
+    by_volume = stats.lognorm(spread, scale=np.exp(3.0 * spread**2))
+    ends = by_number.ppf([0.001, 0.999])
+    one = cut_classes(Continuous(by_number), "number", (0.001, 0.999), 20)
+    other = cut_classes(Continuous(by_volume), "volume", tuple(by_volume.cdf(ends)), 20)
+    assert one.mean_mass_diameter == pytest.approx(other.mean_mass_diameter, rel=1e-9)
+
+
+def table(folder: Path, text: str) -> Path:
+    path = folder / "sizes.csv"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+SIEVES = "opening,{column}\n0,{0}\n500 um,{1}\n0.71 mm,{2}\n1 mm,{3}\n1.4 mm,{4}\n"
+
+
+@pytest.mark.parametrize(
+    ("column", "values"),
+    [
+        ("retained", ("2 g", "18 g", "60 g", "20 g", "0 g")),
+        ("retained", (1, 9, 30, 10, 0)),
+        ("retained_percent", (2, 18, 60, 20, 0)),
+        ("passing_percent", (0, 2, 20, 80, 100)),
+    ],
+)
+def test_a_sieve_analysis_is_read_in_every_form(tmp_path: Path, column: str, values: tuple) -> None:
+    found, unaccounted = read_sieves(table(tmp_path, SIEVES.format(*values, column=column)))
+    assert unaccounted == pytest.approx(0.02, rel=1e-9)
+    assert found.lows == pytest.approx((0.5e-3, 0.71e-3, 1e-3))
+    assert found.shares == pytest.approx((18 / 98, 60 / 98, 20 / 98), rel=1e-9)
+    # a fifth of the mass below 1 mm lies below 0.71 mm
+    assert found.quantile(18 / 98) == pytest.approx(0.71e-3, rel=1e-9)
+    assert cut_classes(found, "mass", (0.0, 1.0), 5, unaccounted).mass_lost == pytest.approx(0.02, rel=1e-9)
+
+
+def test_moments_of_a_table_are_those_of_its_grains() -> None:
+    found = Tabulated((1.0, 2.0), (2.0, 5.0), (0.3, 0.7))
+    rng = np.random.default_rng(2)
+    shares = np.sort(rng.random(400_000))
+    sample = np.array([found.quantile(share) for share in shares[::400]])
+    for power in (-3, 1, 3):
+        # a thousand quantiles evenly drawn: their error is 1 / sqrt(1000) of the spread, and sorted far less
+        assert found.moment(power, 0.0, 1.0) == pytest.approx(np.mean(sample**power), rel=0.02)
+    parts = [found.moment(3, low, high) for low, high in ((0.0, 0.2), (0.2, 0.6), (0.6, 1.0))]
+    assert sum(parts) == pytest.approx(found.moment(3, 0.0, 1.0), rel=1e-12)
+
+
+def test_counts_of_single_grains_are_those_grains(tmp_path: Path) -> None:
+    diameters = np.random.default_rng(3).normal(1.0, 0.1, 500)
+    text = "diameter\n" + "\n".join(f"{value!r} mm" for value in diameters.tolist())
+    found = cut_classes(read_counts(table(tmp_path, text)), "number", (0.0, 1.0), 10)
+    assert found.mean_mass_diameter == pytest.approx(1e-3 * np.cbrt(np.mean(diameters**3)), rel=1e-9)
+    assert found.mass_lost == pytest.approx(0.0, abs=1e-12)
+    classed = "from,to,count\n800,900,16\n900,1000,34\n1000,1100,34\n1100,1200,16\n"
+    by_class = cut_classes(read_counts(table(tmp_path, classed), "um"), "number", (0.0, 1.0), 10)
+    # A class of 10 % width: the mean cube of normal grains in it, to a percent.
+    assert by_class.mean_mass_diameter == pytest.approx(found.mean_mass_diameter, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "message"),
+    [
+        ("opening,retained\n0.25 in,3\n0.5 in,4\n", None, r"sizes.csv:2: opening: needs a unit of length"),
+        (
+            "opening,retained\n0.25,3\n0.5,4\n",
+            None,
+            r"sizes.csv:2: opening: needs a unit .*; or name",
+        ),
+        (
+            "opening,retained\n2,3\n1,4\n",
+            "mm",
+            r"sizes.csv:3: opening: must rise from row.*received 1",
+        ),
+        ("opening,retained\n1,3\n1,4\n", "mm", r"sizes.csv:3: opening: must rise"),
+        ("opening,retained\n-1,3\n1,4\n", "mm", r"sizes.csv:2: opening: must be above 0 \(received -1\)"),
+        (
+            "opening,passing_percent\n1,30\n2,101\n",
+            "mm",
+            r"sizes.csv:3: passing_percent: must be at most 100",
+        ),
+        ("opening,passing_percent\n1,60\n2,30\n", "mm", r"sizes.csv:3: passing_percent: must rise with the"),
+        (
+            "opening,retained_percent\n1,50\n2,40\n",
+            "mm",
+            r"must add up to 100 .*received 90",
+        ),
+        ("opening,retained\n1,-3\n2,4\n", "mm", r"sizes.csv:2: retained: must be 0 or more \(received -3\)"),
+        ("opening,retained\n1,x\n2,4\n", "mm", r"sizes.csv:2: retained: must be a number"),
+        ("opening,retained\n1,3 mm\n2,4\n", "mm", r"sizes.csv:2: retained: needs a unit of mass"),
+        ("opening,retained\n1,0\n2,4\n", "mm", r"sizes.csv: retained: must hold mass between two sieves"),
+        ("opening,retained\n1,3\n", "mm", r"sizes.csv: needs 2 rows or more .*received 1"),
+        ("opening\n1\n2\n", "mm", r"sizes.csv: needs one column of retained, .*received none"),
+        ("opening,retained,passing_percent\n1,3,4\n", "mm", r"needs one column of"),
+        (
+            "# 3 sieves, dry\nopening,passing_percent\n0.4 mm,2\n#30,20\n#20,100\n",
+            None,
+            r"sizes.csv:4: opening: needs a unit of length, .*\(received #30\)",
+        ),
+        (
+            "opening,retained\n0.5,1 g\n1,12\n2,5 g\n",
+            "mm",
+            r"sizes.csv:3: retained: needs a unit, as other rows have one \(received 12\)",
+        ),
+        (
+            "opening,passing_percent\n0.5,0.02\n1,0.8\n2,1\n",
+            "mm",
+            r"sizes.csv:4: passing_percent: must be percent, .*not parts of 1 \(received 1\)",
+        ),
+        ("openning,retained\n1,3\n", "mm", r"missing: opening"),
+    ],
+)
+def test_a_bad_sieve_analysis_is_refused_with_its_row(
+    tmp_path: Path, text: str, unit: str | None, message: str
+) -> None:
+    with pytest.raises(InputError, match=message):
+        read_sieves(table(tmp_path, text), unit)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("diameter\n-1\n", r"sizes.csv:2: diameter: must be above 0 \(received -1\)"),
+        ("diameter\nnan\n", r"sizes.csv:2: diameter: must be"),
+        ("diameter,count\n1,-2\n", r"sizes.csv:2: count: must be 0 or more"),
+        ("diameter,count\n1,0\n", r"sizes.csv: count: must count at least one grain"),
+        ("from,to,count\n1,0.5,3\n", r"sizes.csv:2: to: must be above from, 1 \(received 0.5\)"),
+        ("from,to,count\n1,2,3\n1.5,3,4\n", r"sizes.csv:3: from: .*classes rise .*received 1.5"),
+        ("from,count\n1,2\n", r"needs a column diameter, or from, to and count; missing: to"),
+        ("diameter,from,to,count\n1,1,2,3\n", r"sizes.csv: takes a column diameter, or .*not both"),
+        ("diameter\n", r"sizes.csv: needs 1 rows or more"),
+    ],
+)
+def test_bad_counts_are_refused_with_their_row(tmp_path: Path, text: str, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        read_counts(table(tmp_path, text), "mm")
+
+
+# ---- diameters of a shape ----------------------------------------------------------------------------------
+
+
+def rod(spheres: int, step: float = 0.5, radius: float = 1.0) -> ClumpShape:
+    centers = np.zeros((spheres, 3))
+    centers[:, 0] = step * np.arange(spheres)
+    return ClumpShape.from_spheres(centers, [radius] * spheres)
+
+
+def test_all_diameters_of_a_sphere_are_its_own() -> None:
+    ball = ClumpShape.sphere(1.5)
+    for diameter in (sieve_diameter, feret_diameter):
+        assert diameter(ball) == pytest.approx(3.0, rel=1e-12)
+    # The volume is a quadrature.
+    assert volume_diameter(ball) == pytest.approx(3.0, rel=1e-4)
+
+
+def test_a_rod_passes_a_sieve_end_on_and_lies_under_the_caliper_at_full_length() -> None:
+    shape = rod(9)
+    assert sieve_diameter(shape) == pytest.approx(2.0, rel=1e-4)
+    assert feret_diameter(shape) == pytest.approx(6.0, rel=1e-12)
+    assert sieve_diameter(shape) < volume_diameter(shape) < feret_diameter(shape)
+
+
+def test_a_flat_grain_passes_across_the_diagonal() -> None:
+    # Four balls in a square of side a: end on its shadow is a stadium of length a + 2 r and width 2 r. Across
+    # the diagonal of the opening its widths along both sides are a / sqrt 2 + 2 r.
+    side, radius = 6.0, 0.5
+    centers = np.array([[x, y, 0.0] for x in (0.0, side) for y in (0.0, side)])
+    shape = ClumpShape.from_spheres(centers, [radius] * 4)
+    assert sieve_diameter(shape) == pytest.approx(side / np.sqrt(2.0) + 2.0 * radius, rel=1e-3)
+
+
+# ---- in a study --------------------------------------------------------------------------------------------
+
+SECTION = """[grain.sizes]
+distribution = "lognormal"
+median = "3.6 mm"
+geometric_sd = 1.2
+by = "volume"
+"""
+WriteStudy = Callable[..., Path]
+BEFORE_WALL = "[wall]\n"
+
+
+def with_sizes(write_study: WriteStudy, section: str) -> Path:
+    return write_study((BEFORE_WALL, section + "\n" + BEFORE_WALL))
+
+
+def test_a_study_takes_its_sizes_from_a_distribution(write_study: WriteStudy) -> None:
+    grains = load_study(with_sizes(write_study, SECTION)).case({}, seed=1).grains
+    law = stats.lognorm(np.log(1.2), scale=3.6e-3)
+    expected = cut_classes(Continuous(law), "volume", (0.01, 0.99), 10)
+    [shape] = grains.mixture.shapes
+    assert 2.0 * shape.radii[0] == pytest.approx(expected.mean_mass_diameter, rel=1e-4)
+    assert grains.classes.moment(3) == pytest.approx(1.0, rel=1e-12)
+    diameters = 2.0 * shape.radii[0] * np.array(grains.classes.sizes)
+    assert diameters == pytest.approx(expected.diameters, rel=1e-4)
+    facts = study_facts(load_study(with_sizes(write_study, SECTION)))
+    assert facts["Sizes"].endswith("2 % of the mass lies beyond the cuts and is left out")
+
+
+@pytest.mark.parametrize(("diameter", "scale"), [("sieve", 2.0), ("feret", 6.0), ("volume", None)])
+def test_a_diameter_scales_the_clump_as_its_instrument_sees_it(
+    write_study: WriteStudy, tmp_path: Path, diameter: str, scale: float | None
+) -> None:
+    shape = rod(9)
+    lines = [f"{x} {y} {z} {r}" for (x, y, z), r in zip(shape.centers, shape.radii, strict=True)]
+    (tmp_path / "rod.txt").write_text("\n".join(lines), encoding="utf-8")
+    section = SECTION + f'diameter = "{diameter}"\ncut = [0.49, 0.51]\nclasses = 1\n'
+    path = write_study(
+        ('sphere = "2 mm"', 'clump = "rod.txt"'), (BEFORE_WALL, section + BEFORE_WALL),
+        ('diameter = "28 mm"', 'diameter = "60 mm"'),
+    )  # fmt: skip
+    [scaled] = load_study(path).case({}, seed=1).grains.mixture.shapes
+    expected = 3.6e-3 / (scale or volume_diameter(shape))
+    # A class of 2 % of the grains stands for its median to 1e-4; the turn in the sieve is found as well.
+    assert scaled.radii[0] == pytest.approx(expected, rel=1e-3)
+
+
+def test_a_factor_may_vary_a_size(write_study: WriteStudy) -> None:
+    factor = """
+[[factor]]
+name = "D"
+label = "median diameter"
+parameter = "grain.sizes.median"
+low = "3 mm"
+high = "4 mm"
+"""
+    section = SECTION.replace('median = "3.6 mm"\n', "")
+    study = load_study(write_study((BEFORE_WALL, section + BEFORE_WALL), add=factor))
+    small, large = (
+        study.case({"D": value}, seed=1).grains.mixture.shapes[0].radii[0] for value in (3.0, 4.0)
+    )
+    assert large / small == pytest.approx(4.0 / 3.0, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "rule"),
+    [
+        ('by = "volume"', "", "a distribution needs by"),
+        ("geometric_sd = 1.2", "", "a lognormal distribution needs geometric_sd"),
+        ("geometric_sd = 1.2", "geometric_sd = 0.9", "geometric_sd: must be greater than 1"),
+        ("geometric_sd = 1.2", 'geometric_sd = 1.2\nsd = "1 mm"', "distribution takes no sd"),
+        ('median = "3.6 mm"', "median = 3.6", "median: needs a unit of length"),
+        ('distribution = "lognormal"', 'distribution = "log"', "distribution: must be 'normal', 'lognormal'"),
+        ('distribution = "lognormal"', 'counts = "none.csv"', "must name an existing file"),
+        ("[grain.sizes]", "size_sd = 0.1\n[grain.sizes]", "takes sizes .* or size_sd, not both"),
+        ('by = "volume"', 'by = "volume"\ncut = [0.9, 0.1]', "cut must rise, not go from 0.9 to 0.1"),
+        ('by = "volume"', 'by = "volume"\nunit = "in"', "unit: needs a unit of length"),
+        ('by = "volume"', 'by = "volume"\nclasses = 0', "classes: must be greater than or equal to 1"),
+    ],
+)
+def test_bad_sizes_are_refused_with_their_place(
+    write_study: WriteStudy, old: str, new: str, rule: str
+) -> None:
+    with pytest.raises(StudyError, match=rule) as caught:
+        load_study(with_sizes(write_study, SECTION.replace(old, new)))
+    assert "small.toml" in caught.value.problems[0].place
+
+
+def test_a_normal_distribution_that_reaches_zero_is_refused(write_study: WriteStudy) -> None:
+    section = '[grain.sizes]\ndistribution = "normal"\nmean = "3 mm"\nsd = "2 mm"\nby = "number"\n'
+    with pytest.raises(StudyError, match=r"the sizes at the lower cut, 0.01, must be positive: raise it"):
+        load_study(with_sizes(write_study, section))
+
+
+def test_a_wrong_table_is_named_by_the_study_and_by_its_row(write_study: WriteStudy, tmp_path: Path) -> None:
+    table(tmp_path, "opening,passing_percent\n1,30\n2,101\n")
+    with pytest.raises(StudyError, match=r"sizes.csv:3: passing_percent: must be at most 100") as caught:
+        load_study(with_sizes(write_study, '[grain.sizes]\nsieves = "sizes.csv"\nunit = "mm"\n'))
+    assert caught.value.problems[0].place.endswith("grain.sizes")

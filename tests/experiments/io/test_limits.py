@@ -1,0 +1,267 @@
+"""Files that would take all memory or time, or are no files: each is refused by a stated limit."""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+import time
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from dem_warp import ClumpShape, LiftedCylinder
+from dem_warp.solids import read_mesh
+from doe import DesignError
+from doe.discrepancy import load_bank
+from experiments.cases.store.manifest import read_manifest
+from experiments.cases.store.outcome_table import OutcomeTable
+from experiments.io.errors import InputError, Problem, StudyError
+from experiments.io.rows import read_rows
+from experiments.io.toml_files import read_toml
+from experiments.io.units import Quantity
+from experiments.measurement.target import with_measurements
+from experiments.runs.campaign import check_runs
+from experiments.studyfile import load_study
+from imaging import PictureError, measure_photograph
+from imaging.pictures import read_picture
+
+WriteStudy = Callable[..., Path]
+
+READERS: dict[str, Callable[[Path], object]] = {
+    "a.toml": load_study,
+    "a.csv": lambda path: list(read_rows(path, [], ["a"])),
+    "a.txt": ClumpShape.read,
+    "a.stl": read_mesh,
+    "a.png": read_picture,
+    "a.jpg": lambda path: measure_photograph(path, "flank"),
+    "a.npz": load_bank,
+    "study.json": lambda path: read_manifest(path.parent),
+    "a.sqlite": lambda path: OutcomeTable(path).load(["a"]),
+}
+"""Readers of what a stranger may send, by a file name that they take."""
+
+REFUSED = (ValueError, OSError)
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_a_pipe_and_a_device_are_no_files(tmp_path: Path, name: str) -> None:
+    os.mkfifo(tmp_path / name)
+    with pytest.raises(REFUSED):
+        READERS[name](tmp_path / name)
+    (tmp_path / name).unlink()
+    (tmp_path / name).symlink_to("/dev/zero")
+    with pytest.raises(REFUSED):
+        READERS[name](tmp_path / name)
+
+
+def test_a_pipe_is_said_to_be_no_regular_file_where_a_picture_is_wanted(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "a.png")
+    with pytest.raises(PictureError, match="a regular file; received a pipe or a device"):
+        read_picture(tmp_path / "a.png")
+
+
+@pytest.mark.parametrize("name", ["a.toml", "a.csv", "a.txt", "a.stl", "a.png"])
+def test_a_file_of_a_terabyte_is_not_read(tmp_path: Path, name: str) -> None:
+    with (tmp_path / name).open("wb") as file:
+        file.truncate(10**12)
+    with pytest.raises(REFUSED, match=r"at most [\d,]+ bytes"):
+        READERS[name](tmp_path / name)
+
+
+LONG = ["1" * 4000 + "x", "1" * 4000, "1." + "1" * 4000, " " * 4000 + "1 m", "9" * 400]
+
+
+@pytest.mark.parametrize("text", LONG)
+def test_a_long_number_is_no_quantity(text: str) -> None:
+    started = time.process_time()
+    with pytest.raises(ValueError, match="must be"):
+        Quantity.parse(text)
+    # a cubic search takes minutes
+    assert time.process_time() - started < 0.1
+
+
+@pytest.mark.parametrize("text", ["110 mm", " 1.5e-3  m ", "+3", ".5 1/s", "2.", "7 kg/m^3", "4mm"])
+def test_quantities_are_read_as_before(text: str) -> None:
+    number, _, unit = text.strip().replace("4mm", "4 mm").partition(" ")
+    assert Quantity.parse(text) == Quantity(float(number), unit.strip())
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("[measurement]\nazimuths = 1000000000\n", "azimuths"),
+        ("seeds = " + "[" * 100_000, "few levels|valid TOML"),
+        ("[a" + ".a" * 100_000 + "]\n", "few levels"),
+        ("n = " + "1" * 5000 + "\n", "valid TOML"),
+        (f"[numerics]\nskin = {10**400}\n", "64 bits"),
+        ("[campaign.noise_floor]\nreplicates = 1000000000\n", "replicates.*equal to 1000"),
+        ("[campaign.climb]\nsteps = 1000000000\n", "steps.*equal to 1000"),
+        ("[campaign.surface]\ncenter_points = 1000000000\n", "center_points.*equal to 1000"),
+    ],
+)
+def test_an_excessive_study_is_refused(write_study: WriteStudy, line: str, said: str) -> None:
+    measurement = "[measurement]\nazimuths = 2\npixels = 200\n"
+    path = write_study((measurement, ""), ("[numerics]\nmodulus_scale = 400.0\n", ""), add=line)
+    with pytest.raises(StudyError, match=said):
+        load_study(path)
+
+
+@pytest.mark.parametrize(
+    ("count", "said"), [(10**8, "at most 20,000,000 grains"), (10**9, "at most 134,217,728 grains")]
+)
+def test_a_case_that_no_memory_holds_is_refused_before_it_is_made(
+    write_study: WriteStudy, count: int, said: str
+) -> None:
+    study = load_study(write_study(("grain_count = 30", f"grain_count = {count}")))
+    with pytest.raises(StudyError, match=said):
+        study.case({}, 1)
+    with pytest.raises(StudyError, match=said):
+        check_runs(study)
+
+
+@pytest.mark.parametrize("count", [130_000_000, 1_000_000_000])
+def test_too_many_grains_are_told_with_their_number_and_their_key(
+    write_study: WriteStudy, count: int
+) -> None:
+    path = write_study(("grain_count = 30", f"grain_count = {count}"))
+    problem = _problem_with_grains(path)
+    line = path.read_text(encoding="utf-8").splitlines().index(f"grain_count = {count}") + 1
+    assert (problem.value, problem.place) == (
+        f"{count:,}",
+        f"{path}:{line}: scene.lifted-cylinder.grain_count",
+    )
+
+
+@pytest.mark.parametrize("height", [1e4, 9e9])
+def test_too_many_grains_of_a_large_tube_are_told_at_the_tube(write_study: WriteStudy, height: float) -> None:
+    path = write_study(('height = "28 mm"\ngrain_count = 30', f'height = "{height} m"'))
+    problem = _problem_with_grains(path)
+    line = path.read_text(encoding="utf-8").splitlines().index("[scene.lifted-cylinder]") + 1
+    assert problem.place == f"{path}:{line}: scene.lifted-cylinder"
+    # the engine rounds a number beyond its own limit to four digits
+    count = LiftedCylinder.densest_fill * math.pi * 0.014**2 * height / (4 / 3 * math.pi * 0.002**3)
+    assert float(problem.value.replace(",", "")) == pytest.approx(count, rel=5e-4)
+
+
+def _problem_with_grains(path: Path) -> Problem:
+    with pytest.raises(StudyError) as caught:
+        load_study(path).case({"E": 0.5}, 1)
+    [problem] = caught.value.problems
+    assert re.fullmatch(r"must (hold|have) at most [\d,]+ grains .*: lower grain_count, or .*", problem.rule)
+    assert "got" not in problem.rule
+    return problem
+
+
+def test_the_place_of_too_many_grains_is_that_of_the_condition_that_asks_for_them(
+    write_study: WriteStudy,
+) -> None:
+    condition = "\n[condition.large]\nscene.lifted-cylinder.grain_count = 130_000_000\n"
+    study = load_study(write_study(add=condition))
+    with pytest.raises(StudyError) as caught:
+        study.case({}, 1, "large")
+    assert caught.value.place.endswith(": condition.large.scene.lifted-cylinder.grain_count")
+
+
+def test_a_clump_has_a_limit_of_spheres(tmp_path: Path) -> None:
+    path = tmp_path / "clump.txt"
+    path.write_text("0 0 0 1\n" * 20_000, encoding="utf-8")
+    with pytest.raises(ValueError, match="at most 256 spheres"):
+        ClumpShape.read(path)
+
+
+def test_a_small_bank_that_claims_much_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "bank.npz"
+    with (
+        zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive,
+        archive.open("values.npy", "w") as member,
+    ):
+        for _ in range(60):
+            member.write(bytes(10_000_000))
+    with pytest.raises(DesignError, match="at most 500,000,000"):
+        load_bank(path)
+
+
+@pytest.mark.parametrize("damage", [b"", b"PK\x03\x04"])
+def test_half_a_bank_is_refused(tmp_path: Path, damage: bytes) -> None:
+    path = tmp_path / "bank.npz"
+    path.write_bytes(damage)
+    with pytest.raises(DesignError, match="must be a bank"):
+        load_bank(path)
+
+
+def test_a_small_picture_that_claims_much_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "black.png"
+    cv2.imwrite(str(path), np.zeros((11_000, 11_000), np.uint8))
+    assert path.stat().st_size < 200_000
+    with pytest.raises(PictureError, match="at most 120 million pixels"):
+        read_picture(path)
+
+
+def test_a_chunk_of_a_picture_that_claims_much_is_not_decoded(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "grey.png"
+    cv2.imwrite(str(path), np.full((60, 80, 3), 128, np.uint8))
+    whole = path.read_bytes()
+    path.write_bytes(whole + b"what follows the end is not looked at")
+    assert read_picture(path).shape == (60, 80, 3)
+    at = whole.index(b"IDAT") - 4
+    path.write_bytes(whole[:at] + (2**31 - 1).to_bytes(4) + whole[at + 4 :])
+    # OpenCV would take two gigabytes for it, and then refuse it
+    monkeypatch.setattr(cv2, "imdecode", lambda *_: pytest.fail("it was decoded"))
+    with pytest.raises(PictureError, match="a picture that OpenCV can read"):
+        read_picture(path)
+
+
+def test_a_mesh_names_no_other_file(tmp_path: Path) -> None:
+    for kind in ("3mf", "zip", "gltf", "glb", "dae"):
+        path = tmp_path / f"a.{kind}"
+        path.write_bytes(b"anything")
+        with pytest.raises(ValueError, match="a mesh file is one of stl, obj, ply, off"):
+            read_mesh(path)
+
+
+def test_a_mesh_of_mixed_winding_is_turned_outward(tmp_path: Path) -> None:
+    path = tmp_path / "tetrahedron.off"
+    corners, faces = "0 0 0\n9 0 0\n0 9 0\n0 0 9\n", "3 0 1 2\n3 0 1 3\n3 0 2 3\n3 1 2 3\n"
+    path.write_text(f"OFF\n4 4 0\n{corners}{faces}", encoding="utf-8")
+    # a sixth of the cube on its edges [m3]
+    assert read_mesh(path).volume == pytest.approx(9.0e-3**3 / 6.0)
+
+
+def test_toml_that_is_no_text_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.toml"
+    for content in (b"\xff\xfe", b"a = \x00", "a = 1\u2028= 2\x0b".encode()):
+        path.write_bytes(content)
+        with pytest.raises(InputError):
+            read_toml(path)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ('sphere = "2 mm"', f'clump = "{"a" * 5000}.txt"'),
+        ("n = 5", f"n = {2**63}"),
+        ('mean = "30 deg"\nsd = "0.5 deg"\nn = 5', f'pictures = "{"a" * 5000}"'),
+    ],
+)
+def test_names_and_integers_beyond_the_machine_are_refused(
+    write_study: WriteStudy, old: str, new: str
+) -> None:
+    path = write_study((old, new))
+    with pytest.raises(InputError):
+        with_measurements(load_study(path))
+
+
+@pytest.mark.parametrize(
+    "sizes", ["size_sd = 1e308", "size_mean = 1e-200\nsize_sd = 0.0", "size_mean = 1e200\nsize_sd = 0.1"]
+)
+def test_sizes_whose_cubes_are_no_numbers_are_refused(write_study: WriteStudy, sizes: str) -> None:
+    path = write_study(('sphere = "2 mm"', f'sphere = "2 mm"\nsize_mean_of = "masses"\n{sizes}'))
+    with pytest.raises(StudyError, match=r"size_(sd|mean): .*(less|greater) than or equal to"):
+        load_study(path)

@@ -1,0 +1,187 @@
+"""Demands on the CPU's path of Windows, macOS and a bare C locale, as far as one machine shows it."""
+
+from __future__ import annotations
+
+import ast
+import json
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path, PurePosixPath, PureWindowsPath
+
+import pytest
+from commandline import dem_warp
+
+from experiments.cases.engines import keeper
+from experiments.commands.console import Attempt
+from experiments.evidence import machine
+from experiments.io.files import is_device_name
+from experiments.measurement.photographs import drawn_names
+
+ROOT = Path(__file__).resolve().parents[3]
+PACKAGES = ("dem_warp", "doe", "imaging", "experiments")
+EVIDENCE = (
+    "experiments/evidence/performance/",
+    "experiments/evidence/trials/",
+    "experiments/evidence/verification/",
+)
+
+ONLY_POSIX = {
+    "os.fork", "os.killpg", "os.setsid", "os.getuid", "os.getpgid", "os.uname", "os.sched_getaffinity",
+    "os.nice", "os.mkfifo", "signal.SIGKILL", "signal.SIGHUP", "signal.SIGALRM", "signal.alarm",
+}  # fmt: skip
+ONLY_POSIX_MODULES = {"fcntl", "grp", "pwd", "resource", "termios", "tty", "pty", "syslog"}
+GUARDED = {
+    "experiments/cases/engines/keeper.py": {"os.killpg", "signal.SIGKILL"},
+    "experiments/runs/examination.py": {"os.sched_getaffinity"},
+}
+"""Calls that stand behind a question for the system."""
+ASKED = {"experiments/evidence/machine.py": {"/proc/cpuinfo"}}
+"""Places of one system that are looked for, and may be missing."""
+
+
+def sources() -> Iterator[tuple[str, ast.Module]]:
+    for package in PACKAGES:
+        for path in (ROOT / package).rglob("*.py"):
+            name = path.relative_to(ROOT).as_posix()
+            if not name.startswith(EVIDENCE):
+                yield name, ast.parse(path.read_text(encoding="utf-8"))
+
+
+def test_nothing_of_one_system_is_used() -> None:
+    found: dict[str, set[str]] = {}
+    for name, tree in sources():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Attribute) and ast.unparse(node) in ONLY_POSIX:
+                found.setdefault(name, set()).add(ast.unparse(node))
+            if isinstance(node, ast.Import | ast.ImportFrom):
+                modules = {each.name for each in node.names} | {getattr(node, "module", None)}
+                if strange := modules & ONLY_POSIX_MODULES:
+                    found.setdefault(name, set()).update(map(str, strange))
+    assert found == GUARDED
+
+
+def test_no_file_has_its_place_at_a_root_of_one_system() -> None:
+    rooted = re.compile(r"^/(tmp|proc|dev|etc|usr|var|sys|bin)\b")
+    found: dict[str, set[str]] = {}
+    for name, tree in sources():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Constant) and isinstance(node.value, str) and rooted.match(node.value):
+                found.setdefault(name, set()).add(node.value)
+    assert found == ASKED
+
+
+@pytest.mark.parametrize(
+    ("system", "written"),
+    [
+        ("linux", "dem-warp calibrate 'my wheat.toml' --out 'my results'"),
+        ("darwin", "dem-warp calibrate 'my wheat.toml' --out 'my results'"),
+        ("win32", 'dem-warp calibrate "my wheat.toml" --out "my results"'),
+    ],
+)
+def test_commands_are_quoted_for_the_shell_of_the_system(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, system: str, written: str
+) -> None:
+    monkeypatch.setattr(sys, "platform", system)
+    assert Attempt.of("calibrate", Path("my wheat.toml"), out=Path("my results")).command == written
+    monkeypatch.chdir(tmp_path)
+    _, out, _ = dem_warp("new", "my wheat")
+    assert out.rstrip().endswith(written.partition(" --out")[0])
+
+
+@pytest.mark.parametrize("name", ["nul", "CON", "com1", "LPT9.toml", "aux "])
+def test_names_that_windows_keeps_for_itself_are_refused(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, name: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    code, _, err = dem_warp("new", name)
+    assert (code, list(tmp_path.iterdir())) == (2, [])
+    assert "device of Windows" in err
+
+
+def test_other_names_are_no_devices() -> None:
+    assert not any(map(is_device_name, ("console", "com10", "common.toml", "annul", "wheat")))
+
+
+def test_copies_have_names_of_their_own_on_every_system() -> None:
+    windows = [PureWindowsPath(place) for place in (r"C:\one\Heap.jpg", r"D:\one\heap.png")]
+    pictures = [*windows, PurePosixPath("two/heap.jpg")]
+    names = drawn_names([*pictures, *pictures])  # type: ignore[list-item]
+    assert len({name.casefold() for name in names}) == len(names)
+    assert not set(r'\/:*?"<>|') & set("".join(names))
+
+
+def test_a_program_is_ended_at_its_limit_without_process_groups(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(keeper, "POSIX", False)
+    monkeypatch.setattr(keeper, "_end_with_starter", lambda program: None)
+    monkeypatch.chdir(tmp_path)
+    keeper.main("0.5", sys.executable, "-c", "import threading; threading.Event().wait()")
+    ending = json.loads(Path(keeper.ENDING).read_text(encoding="utf-8"))
+    assert (ending["timed_out"], ending["code"]) == (True, None)
+    assert ending["seconds"] >= 0.5
+
+
+def test_a_machine_is_named_where_no_file_tells_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    def no_such_file(*_: object, **__: object) -> str:
+        raise FileNotFoundError
+
+    monkeypatch.setattr(Path, "read_text", no_such_file)
+    named = machine.machine("cpu")
+    assert re.match(r"one core of \S.*, Warp ", named)
+
+
+SMALL_CAMPAIGN = """
+[campaign.noise_floor]
+replicates = 3
+[campaign.verification]
+replicates = 2
+"""
+
+
+def run(folder: Path, *words: str, **environment: str) -> subprocess.CompletedProcess[bytes]:
+    """Run the command line as a process of its own."""
+    command = [sys.executable, "-c", "from experiments.cli import main; main()", *words]
+    settings = os.environ | {"PYTHONPATH": str(ROOT), **environment}
+    return subprocess.run(command, cwd=folder, env=settings, capture_output=True, check=False)
+
+
+def test_a_campaign_runs_in_new_processes_under_a_bare_locale(tmp_path: Path, small_text: str) -> None:
+    """Workers are always started anew, as Windows and macOS do; two of them share this campaign."""
+    folder = tmp_path / "Körner und mehr"
+    folder.mkdir()
+    (folder / "Weizen groß.toml").write_text(small_text + SMALL_CAMPAIGN, encoding="utf-8")
+    words = ("calibrate", "Weizen groß.toml", "--device", "cpu", "--workers", "2", "--out", "aus gabe ü")
+    bare = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONWARNDEFAULTENCODING": "1"}
+    done = run(folder, *words, **bare)
+    told = done.stderr.decode("utf-8", "replace")
+    assert done.returncode == 0, told
+    results = json.loads((folder / "aus gabe ü" / "results.json").read_text(encoding="utf-8"))
+    assert results["study"]["file"] == "Weizen groß.toml"
+    assert results["campaign"]["outcome"] in (
+        "calibrated",
+        "not-told-apart",
+        "missed",
+        "no-significant-factor",
+    )
+    assert (folder / "aus gabe ü" / "report.html").read_text(encoding="utf-8").rstrip().endswith("</html>")
+    # No file of ours is opened in an encoding that the system chooses.
+    ours = tuple(str(ROOT / package) for package in PACKAGES)
+    assert [line for line in told.splitlines() if "EncodingWarning" in line and line.startswith(ours)] == []
+
+
+def test_stubs_read_the_same_in_every_encoding() -> None:
+    """lazy_loader opens them in the one that the system chooses."""
+    stubs = [path for package in PACKAGES for path in (ROOT / package).rglob("*.pyi")]
+    assert len(stubs) >= 5
+    assert [path.name for path in stubs if not path.read_bytes().isascii()] == []
+
+
+def test_what_a_console_cannot_show_is_no_error(tmp_path: Path) -> None:
+    done = run(tmp_path, "heap", "Maße µ.toml", PYTHONIOENCODING="ascii", PYTHONUTF8="0")
+    assert done.returncode == 2
+    assert b"Traceback" not in done.stderr
+    assert rb"Ma\xdfe \xb5.toml" in done.stderr

@@ -1,0 +1,53 @@
+"""The version that a run tells, where a tree runs that nobody has installed."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from experiments.io import version
+from experiments.io.version import program_version, with_version
+
+ROOT = Path(__file__).resolve().parents[3]
+STATED = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
+
+UNINSTALLED = """
+import importlib.metadata as metadata
+known = metadata.version
+def version(name):
+    if name == "dem-warp":
+        raise metadata.PackageNotFoundError(name)
+    return known(name)
+metadata.version = version
+import json
+from dem_warp.device import resolve_device
+from experiments.report.writer import library_versions
+from experiments.evidence.studies.cellulose import campaign
+print(json.dumps([campaign._origin("cpu"), library_versions()]))
+"""
+
+
+def test_a_run_of_a_tree_without_metadata_tells_the_version_of_the_tree(tmp_path: Path) -> None:
+    told = subprocess.run(
+        [sys.executable, "-c", UNINSTALLED], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    origin, versions = json.loads(told.stdout.splitlines()[-1])
+    assert origin["dem-warp"] == versions["dem-warp"] == STATED
+
+
+@pytest.mark.parametrize("project", [None, "[project]\nname = 'another'\nversion = '9'\n", "no TOML", ""])
+def test_without_a_tree_of_its_own_it_is_that_of_the_package(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, project: str | None
+) -> None:
+    if project is not None:
+        (tmp_path / "pyproject.toml").write_text(project, encoding="utf-8")
+    monkeypatch.setattr(version, "ROOT", tmp_path)
+    monkeypatch.setattr(version.dem_warp, "__version__", "7.8.9", raising=False)
+    monkeypatch.setattr(version, "program_version", program_version.__wrapped__)
+    assert version.program_version() == "7.8.9"
+    assert with_version({"dem-warp": "0+unknown", "commit": "abc"}) == {"dem-warp": "7.8.9", "commit": "abc"}

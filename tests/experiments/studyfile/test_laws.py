@@ -1,0 +1,244 @@
+"""Laws in a study: by the name of a code, law by law, wrong; in its cards, cases, page and template."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from dem_warp import EDEM, PRESETS, RELATIVE, laws_named
+from experiments.cases import engine_of, with_engine
+from experiments.cases.engines import engines
+from experiments.cases.engines.key import case_key
+from experiments.cli import app
+from experiments.discover.library import library_for
+from experiments.discover.search import Search
+from experiments.io.errors import StudyError
+from experiments.report.study_facts import study_facts
+from experiments.studyfile import load_study
+from experiments.studyfile.solver_section import SolverSection, written
+from experiments.studyfile.study import BUCKWHEAT
+from experiments.studyfile.template import write_template
+
+WriteStudy = Callable[..., Path]
+
+STUDIES = sorted(BUCKWHEAT.parents[1].glob("*/*.toml"))
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_a_study_names_the_laws_of_a_code(write_study: WriteStudy, name: str) -> None:
+    study = load_study(write_study(add=f'[solver]\nlaws = "{name}"\n'))
+    assert study.case({}, seed=1).laws == laws_named(name)
+    assert study_facts(study)["Contact laws"].startswith(f"{name}: ")
+
+
+def test_a_study_chooses_law_by_law_on_top_of_a_set(write_study: WriteStudy) -> None:
+    table = '[solver.laws]\nbase = "lammps"\nrolling_spring = "900 N/m"\nattraction = "clamped"\n'
+    laws = load_study(write_study(add=table)).case({}, seed=1).laws
+    lammps = laws_named("lammps").to_dict()
+    assert laws.to_dict() == lammps | {"rolling_spring": 900.0, "attraction": "clamped"}
+    # what a card writes reads back as the same laws
+    for each in (laws, EDEM, RELATIVE):
+        assert SolverSection.model_validate({"laws": written(each)}).laws == each
+
+
+def test_a_study_without_laws_keeps_the_base_law(write_study: WriteStudy) -> None:
+    study = load_study(write_study())
+    assert study.case({}, seed=1).laws == EDEM
+    named = load_study(write_study(add='[solver]\nlaws = "edem"\n'))
+    assert case_key(named.case({}, 1)) == case_key(study.case({}, 1))
+    assert Search.of(named).fingerprint == Search.of(study).fingerprint
+
+
+def test_a_new_study_has_the_relative_law_and_shipped_ones_name_theirs(tmp_path: Path) -> None:
+    assert load_study(write_template("grain", tmp_path)).solver.laws == RELATIVE
+    read = {path: tomllib.loads(path.read_text(encoding="utf-8")) for path in STUDIES}
+    named = {path.parent.name: study["solver"]["laws"] for path, study in read.items() if "scene" in study}
+    drums = {"wheat_drums": "relative", "cellulose": "liggghts-cdt"}
+    assert named == {name: drums.get(name, "edem") for name in named}
+    assert {"buckwheat", "trial", *drums} <= set(named)
+
+
+@pytest.mark.parametrize(
+    ("text", "place", "rule"),
+    [
+        ('[solver]\nlaws = "ligghts"\n', "solver.laws", "must be a set of laws, did you mean 'liggghts'?"),
+        (
+            "[solver]\nlaws = 3\n",
+            "solver.laws",
+            'must name a set of laws, as laws = "liggghts", or be a table',
+        ),
+        ('[solver]\nlaw = "edem"\n', "solver.law", "unknown key, did you mean 'laws'?"),
+        ('[solver.laws]\nrolling = "spd2"\n', "solver.laws.rolling", "must be 'own_spin', "),
+        ('[solver.laws]\nroling = "cdt"\n', "solver.laws.roling", "unknown key, did you mean 'rolling'?"),
+        ('[solver.laws]\nbase = "ansys"\n', "solver.laws", "must be a set of laws, known: edem, "),
+        (
+            "[solver.laws]\nrolling_damping = -1.0\n",
+            "solver.laws.rolling_damping",
+            "greater than or equal to 0",
+        ),
+        ('[solver.laws]\nnormal_damping = "viscoelastic"\n', "solver.laws", "damping_rate: must be given"),
+        (
+            '[solver]\nlaws = "relative"\n[mechanism.elastic_plastic_rolling]\nrolling_stiffness = 2.25\n',
+            "solver.laws",
+            "must be 'own_spin' beside the mechanism elastic_plastic_rolling, got 'elastic_plastic'",
+        ),
+    ],
+)
+def test_wrong_laws_are_refused_with_rule_value_and_place(
+    write_study: WriteStudy, text: str, place: str, rule: str
+) -> None:
+    path = write_study(add=text)
+    with pytest.raises(StudyError) as caught:
+        load_study(path)
+    assert rule in caught.value.rule
+    assert caught.value.place.startswith(f"{path}:")
+    assert caught.value.place.endswith(place)
+
+
+def test_no_factor_varies_a_law(write_study: WriteStudy) -> None:
+    factor = '[[factor]]\nname = "c"\nlabel = "c"\nlow = 1.0\nhigh = 2.0\n'
+    path = write_study(add=f'{factor}parameter = "solver.laws.rolling_stiffness"\n')
+    with pytest.raises(StudyError, match="must lead to a quantity of the study"):
+        load_study(path)
+
+
+def test_a_restitution_that_the_laws_take_no_part_of_is_no_factor(write_study: WriteStudy) -> None:
+    laws = '[solver.laws]\nbase = "lammps"\nnormal_damping = "mass_velocity"\ndamping_rate = "200 1/s"\n'
+    factor = '[[factor]]\nname = "C"\nlabel = "e"\nlow = 0.2\nhigh = 0.4\n'
+    place = 'parameter = "contact.grain-grain.restitution"\n'
+    path = write_study(("restitution = 0.2\n", ""), add=factor + place + laws)
+    with pytest.raises(StudyError, match="the damping 'mass_velocity' takes none: leave the factor out"):
+        load_study(path)
+
+
+def test_cases_of_other_laws_are_stored_apart_and_banks_refused(write_study: WriteStudy) -> None:
+    studies = [load_study(write_study(add=f'[solver]\nlaws = "{name}"\n')) for name in PRESETS]
+    assert len({case_key(study.case({}, 1)) for study in studies}) == len(PRESETS)
+    assert len({Search.of(study).fingerprint for study in studies}) == len(PRESETS)
+
+
+def test_what_stands_in_place_of_the_base_law_is_not_looked_for_beside_another(
+    write_study: WriteStudy,
+) -> None:
+    base, relative = (
+        {one.name for one in library_for(load_study(write_study(add=f'[solver]\nlaws = "{name}"\n')))}
+        for name in ("edem", "relative")
+    )
+    assert base - relative == {"rolling_spring"}
+    assert relative <= base
+
+
+WITH_CARD = ('name = "Small"', 'name = "Small"\nmaterial = "card.toml"')
+CARD = '[material.contact.grain-wall]\nrestitution = 0.31\n\n[material.solver]\nlaws = "relative"\n'
+
+
+def test_a_study_without_laws_takes_those_of_its_card(write_study: WriteStudy) -> None:
+    path = write_study(WITH_CARD)
+    (path.parent / "card.toml").write_text(CARD, encoding="utf-8")
+    assert load_study(path).solver.laws == RELATIVE
+
+
+def test_a_card_of_other_laws_is_taken_by_a_study_that_says_so_alone(write_study: WriteStudy) -> None:
+    def study(solver: str) -> Path:
+        path = write_study(WITH_CARD, add=f"[solver]\n{solver}\n")
+        (path.parent / "card.toml").write_text(CARD, encoding="utf-8")
+        return path
+
+    for solver in ('laws = "liggghts"', 'laws = "liggghts"\ncard_laws = "edem"'):
+        with pytest.raises(StudyError) as caught:
+            load_study(study(solver))
+        assert "hold for the laws 'relative'" in caught.value.rule
+        assert 'card_laws = "relative"' in caught.value.rule
+        assert caught.value.value == "liggghts"
+    assert load_study(study('laws = "relative"')).solver.laws == RELATIVE
+    told = load_study(study('laws = "liggghts"\ncard_laws = "relative"'))
+    assert told.solver.laws == laws_named("liggghts")
+
+
+def test_a_card_from_before_laws_had_names_holds_for_the_base_law(write_study: WriteStudy) -> None:
+    path = write_study(WITH_CARD, add='[solver]\nlaws = "relative"\n')
+    (path.parent / "card.toml").write_text(CARD.partition("\n\n")[0], encoding="utf-8")
+    with pytest.raises(StudyError, match="hold for the laws 'edem'"):
+        load_study(path)
+
+
+CORRECTED = f'{CARD}\n[bridge]\nengine = "other"\n'
+"""A card whose values a bridge has corrected for a solver of this name."""
+
+
+@pytest.fixture
+def corrected(write_study: WriteStudy, monkeypatch: pytest.MonkeyPatch) -> WriteStudy:
+    """Write a study with a corrected card; the solver that it is corrected for is installed, and one more."""
+    for name in ("other", "third"):
+        monkeypatch.setitem(engines._DRIVERS, name, lambda cases, **more: [])
+
+    def write(add: str = "") -> Path:
+        path = write_study(WITH_CARD, add=add)
+        (path.parent / "card.toml").write_text(CORRECTED, encoding="utf-8")
+        return path
+
+    return write
+
+
+@pytest.mark.parametrize(
+    ("add", "option", "received"),
+    [
+        ("", None, "dem-warp"),
+        ("", "third", "third"),
+        ('[engine]\nname = "third"\n', None, "third"),
+        ('[engine]\nname = "other"\n', "third", "third"),
+        ('[solver]\ncard_solver = "third"\n', None, "dem-warp"),
+    ],
+)
+def test_a_card_corrected_for_one_solver_is_refused_in_another(
+    corrected: WriteStudy, add: str, option: str | None, received: str
+) -> None:
+    study = with_engine(load_study(corrected(add)), option)
+    with pytest.raises(StudyError) as caught:
+        engine_of(study)
+    assert "must run in 'other'" in caught.value.rule
+    assert 'card_solver = "other"' in caught.value.rule
+    assert caught.value.value == received
+    assert caught.value.place == f"{study.file}: solver.card_solver"
+
+
+@pytest.mark.parametrize(
+    ("add", "option"),
+    [
+        ("", "other"),
+        ('[engine]\nname = "other"\n', None),
+        ('[solver]\ncard_solver = "other"\n', None),
+        ('[solver]\ncard_solver = "other"\n', "third"),
+    ],
+)
+def test_it_runs_in_its_solver_and_where_the_study_says_so(
+    corrected: WriteStudy, add: str, option: str | None
+) -> None:
+    study = with_engine(load_study(corrected(add)), option)
+    assert (engine_of(study) is None) == (option is None and "engine" not in add)
+    assert study_facts(study)["Card"] == "corrected for other by a bridge"
+    assert study.case({}, 1).laws == RELATIVE
+
+
+@pytest.mark.parametrize("command", ["heap", "calibrate", "discover"])
+def test_no_command_runs_a_card_of_another_solver(
+    corrected: WriteStudy, tmp_path: Path, command: str
+) -> None:
+    words = [command, str(corrected()), "--out", str(tmp_path / "out")]
+    refused = CliRunner().invoke(app, words)
+    assert refused.exit_code == 2
+    assert "must run in 'other'" in " ".join(refused.stderr.split())
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_export_warns_of_a_corrected_card_also_through_a_study(
+    corrected: WriteStudy, tmp_path: Path
+) -> None:
+    words = ["export", str(corrected()), "--to", "edem", "--approximate", "--out", str(tmp_path / "sheet")]
+    assert CliRunner().invoke(app, words).exit_code == 0
+    head = (tmp_path / "sheet" / "values.md").read_text().splitlines()[:6]
+    assert any("WARNING: the card was corrected for other" in line for line in head)

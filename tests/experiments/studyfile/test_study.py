@@ -1,0 +1,395 @@
+"""Study files: what they mean in SI, and what is said about a wrong one."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from dem_warp.parameters import UNITS as ENGINE_UNITS
+from doe import Sample
+from experiments.io.errors import StudyError
+from experiments.io.units import UNITS, Quantity, dimension_of_unit
+from experiments.studyfile import BUCKWHEAT, load_study, study_scales, write_template
+from experiments.studyfile.campaign import Response, Target
+from experiments.studyfile.schema import Dimension
+
+WriteStudy = Callable[..., Path]
+
+PAPER_FACTORS = {
+    "A": (0.16, 0.42, ""),
+    "B": (6.81, 61.84, "MPa"),
+    "C": (0.10, 0.26, ""),
+    "D": (0.20, 0.80, ""),
+    "E": (0.32, 0.60, ""),
+    "F": (0.18, 0.58, ""),
+    "G": (0.03, 0.08, ""),
+    "H": (0.02, 0.09, ""),
+}
+"""Table 2 of the paper."""
+
+
+@pytest.mark.parametrize(
+    ("text", "dimension", "expected"),
+    [
+        ("110 mm", "length", 0.110),
+        ("28mm", "length", 0.028),
+        ("70 GPa", "pressure", 7.0e10),
+        ("34.325 MPa", "pressure", 34.325e6),
+        ("1.2 g/cm^3", "density", 1200.0),
+        ("3000 1/s", "rate", 3000.0),
+        ("5e-2 m/s", "speed", 0.05),
+        ("250 ms", "time", 0.25),
+        ("0.5 rad", "angle", math.degrees(0.5)),
+    ],
+)
+def test_quantities_are_read_in_si(text: str, dimension: str, expected: float) -> None:
+    # The nearest double to the decimal value, or one rounding away from it (degrees).
+    assert Quantity.parse(text).to_base(dimension) == pytest.approx(expected, rel=3e-16)
+
+
+def test_every_unit_survives_a_round_trip() -> None:
+    for dimension, units in UNITS.items():
+        for unit in units:
+            for other in units:
+                there = Dimension(dimension).to_unit(Quantity(1.5, unit), other)
+                # Two roundings each way.
+                back = Dimension(dimension).to_unit(Quantity(there, other), unit)
+                assert back == pytest.approx(1.5, rel=1e-15)
+
+
+def test_every_unit_of_a_parameter_of_the_engine_can_be_written() -> None:
+    assert "" not in [dimension_of_unit(unit) for unit in ENGINE_UNITS if unit != "1"]
+
+
+def test_the_paper_study_is_the_papers() -> None:
+    study = load_study()
+    assert {f.name: (f.low, f.high, f.unit) for f in study.factors} == PAPER_FACTORS
+    angle = Response("angle", "angle", "deg", measured=Sample(30.148, 0.518, 5))
+    assert study.target == Target((angle,))
+    assert study.companion == "buckwheat"
+    case = study.case({}, seed=3)
+    assert (case.scene.diameter, case.scene.height, case.scene.lift_speed) == (0.035, 0.110, 0.05)
+    assert (case.grains.material.density, case.scene.wall_material.shear_modulus) == (698.0, 70.0e9)
+    assert case.grains.shape.sphere_count == 9
+    assert case.numerics.modulus_scale == 1.0
+
+
+def test_factors_that_are_not_set_are_at_their_middle() -> None:
+    case = load_study().case({"E": 0.48}, seed=3)
+    assert case.grain_grain.static_friction == 0.48
+    assert case.grain_wall.static_friction == pytest.approx(0.38, rel=1e-15)
+    assert case.grains.material.poisson_ratio == pytest.approx(0.29, rel=1e-15)
+    assert case.grains.material.shear_modulus == pytest.approx(34.325e6, rel=1e-15)
+
+
+TWO_SHAPES = """
+[grain.shapes.whole]
+sphere = "2 mm"
+[grain.shapes.split]
+clump = "split.txt"
+fraction = 0.25
+"""
+
+
+@pytest.fixture
+def two_shapes(tmp_path: Path, write_study: WriteStudy) -> WriteStudy:
+    """Write the small study with two shapes, some of its text replaced."""
+    (tmp_path / "split.txt").write_text("0 0 0 1\n1 0 0 1\n", encoding="utf-8")
+
+    def write(*replacements: tuple[str, str], add: str = "") -> Path:
+        text = TWO_SHAPES
+        for old, new in replacements:
+            assert text.count(old) == 1, old
+            text = text.replace(old, new)
+        return write_study(('sphere = "2 mm"\n', ""), ("[wall]", f"{text}\n[wall]"), add=add)
+
+    return write
+
+
+def test_several_shapes_are_mixed_in_the_order_of_the_file(two_shapes: WriteStudy) -> None:
+    grains = load_study(two_shapes()).case({}, seed=1).grains
+    whole, split = grains.mixture.shapes
+    assert (whole.sphere_count, whole.radii[0], split.sphere_count) == (1, 2e-3, 2)
+    assert grains.mixture.fractions == (0.75, 0.25)
+    given = load_study(two_shapes(('sphere = "2 mm"', 'sphere = "2 mm"\nfraction = 0.75')))
+    assert given.case({}, seed=1).grains == grains
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key", "rule"),
+    [
+        ("fraction = 0.25", "fraction = 1.25", "grain.shapes.split.fraction", "less than or equal to 1"),
+        ("fraction = 0.25", 'fraction = "1 mm"', "grain.shapes.split.fraction", "without the unit"),
+        ("fraction = 0.25", "part = 0.25", "grain.shapes.split.part", "unknown key"),
+        ("fraction = 0.25", "fractoin = 0.25", "grain.shapes.split.fractoin", "did you mean 'fraction'?"),
+        ('clump = "split.txt"', 'clump = "none.txt"', "grain.shapes.split.clump", "existing clump file"),
+        ('clump = "split.txt"', "", "grain.shapes.split", "needs a clump"),
+        ('clump = "split.txt"', 'clump = "split.txt"\nsphere = "1 mm"', "grain.shapes.split", "not both"),
+        ("fraction = 0.25", "", "grain", "every shape but one needs its fraction"),
+        ('sphere = "2 mm"', 'sphere = "2 mm"\nfraction = 0.7', "grain", "add up to 1 .* not to 0.95"),
+        ('sphere = "2 mm"', 'sphere = "2 mm"\nfraction = 0.8', "grain", "add up to 1 .* not to 1.05"),
+    ],
+)
+def test_a_breach_in_one_of_several_shapes_is_placed_there(
+    two_shapes: WriteStudy, old: str, new: str, key: str, rule: str
+) -> None:
+    path = two_shapes((old, new))
+    with pytest.raises(StudyError, match=rule) as caught:
+        load_study(path)
+    place, _, found = caught.value.place.rpartition(": ")
+    assert found == key
+    line = path.read_text(encoding="utf-8").splitlines()[int(place.rpartition(":")[2]) - 1]
+    assert line.startswith(key.rpartition(".")[2] + " ") or line == f"[{key}]"
+
+
+def test_one_shape_and_several_exclude_each_other(two_shapes: WriteStudy) -> None:
+    with pytest.raises(StudyError, match=r"one shape .* or several .*, not both"):
+        load_study(two_shapes(add='[scale.other]\ngrain.sphere = "1 mm"\n'), "other")
+
+
+def test_a_fraction_can_be_a_factor(two_shapes: WriteStudy) -> None:
+    factor = """
+[[factor]]
+name = "S"
+label = "split grains"
+parameter = "grain.shapes.split.fraction"
+low = 0.0
+high = 0.4
+"""
+    study = load_study(two_shapes(("fraction = 0.25\n", ""), add=factor))
+    assert study.limits["S"] == (0.0, 1.0)
+    assert study.case({}, seed=1).grains.mixture.fractions == (0.8, 0.2)
+    assert study.case({"S": 0.1}, seed=1).grains.mixture.fractions == (0.9, 0.1)
+    # Without split grains a case is one of spheres.
+    assert study.case({"S": 0.0}, seed=1).grains.sphere_count == 1
+    with pytest.raises(StudyError, match="less than or equal to 1"):
+        study.case({"S": 1.1}, seed=1)
+
+
+def test_a_scale_exchanges_clump_sizes_tube_rain_step_and_fit(two_shapes: WriteStudy, tmp_path: Path) -> None:
+    (tmp_path / "other.txt").write_text("0 0 0 1\n1 0 0 1\n0 1 0 1\n", encoding="utf-8")
+    scale = """
+[scale.other]
+grain.shapes.split.clump = "other.txt"
+grain.size_sd = 0.1
+scene.lifted-cylinder.height = "50 mm"
+scene.lifted-cylinder.rain_rate = "1000 1/s"
+numerics.time_step_fraction = 0.1
+measurement.fit = "middle"
+"""
+    study = load_study(two_shapes(add=scale), "other")
+    case = study.case({}, seed=1)
+    assert [shape.sphere_count for shape in case.grains.mixture.shapes] == [1, 3]
+    assert (case.grains.size_sd, case.numerics.time_step_fraction) == (0.1, 0.1)
+    assert (case.scene.height, case.scene.rain_rate, study.measurement.fit) == (0.05, 1000.0, "middle")
+
+
+@pytest.mark.parametrize(
+    ("fixed", "parameter", "low", "high"),
+    [
+        ("size_sd", "grain.size_sd", 0.0, 0.1),
+        ("sphere", "grain.sphere", "1 mm", "2 mm"),
+        ("height", "scene.lifted-cylinder.height", "20 mm", "40 mm"),
+        ("duration", "scene.lifted-cylinder.duration", "1 s", "2 s"),
+        ("modulus_scale", "numerics.modulus_scale", 10.0, 400.0),
+    ],
+)
+def test_sizes_tube_and_softening_can_be_factors(
+    write_study: WriteStudy, fixed: str, parameter: str, low: object, high: object
+) -> None:
+    path = write_study()
+    lines = [line for line in path.read_text(encoding="utf-8").splitlines() if not line.startswith(fixed)]
+    factor = (
+        f'[[factor]]\nname = "X"\nlabel = "x"\nparameter = "{parameter}"\nlow = {low!r}\nhigh = {high!r}\n'
+    )
+    path.write_text("\n".join([*lines, factor]), encoding="utf-8")
+    study = load_study(path)
+    ends = [study.case({"X": getattr(study.factors[1], end)}, seed=1).to_dict() for end in ("low", "high")]
+    assert ends[0] != ends[1]
+
+
+def test_factor_values_are_in_the_factors_unit() -> None:
+    study = load_study()
+    assert study.natural_settings({"B": "34000 kPa", "E": 0.4}) == {"B": 34.0, "E": 0.4}
+    assert study.case({"B": 34.0}, seed=1).grains.material.shear_modulus == 34.0e6
+
+
+def test_bench_is_a_twin_and_leaves_the_paper_alone() -> None:
+    assert study_scales() == ("paper", "soft", "bench")
+    bench, paper = load_study(scale="bench"), load_study(scale="paper")
+    assert bench.target.twin is not None
+    assert paper.target.twin is None
+    assert bench.scene.lifted_cylinder.grain_count == 400
+    assert paper.scene.lifted_cylinder.grain_count is None
+    assert bench.note != paper.note
+
+
+def test_limits_are_physical_and_in_the_factors_unit() -> None:
+    limits = load_study().limits
+    assert limits["E"] == (0.0, math.inf)
+    assert limits["A"] == (0.0, 0.5)
+    assert limits["B"][0] == pytest.approx(1e-3)  # the 1 kPa of `MaterialSection`, in MPa
+    for name, (low, high, _) in PAPER_FACTORS.items():
+        assert limits[name][0] <= low < high <= limits[name][1]
+
+
+def test_campaign_values_carry_units(write_study: WriteStudy) -> None:
+    extra = """
+[[factor]]
+name = "B"
+label = "grain shear modulus"
+parameter = "grain.shear_modulus"
+low = "6 MPa"
+high = "60 MPa"
+
+[campaign.climb]
+start = { B = "9000 kPa", E = 0.3 }
+step = { B = "5 MPa", E = 0.05 }
+
+[campaign.verification]
+margin = "1.5 deg"
+"""
+    study = load_study(write_study(('shear_modulus = "10 MPa"\n', ""), add=extra))
+    assert study.campaign.climb.start == {"B": 9.0, "E": 0.3}
+    assert study.campaign.verification.margin == 1.5
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key", "rule"),
+    [
+        ('sphere = "2 mm"', "sphere = 2", "grain.sphere", "unit of length"),
+        ('sphere = "2 mm"', 'sphere = "2 MPa"', "grain.sphere", "unit of length"),
+        ('sphere = "2 mm"', 'sphere = "-2 mm"', "grain.sphere", "greater than 0"),
+        ('sphere = "2 mm"', 'sphere = "wide"', "grain.sphere", "must be a number"),
+        ('sphere = "2 mm"', "sphere = true", "grain.sphere", "must be a number"),
+        ('sphere = "2 mm"', 'clump = "none.txt"', "grain.clump", "existing clump file"),
+        ('sphere = "2 mm"', "", "grain", "needs a clump"),
+        ('sphere = "2 mm"', 'spere = "2 mm"', "grain.spere", "did you mean 'sphere'?"),
+        ("poisson_ratio = 0.25", "poisson_ratio = 0.7", "grain.poisson_ratio", "less than or equal to 0.5"),
+        ("poisson_ratio = 0.25", "poisson_ratio = inf", "grain.poisson_ratio", "finite"),
+        ('sd = "0.5 deg"\n', "", "target", "missing: sd"),
+        ("low = 0.2", "low = 0.9", "factor[1]", "low must be below high"),
+        ("low = 0.2", "low = -0.2", "factor[1]", "must stay within 0"),
+        ("low = 0.2", 'low = "0.2 mm"', "factor[1].low", "without the unit"),
+        (
+            'parameter = "contact.grain-grain.static_friction"',
+            'parameter = "contact.static_friction"',
+            "factor[1].parameter",
+            "quantity of the study",
+        ),
+        (
+            "restitution = 0.2\n",
+            "restitution = 0.2\nstatic_friction = 0.5\n",
+            "contact.grain-grain.static_friction",
+            "varied by the factor 'E'",
+        ),
+        ('mean = "30 deg"', "mean = 30", "target.mean", "unit of angle"),
+        ('name = "E"', 'name = "E:F"', "factor[1].name", "pattern"),
+    ],
+)
+def test_a_breach_is_named_with_its_rule_value_and_line(
+    write_study: WriteStudy, old: str, new: str, key: str, rule: str
+) -> None:
+    path = write_study((old, new))
+    with pytest.raises(StudyError) as caught:
+        load_study(path)
+    error = caught.value
+    assert rule in error.rule
+    place, _, found = error.place.rpartition(": ")
+    assert found == key
+    line = path.read_text(encoding="utf-8").splitlines()[int(place.rpartition(":")[2]) - 1]
+    # The line of the key itself, or of the table that should have it.
+    own_line = line.startswith(key.rpartition(".")[2] + " ")
+    assert own_line or line in ("[grain]", "[target]", "[[factor]]")
+
+
+def test_a_breach_inside_a_scale_is_placed_there(write_study: WriteStudy) -> None:
+    path = write_study(add="numerics.precision = 'half'\n")
+    assert load_study(path).numerics.precision == "mixed"
+    with pytest.raises(StudyError) as caught:
+        load_study(path, "stiff")
+    last_line = len(path.read_text(encoding="utf-8").splitlines())
+    assert caught.value.place == f"{path}:{last_line}: scale.stiff.numerics.precision"
+    assert caught.value.value == "'half'"
+
+
+def test_every_breach_is_listed(write_study: WriteStudy) -> None:
+    path = write_study(('density = "700 kg/m^3"', "density = 700"), ('sphere = "2 mm"', "sphere = 2"))
+    with pytest.raises(StudyError) as caught:
+        load_study(path)
+    assert len(caught.value.problems) == 2
+
+
+@pytest.mark.parametrize("key", ["name", "parameter"])
+def test_no_two_factors_share_a_name_or_a_parameter(write_study: WriteStudy, key: str) -> None:
+    other = {"name": "F", "parameter": "contact.grain-wall.static_friction"}
+    other[key] = {"name": "E", "parameter": "contact.grain-grain.static_friction"}[key]
+    extra = f'[[factor]]\nlabel = "x"\nlow = 0.1\nhigh = 0.2\nname = "{other["name"]}"\n'
+    extra += f'parameter = "{other["parameter"]}"\n'
+    with pytest.raises(StudyError, match=f"a {key} of its own"):
+        load_study(write_study(add=extra))
+
+
+@pytest.mark.parametrize(
+    ("extra", "rule"),
+    [
+        ("[campaign.climb]\nstart = { Q = 0.3 }\nstep = { Q = 0.1 }\n", "must name a factor"),
+        ("[campaign.verification]\nmargin = 1.0\n", "unit of angle"),
+        ("[campaign.screning]\nruns = 12\n", "did you mean 'screening'?"),
+        ("[campaign.screening]\nruns = 13\n", "multiple of 4"),
+        ("[target.twin]\ntruth = { E = '0.3 m' }\n", "without the unit"),
+        ("[surplus]\n", "unknown key"),
+    ],
+)
+def test_a_wrong_decision_is_refused(write_study: WriteStudy, extra: str, rule: str) -> None:
+    with pytest.raises(StudyError, match=rule):
+        load_study(write_study(add=extra))
+
+
+def test_a_file_that_is_no_study_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(StudyError, match="readable file"):
+        load_study(tmp_path / "absent.toml")
+    broken = tmp_path / "broken.toml"
+    broken.write_text('name = "x"\nheight = 110 mm\n', encoding="utf-8")
+    with pytest.raises(StudyError, match="valid TOML") as caught:
+        load_study(broken)
+    assert (caught.value.place, caught.value.value) == (f"{broken}:2", "height = 110 mm")
+    broken.write_bytes(b"\xff\xfe")
+    with pytest.raises(StudyError, match="UTF-8"):
+        load_study(broken)
+
+
+def test_an_unknown_scale_is_refused(write_study: WriteStudy) -> None:
+    with pytest.raises(StudyError, match="did you mean 'stiff'"):
+        load_study(write_study(), "stif")
+
+
+def test_a_case_outside_what_is_physical_is_refused(write_study: WriteStudy) -> None:
+    study = load_study(write_study())
+    with pytest.raises(StudyError, match="greater than or equal to 0"):
+        study.case({"E": -0.1}, seed=1)
+    with pytest.raises(StudyError, match="must name a factor"):
+        study.case({"F": 0.1}, seed=1)
+
+
+def test_a_new_study_loads_and_never_overwrites(tmp_path: Path) -> None:
+    path = write_template("my grain", tmp_path)
+    study = load_study(path)
+    assert study.name == "my grain"
+    assert len(study.factors) == 4
+    assert study.case({}, seed=1).seed == 1
+    path.write_text("mine", encoding="utf-8")
+    with pytest.raises(ValueError, match="never overwrites"):
+        write_template("my grain", tmp_path)
+    assert path.read_text(encoding="utf-8") == "mine"
+
+
+def test_the_buckwheat_file_names_no_value_twice() -> None:
+    document = tomllib.loads(BUCKWHEAT.read_text(encoding="utf-8"))
+    parameters = {factor["parameter"] for factor in document["factor"]}
+    assert len(parameters) == 8
+    assert "contact" not in document

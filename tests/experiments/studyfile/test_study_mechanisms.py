@@ -1,0 +1,96 @@
+"""Mechanisms in study files."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from dem_warp.laws.capillary import CapillaryBridge
+from dem_warp.laws.elastic_plastic_rolling import ElasticPlasticRolling
+from dem_warp.laws.jkr import JKR
+from dem_warp.laws.rate_weakening import RateWeakening
+from dem_warp.laws.wall_adhesion import WallAdhesion
+from experiments.io.errors import StudyError
+from experiments.studyfile import load_study
+
+WriteStudy = Callable[..., Path]
+
+SPRING = "[mechanism.elastic_plastic_rolling]\nrolling_stiffness = 2.25\n"
+
+
+def test_mechanisms_are_those_of_the_library(write_study: WriteStudy) -> None:
+    study = load_study(
+        write_study(add=f'\n{SPRING}between = "grains"\n[mechanism.jkr]\nwork_of_adhesion = 0.1\n')
+    )
+    assert study.case({}, seed=1).mechanisms == (
+        JKR(work_of_adhesion=0.1),
+        ElasticPlasticRolling(rolling_stiffness=2.25, between="grains"),
+    )
+    assert load_study().case({}, seed=1).mechanisms == ()
+
+
+def test_a_mechanism_can_be_a_factor(write_study: WriteStudy) -> None:
+    varied = (
+        'parameter = "contact.grain-grain.static_friction"',
+        'parameter = "mechanism.elastic_plastic_rolling.rolling_stiffness"',
+    )
+    friction = ("restitution = 0.2", "restitution = 0.2\nstatic_friction = 0.3")
+    study = load_study(write_study(varied, friction))
+    assert study.case({"E": 0.5}, seed=1).mechanisms == (ElasticPlasticRolling(rolling_stiffness=0.5),)
+
+
+def test_parameters_of_mechanisms_have_units_and_plain_numbers_are_si(write_study: WriteStudy) -> None:
+    bridge = """
+[mechanism.capillary_bridge]
+surface_tension = "72 mN/m"
+bridge_volume = "20 ul"
+contact_angle = "30 deg"
+[mechanism.rate_weakening]
+weakening = 0.3
+weakening_speed = "10 cm/s"
+[mechanism.wall_adhesion]
+wall_adhesion_energy_density = 50.0
+"""
+    wall, water, weakening = load_study(write_study(add=bridge)).case({}, seed=1).mechanisms
+    assert wall == WallAdhesion(wall_adhesion_energy_density=50.0)
+    assert water == CapillaryBridge(
+        surface_tension=0.072, bridge_volume=2e-8, contact_angle=math.radians(30.0)
+    )
+    assert weakening == RateWeakening(weakening=0.3, weakening_speed=0.1)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "rule"),
+    [
+        ("[mechanism.jkrr]\nx = 1", r"small.toml:\d+: mechanism.jkrr: unknown key, did you mean 'jkr'"),
+        ("[mechanism.jkr]\nwork_of_adhesion = -1.0", r"mechanism.jkr.work_of_adhesion: must be greater than"),
+        ('[mechanism.jkr]\nbetween = "grain"', r"mechanism.jkr.between: must be 'all', 'grains' or 'walls'"),
+        (
+            "[mechanism.kinetic_friction]\nfriction_drop = 1.5",
+            r"friction_drop: must be less than 1 \(received 1.5\)",
+        ),
+        (
+            '[mechanism.jkr]\nwork_of_adhesion = "0.1 J"',
+            r"small.toml:\d+: mechanism.jkr.work_of_adhesion: needs a unit of surface energy \(J/m\^2",
+        ),
+        (
+            "[mechanism.jkr]\nwork_of_adhesion = 0.1\n[mechanism.hysteretic_spring]\nplasticity = 0.3",
+            r"mechanism.jkr must not stand beside mechanism.hysteretic_spring in one contact",
+        ),
+    ],
+)
+def test_a_wrong_mechanism_is_named_with_its_place(write_study: WriteStudy, wrong: str, rule: str) -> None:
+    with pytest.raises(StudyError, match=rule):
+        load_study(write_study(add=f"\n{wrong}\n"))
+
+
+def test_mechanisms_that_exclude_each_other_may_act_in_different_contacts(write_study: WriteStudy) -> None:
+    apart = '[mechanism.jkr]\nwork_of_adhesion = 0.1\nbetween = "grains"\n[mechanism.hysteretic_spring]\n'
+    study = load_study(write_study(add=f'\n{apart}plasticity = 0.3\nbetween = "walls"\n'))
+    case = study.case({}, seed=1)
+    grains, walls = case.contacts(case.scene.wall_material)
+    assert [one.name for one in grains.mechanisms] == ["jkr"]
+    assert [one.name for one in walls.mechanisms] == ["hysteretic_spring"]

@@ -1,0 +1,171 @@
+"""Responses beside the angle in a study file: what they mean, and what is said about a wrong one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import SimpleNamespace
+
+import pandas as pd
+import pytest
+
+from dem_warp import DrawDown, Drum, Hopper, LiftedCylinder
+from doe import Sample
+from experiments.cases import Store, execute, run_cases
+from experiments.cases.workers import own
+from experiments.io.errors import StudyError
+from experiments.io.units import UNITS
+from experiments.measurement.states import Observed
+from experiments.studyfile import BUCKWHEAT, load_study
+from experiments.studyfile.campaign import Response, Target, Twin
+from experiments.studyfile.observables import DIMENSIONS
+
+WriteStudy = Callable[..., Path]
+
+RESPONSES = """
+[response-scene.bin.hopper]
+diameter = "40 mm"
+fill_depth = "30 mm"
+outlet = "20 mm"
+
+[response-scene.short.lifted-cylinder]
+diameter = "28 mm"
+height = "14 mm"
+
+[[response]]
+observable = "solid_fraction"
+mean = 0.55
+sd = 0.01
+n = 4
+
+[[response]]
+name = "outflow"
+observable = "flow_rate"
+scene = "bin"
+mean = "12 g/s"
+sd = "0.4 g/s"
+n = 5
+
+[[response]]
+name = "short_angle"
+observable = "angle"
+scene = "short"
+mean = "25 deg"
+sd = "0.6 deg"
+n = 5
+"""
+
+TWIN = "[target.twin]\ntruth = { E = 0.3 }\n"
+
+
+def test_responses_are_read_in_si_with_their_scenes(write_study: WriteStudy) -> None:
+    study = load_study(write_study(add=RESPONSES))
+    assert study.target == Target(
+        (
+            Response("angle", "angle", "deg", measured=Sample(30.0, 0.5, 5)),
+            Response("solid_fraction", "solid_fraction", measured=Sample(0.55, 0.01, 4)),
+            Response("outflow", "flow_rate", "kg/s", "bin", Sample(0.012, 0.0004, 5)),
+            Response("short_angle", "angle", "deg", "short", Sample(25.0, 0.6, 5)),
+        )
+    )
+    assert list(study.scenes) == ["target", "bin", "short"]
+
+
+def test_a_twin_needs_no_measurements_of_its_responses(write_study: WriteStudy) -> None:
+    path = write_study(add=f'{TWIN}[[response]]\nobservable = "fill_height"\n')
+    responses = (Response("angle", "angle", "deg"), Response("fill_height", "fill_height", "m"))
+    assert load_study(path).target == Target(responses, Twin({"E": 0.3}))
+
+
+def test_a_case_of_a_further_scene_has_the_same_grains_and_contacts(write_study: WriteStudy) -> None:
+    study = load_study(write_study(add=RESPONSES))
+    heap, outflow = (study.case({"E": 0.3}, seed=1, scene=name) for name in ("target", "bin"))
+    assert isinstance(heap.scene, LiftedCylinder)
+    assert isinstance(outflow.scene, Hopper)
+    assert outflow.scene.wall_material == heap.scene.wall_material
+    assert (outflow.grains, outflow.grain_grain, outflow.grain_wall, outflow.numerics) == (
+        heap.grains,
+        heap.grain_grain,
+        heap.grain_wall,
+        heap.numerics,
+    )
+    with pytest.raises(StudyError, match="did you mean 'bin'"):
+        study.case({}, seed=1, scene="bim")
+
+
+def test_a_table_is_simulated_each_row_in_its_scene(
+    write_study: WriteStudy, cone: Callable, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    simulated = []
+
+    def engine(cases, *, on_result, **_) -> None:
+        simulated.append({case.seed: type(case.scene) for case in cases})
+        for index, _ in enumerate(cases):
+            on_result(index, cone())
+
+    monkeypatch.setattr(own, "simulate", engine)
+    monkeypatch.setattr(
+        execute,
+        "observe",
+        lambda _, result, heap: Observed({"angle": 25.0}, SimpleNamespace(se=0.1)) if heap else Observed(),
+    )
+    study = load_study(write_study(add=RESPONSES))
+    table = pd.DataFrame({"seed": [1, 2, 3], "scene": ["target", "bin", "short"]})
+    found = run_cases(study, table, Store(tmp_path))
+    # one call for all, the costly ones first
+    assert simulated == [{1: LiftedCylinder, 2: Hopper, 3: LiftedCylinder}]
+    # A bin leaves no heap, and is none that failed to be measured.
+    assert found["angle"].notna().tolist() == [True, False, True]
+    assert found["reason"].eq("").all()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key", "rule"),
+    [
+        ('observable = "flow_rate"', 'observable = "flow"', "response[2].observable", "the scene measures"),
+        ('scene = "bin"', 'scene = "bim"', "response[2].scene", "did you mean 'bin'?"),
+        ('mean = "12 g/s"', 'mean = "12 g"', "response[2].mean", "unit of mass flow"),
+        ('mean = "12 g/s"\n', "", "response[2]", "missing: mean"),
+        ("sd = 0.01", "sd = 0.0", "response[1].sd", "must be positive"),
+        ("n = 4", "n = 1", "response[1].n", "greater than or equal to 2"),
+        ("mean = 0.55", "meen = 0.55", "response[1].meen", "did you mean 'mean'?"),
+        ('name = "outflow"', 'name = "out flow"', "response[2].name", "pattern"),
+        ('name = "outflow"', 'name = "solid_fraction"', "response[2]", "a name of its own"),
+        ('name = "short_angle"\n', "", "response[3]", "a name of its own, other than 'angle'"),
+        ('"solid_fraction"', '"angle"\nname = "a"', "response[1].observable", "to be matched already"),
+        ('outlet = "20 mm"', 'outlet = "50 mm"', "response-scene.bin.hopper", "below the diameter"),
+    ],
+)  # fmt: skip
+def test_a_breach_is_named_with_its_rule_and_place(
+    write_study: WriteStudy, old: str, new: str, key: str, rule: str
+) -> None:
+    assert RESPONSES.count(old) == 1
+    with pytest.raises(StudyError) as caught:
+        load_study(write_study(add=RESPONSES.replace(old, new)))
+    assert rule in caught.value.rule
+    assert caught.value.place.rpartition(": ")[2] == key
+
+
+def test_a_further_scene_has_a_name_of_its_own(write_study: WriteStudy) -> None:
+    scene = '[response-scene.target.hopper]\ndiameter = "40 mm"\nfill_depth = "30 mm"\noutlet = "20 mm"\n'
+    with pytest.raises(StudyError, match="'target' is the study's own") as caught:
+        load_study(write_study(add=scene))
+    assert caught.value.place.endswith("response-scene.target")
+
+
+@pytest.mark.parametrize("scale", [None, "paper", "bench"])
+def test_the_study_from_a_curve_to_a_point_hides_the_same_truth_at_every_scale(scale: str | None) -> None:
+    study = load_study(BUCKWHEAT.with_name("curve_to_point.toml"), scale)
+    assert [response.scene for response in study.target.responses] == ["target", "target", "bin"]
+    assert study.target.twin.truth == {"E": 0.42, "F": 0.27, "G": 0.05}
+    assert isinstance(study.case({}, seed=1, scene="bin").scene, Hopper)
+    assert {f.name for f in study.factors} == set("EFGH")
+
+
+@pytest.mark.parametrize("scene", [LiftedCylinder, Hopper, Drum, DrawDown])
+def test_every_observable_has_a_unit_that_a_study_can_write(scene: type) -> None:
+    observables: Mapping = scene.observables
+    assert observables
+    for observable in observables.values():
+        dimension = DIMENSIONS[observable.unit]
+        assert not dimension or UNITS[dimension][observable.unit] == 1.0
